@@ -28,7 +28,7 @@ __all__ = [
     "trapezoidal",
 ]
 
-#: schemes by the name they have in a system file
+#: schemes by their names in a system file
 INTEGRATORS: dict[str, Callable[..., Integrator]] = {
     "generalized-alpha": GeneralizedAlpha,
     "hht": hht,
@@ -40,7 +40,7 @@ INTEGRATORS: dict[str, Callable[..., Integrator]] = {
     "ida": Ida,
 }
 
-#: their classes, by the name in a results file
+#: their classes by their names in a results file
 CLASSES = {
     cls.__name__: cls
     for cls in (
@@ -50,10 +50,10 @@ CLASSES = {
 
 
 def has_second_order(integrator: Integrator) -> bool:
-    """Whether the error of a method falls with the square of its steps."""
+    """Whether the error of a method falls with the square of its step."""
     return not isinstance(integrator, Ida | RelativeOde)
 
 
 def has_fixed_steps(integrator: Integrator) -> bool:
-    """Whether a method takes steps of the size that it is given."""
+    """Whether a method takes steps of the given size."""
     return has_second_order(integrator) and getattr(integrator, "error_tolerance", None) is None

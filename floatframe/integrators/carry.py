@@ -1,4 +1,4 @@
-"""What an integrator remembers between steps, and what it reports: one type for all of them."""
+"""Memory and report of an integrator between steps: one type for all integrators."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -40,22 +40,22 @@ __all__ = [
     "words_of_contact",
 ]
 
-LEAST_STEP = 1e-6  #: of the largest, where a step may be divided and no least one is given
+LEAST_STEP = 1e-6  #: fraction of the largest step, for steps that may be divided without a given smallest step
 
 
 @dataclass(frozen=True, eq=False)
 class Carry:
-    """All that an integrator remembers between steps."""
+    """The complete memory of an integrator between steps."""
 
     state: State
     u_dot: Array  #: accelerations, (n_u,)
     a: Array  #: algorithmic accelerations, (n_u,); for h = 0 (at the start) the rates of u_dot
-    h: float  #: step size to which `a` belongs; 0 at the start
+    h: float  #: step size for which `a` holds; 0 at the start
     w: Array  #: wrenches of the connections on their markers A, ground axes, (n_w,)
-    work: Array  #: of point forces; taken by dampers and modal damping, (2,)
+    work: Array  #: work of point forces; energy dissipated by dampers and modal damping, (2,)
     power: Array  #: their rates, (2,)
     n_iterations: int = 0  #: of Newton's method so far
-    h_next: float = 0.0  #: step size that is wanted next
+    h_next: float = 0.0  #: desired size of the next step
     n_steps: int = 0  #: accepted so far
     n_rejected: int = 0  #: tried in vain so far
     #: angles of `CompiledSystem.angles`, counted through full turns, (n_angles,) [rad]; empty: not counted
@@ -65,34 +65,37 @@ class Carry:
 
 @dataclass(frozen=True)
 class Failure:
-    """Why a step could not be made."""
+    """Reason of a failed step."""
 
     words: str
-    residual: float  #: last correction over the allowed one
+    residual: float  #: last correction relative to the allowed one
 
 
 class Integrator(Protocol):
     """A method with its parameters: a frozen dataclass of plain numbers, all memory in the carry."""
 
     def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
-        """Return the memory at the beginning, from a state made consistent.
+        """Return the memory at the beginning, from a consistent state.
 
         Counted angles, angles of couplers and states of user forces go on from those of a memory `before`.
         """
 
     def after_jump(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
-        """Return the memory after a jump of forces at t, and the results there; positions and velocities go on."""
+        """Return the memory after a jump of forces at t, and the results there.
+
+        Positions and velocities are continuous.
+        """
 
     def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
         """Return the memory one step of size h later; `ConvergenceError` if it fails."""
 
     def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
-        """Return the results at the carried state; the carry learns the power at it."""
+        """Return the results at the carried state, and store the power there in the carry."""
 
     def advance(
         self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
     ) -> tuple[Carry, Rows, int, Failure | None]:
-        """Advance by n_steps of size h, the first of them number `first` from t0, with a row after every `every`-th.
+        """Advance by n_steps of size h, the first with the number `first` from t0, with a row after every `every`-th.
 
         Returns
         -------
@@ -103,13 +106,13 @@ class Integrator(Protocol):
 
 
 def started_anew(method: Integrator, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
-    """Return the memory of a motion that begins at t from the state of another memory, and the results there."""
+    """Return the memory of a motion that begins at t in the state of another memory, and the results there."""
     fresh = method.start(system, t, state_of_file(compiled_system(system), carry.state), before=carry)
     return method.observe(system, t, counted_on(fresh, carry), work)
 
 
 def counted_on(fresh: Carry, carry: Carry) -> Carry:
-    """Return the memory of a new start with work and counts of the one before."""
+    """Return the memory of a new start with work and counts of the previous one."""
     return replace(
         fresh, work=carry.work, n_iterations=carry.n_iterations, n_steps=carry.n_steps, n_rejected=carry.n_rejected,
         h_next=0.0,
@@ -117,7 +120,7 @@ def counted_on(fresh: Carry, carry: Carry) -> Carry:
 
 
 def one_step_of(method: Integrator, system: System, t: float, h: float, carry: Carry) -> Carry:
-    """Return the memory one step of size h later, as `advance` makes it; `ConvergenceError` if it fails."""
+    """Return the memory one step of size h later, as computed by `advance`; `ConvergenceError` if it fails."""
     work = new_work(compiled_system(system).model)
     after, _, _, failure = method.advance(system, carry, work, t0=t, h=h, first=0, n_steps=1, every=2)
     if failure is not None:
@@ -138,7 +141,7 @@ def one_by_one(
     n_steps: int,
     every: int,
 ) -> tuple[Carry, list[Rows], int, Failure | None]:
-    """Advance as `Integrator.advance` does, each step by itself: memory, rows, how many were good, why not the next."""
+    """Advance as `Integrator.advance`, step by step: memory, rows, number of good steps, reason of failure."""
     rows: list[Rows] = []
     for k in range(n_steps):
         carry, row, n_good, failure = method.advance(
@@ -162,7 +165,7 @@ def memory_of(carry: Carry) -> Memory:
 
 
 def carry_of(memory: Memory, n_iterations: int) -> Carry:
-    """Return what the kernels have left in a memory, after so many iterations of Newton's method."""
+    """Return the memory as left by the kernels after a number of iterations of Newton's method."""
     return Carry(
         State(memory.r, memory.p, memory.q, memory.u),
         memory.u_dot,
@@ -218,7 +221,7 @@ def with_angles(system: System, t: float, carry: Carry, before: Carry | None = N
 
 
 def turned_on(system: System, carry: Carry, h: float) -> Carry:
-    """Return the memory with its angles counted on by a step of size h to its state; none if none are counted."""
+    """Return the memory with its angles advanced by a step of size h to its state; none if none are counted."""
     from floatframe.engine.kernels.entry import count_angles
 
     if not len(carry.angle):
@@ -230,7 +233,7 @@ def turned_on(system: System, carry: Carry, h: float) -> Carry:
 
 
 def coasted(method: Integrator, system: System, t: float, size: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
-    """Return the memory so little later than t that a step would be rounding alone, by its rates, and the results."""
+    """Return the memory so shortly after t that a step would be only rounding, from its rates, and the results."""
     compiled = compiled_system(system)
     state = displaced(compiled.model, carry.state, size * carry.state.u)
     w, rows = carry.w.copy(), compiled.model.states.row
@@ -241,21 +244,24 @@ def coasted(method: Integrator, system: System, t: float, size: float, carry: Ca
 
 
 class FollowedRotations:
-    """Counted rotations of bushings along evaluations of a method with steps of its own; the iterate takes them."""
+    """Counted rotations of bushings for a method with its own steps; they are set in the iterate."""
 
     def __init__(self, model: Model, work: Work, t: float, carry: Carry) -> None:
-        """Begin where a motion stands at time t."""
+        """Begin with the state of a motion at time t."""
         self.angles, self.u0, self.state = model.angles, model.bodies.u0, work.state
         self.first = np.flatnonzero(model.angles.part == 0)
         self.begin(t, carry.angle, carry.angle_rate)
 
     def begin(self, t: float, angle: Array, rate: Array) -> None:
-        """Take rotations at time t, from where to go on."""
+        """Set the rotations at time t, from which counting continues."""
         self.t, self.angle, self.rate = t, angle.copy(), rate.copy()
         self.state.angle[: len(angle)] = angle
 
     def has_changed(self, t: float) -> bool:
-        """Take the rotations of the iterate at time t; return whether they are by full turns off those it was with."""
+        """Set the rotations of the iterate at time t.
+
+        Return whether they differ by full turns from those used before.
+        """
         changed = False
         for k in self.first:
             parts = slice(k, k + 3)
@@ -282,7 +288,7 @@ class FollowedRotations:
 
 
 def observed_unless_stopped(system: System, t: float, carry: Carry, work: Work) -> tuple[Array, Rows, Failure | None]:
-    """Return what `observed` does, and why an element ends the run at the carried state; None if none does."""
+    """Return the same as `observed`, and the reason if an element ends the run at the carried state; otherwise None."""
     work.counted.stopped[...] = 0
     power, rows = observed(system, t, carry, work)
     stop = int(work.counted.stopped)
@@ -304,16 +310,16 @@ def joined_rows(parts: Sequence[Rows]) -> Rows:
 
 
 def words_of_contact(compiled: CompiledSystem, work: Work, least: float, smaller: str) -> str:
-    """Say which contact a step of the least size is too long for, and what may be made smaller."""
+    """Return a message with the contact that needs steps below the smallest size, and with the remedy."""
     c = int(compiled.model.gaps.connection[int(work.gaps.shortest)])
     return (
-        f"contact {compiled.connection_names[c]!r} takes steps of {float(work.gaps.step):.3g} s, expected no shorter "
-        f"ones than h_min = {least:.3g}: in longer ones it would gain energy; give a smaller {smaller}, or a softer "
+        f"contact {compiled.connection_names[c]!r} takes steps of {float(work.gaps.step):.3g} s, expected h_min = "
+        f"{least:.3g} at least: with longer steps it would gain energy; give a smaller {smaller}, or a softer "
         "contact"
     )
 
 
 def has_divided_steps(model: Model) -> bool:
-    """Whether fixed steps of a system may be divided: where contacts close, or dry friction comes to rest."""
+    """Whether fixed steps of a system may be divided: if contacts close, or dry friction comes to rest."""
     forces = model.joint_forces
     return len(model.gaps.connection) > 0 or bool((forces.friction > 0).any() or (forces.coefficient > 0).any())

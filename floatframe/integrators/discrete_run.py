@@ -1,4 +1,4 @@
-"""What the conserving and variational schemes share: how a run of them starts, goes on and is observed."""
+"""Common parts of the conserving and variational schemes: start, continuation and observation of a run."""
 
 from dataclasses import dataclass, replace
 
@@ -40,24 +40,24 @@ __all__ = ["DiscreteScheme", "StepResult", "check_options"]
 
 @dataclass(frozen=True, eq=False)
 class StepResult:
-    """The bodies after a step, and what happened over it."""
+    """The bodies after a step, and the work over it."""
 
     placed: list[Placed]
     f: Array  #: multipliers of the joints, (n_held,)
-    work: tuple[float, float]  #: that entered; taken by dampers and friction
+    work: tuple[float, float]  #: work supplied; work dissipated by dampers and friction
     n_iterations: int
-    w: Array  #: what connections remember, (n_w,), see `discrete.constraints.Span`
+    w: Array  #: memory of connections, (n_w,), see `discrete.constraints.Span`
 
 
 class DiscreteScheme:
-    """A scheme that steps from bodies to bodies; what it is besides its `one_step`."""
+    """A scheme that steps from bodies to bodies; all its parts except `one_step`."""
 
     tolerance: float
     max_iterations: int
 
     @property
     def equations(self) -> int:
-        """Which equations: `CONSERVING` or `VARIATIONAL`."""
+        """Kind of equations: `CONSERVING` or `VARIATIONAL`."""
         raise NotImplementedError
 
     @property
@@ -125,10 +125,10 @@ class DiscreteScheme:
             tolerance=self.tolerance, max_iterations=self.max_iterations, length=ds.length,
             h_min=least,
         )  # fmt: skip
-        if outcome.status == NO_ACCELERATION:  # the memory has gone on to where there is none: the good steps again
+        if outcome.status == NO_ACCELERATION:  # the memory has passed the failed step: repeat the good steps
             failure = explained(
                 compiled, work, outcome, self.max_iterations, LEAST_STEP * h
-            )  # of what they would forget
+            )  # data that they would lose
             work.past.n[...] = 0
             again = self.advance(system, carry, work, t0=t0, h=h, first=first, n_steps=outcome.n_steps, every=every)
             return *again[:3], failure
@@ -143,7 +143,7 @@ class DiscreteScheme:
 def explained(
     compiled: CompiledSystem, work: Work, outcome: Outcome, max_iterations: int, least: float
 ) -> Failure | None:
-    """Say why a step failed; None if none did."""
+    """Return the reason of a failed step; None if none failed."""
     from floatframe.engine.structure_preserving.kernels.newton import (
         CONVERGED,
         NO_ACCELERATION,
@@ -161,7 +161,7 @@ def explained(
     if int(work.counted.no_number):
         name = compiled.connection_names[int(work.counted.no_number) - 1]
         words = (
-            f"element {name!r} gives what is no number (NaN or infinity) for a motion that is one; see its law, or "
+            f"element {name!r} is not finite (NaN or infinity) for a finite motion; check its law, or "
             "choose a smaller h if it is only known near the motion"
         )
         return Failure(words, outcome.excess)
@@ -172,7 +172,7 @@ def explained(
         words = "the matrix of Newton's method is singular"
     elif not np.isfinite(outcome.excess):
         words = "Newton's method diverged"
-    return Failure(f"{words}; choose a smaller h, or look for a singular position", outcome.excess)
+    return Failure(f"{words}; choose a smaller h, or check for a singular position", outcome.excess)
 
 
 def check_options(scheme: DiscreteScheme) -> None:

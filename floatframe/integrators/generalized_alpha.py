@@ -51,7 +51,7 @@ from floatframe.model.system import System
 
 __all__ = ["GeneralizedAlpha", "hht", "newmark", "trapezoidal"]
 
-LONGER = 1 + 1e-6  #: ratio of two step sizes that are one
+LONGER = 1 + 1e-6  #: ratio below which two step sizes count as equal
 
 
 @dataclass(frozen=True)
@@ -92,20 +92,21 @@ class GeneralizedAlpha:
        Negrut et al. carry to the index-3 equations of HHT, for all parameters; derived above.
     """
 
-    #: spectral radius at infinite frequency, 0 <= rho_inf <= 1; 1: no numerical damping, reactions of joints then
-    #: oscillate by O(h) for good
+    #: spectral radius at infinite frequency, 0 <= rho_inf <= 1; 1: no numerical damping, so that reactions of joints
+    #: oscillate permanently by O(h)
     rho_inf: float = 0.8
-    tolerance: float = 1e-8  #: largest last correction over the one that the accelerations of the step amount to
+    #: largest last correction relative to the displacement due to the accelerations of the step
+    tolerance: float = 1e-8
     max_iterations: int = 25
-    #: largest local error of a body in a step over the size of what hangs together with it; None: fixed step
+    #: largest local error of a body in a step relative to the size of the connected bodies; None: fixed step
     error_tolerance: float | None = None
-    #: least step, to which one that fails or meets a contact is divided [s]; None: a millionth of h, and no division of
+    #: smallest size of a divided step, after failure or at a contact [s]; None: a millionth of h, without division of
     #: fixed steps in systems without contacts and dry friction
     h_min: float | None = None
-    #: alpha_m, alpha_f, beta, gamma in place of those that follow from rho_inf (see `newmark`, `hht`)
+    #: alpha_m, alpha_f, beta, gamma instead of those from rho_inf (see `newmark`, `hht`)
     parameters: tuple[float, float, float, float] | None = None
-    #: hold velocities of joints as well as positions, and take the spin of axisymmetric bodies by itself; False: the
-    #: equations of reference 2 as they are, whose steps sensitivities differentiate
+    #: enforce velocities of joints as well as positions, and integrate the spin of axisymmetric bodies separately;
+    #: False: the equations of reference 2 unchanged, whose steps sensitivities differentiate
     stabilized: bool = True
 
     def __post_init__(self) -> None:
@@ -138,7 +139,7 @@ class GeneralizedAlpha:
         return alpha_m, alpha_f, 0.25 * (gamma + 0.5) ** 2, gamma
 
     def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
-        """Return the memory at the beginning: the state made consistent and its accelerations."""
+        """Return the memory at the beginning: the consistent state and its accelerations."""
         known, angle = (None, None) if before is None else (before.w, before.angle)
         consistent = consistent_motion(system, state, t=t, known=known, angle=angle)
         return with_angles(system, t, begun_carry(consistent), before)
@@ -157,7 +158,7 @@ class GeneralizedAlpha:
     def jump(
         self, compiled: CompiledSystem, carry: Carry, t: float, may: NDArray[np.bool_] | None = None
     ) -> tuple[Carry, Array]:
-        """Return the memory with u_dot and w after a jump of forces at t, and the change of u_dot, filtered.
+        """Return the memory with u_dot and w after a jump of forces at t, with the change of u_dot filtered.
 
         may: as of `spin_at`.
         """
@@ -180,7 +181,7 @@ class GeneralizedAlpha:
         return one_step_of(self, system, t, h, carry)
 
     def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
-        """Return the results at the carried state; the carry learns the power at it."""
+        """Return the results at the carried state, and store the power there in the carry."""
         power, rows = observed(system, t, carry, work)
         return replace(carry, power=power), rows
 
@@ -224,7 +225,7 @@ class GeneralizedAlpha:
         return after, rows, outcome.n_steps, failure
 
     def least_step(self, h: float, compiled: CompiledSystem) -> float:
-        """Return the least part into which a step of size h may be divided; 0 if it may not."""
+        """Return the smallest part of a divided step of size h; 0 if it may not be divided."""
         if self.h_min is not None:
             return min(self.h_min, h)
         is_fixed = self.error_tolerance is None and not has_divided_steps(compiled.model)
@@ -237,7 +238,7 @@ class GeneralizedAlpha:
     def filter_at(
         self, compiled: CompiledSystem, carry: Carry, h: float, t: float, *, full: bool, spin: Spin | None
     ) -> StepFilter | None:
-        """Return the filter of `start.step_filter` for steps of size h, full: with s = 1; None for s = 0."""
+        """Return the filter of `start.step_filter` for steps of size h; full: with s = 1; None for s = 0."""
         _, _, beta, gamma = self.coefficients
         s = 1.0 if full else min(gamma - 0.5, 1.0)
         if s <= 0.0:
@@ -247,12 +248,12 @@ class GeneralizedAlpha:
     def filtered(
         self, compiled: CompiledSystem, carry: Carry, h: float, t: float, *, full: bool, spin: Spin | None
     ) -> Beginning:
-        """Return accelerations and their rates with which a motion begins, by the filter of `filter_at`."""
+        """Return the initial accelerations of a motion and their rates, from the filter of `filter_at`."""
         z = self.filter_at(compiled, carry, h, t, full=full, spin=spin)
         return beginning_of(compiled, consistent_of(carry), t, h, z, spin=spin)
 
     def first_step(self, compiled: CompiledSystem, carry: Carry, h: float, t: float, spin: Spin | None) -> float:
-        """Return the size of the first step: what its estimated error allows, an equal part of h."""
+        """Return the size of the first step: allowed by its estimated error, and an equal part of h."""
         if self.error_tolerance is None:
             return h
         model = compiled.model
@@ -293,7 +294,7 @@ class GeneralizedAlpha:
         return replace(carry, state=state, u_dot=u_dot, a=a, h=h, h_next=h)
 
     def explain(self, system: System, work: Work, outcome: tuple, least: float) -> Failure:
-        """Say why a step failed."""
+        """Return the reason of a failed step."""
         from floatframe.engine.kernels.generalized_alpha import (
             INACCURATE,
             SINGULAR_BODY,
@@ -309,7 +310,7 @@ class GeneralizedAlpha:
         if no_number:
             name = compiled.connection_names[no_number - 1]
             words = (
-                f"element {name!r} gives what is no number (NaN or infinity) for a motion that is one; see its law, or "
+                f"element {name!r} is not finite (NaN or infinity) for a finite motion; check its law, or "
                 "choose a smaller h if it is only known near the motion"
             )
             return Failure(words, excess)
@@ -321,7 +322,7 @@ class GeneralizedAlpha:
             name = compiled.connection_names[index]
             words = (
                 f"the constraints of joint {name!r} depend on others here (a singular position); choose a smaller h, "
-                "or look for a drive out of reach or an error in the system"
+                "or check for a drive out of reach or an error in the system"
             )
             return Failure(words, excess)
         if status == TURNED:
@@ -336,8 +337,8 @@ class GeneralizedAlpha:
             return Failure(words_of_contact(compiled, work, least, "h_min or h"), excess)
         if status == INACCURATE:
             words = (
-                f"its error stays above error_tolerance = {self.error_tolerance} down to the least step, "
-                f"h_min = {least:.3g}; allow a larger error or a shorter step, or look for a jump in the motion"
+                f"its error stays above error_tolerance = {self.error_tolerance} down to the smallest "
+                f"step, h_min = {least:.3g}; allow a larger error or a shorter step, or check for a jump in the motion"
             )
             return Failure(words, excess)
         words = f"Newton's method did not converge in {self.max_iterations} iterations"
@@ -347,13 +348,15 @@ class GeneralizedAlpha:
         if gaps and np.isfinite(work.connections.g).all():
             words += f"; {gaps}"
         if least > 0:
-            words += f"; this was the least step, h_min = {least:.3g}"
-        words += "; choose a smaller h, or look for a singular position, a drive out of reach or an error in the system"
+            words += f"; this was the smallest step, h_min = {least:.3g}"
+        words += (
+            "; choose a smaller h, or check for a singular position, a drive out of reach or an error in the system"
+        )
         return Failure(words, excess)
 
 
 def newmark(beta: float = 0.25, gamma: float = 0.5, **options: float) -> GeneralizedAlpha:
-    """Return the method of Newmark [1]_: alpha_m = alpha_f = 0; second order for gamma = 1/2 alone.
+    """Return the method of Newmark [1]_: alpha_m = alpha_f = 0; second order only for gamma = 1/2.
 
     Parameters
     ----------
@@ -410,7 +413,7 @@ def mass_weights(model: Model) -> Array:
 
 
 def words_of_turn(compiled: CompiledSystem, work: Work, body: int) -> str:
-    """Say that a body turns too far in a step."""
+    """Return the message that a body rotates too far in a step."""
     from floatframe.engine.kernels.generalized_alpha import MOST_TURN
 
     turn = float(np.linalg.norm(work.state.theta[body]))

@@ -1,4 +1,4 @@
-"""Contacts that a solver with steps of its own passes over: open at both ends of a step, closed between them.
+"""Contacts that a solver with its own steps misses: open at both ends of a step, closed between them.
 
 An error estimate knows only what the solver has evaluated. The cubic through the ends of a step and their rates shows
 the rest: where a gap is closed within the step alone, the solver goes anew to just before it, then in steps that end
@@ -15,13 +15,13 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["Stretch", "stretches_of_passed_contact"]
 
-PARTS = 5  #: of a step, at whose ends gaps are evaluated
-WITHIN = 4  #: steps within a contact that was passed over
-TOLERANCE = 1e-9  #: depth that is no contact, by the change of the gap in the step
+PARTS = 5  #: fractions of a step at which gaps are evaluated
+WITHIN = 4  #: number of steps within a missed contact
+TOLERANCE = 1e-9  #: depth relative to the change of the gap in the step, below which it is no contact
 
 
 class Stretch(NamedTuple):
-    """A stretch of a motion that a solver makes by itself."""
+    """A part of a motion that a solver computes with its own steps."""
 
     end: float  #: [s]
     most: float = np.inf  #: its longest step [s]
@@ -30,7 +30,7 @@ class Stretch(NamedTuple):
 def stretches_of_passed_contact(
     gaps: Callable[[float, Array], Array], t_0: float, t_1: float, y: Array, rates: Array
 ) -> list[Stretch]:
-    """Return the stretches to and through the first contact within a step from t_0 to t_1; none without one.
+    """Return the parts up to and through the first contact within a step from t_0 to t_1; none without a contact.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def stretches_of_passed_contact(
         depth = TOLERANCE * np.ptp(values[:, g])
         k = int(np.argmin(values[1:-1, g])) + 1
         lowest, least = t[k], values[k, g]
-        if least >= -depth:  # a gap along a smooth way has one minimum between the places beside the lowest
+        if least >= -depth:  # a gap along a smooth path has one minimum between the neighbours of the lowest value
             best = minimize_scalar(gap, bounds=(t[k - 1], t[k + 1]), method="bounded")
             lowest, least = float(best.x), float(best.fun)
         if least < -depth:

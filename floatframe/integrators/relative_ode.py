@@ -48,11 +48,11 @@ __all__ = ["METHODS", "Partition", "RelativeOde", "partition_of"]
 
 
 METHODS = ("BDF", "Radau", "LSODA", "DOP853", "RK45")  #: of SciPy
-TURN = 2.0  #: rad: a rotation vector further from its beginning is counted from anew
-CLOSED = 1e-13  #: of lengths and angles, of loops at each evaluation
+TURN = 2.0  #: rad: a rotation vector longer than this is restarted from zero
+CLOSED = 1e-13  #: tolerance of lengths and angles when closing loops at each evaluation
 MOST = 20  #: iterations
-COUNTED = 0.1  #: absolute tolerance of coordinates that only say which turn an angle is in
-SETTLED = 1e-12  #: last change of reactions and the like, relative to the largest
+COUNTED = 0.1  #: absolute tolerance of coordinates that only determine the turn of an angle
+SETTLED = 1e-12  #: tolerance of the last change of reactions and similar unknowns, relative to the largest
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class RelativeOde:
         return one_step_of(self, system, t, h, carry)
 
     def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
-        """Return the results at the carried state; the carry learns the power at it."""
+        """Return the results at the carried state, and store the power there in the carry."""
         power, rows = observed(system, t, carry, work)
         return replace(carry, power=power), rows
 
@@ -134,7 +134,7 @@ class RelativeOde:
             failure = Failure(f"{self.method}: {error}", np.inf)
         carry = replace(carry, n_iterations=carry.n_iterations + motion.n_evaluations)
         if failure is not None and n_steps > 1 and not has_stopped and compiled_system(system).stop_words:
-            begun = first + n_good  # its stop may come before what failed: output by output to there
+            begun = first + n_good  # its stop may precede the failure: output by output up to the stop
             carry, more_rows, more, failure = one_by_one(
                 self, system, carry, work, t0=t0, h=h, first=begun, n_steps=n_steps - n_good, every=every
             )
@@ -173,7 +173,7 @@ class Motion:
         self.begin(state, t)
 
     def begin(self, state: State, t: float) -> None:
-        """Count increments from a state, and choose the independent coordinates there."""
+        """Start the increments at a state, and choose the independent coordinates there."""
         from floatframe.engine.tree.kernels.entry import motion_of_joints
 
         set_iterate(self.work, state)
@@ -198,11 +198,11 @@ class Motion:
         return np.where(self.is_mode, of_bodies[self.tree.slot], columns)
 
     def put(self, t: float, x: Array, rates: Array) -> None:
-        """Write increments and rates, prescribed ones as their functions say."""
+        """Write increments and rates; prescribed ones follow their functions."""
         tree, joints, state = self.tree, self.joints, self.work.state
         state.time[...] = t
         state.w[:] = 0.0
-        state.w[self.own] = self.z  # angles are those next to it
+        state.w[self.own] = self.z  # angles are those nearest to it
         self.work.states.base[:] = self.z[: self.n_states]
         joints.x[tree.column[~self.is_mode]] = x[~self.is_mode]
         joints.rate[tree.column[~self.is_mode]] = rates[~self.is_mode]
@@ -217,7 +217,7 @@ class Motion:
         state.u_dot[tree.slot[modes]] = 0.0
 
     def constrain(self, t: float, x: Array, rates: Array, *, by_increments: bool) -> None:
-        """Write what is held, its rates and C."""
+        """Write the constraints, their rates and C."""
         from floatframe.engine.tree.kernels.entry import constraints
 
         self.put(t, x, rates)
@@ -225,7 +225,7 @@ class Motion:
         raise_errors_of(self.compiled.callbacks)
 
     def closed_at(self, t: float, y: Array) -> tuple[Array, Array]:
-        """(2): return increments and rates of all unknowns that belong to the independent ones."""
+        """(2): return increments and rates of all unknowns from the independent ones."""
         places, speeds = self.of_places, self.of_rates
         n, m = len(places.independent), len(y) - len(self.own)
         x, rates, self.z = self.x.copy(), np.zeros_like(self.x), y[m:].copy()
@@ -274,7 +274,8 @@ class Motion:
             self.work.state.w[self.own] = self.z
         for _ in range(1 if self.is_linear else MOST):
             if not accelerations(self.model, self.work, self.tree, self.joints, self.tangent):
-                central_bodies(self.model, self.compiled.body_names, "RelativeOde")  # names a mode without mass
+                # raises an error with the name of a mode without mass
+                central_bodies(self.model, self.compiled.body_names, "RelativeOde")
                 raise ModelError(
                     f"the equations of motion are singular at t = {t:.9g}: a mode or a coordinate without mass, or "
                     "constraints that depend on each other; use GeneralizedAlpha for modes without mass"
@@ -284,7 +285,7 @@ class Motion:
             change = np.abs(self.tangent.mu).max(initial=0.0)
             if change <= SETTLED * np.abs(self.work.state.w[self.rows]).max(initial=0.0):
                 break
-            if not self.is_linear:  # joints have moved to where x leads
+            if not self.is_linear:  # the joints are at the positions of x
                 w = self.work.state.w.copy()
                 self.put(t, x, rates)
                 self.work.state.w[self.rows] = w[self.rows]
@@ -327,7 +328,7 @@ class Motion:
                 stretches = found
             elif solution.status < 0:
                 raise ModelError(solution.message)
-            elif solution.status == 1:  # rotations went far, or the choice of coordinates is worn out
+            elif solution.status == 1:  # rotations are large, or the choice of coordinates has become unsuitable
                 t = float(max(events[-1] for events in solution.t_events if len(events)))
                 y_at = next(found[-1] for found in solution.y_events if len(found))
                 stretches = [Stretch(end, most), *stretches]
@@ -336,7 +337,7 @@ class Motion:
                 self.begin(state, t)
 
     def before_contact(self, solution: Any, work: Work) -> tuple[float, Array, list[Stretch]]:
-        """Return time, y and the next stretches at the step that passes over a contact; the end if none does."""
+        """Return time, y and the next parts of the motion at a step that misses a contact; the end if none does."""
 
         def gaps(t: float, y: Array) -> Array:
             state, _, w = self.state_at(t, y)
@@ -352,7 +353,7 @@ class Motion:
         return end, solution.sol(end), []
 
     def events(self) -> Sequence[Callable[[float, Array], float]]:
-        """Return functions of (t, y) that end a stretch where they pass zero."""
+        """Return functions of (t, y) that end a part of the motion where they pass zero."""
 
         def far(t: float, y: Array) -> float:
             x, _ = self.closed_at(t, y)
@@ -377,13 +378,13 @@ class Motion:
         projected(self.model, self.work, self.tree, self.joints)
         state = self.work.state
         p = np.array([euler_parameters(R) for R in state.R])
-        p *= np.where((p * self.p).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]  # of the two signs the nearer one
+        p *= np.where((p * self.p).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]  # of the two signs, the nearer one
         self.p = p
         return State(state.r, p, state.q, state.u), state.u_dot.copy(), state.w.copy()
 
 
 def groups_of(parts: SystemTree) -> list[Array]:
-    """Return the unknowns of each rotation that is a group, three numbers each."""
+    """Return the unknowns of each rotation group, three numbers each."""
     tree = parts.tree
     groups = []
     for i in range(len(tree.parent)):
@@ -404,24 +405,25 @@ def groups_of(parts: SystemTree) -> list[Array]:
 # docs/relative.md §7.
 
 
-RANK = 1e-9  #: of the largest pivot: what is none
-WORSE = 1e3  #: growth of the solution by which a partition is made anew
+RANK = 1e-9  #: ratio to the largest pivot below which a pivot is zero
+WORSE = 1e3  #: growth of the solution above which a partition is renewed
 
 
 @dataclass(frozen=True, eq=False)
 class Partition:
-    """Which coordinates follow from the others."""
+    """The partition into dependent and independent coordinates."""
 
     dependent: IntArray  #: (n_c,)
     independent: IntArray  #: (n - n_c,)
-    growth: float  #: largest change of a dependent coordinate by an independent one when it was made, at least 1
+    #: largest change of a dependent coordinate by an independent one when the partition was made, at least 1
+    growth: float
 
     def solved(self, C: Array, right: Array) -> Array:
         """Return the dependent coordinates y of C_d y = right."""
         return np.asarray(lu_solve(lu_factor(C[:, self.dependent]), right)) if len(self.dependent) else np.zeros(0)
 
     def is_worn(self, C: Array) -> bool:
-        """Whether dependent coordinates now change much more with the others than when it was made."""
+        """Whether dependent coordinates now change much more with the others than when the partition was made."""
         return bool(len(self.dependent)) and growth(C, self.dependent, self.independent) > WORSE * self.growth
 
 
@@ -461,7 +463,7 @@ def partition_of(C: Array, names: tuple[str, ...], sizes: Array) -> Partition:
         raise ModelError(f"joint {names[int(np.argmin(size))]!r} holds what cannot move")
     left = left / size if n_c else left
     dependent: list[int] = []
-    for k in range(n_c):  # rows in turn, the largest of all numbers that are left as pivot
+    for k in range(n_c):  # rows one by one, with the largest of all remaining numbers as pivot
         rest = np.abs(left[k:])
         row, column = divmod(int(np.argmax(rest)), n)
         if rest[row, column] <= RANK:

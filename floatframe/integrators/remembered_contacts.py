@@ -8,7 +8,7 @@ __all__ = ["require_no_remembered_contacts"]
 
 
 def require_no_remembered_contacts(compiled: CompiledSystem, scheme: str) -> None:
-    """Raise `ModelError` naming a contact whose force depends on the speed with which it began."""
+    """Raise `ModelError` with the name of a contact whose force depends on its initial speed."""
     model = compiled.model
     for c, name in enumerate(compiled.connection_names):
         if model.connections.law[c] == CONTACT and model.contacts.dissipation[model.connections.item[c]] > 0:

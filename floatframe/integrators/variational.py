@@ -69,7 +69,7 @@ class Variational(DiscreteScheme):
 
     @property
     def equations(self) -> int:
-        """Which equations: `VARIATIONAL`."""
+        """Kind of equations: `VARIATIONAL`."""
         return VARIATIONAL
 
     def one_step(self, ds: DiscreteSystem, placed: list[Placed], span: Span, f: Array) -> StepResult:
@@ -94,7 +94,7 @@ class VariationalScheme:
     acts_along: bool = False
 
     def inertia(self, body: CentralBody, place: Placed, x: Array, h: float) -> Array:
-        """H times the right sides of (1) without loads, less the momenta at the beginning."""
+        """H times the right sides of (1) without loads, minus the momenta at the beginning."""
         d, theta = x[..., :3], x[..., 3:6]
         Pi_0, Y_0 = body.momenta(place.q, place.omega, place.q_dot)
         Pi, Y, force = interval(body, place, x, h)
@@ -104,7 +104,7 @@ class VariationalScheme:
         )  # fmt: skip
 
     def force_step(self, place: Placed, x: Array) -> BodyStep:
-        """Forces act where the step begins."""
+        """Forces act at the start of the step."""
         return still(place, x)
 
     def torque(self, place: Placed, x: Array, tau: Array) -> Array:

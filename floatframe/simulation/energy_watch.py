@@ -33,11 +33,11 @@ from floatframe.simulation.step_watch import FIRST_VERDICT
 
 __all__ = ["EnergyWatch"]
 
-GAIN_LIMIT = 0.05  #: gain over the energy in motion above which a run reports it
+GAIN_LIMIT = 0.05  #: gain relative to the energy in motion above which a run reports it
 STOP_LIMIT = 0.5  #: gain above which a run stops
-LOSS_LIMIT = 0.1  #: loss over the energy in motion above which a run reports it
+LOSS_LIMIT = 0.1  #: loss relative to the energy in motion above which a run reports it
 STEADY = 0.05  #: relative change of the work of dampers between two intervals up to which their velocities are resolved
-MOST_WAITING = 400  #: rows wait until they are as many as those before, and for so many at most
+MOST_WAITING = 400  #: rows are collected until they are as many as those before, but at most this number
 ADVICE = {
     "energy": "take a shorter step, the scheme energy-momentum or relative coordinates",
     "damping": "take a step that resolves the fast vibrations, less numerical damping (rho_inf nearer to 1), or start "
@@ -55,22 +55,22 @@ class EnergyWatch:
     h: float  #: step size [s]
     n_seen: int = 0  #: rows after the first one
     last: Array | None = None  #: energy, work given and taken at the last row, (3,)
-    change: Array | None = None  #: of the work in the interval before it, (2,)
-    potential: Array | None = None  #: least and largest of gravity
+    change: Array | None = None  #: work in the previous interval, (2,)
+    potential: Array | None = None  #: smallest and largest potential of gravity
     gain: float = 0.0  #: energy that the steps have added
-    unsure: float = 0.0  #: error of it by the sums of work
-    unresolved: float = 0.0  #: further error by the work of dampers that the steps do not resolve
+    unsure: float = 0.0  #: its error due to the integration of work
+    unresolved: float = 0.0  #: further error due to the work of unresolved dampers
     taken: float = 0.0  #: work of dampers
-    scale: float = 0.0  #: largest energy that moves about
-    noise: float = 0.0  #: of the energy, by rounding
-    waiting: list[Rows] = field(default_factory=list)  #: rows that are not judged yet
+    scale: float = 0.0  #: largest energy in motion
+    noise: float = 0.0  #: of the energy, due to rounding
+    waiting: list[Rows] = field(default_factory=list)  #: rows that are not yet assessed
     notes: dict[str, ValidityNote] = field(default_factory=dict)  #: by kind
     is_beyond: bool = False  #: whether the run has to stop
 
     def observe(
         self, system: System, rows: Rows, *, is_switched: bool, is_last: bool = False
     ) -> tuple[ValidityNote, ...]:
-        """Take rows of results; return the notes that are new with them. is_switched: something else acts in them.
+        """Take rows of results and return the new notes. is_switched: the acting forces differ in these rows.
 
         The first steps, in which little moves yet, are judged at the end of a run alone (is_last). Rows are judged
         together: a look at a few costs as much as one at many.
@@ -85,14 +85,14 @@ class EnergyWatch:
         return (*notes, *self.judge(system, rows, is_switched=is_switched, is_last=is_last))
 
     def flush(self, system: System) -> tuple[ValidityNote, ...]:
-        """Judge the rows that wait; return the notes that are new with them."""
+        """Assess the collected rows and return the new notes."""
         if not self.waiting:
             return ()
         rows, self.waiting = joined_rows(self.waiting), []
         return self.judge(system, rows, is_switched=False, is_last=False)
 
     def judge(self, system: System, rows: Rows, *, is_switched: bool, is_last: bool) -> tuple[ValidityNote, ...]:
-        """Take rows of results; return the notes that are new with them."""
+        """Take rows of results and return the new notes."""
         d = rows.diagnostics
         energy = d[:, KINETIC] + d[:, STRAIN] + d[:, SPRINGS] + d[:, GRAVITATION]
         now = np.stack([energy, d[:, WORK_GIVEN], d[:, WORK_TAKEN]], axis=1)
@@ -135,7 +135,10 @@ class EnergyWatch:
         return tuple(note for note in new if note is not None)
 
     def noted(self, system: System, rows: Rows, kind: str, share: Array, limit: float) -> ValidityNote | None:
-        """Keep the largest share at the times of rows, (n_t,), if it is above a limit; return the note if it is new."""
+        """Store the largest share at the times of rows, (n_t,), if it is above a limit.
+
+        Return the note if it is new.
+        """
         k = int(np.argmax(share))
         largest, t = float(share[k]), float(rows.t[k])
         if not largest > limit:
@@ -149,7 +152,7 @@ class EnergyWatch:
         return self.notes[kind]
 
     def record(self) -> dict[str, Array]:
-        """Return what is needed to go on, by name; no rows may wait."""
+        """Return the data to resume from, by name; no rows may be waiting."""
         if self.last is None or self.potential is None:
             return {}
         change = np.full(2, np.nan) if self.change is None else self.change
@@ -157,7 +160,7 @@ class EnergyWatch:
         return {"energy_sums": np.concatenate([sums, self.last, change, self.potential])}
 
     def restore(self, record: Mapping[str, Array], notes: tuple[ValidityNote, ...]) -> None:
-        """Go on from a record and the notes of the part that is done."""
+        """Resume from a record and the notes of the completed part."""
         if "energy_sums" not in record:
             return
         numbers = np.array(record["energy_sums"], dtype=float)
@@ -169,7 +172,7 @@ class EnergyWatch:
         self.notes = {note.kind: note for note in notes if note.kind in ADVICE}
 
     def measured(self, d: Array) -> Array:
-        """Return the largest energy that has moved about at the times of rows, (n_t,)."""
+        """Return the largest energy in motion up to the times of rows, (n_t,)."""
         low, high = np.minimum.accumulate(d[:, GRAVITATION]), np.maximum.accumulate(d[:, GRAVITATION])
         if self.potential is not None:
             low, high = np.minimum(low, self.potential[0]), np.maximum(high, self.potential[1])
@@ -179,7 +182,7 @@ class EnergyWatch:
 
 
 def rounding_energies(system: System, rows: Rows, h: float) -> Array:
-    """Return by how much rounding may change the energy of rows in steps of size h, (n_t,)."""
+    """Return the possible change of the energy of rows by rounding in steps of size h, (n_t,)."""
     compiled = compiled_system(system)
     model = compiled.model
     mass = model.body_types.mass[model.bodies.kind]

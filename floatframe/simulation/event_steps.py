@@ -249,7 +249,7 @@ class EventWatch:
         return max(1, MOST_NUMBERS // (numbers + 1))
 
     def trial_work(self) -> Work:
-        """Return working arrays of trial steps, so that those of the run keep their factors."""
+        """Return working arrays of trial steps, so that the arrays of the run keep their factors."""
         if self.trial is None or self.trial[0] is not self.system:
             self.trial = self.system, new_work(compiled_system(self.system).model)
         return self.trial[1]

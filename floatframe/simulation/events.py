@@ -1,4 +1,4 @@
-"""Events: what a run does when a sensor or joint coordinate passes a level, or at a time.
+"""Events: actions of a run when a sensor or joint coordinate passes a level, or at a given time.
 
 Event("caught", "hinge.angle", level=np.pi / 2, direction="rising", stop=True)
 Event("release", "drop", column="y", level=0.2, direction="falling", switch_off=("rope",))
@@ -37,8 +37,8 @@ __all__ = [
 
 DIRECTIONS = {"rising": 1, "falling": -1, "both": 0}
 
-#: the same force without any load, which keeps its place in the system; one with nothing at all is refused, hence the
-#: functions that are zero
+#: the same force without any load, which keeps its place in the system; a force with no functions at all is refused,
+#: hence the zero functions
 SILENT: dict[type, dict[str, Any]] = {
     PointForce: {"force": np.zeros(3), "torque": np.zeros(3)},
     SpringDamper: {"stiffness": 0.0, "damping": 0.0, "preload": 0.0, "characteristic": constant(0.0)},
@@ -63,7 +63,7 @@ SILENT: dict[type, dict[str, Any]] = {
 
 @dataclass(frozen=True)
 class Event:
-    """What happens when a measured value passes a level, or at a time.
+    """Actions when a measured value passes a level, or at a given time.
 
     The time where a value passes its level is found to `tolerance` by steps of other sizes. A force or an element is
     off at the start if the first event that names it switches it on; a coupler (a latch, a clutch) if it is not
@@ -72,24 +72,24 @@ class Event:
 
     name: str
     watch: str = ""  #: name of a sensor of the system, or "joint.coordinate"; "": the event has a time
-    level: float = 0.0  #: in the unit of what is watched
+    level: float = 0.0  #: in the unit of the watched quantity
     direction: str = "both"  #: "rising", "falling" or "both"
-    column: str = ""  #: of the sensor, such as "x" or "rate"; "": its first
+    column: str = ""  #: column of the sensor, such as "x" or "rate"; "": its first
     stop: bool = False  #: end the run there
     switch_on: tuple[str, ...] = ()  #: names of forces, couplers and elements
     switch_off: tuple[str, ...] = ()
-    tolerance: float = 1e-9  #: of the time, in parts of the step
+    tolerance: float = 1e-9  #: tolerance of the time, relative to the step
     at: float | None = None  #: instead of `watch`: the time of the event, after the start of the run [s]
-    record: bool = False  #: keep the results at this time, besides those of the output times
+    record: bool = False  #: keep the results at this time, in addition to those of the output times
 
     @property
     def is_active(self) -> bool:
-        """Whether the motion is another one after it."""
+        """Whether the event changes the motion."""
         return self.stop or bool(self.switch_on) or bool(self.switch_off)
 
     @property
     def level_passed(self) -> float:
-        """The level of what is watched, or the time."""
+        """The level of the watched quantity, or the time."""
         return self.level if self.at is None else self.at
 
     def __post_init__(self) -> None:
@@ -153,7 +153,7 @@ def require_events(system: System) -> None:
 
 
 def require_switched(where: str, coupler: CoordinateCoupler, *, is_first_on: bool) -> None:
-    """Raise `ModelError` if a coupler cannot be switched by events, or waits for one without saying so."""
+    """Raise `ModelError` if events cannot switch a coupler, or if it waits for one without declaring it."""
     if coupler.limits is not None:
         raise ModelError(
             f"{where}: coupler {coupler.name!r} has limits and is switched by them alone; take another coupler for the "
@@ -166,12 +166,12 @@ def require_switched(where: str, coupler: CoordinateCoupler, *, is_first_on: boo
 
 
 def events_of(system: System) -> tuple[Event, ...]:
-    """Return the events that a system carries, whose names alone it knows, and those that its elements bring."""
+    """Return the events of a system, and those of its elements."""
     return cast(tuple[Event, ...], (*system.events, *(event for each in system.elements for event in each.events())))
 
 
 def has_events(system: System) -> bool:
-    """Whether something may be switched during a motion: events, stops that are struck, laws that jump with it."""
+    """Whether anything may be switched during a motion: by events, by stops that are hit, by laws with switches."""
     return (
         bool(events_of(system))
         or any(coupler.limits is not None for coupler in system.couplers)

@@ -1,4 +1,4 @@
-"""Units of other programs beside a system: which FMU, what it is given and acts on, and how steps are coupled."""
+"""Units of other programs in a system: which FMU, its inputs and outputs, and the coupling of steps."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,19 +15,19 @@ SCHEMES = ("explicit", "iterated")
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ForeignUnit:
-    """An FMU for co-simulation that acts beside a system: a controller, a tyre, hydraulics."""
+    """An FMU for co-simulation in a system: a controller, a tyre, hydraulics."""
 
     name: str
     file: str  #: path of the FMU
-    inputs: Mapping[str, str] = field(default_factory=dict)  #: its inputs by sensors of the system, "tip.x"
-    outputs: Mapping[str, str] = field(default_factory=dict)  #: its outputs by inputs of the system, on which they act
+    inputs: Mapping[str, str] = field(default_factory=dict)  #: its inputs, by sensors of the system, "tip.x"
+    outputs: Mapping[str, str] = field(default_factory=dict)  #: its outputs, by inputs of the system on which they act
     parameters: Mapping[str, float] = field(default_factory=dict)  #: its parameters by values
 
     def __post_init__(self) -> None:
         for part in ("inputs", "outputs", "parameters"):
             object.__setattr__(self, part, FrozenMapping(dict(getattr(self, part))))
         if not self.inputs and not self.outputs:
-            raise ModelError(f"unit {self.name!r}: expected inputs or outputs, got neither: it would act on nothing")
+            raise ModelError(f"unit {self.name!r}: expected inputs or outputs, got neither: it would have no effect")
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Steps over times at which a force jumps: one that ends there and one that begins there, so that no impulse is lost.
+"""Steps across times at which a force jumps: one step ends there and the next begins there, so that no impulse is lost.
 
 A method of steps takes a force from both ends of a step; a jump between them, or at one of them, would count for too
 much or too little of the step (an error of the impulse of order h). So the step is cut just before the jump, and the
@@ -24,16 +24,17 @@ from floatframe.simulation.event_steps import EventWatch
 
 __all__ = ["jump_times", "jumps_by_step", "jumps_of_steps", "next_steps"]
 
-PER_STEP = 4  #: places in a step between which expressions of t are compared
+PER_STEP = 4  #: points in a step between which expressions of t are compared
 MOST_PLACES = 1_000_000  #: in a run
-N_PARTS = 10  #: halvings of a step after a jump that states follow faster
-FOLLOWED, FELT = 2.0, 0.05  #: change of a state by its rate at the jump, over its change in the step; over its size
+N_PARTS = 10  #: largest number of halvings of a step after a jump to which states respond faster
+#: ratios: of the change predicted by the rate of a state at the jump to its change in the step; and to its size
+FOLLOWED, FELT = 2.0, 0.05
 STEEP = 1.5  #: growth of an expression at half the distance from a pole
-SHORT = 1e-9  #: of a step: what is left out before a jump, and a rest that is none
+SHORT = 1e-9  #: fraction of a step: gap left before a jump, and remainder that counts as zero
 
 
 def jump_times(system: System, t_start: float, h: float, n_steps: int) -> list[float]:
-    """Return the times after the start of a run, to its end, at which a force or the law of an element jumps, rising.
+    """Return the times after the start of a run, up to its end, at which a force or law jumps, in ascending order.
 
     (1) jumps of the values of functions of time
     (2) switches of expressions, found between places in the steps
@@ -54,7 +55,7 @@ def jump_times(system: System, t_start: float, h: float, n_steps: int) -> list[f
 
 
 def require_bounded(where: str, values: Sequence[OfTime], times: Sequence[float], short: float) -> None:
-    """Raise `ModelError` if an expression has a pole at a switch: it halves, about, with twice the distance from it."""
+    """Raise `ModelError` if an expression has a pole at a jump: near it, its value halves with twice the distance."""
     for value in values:
         for t in times:
             for side in (-short, short):
@@ -68,7 +69,7 @@ def require_bounded(where: str, values: Sequence[OfTime], times: Sequence[float]
 
 
 def jumps_of_steps(system: System, t_start: float, h: float, n_steps: int) -> dict[int, list[float]]:
-    """Return the times of jumps in each step k, from t_start + k h (not there) to t_start + (k + 1) h (there too)."""
+    """Return the times of jumps in each step k, after t_start + k h and up to t_start + (k + 1) h inclusive."""
     jumps = jumps_by_step(jump_times(system, t_start, h, n_steps), t_start, h)
     return {k: times for k, times in jumps.items() if k < n_steps}
 
@@ -77,7 +78,7 @@ def jumps_by_step(times: list[float], t0: float, h: float) -> dict[int, list[flo
     """Return the times of jumps after t0 by the step k in which each lies, from t0 + k h to t0 + (k + 1) h."""
     found: dict[int, list[float]] = {}
     for t in times:
-        k = max(ceil((t - t0) / h - SHORT) - 1, 0)  # next to t0: the motion begins anew at once
+        k = max(ceil((t - t0) / h - SHORT) - 1, 0)  # next to t0: the motion restarts at once
         found.setdefault(k, []).append(t)
     return found
 
@@ -96,7 +97,7 @@ def next_steps(
     jumps: dict[int, list[float]],
     events: EventWatch | None = None,
 ) -> tuple[Carry, Rows, Work, int, Failure | None]:
-    """Take steps of size h, the first of them number `first` from t0: the one with the next jumps, or those before it.
+    """Take steps of size h, the first with number `first` from t0: the one with the next jumps, or those before it.
 
     Return the memory after them, the results after every `every`-th (and at a stop), how many steps are done, at most
     n_steps, and why the next one failed, if it did. jumps: times by step. system: as events have switched it.
@@ -129,7 +130,7 @@ def over_jumps(
     jumps: list[float],
     events: EventWatch | None = None,
 ) -> tuple[Carry, Rows, Work, Failure | None]:
-    """Take a step of size h from t, cut at jumps; return the memory and the results at its end, or at the stop."""
+    """Take a step of size h from t, divided at jumps; return the memory and the results at its end, or at a stop."""
     where, end, begin = t, t + h, carry
     rows: Rows | None = None
     is_after = False  # a jump
@@ -140,7 +141,7 @@ def over_jumps(
             acting = system if events is None else events.system
             n_parts = n_settling_parts(integrator, acting, carry, work, where, size) if is_after else 0
             done = 0.0
-            for part in range(n_parts + 1):  # each as long as all before it
+            for part in range(n_parts + 1):  # each part is as long as all parts before it
                 until_part = size * 2.0 ** (part - n_parts)
                 at, own = where + done, until_part - done
                 if events is None:
@@ -164,7 +165,7 @@ def over_jumps(
 
 
 def n_settling_parts(integrator: Integrator, system: System, carry: Carry, work: Work, t: float, size: float) -> int:
-    """Return how often a step of this size after a jump is to be halved at its beginning.
+    """Return how often a step of this size after a jump is halved at its beginning.
 
     A step is tried: a state whose rate at its beginning would lead much further than the step does settles in less.
     """

@@ -1,4 +1,4 @@
-"""Knots of tables and the steps of a run: where steps pass over samples, or over jumps of a driven acceleration."""
+"""Knots of tables and the steps of a run: steps that pass over samples, or over jumps of a driven acceleration."""
 
 import numpy as np
 
@@ -8,11 +8,11 @@ from floatframe.simulation.jumps import jump_times
 
 __all__ = ["knot_words"]
 
-ON_A_STEP = 1e-6  #: of a step, by which a knot may miss its end
+ON_A_STEP = 1e-6  #: fraction of a step by which a knot may differ from its end
 
 
 def knot_words(system: System, t_start: float, h: float, n_steps: int) -> tuple[str, ...]:
-    """Return in words where the steps of a run miss what a table says.
+    """Return messages about table data that the steps of a run miss.
 
     (1) Several knots in one step: what lies between them is not seen. Where a force jumps a step ends.
     (2) A jump of a driven acceleration inside a step: the step takes it for a ramp. Jumps at the ends of steps are met.
@@ -23,7 +23,7 @@ def knot_words(system: System, t_start: float, h: float, n_steps: int) -> tuple[
         inside = (function.begins > t_start) & (function.begins < t_start + n_steps * h * (1 - 1e-12))
         knots = function.begins[inside]
         steps = np.ceil((knots - t_start) / h - ON_A_STEP)
-        parts = steps + np.searchsorted(cuts, knots - ON_A_STEP * h)  # of the steps, which jumps cut
+        parts = steps + np.searchsorted(cuts, knots - ON_A_STEP * h)  # range of the steps, which jumps divide
         passed = len(knots) - len(np.unique(parts))
         if passed:
             shortest = float(np.diff(knots).min())

@@ -1,4 +1,4 @@
-"""Functions of users that depend on time in a way that nothing declares: compared at ends and middles of steps.
+"""Users' functions with undeclared dependence on time: values at ends and middles of steps are compared.
 
 Functions of time in fields, expressions and `knots` say where a law jumps, and steps end there. What else a function of
 a user does with the time is not known. After some steps it is asked at their ends and middles with the motion as it is
@@ -25,9 +25,9 @@ from floatframe.simulation.switch_events import unknowns_of_force
 
 __all__ = ["LawWatch"]
 
-N_STEPS = 100  #: least number of steps that are looked at together
-FAR = 0.05  #: of the largest value, by which a middle may differ from the mean of the ends
-OWN = "floatframe."  #: modules of elements that declare what depends on time
+N_STEPS = 100  #: smallest number of steps that are checked together
+FAR = 0.05  #: allowed difference of a middle from the mean of the ends, relative to the largest value
+OWN = "floatframe."  #: modules of elements that declare their dependence on time
 LAW, FORCE = (ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * n) for n in (4, 2))
 
 
@@ -49,8 +49,8 @@ class LawWatch:
     system: System
     t_start: float
     h: float
-    cut: Collection[int]  #: steps in which a declared jump lies
-    n_seen: int = 0  #: steps that have been looked at
+    cut: Collection[int]  #: steps with a declared jump
+    n_seen: int = 0  #: number of checked steps
     laws: list[AskedLaw] = field(init=False)
     work: Work | None = field(init=False, default=None)
 
@@ -58,7 +58,7 @@ class LawWatch:
         self.laws = list(asked_laws(self.system, compiled_system(self.system)))
 
     def observe(self, carry: Carry, n_done: int, *, is_last: bool) -> list[str]:
-        """Look at the steps since the last look, with the motion after the last of them; return what is new."""
+        """Check the steps since the last check, with the motion after the last of them; return new messages."""
         if all(law.is_told for law in self.laws) or (n_done - self.n_seen < N_STEPS and not is_last):
             return []
         first, self.n_seen = self.n_seen, n_done
@@ -76,7 +76,7 @@ class LawWatch:
         for law in self.laws:
             error = law.callback.error
             values = law.ask(law.inputs(carry, self.work), t)
-            law.callback.error = error  # what the run itself has raised alone is raised
+            law.callback.error = error  # only errors of the run itself are raised
             far = np.abs(values[1::2] - 0.5 * (values[:-2:2] + values[2::2])) > FAR * np.abs(values).max(axis=0)
             steps = [first + int(k) for k in np.flatnonzero(far.any(axis=1)) if first + k not in self.cut]
             if steps and not law.is_told:

@@ -1,21 +1,21 @@
-"""Where in a step a value passes its level: a bracketed secant method from a place that is nearly right."""
+"""Time in a step at which a value passes its level: a bracketed secant method with a good initial guess."""
 
 from collections.abc import Callable, Sequence
 from math import ceil, floor, isfinite
 
 __all__ = ["MOST_NEIGHBOURS", "expected_passage", "passage"]
 
-MOST_NEIGHBOURS = 3  #: values on either side of a passage from which its place is guessed
+MOST_NEIGHBOURS = 3  #: number of values on either side of a passage that determine the guess
 MOST_EVALUATIONS = 200
-PATIENCE = 3  #: evaluations in which a bracket has to shrink to half, else it is halved
-ALIKE = 0.01  #: relative difference of two slopes in a row that are known
-SURE = 0.97  #: of what such a slope makes of the tolerance
+PATIENCE = 3  #: number of evaluations after which a bracket that has not halved is bisected
+ALIKE = 0.01  #: relative difference of two successive slopes below which the slope is known
+SURE = 0.97  #: factor on the tolerance with a known slope
 EQUAL = 1e-12
-POLISHED = 1e-13  #: place in a step to which the guess is made
+POLISHED = 1e-13  #: tolerance of the guess, as a fraction of a step
 
 
 def expected_passage(places: Sequence[float], values: Sequence[float]) -> tuple[float, float]:
-    """Return where between 0 and 1 the polynomial through values at places passes zero, and its slope there.
+    """Return the zero between 0 and 1 of the polynomial through values at given points, and its slope there.
 
     Both 0 and 1 are among the places, with values of different signs; Newton's divided differences, Newton's method in
     a bracket.
@@ -49,7 +49,7 @@ def expected_passage(places: Sequence[float], values: Sequence[float]) -> tuple[
 def passage(
     beyond: Callable[[float], float], before: float, after: float, tolerance: float, guess: tuple[float, float]
 ) -> float:
-    """Return the first multiple of the tolerance, 1 at most, where a function that was below zero is not any more.
+    """Return the first multiple of the tolerance, at most 1, at which a function that was negative is not negative.
 
     (1) x is where the zero is expected, a multiple of the tolerance; f = beyond(x) bounds the bracket,
         f(low) < 0 <= f(high)
@@ -75,7 +75,7 @@ def passage(
         return 1.0
     most = ceil(1.0 / tolerance * (1.0 - EQUAL))
     low, high, at_high = 0, most, after
-    if not (isfinite(guess[0]) and isfinite(guess[1])):  # of values after the event, which may be no numbers
+    if not (isfinite(guess[0]) and isfinite(guess[1])):  # values after the event may be NaN
         guess = before / (before - after), after - before
     x, slope = ceil(guess[0] / tolerance), guess[1]
     if not slope > 0.0:

@@ -1,4 +1,4 @@
-"""Restart records: all an integrator remembers, kept with the results, so that an interrupted run can go on.
+"""Restart records: the complete memory of an integrator, stored with the results to resume an interrupted run.
 
 A record belongs to a step whose number is a multiple of `RESTART_STEPS`. There every run makes its Newton factors
 anew, so that a resumed run takes the same steps as one that was never interrupted, bit for bit.
@@ -64,8 +64,9 @@ def carry_of_record(record: Mapping[str, Array], system: System) -> tuple[Carry,
 
 
 def system_digest(system: System, integrator: Integrator) -> str:
-    """Return the sha256 of everything the motion follows from: compiled system, its start, method and parameters."""
-    digest = hashlib.sha256(repr((type(integrator).__name__, asdict(integrator))).encode())  # type: ignore[call-overload]
+    """Return the sha256 of everything that determines the motion: compiled system, start, method and parameters."""
+    # type: ignore[call-overload]
+    digest = hashlib.sha256(repr((type(integrator).__name__, asdict(integrator))).encode())
     if events_of(system):
         digest.update(repr(events_of(system)).encode())
     compiled = compiled_system(system)

@@ -1,4 +1,4 @@
-"""What a step size can follow of the modes of a system, and of its supplies, loads and drives, in numbers."""
+"""Which modes, supplies, loads and drives a step size resolves, with numbers."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,18 +14,18 @@ from floatframe.model.system import System
 
 __all__ = ["StepAdvice", "frequency_words", "step_advice"]
 
-FOLLOWED = 20.0  #: steps in a period with which generalized-alpha follows a mode within about 1 % of its period
-N_PLACES = 2000  #: in a run, at which frequencies that change are looked at
-SEEN = 2.0  #: steps in a period below which a mode cannot be seen in the results at all
+FOLLOWED = 20.0  #: steps per period with which generalized-alpha resolves a mode within about 1 % of its period
+N_PLACES = 2000  #: number of times in a run at which changing frequencies are evaluated
+SEEN = 2.0  #: steps per period below which a mode is not visible in the results
 
 
 @dataclass(frozen=True)
 class StepAdvice:
-    """Modes of bodies against a step size; frequencies are those of the body alone, in its frame."""
+    """Modes of bodies compared with a step size; frequencies are those of the body alone, in its frame."""
 
     h: float  #: step size [s]
     n_modes: int  #: modes with mass and stiffness, of all bodies
-    n_followed: int  #: with 20 steps in a period or more
+    n_followed: int  #: number of modes with 20 steps per period or more
     n_unseen: int  #: with less than two
     slowest: float  #: frequency [Hz]
     fastest: float  #: frequency [Hz]
@@ -34,17 +34,17 @@ class StepAdvice:
 
     @property
     def h_slowest(self) -> float:
-        """Step size that follows the slowest mode [s]."""
+        """Step size that resolves the slowest mode [s]."""
         return 1 / (FOLLOWED * self.slowest)
 
     @property
     def h_fastest(self) -> float:
-        """Step size that follows the fastest mode [s]."""
+        """Step size that resolves the fastest mode [s]."""
         return 1 / (FOLLOWED * self.fastest)
 
     @property
     def words(self) -> str:
-        """Say in one sentence what the step size follows, and what would follow more."""
+        """Return one sentence on what the step size resolves, and which step sizes resolve more."""
         return (
             f"h = {self.h:.3g} follows {self.n_followed} of {self.n_modes} modes ({FOLLOWED:g} steps in a period); the "
             f"fastest, mode {self.fastest_mode} of body {self.fastest_body!r}, has {1 / (self.h * self.fastest):.2g} "
@@ -54,7 +54,7 @@ class StepAdvice:
 
 
 def step_advice(system: System, h: float) -> StepAdvice | None:
-    """Return what a step size follows of the modes; None for a system without modes."""
+    """Return what a step size resolves of the modes; None for a system without modes."""
     model = compiled_system(system).model
     frequencies, owners = [], []
     for i, name in enumerate(compiled_system(system).body_names):
@@ -81,7 +81,7 @@ def step_advice(system: System, h: float) -> StepAdvice | None:
 def frequency_words(
     system: System, t_start: float, h: float, n_steps: int, *, has_steps_of_one_size: bool = True
 ) -> tuple[str, ...]:
-    """Return in words which supplies, loads and drives have a frequency that the steps of a run do not follow.
+    """Return a message on supplies, loads and drives whose frequency the steps of a run do not resolve.
 
     A method that controls its steps is told of those alone of which it may see nothing: two steps in a period.
     """
@@ -97,14 +97,14 @@ def frequency_words(
 
 
 def highest_frequencies(system: System, t: Array) -> Iterator[tuple[str, float]]:
-    """Yield the highest frequencies of what acts over time in a run at times t, (n_t,), and where they stand [1/s].
+    """Yield the highest frequencies of functions of time in a run at times t, (n_t,), and their places [1/s].
 
     Sines in functions of time, in expressions of time alone, and what elements say by `frequencies`.
     """
     for each in functions_of_time(system):
         function = each.function
         acts = (function.begins < t[-1]) & (np.append(function.begins[1:], np.inf) > t[0])
-        acts[0] |= function.begins[0] >= t[0]  # the first piece holds before its beginning
+        acts[0] |= function.begins[0] >= t[0]  # the first piece also applies before its beginning
         has_sine = acts & (function.pieces[:, 6] != 0.0)
         yield each.where, float(np.abs(function.pieces[has_sine, 7]).max(initial=0.0)) / (2 * np.pi)
     for where, part in parts_of_time(system):

@@ -1,4 +1,4 @@
-"""Events of stops: couplers with limits that are struck, hold while they are pressed, and let go."""
+"""Events of stops: couplers with limits that are hit, hold while they are pressed, and release."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -24,8 +24,9 @@ __all__ = [
     "sum_rows",
 ]
 
-INWARD = {"lower": 1.0, "upper": -1.0}  #: sign of the force of a stop along what it stops
-BEYOND = 1e-9  #: how far beyond a stop a motion may begin, in radians or in parts of the length of the system
+INWARD = {"lower": 1.0, "upper": -1.0}  #: sign of the force of a stop along its coordinate
+#: allowed distance beyond a stop at the start of a motion, in radians or relative to the length of the system
+BEYOND = 1e-9
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ def stop_events(system: System) -> tuple[StopEvent, ...]:
 
 
 def sum_rows(compiled: CompiledSystem, name: str) -> tuple[IntArray, Array, int]:
-    """Return rows of the coordinates of a coupler, their coefficients, and the row of its multiplier."""
+    """Return the coordinate rows of a coupler, their coefficients, and the row of its multiplier."""
     model = compiled.model
     k = compiled.element_names.index(name)
     places = slice(int(model.elements.coordinate0[k]), int(model.elements.coordinate0[k + 1]))
@@ -74,7 +75,7 @@ def coupled_sum(compiled: CompiledSystem, name: str, w: Array) -> float:
 
 
 def stop_values(compiled: CompiledSystem, event: StopEvent, resting: Mapping[str, str], rows: Sequence[Rows]) -> Array:
-    """Return what the event of a stop watches, at the times of rows of results, (n_times,).
+    """Return the watched value of a stop event at the times of rows of results, (n_times,).
 
     A limit on which the sum rests is not reached again; one on which it does not rest cannot let go.
     """
@@ -87,7 +88,7 @@ def stop_values(compiled: CompiledSystem, event: StopEvent, resting: Mapping[str
     if side is not None:
         return np.full(len(w), event.level + INWARD[event.side])
     held, factors, _ = sum_rows(compiled, event.coupler)
-    return np.sum(factors[:, None] * w[:, held].T, axis=0)  # term by term, the same for one row as for many
+    return np.sum(factors[:, None] * w[:, held].T, axis=0)  # term by term, so that one row gives the same as many
 
 
 def require_within_limits(compiled: CompiledSystem, events: Sequence[Event], values: Array) -> None:
@@ -117,7 +118,7 @@ def require_off_stops(system: System, w: Array) -> None:
 
 
 def just_inside(event: StopEvent, value: float) -> float:
-    """Return a value that can reach the limit anew: one at or beyond it is taken for the last number within."""
+    """Return a value that can reach the limit again: one at or beyond it becomes the last number within it."""
     inward = INWARD[event.side]
     if inward * (value - event.level) > 0.0:
         return value

@@ -1,4 +1,4 @@
-"""Switching functions: a law jumps with its motion where one passes zero; its sign stands still in every step.
+"""Switching functions: a law jumps when one passes zero; its sign is constant in every step.
 
 A step that ends beyond the zero with the sign of its beginning finds a smooth motion, so that the time of the zero is
 found by steps of other sizes, as that of an event. There the sign changes, and the motion goes on with the
@@ -30,7 +30,7 @@ __all__ = ["HeldSigns", "SwitchEvent", "beyond_zero", "sign_of", "switch_events"
 class SwitchEvent(Event):
     """A switching function passes zero."""
 
-    #: its values at rows of results, (n_times,); None: an output of an element, which a sensor measures
+    #: its values for rows of results, (n_times,); None: an output of an element, which a sensor measures
     values: Callable[[Sequence[Rows]], Array] | None = None
 
     @property
@@ -59,7 +59,7 @@ def switch_events(system: System) -> tuple[SwitchEvent, ...]:
 
 
 def values_of_tape(tape: Tape, functions: Sequence[TimeFunction], unknowns: IntArray, rows: Sequence[Rows]) -> Array:
-    """Return a switching function of a user force, which depends on the time and on unknowns, at rows, (n_times,)."""
+    """Return a switching function of a user force, of time and unknowns, for rows, (n_times,)."""
     t, w = (np.concatenate([getattr(row, name) for row in rows]) for name in ("t", "w"))
     columns = w[:, unknowns].T
     inputs = {0: np.asarray} | {1 + k: partial(column_at, column) for k, column in enumerate(columns)}
@@ -70,12 +70,12 @@ def values_of_tape(tape: Tape, functions: Sequence[TimeFunction], unknowns: IntA
 
 
 def column_at(column: Array, t: Array) -> Array:
-    """Return what is known at the times t."""
+    """Return the known inputs at the times t."""
     return column
 
 
 def unknowns_of_force(compiled: CompiledSystem, u: int, i: int) -> IntArray:
-    """Return the unknowns that user force u sees, element i among couplers and user forces: values, rates, states."""
+    """Return the unknowns that user force u uses, element i among couplers and user forces: values, rates, states."""
     users, elements = compiled.model.users, compiled.model.elements
     rows = compiled.model.coordinates.row[elements.coordinate0[i] : elements.coordinate0[i + 1]]
     states = int(elements.core[i]) + int(users.n_forces[u]) + 3 * np.arange(int(users.n_states[u]))
@@ -83,7 +83,7 @@ def unknowns_of_force(compiled: CompiledSystem, u: int, i: int) -> IntArray:
 
 
 def with_signs(system: System, signs: Mapping[str, int]) -> System:
-    """Return a system whose switching functions have these signs, by the names of their events, whatever moves."""
+    """Return a system whose switching functions have constant signs, given by the names of their events."""
     if not signs:
         return system
     forces = []
@@ -105,7 +105,7 @@ def sign_of(value: float) -> int:
 
 
 def beyond_zero(value: float, sign: int) -> float:
-    """Return a value on the side of a sign: one that is not is taken for the first number there."""
+    """Return a value on the side of a sign: one on the other side becomes the first number there."""
     return value if sign * value > 0.0 else float(np.nextafter(0.0, sign))
 
 
@@ -116,7 +116,7 @@ def beyond_zero(value: float, sign: int) -> float:
 class HeldSigns(ElementProxy):
     """Replaces an element; its law uses given signs."""
 
-    signs: Sequence[int]  #: of its switching functions, 1 or -1
+    signs: Sequence[int]  #: sign of its switching functions, 1 or -1
 
     def law(self, placed: Placed) -> ElementLaw:
         """Return its law with these signs."""

@@ -1,4 +1,4 @@
-"""Watches a motion row by row, whether every flexible body stays in the range of its linear frame.
+"""Watch over a motion, row by row: whether every flexible body stays in the range of its linear frame.
 
 The stiffness of a body under its loads is K + Σ lambda_j K_j, with the amplitudes lambda of the unit loads (theory.md
 §7): acceleration of the frame origin minus gravity, angular acceleration, products of the angular velocity, wrenches on
@@ -45,26 +45,26 @@ from floatframe.results.validity import ValidityNote
 __all__ = ["ANGLES_LIMIT", "ValidityWatch", "angle_measures"]
 
 
-MOST_CONVERTED = 80  #: modes of a body of which the rotations against mean axes are found
+MOST_CONVERTED = 80  #: number of modes of a body whose rotations relative to mean axes are computed
 ADVICE = {
-    "angles": "let it turn far about one axis alone, or take a joint for what turns far, a bearing for a shaft",
-    "tilt": "take a joint for what turns far",
+    "angles": "limit large rotations to one axis, or use a joint for large rotations and a bearing for a shaft",
+    "tilt": "use a joint for large rotations",
 }
 N_INERTIAL = 12  #: amplitudes of inertial loads: 3 accelerations, 3 angular accelerations, 6 products
 
 
 @dataclass(eq=False)
 class Watched:
-    """What is known of one flexible body."""
+    """Constants of one flexible body."""
 
     index: int
     body: FlexibleBody
     limits: Limits
     frequency: float  #: lowest angular frequency with one of its joints held, or free [rad/s]
     Psi_r: Array  #: rotations of the interfaces by q, (3 n, n_q)
-    scaled: Array  #: K^(-1/2) K_j K^(-1/2) of all unit loads, (n_loads, n_q²); no rows where K is singular
+    scaled: Array  #: K^(-1/2) K_j K^(-1/2) of all unit loads, (n_loads, n_q²); no rows if K is singular
     norms: Array  #: their largest |eigenvalue|, (n_loads,)
-    by_mean_axes: Array | None = None  #: rotations of the interfaces against mean axes by q, made when it is asked for
+    by_mean_axes: Array | None = None  #: rotations of the interfaces relative to mean axes by q, computed on request
     wrenches: list[Wrench] = field(default_factory=list)
     loads: list[Load] = field(default_factory=list)
 
@@ -73,7 +73,7 @@ class ValidityWatch:
     """The notes of a motion; `observe` takes its rows in order."""
 
     def __init__(self, system: System, notes: tuple[ValidityNote, ...] = ()) -> None:
-        """Begin with a system, and the notes of the part of the motion that is already done."""
+        """Begin with a system, and the notes of the completed part of the motion."""
         self.system = system
         self.found = {note.key: note for note in notes}
         elastic = [
@@ -88,11 +88,11 @@ class ValidityWatch:
 
     @property
     def notes(self) -> tuple[ValidityNote, ...]:
-        """What has been found, in the order of time."""
+        """Findings, in the order of time."""
         return tuple(sorted(self.found.values(), key=lambda note: note.t_first))
 
     def observe(self, rows: Rows) -> tuple[ValidityNote, ...]:
-        """Take rows of results; return the notes that are new with them."""
+        """Take rows of results and return the new notes."""
         if len(rows.t) == 0:
             return ()
         told = rows_of_file(compiled_system(self.system), rows)
@@ -124,7 +124,7 @@ class ValidityWatch:
         return tuple(new)
 
     def observe_angles(self, rows: Rows) -> list[ValidityNote]:
-        """Take rows of results; return what is new about the angles of bushings and bearings."""
+        """Take rows of results and return new notes about the angles of bushings and bearings."""
         new = []
         for where, kind, measure in self.angles:
             values = measure(rows)
@@ -141,7 +141,7 @@ class ValidityWatch:
         return new
 
     def measures(self, part: Watched, rows: Rows, told: Rows) -> list[tuple[str, Array]]:
-        """Return what is compared, each over the rows of the engine, told in the frames of the files, (n_t,).
+        """Return the compared quantities for the rows of the engine, in the frames of the files, (n_t,).
 
         A rotation is that against the frame in which the engine moves the body, a load that of the frame of its file.
         """
@@ -166,7 +166,7 @@ class ValidityWatch:
         return rows.q[:, q0 : q0 + part.body.reduced.n_q]
 
     def load_measure(self, part: Watched, rows: Rows, i: int, u0: int) -> Array:
-        """Return the change of the stiffness by the loads; -1 in the rows where it is not looked for."""
+        """Return the change of the stiffness by the loads; -1 in rows without evaluation."""
         R, omega = rotation_matrix(rows.p[:, i]), rows.u[:, u0 + 3 : u0 + 6]
         lam = np.zeros((len(rows.t), len(part.norms)))
         acceleration = rows.u_dot[:, u0 : u0 + 3] - compiled_system(self.system).model.gravity
@@ -197,7 +197,7 @@ class ValidityWatch:
 
 
 def in_mean_axes(part: Watched, q: Array) -> float:
-    """Return the largest rotation of an interface against mean axes at coordinates (n_t, n_q) [rad]; -1: not known.
+    """Return the largest rotation of an interface relative to mean axes at coordinates (n_t, n_q) [rad]; -1: unknown.
 
     Not known where the body has mean axes already, has many modes (the way there takes long), or cannot go there.
     """
@@ -222,7 +222,7 @@ def is_elastic(body: FlexibleBody) -> bool:
 
 
 def held_frequencies(compiled: CompiledSystem, bodies: list[int]) -> list[float]:
-    """Return of bodies the lowest angular frequency above zero with one joint held, whichever makes it least [rad/s].
+    """Return the lowest angular frequency above zero of bodies with one joint held, over all joints [rad/s].
 
     What a joint holds stands still then, so that a body that is clamped by one of its joints has the frequency of a
     cantilever whatever the frame of its file; a body without joints has that of the free body. None above zero: inf.
@@ -264,7 +264,7 @@ def lowest_frequency(M: Array, K: Array, G: Array) -> float:
 
 
 def watched(index: int, body: FlexibleBody, frequency: float) -> Watched:
-    """Return what is known of a body before the motion."""
+    """Return the constants of a body before the motion."""
     reduced = body.reduced
     turning = [np.asarray(interface.Psi[3:]) for interface in body.moved.interfaces if interface.has_rotation]
     scaled, norms = scaled_unit_loads(reduced)
@@ -282,7 +282,7 @@ def watched(index: int, body: FlexibleBody, frequency: float) -> Watched:
 
 
 def scaled_unit_loads(reduced: ReducedBody) -> tuple[Array, Array]:
-    """Return K^(-1/2) K_j K^(-1/2) of all unit loads, (n_loads, n_q²), and their norms; empty where K is singular."""
+    """Return K^(-1/2) K_j K^(-1/2) of all unit loads, (n_loads, n_q²), and their norms; empty if K is singular."""
     n, geometric = reduced.n_q, reduced.geometric
     values, vectors = la.eigh(reduced.K)
     if not values[0] > 0:
@@ -327,13 +327,13 @@ def estimated_interface_loads(reduced: ReducedBody) -> Array:
 # Public elements say themselves how far their angles are beyond small ones (`Element.small_angles`).
 
 
-ANGLES_LIMIT = 0.05  #: of the angle, by which another reading of it may differ
+ANGLES_LIMIT = 0.05  #: relative difference of the angle from another definition that is allowed
 
 Measure = Callable[[Rows], Array]
 
 
 def angle_measures(system: System) -> Iterator[tuple[str, str, Measure]]:
-    """Yield where each bushing and bearing with angles stands, "angles" or "tilt", and how far other readings are off.
+    """Yield name and kind ("angles" or "tilt") of each bushing and bearing with angles, and the deviation.
 
     Each measure is a function of rows of results, (n_t,).
     """
@@ -351,7 +351,7 @@ def angle_measures(system: System) -> Iterator[tuple[str, str, Measure]]:
 
 
 def apart_from_cardan(a: MarkerData, b: MarkerData, k: int, rows: Rows) -> Array:
-    """Return by which part of its angle the rotation vector of marker b against a differs from Cardan angles, (n_t,).
+    """Return the relative difference of the rotation vector of marker b relative to a from Cardan angles, (n_t,).
 
     k: where its components begin in the counted angles, -1 where they are not.
     """
@@ -366,7 +366,7 @@ def apart_from_cardan(a: MarkerData, b: MarkerData, k: int, rows: Rows) -> Array
 
 
 def of_element(beyond: Callable[[Array], Array], markers: tuple[MarkerData, ...], rows: Rows) -> Array:
-    """Return what an element says of its angles (`Element.small_angles`), (n_t,)."""
+    """Return the value that an element declares for its angles (`Element.small_angles`), (n_t,)."""
     return beyond(np.stack([rotation_matrix(orientations_of(marker, rows)) for marker in markers], axis=1))
 
 

@@ -1,4 +1,4 @@
-"""What events watch at rows of results: by the sensors, or straight from the rows where a column is what is watched."""
+"""Watched values of events at rows of results: by the sensors, or directly from a column of the rows."""
 
 from collections.abc import Callable
 
@@ -20,7 +20,7 @@ Values = Callable[[Rows], Array]
 
 
 def direct_values(system: System, event: Event) -> Values | None:
-    """Return a function from rows of results to what an event watches, (n_times,); None where a sensor has to measure.
+    """Return a function from rows of results to the watched value of an event, (n_times,); None if a sensor is needed.
 
     A time; an angle of a joint between rigid bodies, which every run counts. Both to rounding what the sensor gives.
     """
@@ -33,7 +33,7 @@ def direct_values(system: System, event: Event) -> Values | None:
 
 
 def counted_angle_of(system: System, sensor: CoordinateSensor) -> Values | None:
-    """Return the angle of a joint as the run counts it; None if it is not known so."""
+    """Return the angle of a joint as counted by the run; None if it is not counted."""
     joint = next(each for each in system.joints if each.name == sensor.joint)
     if isinstance(joint, SlidingJoint):
         return None

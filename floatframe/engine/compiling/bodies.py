@@ -16,7 +16,7 @@ from floatframe.model.system import Body
 
 __all__ = ["axis_of_inertia", "body_n_q", "body_types", "integers", "offsets", "point_inertia", "type_arrays"]
 
-SYMMETRIC = 0.02  #: difference of two moments of inertia of an axisymmetric body, by the largest one
+SYMMETRIC = 0.02  #: relative difference of two moments of inertia below which a body counts as axisymmetric
 
 
 def integers(values: list[int]) -> IntArray:
@@ -77,7 +77,7 @@ def axis_of_inertia(J: Array, within: float = SYMMETRIC) -> Array:
 
 
 def type_arrays(types: list[RigidBody | ReducedBody]) -> BodyTypes:
-    """Return what the types of bodies hold."""
+    """Return the data of the types of bodies."""
     blocks: list[Array] = []
     block0 = np.zeros((len(types), N_BLOCKS), np.int64)
     is_diagonal = np.ones((len(types), 3), np.int64)
@@ -90,7 +90,7 @@ def type_arrays(types: list[RigidBody | ReducedBody]) -> BodyTypes:
             S.append(body.mass * body.center_of_mass)
             J0.append(body.inertia_about_origin)
             continue
-        moments = body.moments.left_out if body.moments.missing else body.moments  # as `FlexibleBody` was told
+        moments = body.moments.left_out if body.moments.missing else body.moments  # as given to `FlexibleBody`
         mass.append(moments.m)
         S.append(moments.S)
         J0.append(moments.J0)

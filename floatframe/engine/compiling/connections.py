@@ -1,4 +1,4 @@
-"""Connections in the order in which they are met: their ends, wrench and rows."""
+"""Connections in the order of their compilation: their ends, wrenches and rows."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -22,7 +22,7 @@ __all__ = ["Connections", "End", "add_joint", "add_spring"]
 
 @dataclass(frozen=True, eq=False)
 class End:
-    """A marker of a connection, and where its part of the wrench begins."""
+    """A marker of a connection, and the index of its part of the wrench."""
 
     marker: MarkerData
     sign: float  #: +1 at A, -1 at B
@@ -47,12 +47,12 @@ class Connections:
     law: list[int] = field(default_factory=list)
     item: list[int] = field(default_factory=list)
     accelerated: list[int] = field(default_factory=list)  #: markers whose acceleration is an input of a law
-    rates: list[int] = field(default_factory=list)  #: whether rows depend on velocities
+    rates: list[int] = field(default_factory=list)  #: whether the rows depend on velocities
     rows: list[Row] = field(default_factory=list)
     owner: list[str] = field(default_factory=list)  #: of each row
 
     def add_marker(self, marker: MarkerData) -> int:
-        """Add a marker that is no end of a connection; return its number."""
+        """Add a marker that is no end of a connection, and return its number."""
         self.markers.append(marker)
         self.connection_of.append(-1)
         self.sign.append(0.0)
@@ -61,7 +61,7 @@ class Connections:
         return len(self.markers) - 1
 
     def add(self, name: str, law: int, ends: Sequence[End], rows: Sequence[Row], *, has_rates: bool) -> tuple[int, int]:
-        """Add a connection; return the numbers of its first marker and of its first row."""
+        """Add a connection, and return the numbers of its first marker and of its first row."""
         first_marker, first_row = len(self.markers), len(self.rows)
         c = len(self.sizes)
         for end in ends:
@@ -94,7 +94,7 @@ def add_joint(system: System, made: Connections, joint: Joint) -> None:
 
 
 def add_spring(system: System, made: Connections, spring: SpringDamper) -> float:
-    """Add a spring-damper; return its free length."""
+    """Add a spring-damper, and return its free length."""
     where = f"force {spring.name!r}"
     a = find_marker(system, f"{where}: marker_a", spring.marker_a)
     b = find_marker(system, f"{where}: marker_b", spring.marker_b)

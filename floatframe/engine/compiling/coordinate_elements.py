@@ -1,4 +1,4 @@
-"""Couplers and user forces as the kernels see them: coordinates on markers, and what couples them."""
+"""Couplers and user forces in the arrays of the kernels: coordinates between markers, and their couplings."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -47,12 +47,12 @@ __all__ = [
 ]
 
 
-LEAST_SIZE = 1e-3  #: of a state, where nothing else is known
+LEAST_SIZE = 1e-3  #: size of a state if no other is known
 
 
 @dataclass(frozen=True, eq=False)
 class PlacedCoordinate:
-    """A coordinate found in the system: its markers and the directions it is made of."""
+    """A coordinate of a compiled system: its markers and directions."""
 
     a: MarkerData
     b: MarkerData
@@ -60,13 +60,13 @@ class PlacedCoordinate:
 
     @property
     def row(self) -> Row:
-        """The row of its value."""
+        """The row of the value of the coordinate."""
         own = self.coordinate
         return Row(own.kind, own.x, own.y, z=own.z)
 
     @property
     def has_arm(self) -> bool:
-        """Whether a force along it has a moment about the point of A that anything feels."""
+        """Whether a force along the coordinate has a moment about the point of A that loads a body."""
         return self.coordinate.kind == PUSH and self.a.body >= 0
 
 
@@ -84,10 +84,10 @@ class CoordinateElements:
     tapes: list[Tape] = field(default_factory=list)
     callbacks: list[Callback] = field(default_factory=list)
     placed: list[PlacedCoordinate] = field(default_factory=list)
-    lengths: list[float | None] = field(default_factory=list)  #: that forces say of themselves, of each coordinate
+    lengths: list[float | None] = field(default_factory=list)  #: declared by the forces, for each coordinate
 
     def give_lengths(self, radii: Array, length: float, units: Units) -> None:
-        """Set over which coordinates and their rates a law changes, from the radii of gyration of bodies, (n_b,).
+        """Set the ranges of coordinates and rates over which a law changes, from radii of gyration of bodies, (n_b,).
 
         A distance by the length that a force says, or the size of the smaller body, in a second, 1 m/s at most; angles
         by 1 rad.
@@ -99,7 +99,7 @@ class CoordinateElements:
             record["size"], record["speed"] = size, min(size / second, most)
 
     def records(self) -> dict[str, Any]:
-        """Return the parts of the model."""
+        """Return the arrays of the model."""
         tapes = self.tapes
         return {
             "elements": filled(model.Elements(), coordinate0=self.coordinate0, core=self.core),
@@ -195,10 +195,10 @@ def add_coordinates(
     core: list[Row],
     length: float | None = None,
 ) -> int:
-    """Add a connection: rows of its coordinates, then of its core; return the number of the first of these."""
+    """Add a connection, with rows of its coordinates, then of its core; return the number of the first core row."""
     rows: list[Row] = []
     ends: list[End] = []
-    starts: list[tuple[int, int, int]] = []  # of each coordinate, in the connection: value, force, arm
+    starts: list[tuple[int, int, int]] = []  # for each coordinate in the connection: value, force, arm
     for placed, acts in zip(coordinates, has_force, strict=True):
         value = len(rows)
         rows += [placed.row, Row(PART)]
@@ -235,7 +235,7 @@ def add_coordinates(
 
 
 def find_coordinate(system: System, where: str, coordinate: Coordinate, made: Connections) -> PlacedCoordinate:
-    """Return a coordinate as placed; `ModelError` with the nearest name if it is not there."""
+    """Return a coordinate in the assembled position; `ModelError` with the closest name if it does not exist."""
     if isinstance(coordinate, JointCoordinate):
         return coordinate_of_joint(system, where, coordinate, made)
     a = find_marker(system, f"{where}: marker_a", coordinate.marker_a)
@@ -255,7 +255,7 @@ def find_coordinate(system: System, where: str, coordinate: Coordinate, made: Co
 
 
 def coordinate_of_joint(system: System, where: str, wanted: JointCoordinate, made: Connections) -> PlacedCoordinate:
-    """Return a coordinate of a joint as placed."""
+    """Return a coordinate of a joint in the assembled position."""
     names = [joint.name for joint in system.joints]
     if wanted.joint not in names:
         raise ModelError(f"{where}: no joint {quoted(wanted.joint)}{nearest(wanted.joint, names)}")
@@ -275,6 +275,6 @@ def coordinate_of_joint(system: System, where: str, wanted: JointCoordinate, mad
 
 
 def placed_value(placed: PlacedCoordinate, made: Connections) -> float:
-    """Return the value of a coordinate as placed; angles between -pi and pi."""
+    """Return the value of a coordinate in the assembled position; angles between -pi and pi."""
     (r_a, A_a), (r_b, A_b) = (marker_pose(m, made.placed, made.n_q) for m in (placed.a, placed.b))
     return float(placed.coordinate.value(RelativePlace(A_a, A_b, r_b - r_a)))

@@ -1,4 +1,4 @@
-"""Angles whose turns a run counts: of the joints, of sensors of the system that ask for it, of bushings that twist."""
+"""Angles whose turns a run counts: of joints, of sensors that request it, and of bushings that twist."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,23 +28,23 @@ __all__ = [
 ]
 
 Direction = tuple[float, float, float]
-SAME = 1e-9  #: difference of directions that are one
+SAME = 1e-9  #: difference of two directions below which they count as equal
 
 
 @dataclass(frozen=True)
 class CountedAngle:
-    """An angle between two bodies, by directions in their frames; see kernels/turns.py."""
+    """An angle between two bodies, from directions in their frames; see kernels/turns.py."""
 
     holder: int  #: body with the axis x × z, -1 for the ground
     other: int
     x: Direction
     z: Direction
-    y: Direction  #: of the other body, turns from z towards -x
+    y: Direction  #: direction of the other body, which turns from z towards -x
     sign: float = 1.0
-    part: int = -1  #: 0, 1, 2: of the rotation vector of a bushing, of which three follow each other
+    part: int = -1  #: 0, 1, 2: component of the rotation vector of a bushing; its three components are consecutive
 
     def is_same(self, angle: "CountedAngle") -> bool:
-        """Whether another one measures the same."""
+        """Whether another angle measures the same."""
         own, others = ((a.holder, a.other, a.sign, a.part) for a in (self, angle))
         directions = ((*a.x, *a.y, *a.z) for a in (self, angle))
         return own == others and all(abs(p - q) <= SAME for p, q in zip(*directions, strict=True))
@@ -68,12 +68,12 @@ def angle_of(coordinate: RowCoordinate, a: MarkerData, b: MarkerData) -> Counted
 
 
 def direction(x: Sequence[float] | Array) -> Direction:
-    """Return three numbers."""
+    """Return three numbers as a tuple."""
     return float(x[0]), float(x[1]), float(x[2])
 
 
 def counted_angles(system: System, placed: State) -> list[tuple[CountedAngle, TimeFunction | None]]:
-    """Return the angles of a system, each once, with the motion that prescribes it or None."""
+    """Return the angles of a system without duplicates, each with the motion that prescribes it or None."""
     found: list[tuple[CountedAngle, TimeFunction | None]] = []
     between: dict[tuple[int, int, float], list[CountedAngle]] = {}  # the same two bodies
     n_q = n_q_of(system)
@@ -102,7 +102,7 @@ def counted_angles(system: System, placed: State) -> list[tuple[CountedAngle, Ti
 
 
 def rotation_of(a: MarkerData, b: MarkerData) -> list[CountedAngle]:
-    """Return the three parts of the rotation vector of marker b against marker a."""
+    """Return the three components of the rotation vector of marker b relative to marker a."""
     x, _, z = a.shape.triad.T
     return [
         CountedAngle(a.body, b.body, direction(x), direction(z), direction(y), part=k)
@@ -111,13 +111,13 @@ def rotation_of(a: MarkerData, b: MarkerData) -> list[CountedAngle]:
 
 
 def first_angles(system: System, n_angles: int) -> list[int]:
-    """Return for each bushing where its rotation vector begins in the angles, -1 for those that count no turns."""
+    """Return for each bushing the index of its rotation vector among the angles, -1 for those that count no turns."""
     counting = [force.counts_turns for force in system.forces if isinstance(force, Bushing)]
     first = n_angles - 3 * sum(counting)  # they are the last
     return [first + 3 * sum(counting[:k]) if counts else -1 for k, counts in enumerate(counting)]
 
 
 def angle_records(angles: list[CountedAngle]) -> Angles:
-    """Return the angles as the kernels see them."""
+    """Return the angles in the arrays of the kernels."""
     parts = ("holder", "other", "x", "z", "y", "sign", "part")
     return filled(Angles(), **{name: [getattr(angle, name) for angle in angles] for name in parts})

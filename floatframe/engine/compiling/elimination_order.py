@@ -51,7 +51,7 @@ def plan_elimination(sizes: list[int], ends_of_bodies: list[list[int]], connecti
     upper: list[int] = []
     update: list[int] = []
     after0, update0 = [0], [0]
-    waiting = [(len(neighbours[j]), j) for j in range(n)]  # those whose number has changed since are passed over
+    waiting = [(len(neighbours[j]), j) for j in range(n)]  # entries whose number has changed since then are skipped
     heapify(waiting)
     is_left = [True] * n
     while waiting:

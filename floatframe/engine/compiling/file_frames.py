@@ -1,4 +1,4 @@
-"""Between the frames in which the engine moves bodies and those of their files: states, results, small motions.
+"""Conversion of states, results and small motions between the frames of the engine and those of the files.
 
 Kernels, start, integrators and analyses work in the frames of the engine, where stiffened bodies move in mean axes
 (`floatframe.mean_axes`). What a user gives and gets, states, results and shapes, speaks of the frames of the files.
@@ -22,27 +22,27 @@ Way = Literal["to_file", "to_mean"]
 
 
 def state_of_file(compiled: CompiledSystem, state: State) -> State:
-    """Return a state of the engine in the frames of the files."""
+    """Return a state of the engine, converted to the frames of the files."""
     return motion_of_file(compiled, state, np.zeros_like(state.u))[0]
 
 
 def state_of_engine(compiled: CompiledSystem, state: State) -> State:
-    """Return a state in the frames of the files as the engine has it."""
+    """Return a state in the frames of the files, converted to those of the engine."""
     return motion_of_engine(compiled, state, np.zeros_like(state.u))[0]
 
 
 def motion_of_file(compiled: CompiledSystem, state: State, u_dot: Array) -> tuple[State, Array]:
-    """Return a state and accelerations (n_u,) of the engine in the frames of the files."""
+    """Return a state and accelerations (n_u,) of the engine, converted to the frames of the files."""
     return changed_state(compiled, state, u_dot, "to_file")
 
 
 def motion_of_engine(compiled: CompiledSystem, state: State, u_dot: Array) -> tuple[State, Array]:
-    """Return a state and accelerations (n_u,) in the frames of the files as the engine has them."""
+    """Return a state and accelerations (n_u,) in the frames of the files, converted to those of the engine."""
     return changed_state(compiled, state, u_dot, "to_mean")
 
 
 def rows_of_file(compiled: CompiledSystem, rows: Rows) -> Rows:
-    """Return rows of results of the engine in the frames of the files."""
+    """Return rows of results of the engine, converted to the frames of the files."""
     if not any(compiled.mean_axes):
         return rows
     r, p, q, u, u_dot = changed(compiled, (rows.r, rows.p, rows.q, rows.u, rows.u_dot), "to_file")
@@ -50,7 +50,7 @@ def rows_of_file(compiled: CompiledSystem, rows: Rows) -> Rows:
 
 
 def small_motions_of_file(compiled: CompiledSystem, q: Array) -> tuple[Array, ...]:
-    """Return small motions of each body (body axes) in its file's frame by those of the engine, at its q (n_q,)."""
+    """Return small motions of each body in its file's frame (body axes) from those in the engine, at its q (n_q,)."""
     bodies = compiled.model.bodies
     return tuple(
         np.eye(6 + int(bodies.n_q[i])) if axes is None else axes.small_motions(q[bodies.q0[i] : bodies.q0[i + 1]])
@@ -69,7 +69,7 @@ def changed_state(compiled: CompiledSystem, state: State, u_dot: Array, way: Way
 def changed(compiled: CompiledSystem, arrays: tuple[Array, ...], way: Way) -> tuple[Array, ...]:
     """Return r (..., n_b, 3), p (..., n_b, 4), q (..., n_q), u and u_dot (..., n_u) in the other frames."""
     r, p, q, u, u_dot = (np.array(array) for array in arrays)
-    with np.errstate(over="ignore", invalid="ignore"):  # of a motion that diverges
+    with np.errstate(over="ignore", invalid="ignore"):  # NaN of a motion that diverges
         for i, axes in enumerate(compiled.mean_axes):
             if axes is None:
                 continue

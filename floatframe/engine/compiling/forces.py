@@ -1,4 +1,4 @@
-"""Forces as flat arrays, and the functions of time and of coordinates that they and drives share."""
+"""Forces as flat arrays, and the functions of time and of coordinates that forces and drives share."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -27,19 +27,19 @@ __all__ = ["Functions", "body_loads", "joint_forces", "with_forces"]
 
 @dataclass
 class Functions:
-    """Functions in the order in which they are met."""
+    """Functions in the order of their compilation."""
 
     known: list[TimeFunction] = field(default_factory=list)
 
     def index(self, function: TimeFunction | None) -> int:
-        """Return the number of a function, -1 for none."""
+        """Return the number of a function, -1 for no function."""
         if function is None:
             return -1
         self.known.append(function)
         return len(self.known) - 1
 
     def record(self) -> FunctionPieces:
-        """Return the pieces of all, one function after another."""
+        """Return the pieces of all functions, one function after another."""
         return filled(
             FunctionPieces(),
             piece0=offsets(integers([len(function.begins) for function in self.known])),
@@ -49,7 +49,7 @@ class Functions:
 
 
 def with_forces(joint: Joint, rows: Sequence[Row], forces: Sequence[JointForce]) -> list[Row]:
-    """Return the rows of a joint, those of coordinates with forces replaced; `ModelError` where that cannot be."""
+    """Return the rows of a joint, those of coordinates with forces replaced; `ModelError` if that is impossible."""
     result = list(rows)
     for force in forces:
         where = f"force {force.name!r}"
@@ -70,7 +70,7 @@ def with_forces(joint: Joint, rows: Sequence[Row], forces: Sequence[JointForce])
 def joint_forces(
     system: System, rows: Sequence[Row], owner: Sequence[str], functions: Functions
 ) -> tuple[JointForces, list[int]]:
-    """Return the forces along coordinates, sorted by row, and where those of each row begin, and the end.
+    """Return the forces along coordinates, sorted by row, and the index of the first force of each row, and the end.
 
     owner: name of the joint of each row.
     """
@@ -100,7 +100,7 @@ def joint_forces(
 
 
 def body_loads(system: System, functions: Functions) -> BodyLoads:
-    """Return the load cases that act on bodies; `ModelError` if a body or a load case is not there."""
+    """Return the load cases on bodies; `ModelError` if a body or a load case does not exist."""
     loads = [force for force in system.forces if isinstance(force, BodyLoad)]
     bodies, values, first, n = [], [], [], 0
     for load in loads:

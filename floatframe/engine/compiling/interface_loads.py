@@ -1,4 +1,4 @@
-"""What acts on the interfaces of a flexible body: ends of connections, and point forces."""
+"""The loads on the interfaces of a flexible body: ends of connections, and point forces."""
 
 from dataclasses import dataclass
 
@@ -15,12 +15,12 @@ __all__ = ["Load", "Wrench", "amplitudes", "in_body", "interface_number", "loads
 
 @dataclass(frozen=True, eq=False)
 class Wrench:
-    """Where the wrench of a connection on an interface is found."""
+    """Indices of the wrench of a connection on an interface."""
 
     interface: int
     sign: float
-    force: int  #: first column in w, -1 for none
-    moment: int  #: first column in w, -1 for none
+    force: int  #: first column of the force in w, -1 for none
+    moment: int  #: first column of the moment in w, -1 for none
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,11 +30,11 @@ class Load:
     interface: int
     force: PointForce
     triad: Array  #: undeformed axes of the marker in the body frame, (3, 3)
-    number: int = -1  #: among the point forces of the system
+    number: int = -1  #: number among the point forces of the system
 
 
 def loads_on_interfaces(system: System, body: int) -> tuple[list[Wrench], list[Load]]:
-    """Return where the wrenches on the interfaces of a flexible body are found, and the point forces on them."""
+    """Return the indices of the wrenches on the interfaces of a flexible body, and the point forces on them."""
     model, reduced = compiled_system(system).model, system.bodies[body].moved  # type: ignore[union-attr]
     n = reduced.n_q
     forces = [force for force in system.forces if isinstance(force, PointForce)]
@@ -44,7 +44,7 @@ def loads_on_interfaces(system: System, body: int) -> tuple[list[Wrench], list[L
         o = int(model.markers.psi0[m])
         own = model.markers.psi[o : o + 6 * n].reshape(6, n)
         interface = interface_number(reduced, own, model.markers.position[m])
-        if interface < 0:  # the place where something slides along a line
+        if interface < 0:  # the marker of a sliding joint on its line
             continue
         c = int(model.markers.connection[m])
         if c >= 0:
@@ -58,7 +58,7 @@ def loads_on_interfaces(system: System, body: int) -> tuple[list[Wrench], list[L
 
 
 def interface_number(reduced: ReducedBody, psi: Array, position: Array) -> int:
-    """Return the number of the interface that moves and lies so, -1 for none."""
+    """Return the number of the interface with this motion and position, -1 for none."""
     same = [np.array_equal(each.Psi, psi) and np.array_equal(each.position, position) for each in reduced.interfaces]
     return same.index(True) if any(same) else -1
 

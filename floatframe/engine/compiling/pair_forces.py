@@ -1,4 +1,4 @@
-"""Bushings and contacts as the kernels see them."""
+"""Bushings and contacts in the arrays of the kernels."""
 
 from dataclasses import dataclass, field
 
@@ -58,7 +58,7 @@ def add_pair_laws(system: System, made: Connections, functions: Functions) -> Pa
 
 
 def ends_of(a: MarkerData, b: MarkerData) -> tuple[End, End]:
-    """Return the ends of a wrench of force, moment on A and moment on B."""
+    """Return the ends of a wrench with force, moment on A and moment on B."""
     return End(a, 1.0, moment=MOMENT), End(b, -1.0, moment=MOMENT_B)
 
 
@@ -69,7 +69,7 @@ def require_two_bodies(where: str, a: MarkerData, b: MarkerData) -> None:
 
 
 def bushing_markers(system: System, bushing: Bushing, placed: State) -> tuple[MarkerData, MarkerData]:
-    """Return both markers; a body in place of one is met where, and as, the other is placed."""
+    """Return both markers; a body without a marker gets one at the position and with the axes of the other marker."""
     where = f"force {bushing.name!r}"
     given = (bushing.marker_a, bushing.marker_b)
     found = [

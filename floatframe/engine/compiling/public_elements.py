@@ -1,4 +1,4 @@
-"""Public elements as the kernels see them: the ends and rows of their connections, their functions and numbers."""
+"""Public elements in the arrays of the kernels: ends and rows of their connections, their functions and data."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -24,14 +24,14 @@ from floatframe.model.system import System
 
 __all__ = ["PlacedLaw", "PublicElements", "add_public_elements"]
 
-ANGLES = ("rad", "1", "")  #: units of what is held that are not lengths
-WIDTH = 18  #: numbers of the motion of a marker,
-ACCELERATED = 24  #: and with its accelerations
+ANGLES = ("rad", "1", "")  #: units of held quantities that are not lengths
+WIDTH = 18  #: numbers of the motion of a marker
+ACCELERATED = 24  #: the same with its accelerations
 
 
 @dataclass(frozen=True, eq=False)
 class PlacedLaw:
-    """An element with its law, and where its unknowns are."""
+    """An element with its law, and the indices of its unknowns."""
 
     element: Element
     law: ElementLaw
@@ -39,24 +39,24 @@ class PlacedLaw:
     states: tuple[int, ...]  #: rows of the values of its states
     multipliers: tuple[int, ...]  #: rows of its multipliers
     markers: tuple[MarkerData, ...]
-    head: tuple[int, ...]  #: its sizes, see `compiling.callbacks.law_templates`
+    head: tuple[int, ...]  #: sizes of its inputs, see `compiling.callbacks.law_templates`
     value: Callback  #: its function
     slopes: Callback  #: of derivatives
-    rest: tuple[Callback, Callback]  #: the same of what holds in equilibrium
-    length: float = 0.0  #: over which the law changes
-    speed: float = 0.0  #: of 1 m/s, in the units of the system
+    rest: tuple[Callback, Callback]  #: the same functions, for the equations in equilibrium
+    length: float = 0.0  #: length over which the law changes
+    speed: float = 0.0  #: speed of 1 m/s, in the units of the system
     time: float = 0.0  #: of 1 s
-    own_time: float = 0.0  #: over which the law changes by the time alone; 0: not known
+    own_time: float = 0.0  #: time over which the law changes by time alone; 0: unknown
 
     @property
     def digest(self) -> tuple[int | str | None, ...]:
-        """What its functions are, whatever their addresses."""
+        """Key of its functions, independent of their addresses."""
         functions = (self.law.function, self.law.tangent, self.law.rest)
         return tuple(digest_of(each) or words_of(each) if callable(each) else each for each in functions)
 
     @property
     def sizes(self) -> list[float]:
-        """By which its inputs are measured, see `compiling.callbacks.law_templates`.
+        """Sizes of its inputs, see `compiling.callbacks.law_templates`.
 
         Without a time of its own velocities are measured by 1 m/s, or by its length in a second where that is less.
         """
@@ -80,7 +80,7 @@ class PlacedLaw:
 
 
 def words_of(function: Callable[..., None]) -> str:
-    """Return the name of a function that has no digest."""
+    """Return the name of a function without a digest."""
     return f"{getattr(function, '__module__', '')}.{getattr(function, '__qualname__', '')}"
 
 
@@ -102,13 +102,13 @@ class PublicElements:
         return tuple(each.element.name for each in self.placed)
 
     def give_lengths(self, radii: Array, length: float) -> None:
-        """Set the lengths over which laws change that do not say it, from the radii of gyration of bodies, (n_b,)."""
+        """Set the lengths of change that laws do not declare, from the radii of gyration of bodies, (n_b,)."""
         for k, each in enumerate(self.placed):
             own = each.law.length or least_size(each.markers, radii) or length
             self.placed[k] = replace(each, length=own)
 
     def record(self) -> Laws:
-        """Return the laws as the kernels see them."""
+        """Return the laws in the arrays of the kernels."""
         laws = [each.law for each in self.placed]
         sources = [each for group in self.sources for each in group]
         equations = [
@@ -145,7 +145,7 @@ class PublicElements:
 
 
 def add_public_elements(system: System, made: Connections, first_state: int) -> PublicElements:
-    """Add the elements of a system, whose states come after those that are there."""
+    """Add the elements of a system; their states follow the existing ones."""
     elements = PublicElements(state0=[first_state])
     for element in system.elements:
         add_element(system, made, elements, element)
@@ -196,7 +196,7 @@ def add_element(system: System, made: Connections, elements: PublicElements, ele
 
 
 def law_of(element: Element, placed: Placed) -> ElementLaw:
-    """Return the law of an element; `ModelError` that names the element whatever its method raises."""
+    """Return the law of an element; any error of its method becomes a `ModelError` with the name of the element."""
     where = f"element {element.name!r}"
     try:
         law = element.law(placed)
@@ -221,7 +221,7 @@ def law_of(element: Element, placed: Placed) -> ElementLaw:
 
 
 def acting_ends(where: str, markers: list[MarkerData], law: ElementLaw) -> tuple[list[End], list[tuple[int, float]]]:
-    """Return the ends, and the source and factor of each row of their wrenches."""
+    """Return the ends, and the source index and factor of each row of their wrenches."""
     ends: list[End] = []
     sources: list[tuple[int, float]] = []
     is_shared = law.is_opposite and all(marker.body >= 0 for marker in markers)
@@ -242,7 +242,7 @@ def acting_ends(where: str, markers: list[MarkerData], law: ElementLaw) -> tuple
 
 
 def held(law: ElementLaw) -> Sequence[tuple[int, str]]:
-    """Return what each multiplier holds, with its unit."""
+    """Return the held quantity of each multiplier, with its unit."""
     return list(zip(law.holds, law.held_units, strict=True))
 
 

@@ -1,1 +1,1 @@
-"""Done once before a motion: consistent positions, velocities, accelerations; what is wrong with constraints."""
+"""Computed once before a motion: consistent positions, velocities and accelerations, and diagnoses of constraints."""

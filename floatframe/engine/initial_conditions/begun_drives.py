@@ -1,4 +1,4 @@
-"""Drives that begin with another rate than their bodies have: what that does, in words."""
+"""Messages about drives that begin with another rate than their bodies have."""
 
 import numpy as np
 
@@ -12,11 +12,12 @@ from floatframe.model.system import System
 
 __all__ = ["words_of_begun_drives"]
 
-FITS = 1e-9  #: way in a step, in radians or parts of the size of the system, by which a drive may miss its bodies
+#: distance in a step, in radians or relative to the size of the system, that a drive may deviate from its bodies
+FITS = 1e-9
 
 
 def words_of_begun_drives(system: System, t: float, state: State | None, h: float) -> str:
-    """Return in words which drive begins at t with a rate furthest from what its bodies as given have, "" if none does.
+    """Return a message about the drive whose rate at t differs most from that of its bodies, "" if none does.
 
     A motion then begins with velocities that fit, the nearest ones by mass and modal stiffness. Rigid mechanisms move
     so; what is elastic, as bars of segments, takes it as a blow whose waves long steps h do not follow.
@@ -47,7 +48,7 @@ def words_of_begun_drives(system: System, t: float, state: State | None, h: floa
     unit = f"{system.units.length_symbol if is_length[k] else 'rad'}/{system.units.time_symbol}"
     return (
         f"{drive_name(compiled, int(drives[k]))} begins at t = {t:g} with {wanted[k]:.4g} {unit}, {off[k]:.4g} {unit} "
-        "from what its bodies as given have: all begin with velocities that fit, and what is elastic takes that as a "
-        "blow; begin it softly (cycloidal_spin_up), give the bodies velocities that fit, or follow the blow with a "
-        "smaller h"
+        "from what its bodies as given have: all begin with consistent velocities, which acts as an impulse on elastic "
+        "parts; begin it gradually (cycloidal_spin_up), give the bodies consistent velocities, or resolve the impulse "
+        "with a smaller h"
     )

@@ -1,4 +1,4 @@
-"""What is wrong with constraints, in words: drives against each other, singular positions, joints that stay open."""
+"""Messages about constraints: conflicting drives, singular positions, joints that remain open."""
 
 import numpy as np
 
@@ -11,12 +11,12 @@ from floatframe.model.state import State
 
 __all__ = ["conflict_of_drives", "drive_name", "open_joints"]
 
-SPANNED = 1e-7  #: part of a row of length one that the others leave of it, where they span it
-INVOLVED = 1e-4  #: share of a row of length one in another from which it is named
+SPANNED = 1e-7  #: norm of the remainder of a unit row after projection on the others, below which they span it
+INVOLVED = 1e-4  #: component of a unit row in another row above which that row is named
 
 
 def open_joints(compiled: CompiledSystem, error: Array) -> str:
-    """Return the joints that are open most, in words; `error`: the residuals of the rows, (n_w,)."""
+    """Return a message with the joints that are open most; `error`: the residuals of the rows, (n_w,)."""
     model = compiled.model
     words = []
     for c, name in enumerate(compiled.connection_names):
@@ -32,14 +32,14 @@ def open_joints(compiled: CompiledSystem, error: Array) -> str:
 
 
 def drive_name(compiled: CompiledSystem, row: int) -> str:
-    """Return the drive of a row, in words."""
+    """Return the name of the drive of a row, for messages."""
     if not compiled.coordinates[row]:
         return f"the motion of coupler {compiled.owners[row]!r}"
     return f"the drive of {compiled.coordinates[row]!r} of joint {compiled.owners[row]!r}"
 
 
 def conflict_of_drives(compiled: CompiledSystem, work: Work, state: State) -> str:
-    """Return in words which drives prescribe what joints and other drives decide already, "" if none do.
+    """Return a message about drives that conflict with joints and other drives, "" if none do.
 
     A drive is taken back where its row is spanned by those of the joints and of the drives before it.
     """
@@ -64,9 +64,9 @@ def conflict_of_drives(compiled: CompiledSystem, work: Work, state: State) -> st
                 name = drive_name(compiled, int(holds[k]))
                 if others:
                     partners = " and ".join(drive_name(compiled, int(holds[i])) for i in others)
-                    words.append(f"{name} and {partners} prescribe one motion")
+                    words.append(f"{name} and {partners} prescribe the same motion")
                 else:
-                    words.append(f"{name} prescribes what the joints hold already in this position")
+                    words.append(f"{name} prescribes a motion that the joints already hold in this position")
                 continue
         basis.append(int(k))
     return "; ".join(words)

@@ -1,4 +1,4 @@
-"""Mobility: how many ways a system can move, and which constraints repeat others.
+"""Mobility: the number of independent motions of a system, and its redundant constraints.
 
 Rows of the constraint Jacobian, turned by the Cholesky factors of the masses so that they have one unit and norm one,
 are taken joint by joint: a row that the rows before it span repeats them (Gram-Schmidt, twice for accuracy).
@@ -20,7 +20,7 @@ from floatframe.model.state import State
 
 __all__ = ["Mobility", "constraint_mobility", "scaled_constraints"]
 
-DEPENDENT = 1e-7  #: part of a row, of length one, that is left of it when rows before it are taken away
+DEPENDENT = 1e-7  #: norm of the remainder of a unit row after projection on earlier rows, below which it is redundant
 
 
 @dataclass(frozen=True)
@@ -30,18 +30,18 @@ class Mobility:
     n_bodies: int
     n_modes: int
     n_constraints: int  #: held by joints
-    n_redundant: int  #: of them repeat others, modes taken into account
-    n_redundant_rigid: int  #: would if all bodies were rigid
-    redundant: Mapping[str, int]  #: constraints that repeat those of joints before them, by joint
+    n_redundant: int  #: number of redundant constraints, taking modes into account
+    n_redundant_rigid: int  #: number of redundant constraints if all bodies were rigid
+    redundant: Mapping[str, int]  #: number of constraints that repeat those of earlier joints, by joint
 
     @property
     def gruebler(self) -> int:
-        """Count of Gruebler: six for each body less all constraints."""
+        """Count of Gruebler: six for each body minus all constraints."""
         return 6 * self.n_bodies - self.n_constraints
 
     @property
     def mobility(self) -> int:
-        """Ways in which the bodies can move if they are rigid: six for each less the rank of the constraints."""
+        """Number of independent motions of the rigid bodies: six for each minus the rank of the constraints."""
         return self.gruebler + self.n_redundant_rigid
 
     @property
@@ -51,7 +51,7 @@ class Mobility:
 
 
 def constraint_mobility(compiled: CompiledSystem, work: Work, state: State) -> Mobility:
-    """Return the mobility at a state in which the joints are closed."""
+    """Return the mobility at a state with closed joints."""
     model = compiled.model
     holds = is_held(model.rows.kind)
     owner = np.repeat(np.arange(len(model.connections.size)), model.connections.size)[holds]
@@ -87,13 +87,13 @@ def scaled_constraints(model: Model, work: Work, state: State) -> tuple[Array, A
 
 
 def unit_rows(A: Array) -> Array:
-    """Return rows divided by their length; rows of zeros stay."""
+    """Return rows divided by their length; rows of zeros are unchanged."""
     length = np.linalg.norm(A, axis=1, keepdims=True)
     return np.asarray(A / np.where(length > 0, length, 1.0))
 
 
 def dependent_rows(A: Array) -> Array:
-    """Return which rows the rows before them span, (n_rows,) bool."""
+    """Return the rows that earlier rows span, (n_rows,) bool."""
     basis = np.zeros((0, A.shape[1]))
     result = np.zeros(len(A), dtype=bool)
     for k, row in enumerate(A):

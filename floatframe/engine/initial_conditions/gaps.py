@@ -1,4 +1,4 @@
-"""Gaps between bodies at one state, for what is done once per motion or step; the kernels have their own."""
+"""Gaps between bodies at one state, for use once per motion or step; the kernels have their own functions."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ __all__ = ["gaps_at", "has_gaps"]
 
 
 def has_gaps(compiled: CompiledSystem) -> bool:
-    """Whether a system has contacts, or elements that name their gaps."""
+    """Whether a system has contacts, or elements that declare gaps."""
     return len(compiled.model.gaps.connection) > 0
 
 

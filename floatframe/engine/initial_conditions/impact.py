@@ -1,4 +1,4 @@
-"""Velocities after an impact: constraints that begin to hold at an instant, or throw a coordinate back.
+"""Velocities after an impact: constraints that become active at an instant, or reverse the rate of a coordinate.
 
 With M the masses of all bodies and modes and G the rows of all constraints, those of joints among them,
 
@@ -30,18 +30,18 @@ __all__ = ["Impact", "impact"]
 
 @dataclass(frozen=True, eq=False)
 class Impact:
-    """What an impact leaves."""
+    """The result of an impact."""
 
     state: State  #: with the velocities after it
-    rate: Array  #: of what each row holds, before it, (n_w,)
-    impulse: Array  #: of the unknown of each row, (n_w,) [N s, N m s]
-    gap: Array  #: by which what each row holds is open, (n_w,) [m, rad; of velocities held m/s]
+    rate: Array  #: rate of the held quantity of each row before the impact, (n_w,)
+    impulse: Array  #: impulse of the unknown of each row, (n_w,) [N s, N m s]
+    gap: Array  #: gap of the held quantity of each row, (n_w,) [m, rad; for held velocities m/s]
 
 
 def impact(
     compiled: CompiledSystem, state: State, *, t: float, known: Array, restitution: Mapping[int, float]
 ) -> Impact:
-    """Return the state (frames of the engine) after all constraints of a system have taken hold at once.
+    """Return the state (frames of the engine) after all constraints of a system become active at once.
 
     Parameters
     ----------

@@ -66,16 +66,17 @@ __all__ = [
 ]
 
 
-ASSEMBLED = 1e-12  #: largest |g| of an assembled system, points relative to its size
+ASSEMBLED = 1e-12  #: largest |g| of an assembled system; for points relative to the size of the system
 MOST_ITERATIONS = 30
-OF_STEP = 0.1  #: of a step: over which rates of accelerations are differences
-NEAREST = 1e-6  #: of a step: such differences where a contact is near
-NEAR_BY = 1e-3  #: rad, and part of the size of the system: a small way from a position
-ALLOWED = 1e-10  #: singular value of what rigid bodies are held by, relative to the largest, of a motion that is free
+OF_STEP = 0.1  #: fraction of a step for differences that give rates of accelerations
+NEAREST = 1e-6  #: the same fraction if a contact is near
+NEAR_BY = 1e-3  #: small displacement from a position: in rad, or relative to the size of the system
+#: singular value of the constraints of rigid bodies, relative to the largest, below which a motion is free
+ALLOWED = 1e-10
 
 
 def mobility(system: System) -> Mobility:
-    """Return the mobility of a system as placed, its joints closed first.
+    """Return the mobility of a system in its assembled position, after closing its joints.
 
     Raises
     ------
@@ -89,7 +90,7 @@ def mobility(system: System) -> Mobility:
 
 @dataclass(frozen=True, eq=False)
 class ConsistentState:
-    """A state that fulfils the joints, with the accelerations and reactions that go with it."""
+    """A state that fulfils the joints, with its accelerations and reactions."""
 
     state: State
     u_dot: Array  #: (n_u,)
@@ -99,7 +100,7 @@ class ConsistentState:
 def consistent_state(
     system: System, state: State | None = None, *, t: float = 0.0, known: Array | None = None
 ) -> ConsistentState:
-    """Return a consistent state near a given one, or near the bodies as placed, for prescribed motions at time t.
+    """Return a consistent state near a given state or the assembled bodies, for prescribed motions at time t.
 
     known: wrenches and other unknowns from a motion before, (n_w,), whose turned angles of couplers and states of user
     forces go on.
@@ -121,7 +122,7 @@ def consistent_motion(
     known: Array | None = None,
     angle: Array | None = None,
 ) -> ConsistentState:
-    """Return what `consistent_state` returns, in the frames of the engine; the given state is in those of the files.
+    """Return the same as `consistent_state`, in the frames of the engine; the given state is in those of the files.
 
     angle: counted angles of a motion before, (n_angles,), whose turned bushings go on.
     """
@@ -141,7 +142,7 @@ def consistent_motion(
 
 
 def known_of(compiled: CompiledSystem, state: State | None) -> Array | None:
-    """Return the unknowns that a state carries, where the system has states that go on; else None.
+    """Return the unknowns in a state if the system has states that continue; otherwise None.
 
     Raises
     ------
@@ -154,13 +155,13 @@ def known_of(compiled: CompiledSystem, state: State | None) -> Array | None:
     if state.w.shape != (n_w,):
         raise ModelError(
             f"state: w: expected the {n_w} unknowns of this system's joints, forces and elements, got {len(state.w)} "
-            "of another; let their states begin at their start: dataclasses.replace(state, w=None)"
+            "of another system; to use the initial values of their states, call dataclasses.replace(state, w=None)"
         )
     return state.w
 
 
 def checked(compiled: CompiledSystem, state: State) -> State:
-    """Return a state given by the user in the frames of the engine; `ModelError` if it is not one of this system."""
+    """Return a user's state in the frames of the engine; `ModelError` if it is not a state of this system."""
     p = np.empty_like(compiled.placed.p)
     for name in ("r", "p", "q", "u"):
         value = array_of_shape(f"state: {name}", getattr(state, name), getattr(compiled.placed, name).shape)
@@ -171,7 +172,7 @@ def checked(compiled: CompiledSystem, state: State) -> State:
 
 
 def assembled(compiled: CompiledSystem, work: Work, state: State, known: Array | None = None) -> State:
-    """(1): return the state with all joints closed, drives of angles at the angle that is meant."""
+    """(1): return the state with all joints closed, and driven angles at their prescribed values."""
     model = compiled.model
     if not is_held_position(model.rows.kind).any():
         return state
@@ -179,7 +180,7 @@ def assembled(compiled: CompiledSystem, work: Work, state: State, known: Array |
     if len(drives):
         for left in stages(way_of_drives(model, work, state, w, drives)):
             near, error = closed(compiled, led_by(model, drives, left), work, near, w)
-            if error.any():  # the way there leads out of reach: the drive may be within reach all the same
+            if error.any():  # a position on the path is out of reach, although the drive itself may be within reach
                 near = state
                 break
     end, error = closed(compiled, model, work, near, w)
@@ -189,14 +190,14 @@ def assembled(compiled: CompiledSystem, work: Work, state: State, known: Array |
         missed = drives[np.abs(way_of_drives(model, work, end, w, drives)) > np.pi / 2]
         if len(missed):
             raise ModelError(
-                f"{' and '.join(drive_name(compiled, row) for row in missed)}: closed from the given positions half a "
-                "turn from the prescribed angle; place the bodies nearer to it"
+                f"{' and '.join(drive_name(compiled, row) for row in missed)}: closing the joints from the given "
+                "positions ends half a turn from the prescribed angle; place the bodies nearer to it"
             )
     return end
 
 
 def closed(compiled: CompiledSystem, model: Model, work: Work, state: State, w: Array) -> tuple[State, Array]:
-    """Return the state with the joints of a model closed, and what stays open of its rows: (n_w,), zero if none."""
+    """Return the state with the joints of a model closed, and the remaining gaps of its rows: (n_w,), zero if none."""
     holds = is_held_position(model.rows.kind)
     scale = np.where(is_held_length(model.rows.kind), compiled.length, 1.0)
     for _ in range(MOST_ITERATIONS):
@@ -218,7 +219,7 @@ def closed(compiled: CompiledSystem, model: Model, work: Work, state: State, w: 
 
 
 def refuse_open_joints(compiled: CompiledSystem, work: Work, state: State, error: Array) -> None:
-    """Raise `ModelError` naming the joints that stay open, or the drives against each other."""
+    """Raise `ModelError` with the names of the joints that remain open, or of the conflicting drives."""
     conflict = conflict_of_drives(compiled, work, state)
     if conflict:
         raise ModelError(f"conflicting drives: {conflict}; remove one of them, or free the coordinate that opposes it")
@@ -231,7 +232,7 @@ def refuse_open_joints(compiled: CompiledSystem, work: Work, state: State, error
 
 
 def require_independent_constraints(compiled: CompiledSystem, work: Work, tree: Tree, state: State) -> None:
-    """Raise `ModelError` naming the joints if some constraints repeat others, unless these are to share their load."""
+    """Raise `ModelError` with the joints of redundant constraints, unless these are to share their load."""
     model = compiled.model
     holds = is_held(model.rows.kind)
     if not holds.any() or model.rows.soft.any():
@@ -242,7 +243,7 @@ def require_independent_constraints(compiled: CompiledSystem, work: Work, tree: 
     rows, _ = scaled_constraints(model, work, state)
     if not rows.any(axis=1).all():
         raise ModelError("a joint acts on the ground alone")
-    vectors = np.linalg.svd(rows.T)[2][::-1].T  # columns, those of the smallest first
+    vectors = np.linalg.svd(rows.T)[2][::-1].T  # columns, beginning with those of the smallest singular values
     conflict = conflict_of_drives(compiled, work, state)
     if conflict:
         raise ModelError(f"conflicting drives: {conflict}; remove one of them, or free the coordinate that opposes it")
@@ -251,9 +252,9 @@ def require_independent_constraints(compiled: CompiledSystem, work: Work, tree: 
     involved = [name for c, name in enumerate(compiled.connection_names) if share[owner == c].sum() > 1e-6]
     if is_singular_position(compiled, work, tree, state, n_redundant):
         raise ModelError(
-            f"a singular position: {n_redundant} of {int(holds.sum())} constraints repeat others here, but not a "
-            f"little way along the motion (see joints {', '.join(repr(name) for name in involved)}), so that it could "
-            "go on in more than one way; begin in another position"
+            f"a singular position: {n_redundant} of {int(holds.sum())} constraints are redundant here, but "
+            f"not in neighbouring positions (see joints {', '.join(repr(name) for name in involved)}), so that the "
+            "motion could continue in more than one way; begin in another position"
         )
     counts = constraint_mobility(compiled, work, state).redundant
     told = ", ".join(f"{count} of joint {name!r}" for name, count in counts.items())
@@ -266,7 +267,7 @@ def require_independent_constraints(compiled: CompiledSystem, work: Work, tree: 
 
 
 def is_singular_position(compiled: CompiledSystem, work: Work, tree: Tree, state: State, n_redundant: int) -> bool:
-    """Whether fewer constraints repeat others a thousandth of a radian along the motions that the joints allow."""
+    """Whether a displacement of 1e-3 rad along allowed motions reduces the number of redundant constraints."""
     model = compiled.model
     holds = is_held(model.rows.kind)
     set_iterate(work, state)
@@ -323,14 +324,15 @@ def solve_accelerations(
         raise_errors_of(compiled.callbacks)
         require_numbers(compiled, work)
         forces, known_rows = -work.bodies.residual, np.zeros(len(w))
-        if feels_accelerations:  # residuals and rows are those with the accelerations of the iterate
+        if feels_accelerations:  # residuals and rows include the accelerations of the iterate
             forces = forces + sp.block_diag(parts.H) @ y
             known_rows = parts.G @ y
         rows = np.where(is_held(model.rows.kind), -bias, known_rows - work.connections.g)
         y, change = solve(with_mass_for_all(model, parts.H), parts, forces, rows)
         w = w + change
         raise_errors_of(compiled.callbacks)
-        # friction by the normal force is not linear in the reactions, nor are users' forces in states or accelerations
+        # friction that depends on the normal force is not linear in the reactions, and users' forces are not in states
+        # or accelerations
         is_linear = not has_normal_friction(model) and not len(model.states.row) and not feels_accelerations
         if is_linear or np.abs(change).max(initial=0.0) <= 1e-10 * np.abs(w).max(initial=0.0):
             break
@@ -338,14 +340,14 @@ def solve_accelerations(
 
 
 def work_from(model: Model, known: Array | None) -> Work:
-    """Return working arrays in which the states of user forces are held at what is known of them, or their start."""
+    """Return working arrays in which the states of user forces are fixed at their known or initial values."""
     work = new_work(model)
     work.states.base[:] = start_unknowns(model, known)[model.states.row]
     return work
 
 
 def require_numbers(compiled: CompiledSystem, work: Work) -> None:
-    """Raise `ModelError` naming the element whose law gives what is no number at the iterate."""
+    """Raise `ModelError` with the name of an element whose law is not finite at the iterate."""
     no_number = int(work.counted.no_number)
     if no_number:
         raise ModelError(
@@ -355,7 +357,7 @@ def require_numbers(compiled: CompiledSystem, work: Work) -> None:
 
 
 def start_unknowns(model: Model, known: Array | None = None) -> Array:
-    """Return the unknowns of connections before anything is known, (n_w,): states of user forces at their start.
+    """Return the initial unknowns of connections, (n_w,): zero, and states of user forces at their initial values.
 
     With unknowns that are known from before: these states, and the coordinates of couplers and user forces, whose
     angles are those next to them.
@@ -405,20 +407,20 @@ def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t:
     return (u_dot_after(s) - u_dot_after(-s)) / (2 * s)
 
 
-# checks of initial values before they are computed: motions far from the start, half turns, redundant constraints -----
+# checks of initial values: motions far from the start, half turns, redundant constraints ------------------------------
 
 
-# drives of angles that begin far from where their bodies were placed: the root of their row that is meant -------------
+# drives of angles that begin far from where their bodies were placed: selection of the root of their row --------------
 # The row of a driven angle, (E cos f + Z sin f) · D = sin(f - th), vanishes at th = f and half a turn from there, and
-# Newton's method goes to the nearer one. From far away the drive is led there in steps of an eighth of a turn; a row
-# whose axes E, Z are turned by delta asks for f - delta.
+# Newton's method converges to the nearer root. From far away the drive is moved there in steps of an eighth of a turn;
+# a row whose axes E, Z are rotated by delta prescribes f - delta.
 
 
-FAR = np.pi / 4  #: way of a drive from which it is led, and the longest of its steps
+FAR = np.pi / 4  #: deviation of a drive above which it is moved in steps, and the largest step
 
 
 def driven_angles(model: Model) -> IntArray:
-    """Return the rows that prescribe an angle over time."""
+    """Return the rows that prescribe an angle as a function of time."""
     is_turn = (model.rows.kind == TURN) | (model.rows.kind == TURN_B)
     return np.flatnonzero(is_turn & (model.rows.motion >= 0))
 
@@ -435,7 +437,7 @@ def way_of_drives(model: Model, work: Work, state: State, w: Array, rows: IntArr
 
 
 def led_by(model: Model, rows: IntArray, delta: Array) -> Model:
-    """Return the model in which driven angles are to be f - delta, delta (len(rows),) [rad]."""
+    """Return the model in which driven angles are prescribed as f - delta, delta (len(rows),) [rad]."""
     c, s = np.cos(delta)[:, None], (sense_of(model, rows) * np.sin(delta))[:, None]
     x, z = model.rows.x.copy(), model.rows.z.copy()
     x[rows] = c * model.rows.x[rows] - s * model.rows.z[rows]
@@ -444,12 +446,12 @@ def led_by(model: Model, rows: IntArray, delta: Array) -> Model:
 
 
 def sense_of(model: Model, rows: IntArray) -> Array:
-    """Return the sense of an angle as the marker of its axes sees it: -1 about an axis of B."""
+    """Return the sense of an angle in the marker of its axes: -1 about an axis of B."""
     return np.where(model.rows.kind[rows] == TURN_B, -1.0, 1.0)
 
 
 def stages(way: Array) -> list[Array]:
-    """Return how far drives are still from their angles after each step of a lead, (n_drives,) each, the last left out.
+    """Return the remaining deviations of drives after each step towards their angles, (n_drives,), without the last.
 
     No step where all drives are near: they close by themselves.
     """
@@ -457,16 +459,17 @@ def stages(way: Array) -> list[Array]:
     return [way * (1 - k / n) for k in range(1, n)]
 
 
-# rotations that are closed the wrong way round: rows of products of axes vanish at half a turn as well ----------------
-# A fixed orientation is held by x_A·y' = y_A·z' = z_A·x' = 0, axes x', y', z' of B that should lie along those of A, an
-# axis by E·n_1 = E·n_2 = 0, E of A, n_1 × n_2 the axis of B. With R the rotation between the two, the first are
-# R_12 = R_23 = R_31 = 0: fulfilled where R = 1, at half a turn about x, y or z, and nowhere else (R is orthogonal, so
-# that the other numbers of R can only be 1 or -1, or all zero but R_13, R_21, R_32, a third of a turn about the
-# diagonal); the second where the axes are parallel or opposite. Newton's method ends at the nearest of them.
+# wrong roots of rotations: rows of products of axes also vanish at half a turn ----------------------------------------
+# A fixed orientation is held by x_A·y' = y_A·z' = z_A·x' = 0, where the axes x', y', z' of B should be parallel to
+# those of A. An axis is held by E·n_1 = E·n_2 = 0, E of A, n_1 × n_2 the axis of B. With R the rotation between the
+# two, the first are R_12 = R_23 = R_31 = 0: fulfilled where R = 1, at half a turn about x, y or z, and nowhere else (R
+# is orthogonal, so that the other numbers of R can only be 1 or -1, or all zero but R_13, R_21, R_32, a third of a turn
+# about the diagonal); the second where the axes are parallel or opposite. Newton's method converges to the nearest of
+# these.
 
 
 def require_no_half_turns(compiled: CompiledSystem, work: Work, state: State) -> None:
-    """Raise `ModelError` naming a joint whose axes are closed against each other where they should lie along.
+    """Raise `ModelError` with the name of a joint whose axes are closed antiparallel instead of parallel.
 
     Parameters
     ----------
@@ -500,33 +503,34 @@ def require_no_half_turns(compiled: CompiledSystem, work: Work, state: State) ->
         if min(along) < 0.5:
             turn = "half a turn" if min(along) < -0.5 else "a third of a turn"
             raise ModelError(
-                f"joint {name!r} is closed {turn} away from the orientation that it holds, where its equations vanish "
-                "as well; place its bodies nearer to it, or turn the axis (axis_b, rotation) that is given for it"
+                f"joint {name!r} is closed {turn} away from its orientation, because its equations vanish "
+                "there too; place its bodies nearer to this orientation, or rotate its given axis (axis_b, rotation)"
             )
 
 
-# how many constraints repeat others, told from constraints that are poorly conditioned --------------------------------
-# Joints of a tree never repeat each other: each brings a body of its own, and N, the motions of the bodies by the
-# coordinates of the tree, spans all that they allow. So the rank of all constraints G is
+# number of redundant constraints, distinguished from poorly conditioned constraints -----------------------------------
+# Joints of a tree are never redundant: each adds a body, and N, the motions of the bodies by the coordinates of the
+# tree, spans all allowed motions. So the rank of all constraints G is
 #
-#     rank G = rows of the tree + rank (G_c N),      G_c the rows of what closes loops,
+#     rank G = rows of the tree + rank (G_c N),      G_c the rows that close loops.
 #
-# where a chain of any length has no G_c at all, though the least singular value of G, scaled by the masses, falls with
-# the square of the number of its links. Rows of G_c N are scaled to length one, coordinates by the mass that they move.
-# Its small singular values belong to repeated constraints if there is a gap above them, or if they are rounding; those
-# of long trusses fall without a gap. Few constraints that are well conditioned as they are, which is the rule, are not
-# looked at so closely: N would want the kernels of relative coordinates, compiled at their first use.
+# A chain of any length has no G_c, although the smallest singular value of G, scaled by the masses, falls with the
+# square of the number of its links. Rows of G_c N are scaled to length one, coordinates by the mass that they move.
+# Its small singular values belong to redundant constraints if there is a gap above them, or if they are rounding;
+# those of long trusses decrease without a gap. In the usual case of few, well-conditioned constraints this analysis
+# is skipped, because N needs the kernels of relative coordinates, which are compiled at their first use.
 
 
-FEW = 200  #: rows, up to which all are looked at first: that takes milliseconds
-WELL = 1e-6  #: least eigenvalue of G M⁻¹ Gᵀ, rows scaled to length one, of constraints none of which repeats others
-SMALL = 1e-5  #: singular value by the largest, below which constraints may repeat others
-GAP = 1e-3  #: of the next larger one, if they do
-ROUNDING = 1e-11  #: singular value by the largest, or row by what it holds of bodies alone, that is none
+FEW = 200  #: number of rows up to which all are checked first: this takes milliseconds
+WELL = 1e-6  #: smallest eigenvalue of G M⁻¹ Gᵀ, for unit rows, above which no constraint is redundant
+SMALL = 1e-5  #: singular value relative to the largest, below which constraints may be redundant
+GAP = 1e-3  #: ratio of the next larger singular value, if they are
+#: singular value relative to the largest, or norm of a row relative to its part for bodies only, that counts as zero
+ROUNDING = 1e-11
 
 
 def repeated_constraints(compiled: CompiledSystem, work: Work, tree: Tree, state: State) -> int:
-    """Return how many of the rows that joints and elements hold repeat others at a state; arrays are overwritten."""
+    """Return the number of redundant rows of joints and elements at a state; arrays are overwritten."""
     model = compiled.model
     closing = is_held(model.rows.kind) & (tree.kept_row >= 0)
     if not closing.any():
@@ -550,7 +554,7 @@ def repeated_constraints(compiled: CompiledSystem, work: Work, tree: Tree, state
 
 
 def dependent_count(C: Array) -> int:
-    """Return by how much the rank of rows of length one is below their number."""
+    """Return the rank deficiency of unit rows."""
     if not len(C):
         return 0
     values = np.linalg.svd(C, compute_uv=False)

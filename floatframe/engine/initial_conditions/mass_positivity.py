@@ -38,7 +38,7 @@ def indefinite_masses(system: System, state: State) -> tuple[str, ...]:
 
 
 def indefinite_mass_words(names: tuple[str, ...]) -> str:
-    """Say in one sentence what it means and what to do; nothing for no body."""
+    """Return a message on the meaning and the remedy; an empty text for no body."""
     if not names:
         return ""
     told = ", ".join(repr(name) for name in names)

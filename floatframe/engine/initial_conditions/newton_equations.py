@@ -1,4 +1,4 @@
-"""The linearised equations at one iterate, and their solution; for everything that is done once per motion."""
+"""The linearised equations at one iterate, and their solution, for all computations done once per motion."""
 
 from dataclasses import dataclass
 
@@ -28,9 +28,9 @@ __all__ = [
     "with_modal_weight",
 ]
 
-STIFF = 1e3  #: the stiffness in W is scaled so that the softest mode weighs this much more than its mass
-STIFF_START = 1e6  #: the same where a placement is closed: modes that hardly give way hardly ring after it
-MASSLESS = 10.0  #: a mode without mass gets one that puts it at this multiple of the highest frequency
+STIFF = 1e3  #: the stiffness in W is scaled so that it exceeds the mass by this factor for the softest mode
+STIFF_START = 1e6  #: the same when closing a placement: stiff modes hardly vibrate afterwards
+MASSLESS = 10.0  #: frequency of a mode without mass, relative to the highest frequency, from its artificial mass
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,7 @@ def linearized(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> 
     for m in model.bodies.ends:
         i, c, o = int(model.markers.body[m]), int(model.markers.connection[m]), int(model.markers.x0[m])
         n, size = 6 + int(model.bodies.n_q[i]), int(model.connections.size[c])
-        R = work.state.R[i]  # turns each three rows of what follows
+        R = work.state.R[i]  # rotates each three rows of the following columns
         column = work.solver.J_column[6 * o : 6 * (o + n)].reshape(2, 3, n)
         row = work.solver.J_row[12 * o : 12 * (o + n)].reshape(4, 3, n)
         w0, u0 = int(model.connections.w0[c]), int(model.bodies.u0[i])
@@ -157,7 +157,7 @@ def highest_frequency(model: Model) -> float:
 
 
 def modal_weight(model: Model, i: int, stiff: float = STIFF) -> float:
-    """Return the factor of the modal stiffness of a body with which its softest mode weighs `stiff` times its mass."""
+    """Return the factor on the modal stiffness of a body for which its softest mode is `stiff` times its mass."""
     M, K = modal_diagonals(model, i, MASS), modal_diagonals(model, i, STIFFNESS)
     elastic = (M > 0) & (K > 0)
     softest = np.min(K[elastic] / M[elastic]) if elastic.any() else (K.max() if K.size and K.max() > 0 else 1.0)
@@ -165,7 +165,7 @@ def modal_weight(model: Model, i: int, stiff: float = STIFF) -> float:
 
 
 def with_modal_weight(model: Model, H: tuple[Array, ...], stiff: float = STIFF) -> tuple[Array, ...]:
-    """Return mass matrices with the modal stiffness added, scaled by `stiff`: W of `initial`."""
+    """Return mass matrices plus modal stiffness scaled by `stiff`: W of `initial`."""
     weighted = []
     for i, block in enumerate(H):
         block = block.copy()
@@ -175,7 +175,7 @@ def with_modal_weight(model: Model, H: tuple[Array, ...], stiff: float = STIFF) 
 
 
 def with_mass_for_all(model: Model, H: tuple[Array, ...]) -> tuple[Array, ...]:
-    """Return mass matrices in which modes without mass have a small one, so that they can be accelerated."""
+    """Return mass matrices with a small mass for modes without mass, so that they can be accelerated."""
     omega = MASSLESS * highest_frequency(model)
     complete = []
     for i, block in enumerate(H):
@@ -206,7 +206,7 @@ def product(p: Array, s: Array) -> Array:
 
 
 def in_ground_axes(model: Model, state: State, y: Array) -> Array:
-    """Return body unknowns with their translation turned from body to ground axes, (n_u,)."""
+    """Return body unknowns with their translation rotated from body to ground axes, (n_u,)."""
     x = y.copy()
     for i, p in enumerate(state.p):
         u0 = model.bodies.u0[i]
@@ -215,7 +215,7 @@ def in_ground_axes(model: Model, state: State, y: Array) -> Array:
 
 
 def in_body_axes(model: Model, state: State, x: Array) -> Array:
-    """Return body unknowns with their translation turned from ground to body axes, (n_u,)."""
+    """Return body unknowns with their translation rotated from ground to body axes, (n_u,)."""
     y = x.copy()
     for i, p in enumerate(state.p):
         u0 = model.bodies.u0[i]

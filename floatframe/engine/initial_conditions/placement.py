@@ -1,4 +1,4 @@
-"""How far the joints moved bodies from where they were placed: told where it is much, refused where it is absurd.
+"""Displacement of bodies from their given positions by the joints: reported if large, refused if implausible.
 
 Newton's method closes the joints from any place; from far away it can end in another configuration than the one that
 was meant (an elbow the other way round).
@@ -17,12 +17,12 @@ __all__ = ["require_placed_near"]
 
 log = logging.getLogger(__name__)
 
-REPORTED = 0.1  #: of the size of a body: a way that is told
-REFUSED = 3.0  #: of the size of the largest body: a way that is no placement of it
+REPORTED = 0.1  #: displacement relative to the size of a body, above which it is reported
+REFUSED = 3.0  #: displacement relative to the size of the largest body, above which it is refused
 
 
 def require_placed_near(compiled: CompiledSystem, placed: State, closed: State) -> None:
-    """Log which body the joints moved far, and raise `ModelError` where it was placed out of reach.
+    """Log the body that the joints moved far, and raise `ModelError` if it was placed out of reach.
 
     Prescribed motions may move bodies far at their beginning: with them it is told, not refused.
 
@@ -49,7 +49,10 @@ def require_placed_near(compiled: CompiledSystem, placed: State, closed: State) 
             f"body {compiled.body_names[far]!r} was placed {way[far]:.3g} from where its joints hold it; the largest "
             f"body has a size of {size.max():.3g}: place it at its joints, or check the units of its position"
         )
-    log.warning("%s, and moved there; from so far it can end in another configuration: place it at its joints", words)
+    log.warning(
+        "%s and was moved there; from this distance it can end in another configuration, so place it at its joints",
+        words,
+    )
 
 
 def body_sizes(compiled: CompiledSystem) -> Array:

@@ -1,4 +1,4 @@
-"""Accelerations at the start of a motion, without what a step of the given size cannot follow.
+"""Accelerations at the start of a motion, without the parts that a step of the given size cannot resolve.
 
 A start knows the accelerations u_dot of the equations of motion alone. Where a mode, a spring or a damper is far
 faster than the step, they throw the body on which it acts. The matrix of a Newton step tells fast from slow:
@@ -57,7 +57,7 @@ class StepFilter:
 
     compiled: CompiledSystem
     state: State
-    mass: sp.csr_array  #: M and, below, what rows feel of accelerations, (n_u + n_w, n_u)
+    mass: sp.csr_array  #: M and, below, the dependence of rows on accelerations, (n_u + n_w, n_u)
     factors: SuperLU  #: of the matrix of (1)
 
     def __call__(self, y: Array) -> Array:
@@ -76,7 +76,7 @@ class StepFilter:
         return z + self(y - z)
 
     def closing(self, gap: Array) -> Array:
-        """Return du of (3), (n_u,), for g(after)/h, (n_w,), zero in all rows that are not closed so."""
+        """Return du of (3), (n_u,), for g(after)/h, (n_w,), zero in all rows that are not closed in this way."""
         model, n_u = self.compiled.model, self.mass.shape[1]
         right = np.concatenate([np.zeros(n_u), -gap])
         return in_ground_axes(model, self.state, self.factors.solve(right)[:n_u])
@@ -135,7 +135,7 @@ def filter_by(
 
 
 def is_wrench(model: Model) -> NDArray[np.bool_]:
-    """Return which unknowns of connections are forces, moments or multipliers, and no states or coordinates, (n_w,)."""
+    """Return which unknowns of connections are forces, moments or multipliers, and not states, (n_w,)."""
     result = np.ones(int(model.connections.w0[-1]), dtype=bool)
     for k in range(3):
         result[model.states.row + k] = False
@@ -146,15 +146,16 @@ def is_wrench(model: Model) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True, eq=False)
 class Spin:
-    """Axisymmetric bodies whose spin the steps take by itself, see `kernels.generalized_alpha`."""
+    """Axisymmetric bodies whose spin is integrated separately, see `kernels.generalized_alpha`."""
 
-    bodies: NDArray[np.int64]  #: 1 for each of them, (n_b,)
-    turn: Array  #: w omega × e, the part of u_dot by which their axes e turn with the spin w, (n_u,)
-    further: Array  #: by which rates of the rest, in axes that do not spin, differ from those of u_dot, (n_u,)
+    bodies: NDArray[np.int64]  #: 1 for each of these bodies, (n_b,)
+    turn: Array  #: w omega × e, the part of u_dot that rotates their axes e with the spin w, (n_u,)
+    #: difference between the rates of the remainder, in axes that do not spin, and those of u_dot, (n_u,)
+    further: Array
 
 
 def spin_of(compiled: CompiledSystem, consistent: ConsistentState, may: NDArray[np.bool_] | None = None) -> Spin:
-    """Return the bodies whose spin the next step takes by itself; may, (n_b,): of those, None for all."""
+    """Return the bodies whose spin the next step integrates separately; may, (n_b,): candidates, None for all."""
     from floatframe.engine.kernels.generalized_alpha import STEADY
 
     model, u, u_dot = compiled.model, consistent.state.u, consistent.u_dot
@@ -176,7 +177,7 @@ class Beginning:
     """Accelerations with which a motion begins, and their rates, filtered with one s."""
 
     u_dot: Array  #: (2 Z - Z²) u_dot, (n_u,)
-    rates: Array  #: Z d(u_dot)/dt along the motion with these, of bodies that spin in axes that do not, (n_u,)
+    rates: Array  #: Z d(u_dot)/dt along the motion; for bodies that spin in axes that do not spin, (n_u,)
 
 
 def beginning_of(
@@ -188,7 +189,7 @@ def beginning_of(
     *,
     spin: Spin | None = None,
 ) -> Beginning:
-    """Return accelerations and rates at a state at time t for steps of size h; z None: as the equations of motion say.
+    """Return accelerations and rates at a state at time t for steps of size h; z None: from the equations of motion.
 
     spin: of bodies whose accelerations are filtered without the turn of their axes.
     """
@@ -204,7 +205,7 @@ def closing_velocities(z: StepFilter, after: State, w: Array, t: float, h: float
     """Return du of (3), (n_u,), for some rows, (n_w,), in a step of size h from t to `after`; z: with s = 1."""
     model = z.compiled.model
     work, unknowns = work_from(model, w), start_unknowns(model, w)
-    if len(model.coordinates.row):  # angles of couplers and user forces are those next to where their rates lead
+    if len(model.coordinates.row):  # angles of couplers and user forces are those nearest to the predicted ones
         row = model.coordinates.row
         work.state.time[...] = t
         set_iterate(work, z.state, w=unknowns)

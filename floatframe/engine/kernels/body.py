@@ -94,7 +94,7 @@ def axial(W):
 
 @loops
 def modal_term(types, t, n, which, x, out):
-    """Add M x, K x or D x of a type of bodies to out, (n_q,)."""
+    """Add M x, K x or D x of a type of bodies to `out`, (n_q,)."""
     if types.is_diagonal[t, which - MASS]:
         diagonal = block(types, t, which, n)
         for k in range(n):
@@ -287,7 +287,7 @@ def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
 
 @loops
 def spin_columns(model, work, i, c_d, H):
-    """Add what the rate of turn of the axis e of a body that spins adds to its angular acceleration, w dtheta × e.
+    """Add the contribution w dtheta × e of the rotation of the axis e of a spinning body to its angular acceleration.
 
     w: spin; see `kernels.generalized_alpha`. The columns of alpha in (1) to (3) are -tilde(s), J, Bᵀ.
     """
@@ -337,7 +337,7 @@ def modal_tangent(model, work, i, c_m, c_d, c_k, H, turn):
 
 @loops
 def modal_columns(model, work, i, c_d, c_k, H):
-    """Add what needs products over 4C and S_ab: the modal block, and the rest of (2) by q.
+    """Add the terms with products over 4C and S_ab: the modal block, and the rest of the derivative of (2) by q.
 
     2 4C_kj·omega, B'_kj·alpha - omegaᵀ 5C_jk omega; Σ_k B'_kj q_ddot_k + 2 Σ_k q_dot_k 5C_jk omega, where B'_kj is the
     derivative of B_k by q_j: 4C_kj, and K_r,kj of a stiffened body; both are in S_ab. The second is Σ A_ab S_ab,kj with
@@ -362,7 +362,7 @@ def modal_columns(model, work, i, c_d, c_k, H):
 
 @loops
 def stiffened_columns(model, work, i, c_d, c_k, H):
-    """Add what K_t gives beyond s(q) and 1C(q), and the derivatives of q_dotᵀK_t q_dot, q_dotᵀK_r q_dot."""
+    """Add the contribution of K_t beyond s(q) and 1C(q), and the derivatives of q_dotᵀK_t q_dot and q_dotᵀK_r q_dot."""
     n, q0, u0 = model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
     K_t = block(model.body_types, model.bodies.kind[i], K_TRANSLATION, 3 * n * n)
     first_dot = work.bodies.K_t_q_dot[3 * q0 : 3 * (q0 + n)]

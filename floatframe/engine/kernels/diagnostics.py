@@ -119,7 +119,7 @@ def diagnose(model, work, out, drift):
 
 @inner
 def drive_power(model, work, c):
-    """Return the power of the wrenches of a joint on its bodies if it prescribes a motion; else none."""
+    """Return the power of the wrenches of a joint on its bodies if it prescribes a motion; otherwise zero."""
     w0, a, b = model.connections.w0[c], model.connections.a[c], model.connections.b[c]
     is_driven = False
     for k in range(w0, model.connections.w0[c + 1]):
@@ -143,7 +143,7 @@ def drive_power(model, work, c):
 
 @inner
 def loaded_power(model, work, c):
-    """Return the power that enters by forces along coordinates of joint c, that taken by them, and their total."""
+    """Return the power supplied by forces along coordinates of joint c, the power dissipated by them, and the total."""
     rows, markers = model.rows, work.markers
     loads, dissipated, total = 0.0, 0.0, 0.0
     w0, a, b = model.connections.w0[c], model.connections.a[c], model.connections.b[c]
@@ -175,7 +175,7 @@ def body_load_power(model, work, d):
 
 @inner
 def power(model, work):
-    """Return the power of point forces and of drives, and that taken by dampers and modal damping (positive)."""
+    """Return the power of point forces and drives, and the power dissipated by dampers and modal damping (positive)."""
     loads, dissipated = 0.0, 0.0
     for k in range(model.loads.marker.shape[0]):
         m = model.loads.marker[k]

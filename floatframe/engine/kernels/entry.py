@@ -1,4 +1,4 @@
-"""The one compiled entry, and a plain function for each thing it does.
+"""The compiled entry, and a plain function for each of its tasks.
 
 One entry, since numba compiles and links everything below an entry once more for each of them.
 """
@@ -51,17 +51,17 @@ LINEARIZE, RATES, CORRECT, OBSERVE, ADVANCE, COUNT = range(6)
 
 
 class Order(NamedTuple):
-    """What an entry is asked for."""
+    """A request to the entry."""
 
     what: IntArray = integer()  #: LINEARIZE, RATES, CORRECT, OBSERVE, ADVANCE or COUNT
     c_m: Array = real()  #: weights of the parts of mass, damping, stiffness
     c_d: Array = real(unit="s")
     c_k: Array = real(unit="s²")
-    t0: Array = real(unit="s")  #: of step 0, or of the state that is observed
+    t0: Array = real(unit="s")  #: time of step 0, or of the observed state
     h: Array = real(unit="s")
     first: IntArray = integer()  #: number of the first step
     n_steps: IntArray = integer()
-    every: IntArray = integer()  #: results are written after every so many steps
+    every: IntArray = integer()  #: results are written at this interval of steps
     alpha_m: Array = real()  #: coefficients of the method
     alpha_f: Array = real()
     beta: Array = real()
@@ -69,19 +69,19 @@ class Order(NamedTuple):
     tolerance: Array = real()  #: of Newton's method
     max_iterations: IntArray = integer()
     length: Array = real(unit="m")  #: size of the system
-    most_error: Array = real()  #: of a step, 0 for none asked
-    h_min: Array = real(unit="s")  #: into which a step may be divided, 0 if it may not
-    stabilized: IntArray = integer()  #: whether velocities are held too, and spins taken by themselves
+    most_error: Array = real()  #: allowed error of a step, 0 for no control
+    h_min: Array = real(unit="s")  #: smallest part of a divided step, 0 if it may not be divided
+    stabilized: IntArray = integer()  #: whether velocities are enforced too, and spins integrated separately
 
 
 class Outcome(NamedTuple):
-    """What an entry reports."""
+    """The report of the entry."""
 
     status: int  #: DONE, DIVERGED, SINGULAR_BODY, SINGULAR_CONNECTION or INACCURATE
     n_steps: int  #: done
     n_rows: int  #: written
-    singular: int  #: number of the body or connection that is
-    excess: float  #: size of the last correction by the allowed one
+    singular: int  #: number of the singular body or connection
+    excess: float  #: size of the last correction relative to the allowed one
 
 
 as_model, as_work, as_memory = converter(Model()), converter(Work()), converter(Memory())
@@ -135,7 +135,7 @@ NO_ROWS = zeros(Rows(), NO_SIZES)
 
 
 def prepare() -> bool:
-    """Load the kernels from the cache, or compile them; return whether they were compiled now.
+    """Load the kernels from the cache, or compile them; return whether they were compiled in this call.
 
     Otherwise this happens with the first call. Calls after it find everything ready.
     """
@@ -145,11 +145,11 @@ def prepare() -> bool:
 
 
 def call(model: Model, work: Work, memory: Memory, rows: Rows, **order: float) -> Outcome:
-    """Run the entry with an order, what it does not name being zero; all arrays live until it returns."""
+    """Run the entry with a request; unnamed fields are zero, and all arrays live until it returns."""
     if not run.signatures:
         began = time.perf_counter()
         if prepare():
-            level = logging.INFO if is_lean else logging.WARNING  # what is not as usual is said
+            level = logging.INFO if is_lean else logging.WARNING  # unusual results are reported
             log.log(level, "compiled the code of the motion in %.0f s, once: %s", time.perf_counter() - began, words())
     ordered, numbers = table_of_numbers(ORDER, order)
     outcome = run(kept_table_of(model), kept_table_of(work), table_of(memory), table_of(rows), ordered)
@@ -158,7 +158,7 @@ def call(model: Model, work: Work, memory: Memory, rows: Rows, **order: float) -
 
 
 def no_memory() -> Memory:
-    """Return an empty memory, for what needs none."""
+    """Return an empty memory, for tasks that need none."""
     return zeros(Memory(), NO_SIZES)
 
 
@@ -179,14 +179,14 @@ def newton_correction(model: Model, work: Work, c_m: float, c_d: float, c_k: flo
 
 
 def observe_state(model: Model, work: Work, memory: Memory, t: float) -> Rows:
-    """Return the results at the state in the memory; the power at it goes into the memory."""
+    """Return the results at the state in the memory, and store the power at this state in the memory."""
     rows = new_rows(model, 1)
     call(model, work, memory, rows, what=OBSERVE, t0=t)
     return rows
 
 
 def count_angles(model: Model, work: Work, memory: Memory, h: float) -> None:
-    """Take the angles of the state in the memory into it, a step of size h after those that are there."""
+    """Store the angles of the state in the memory, a step of size h after the stored ones."""
     call(model, work, memory, NO_ROWS, what=COUNT, h=h)
 
 

@@ -40,7 +40,7 @@ def evaluate_markers(model, work):
 
 @inner
 def slide_markers(model, work):
-    """Move markers that slide to where they are by now; wrenches of all markers are zero."""
+    """Move sliding markers to their current positions; wrenches of all markers are zero."""
     for m in range(model.markers.body.shape[0]):
         for k in range(6):
             work.markers.wrench[m, k] = 0.0
@@ -50,7 +50,7 @@ def slide_markers(model, work):
 
 @inner
 def evaluate_bodies(model, work):
-    """Write the residuals of bodies with loads and the wrenches that connections put on markers."""
+    """Write the residuals of bodies including loads and wrenches of connections on markers."""
     for k in range(model.loads.marker.shape[0]):
         load_wrench(model, work, k)
     for i in range(model.bodies.kind.shape[0]):
@@ -87,7 +87,7 @@ def body_load(model, work, d):
 
 @inner
 def tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning):
-    """Write the tangent of body i into H, (6 + n, 6 + n), with all wrenches on it held fixed in space or in markers.
+    """Write the tangent of body i into H, (6 + n, 6 + n), with its wrenches constant in space or in markers.
 
     turning, (3, 3): rotation of the body by its unknown dtheta, see `marker_columns`.
     """
@@ -117,7 +117,7 @@ def turning_by_unknown(model, work, i):
 
 @inner
 def linearize(model, work, c_m, c_d, c_k):
-    """Write H of every body, J_row and J_column of every end, and P, V of every connection (nothing factorised)."""
+    """Write H of every body, J_row and J_column of every end, and P, V of every connection, without factorisation."""
     rate = c_d / c_k if c_k > 0.0 else 0.0
     for i in range(model.bodies.kind.shape[0]):
         n = 6 + model.bodies.n_q[i]

@@ -1,4 +1,4 @@
-"""Motion of a marker from that of its body, and the way of a wrench on the marker back to the body.
+"""Motion of a marker from that of its body, and transfer of a wrench on the marker to the body.
 
 With [rho - c; th] = Psi q - 1/2 qᵀ K_P q (K_P, (6, n, n): zero unless the body is stiffened), Psi(q) = Psi - K_P q its
 derivative (t: rows of rho, r: rows of th), E = exp(th), T' = left Jacobian at th, nu = T' th_dot, all in body axes:
@@ -37,7 +37,7 @@ __all__ = [
 
 @loops
 def marker_motion(model, work, m):
-    """Write place and motion of marker m."""
+    """Write position and motion of marker m."""
     i, markers, own = model.markers.body[m], work.markers, model.markers
     if i < 0:
         put(markers.r[m], 0, vector(own.position[m]))
@@ -59,7 +59,7 @@ def body_omega(bodies, state, i):
 
 @loops
 def pose_on_body(model, work, m):
-    """Write place, axes and velocities of marker m in ground axes from its motion in its body."""
+    """Write position, axes and velocities of marker m in ground axes from its motion in its body."""
     i, markers, triad = model.markers.body[m], work.markers, model.markers.triad[m]
     R, omega = work.state.R[i], body_omega(model.bodies, work.state, i)
     if model.markers.psi0[m] >= 0:
@@ -134,7 +134,7 @@ def bent_by(model, m, n, factors, out):
 
 @loops
 def bent_bias(model, work, m, i):
-    """Return -q_dotᵀ K_P q_dot of marker m, displacement and rotation; of a sliding one by its stations."""
+    """Return -q_dotᵀ K_P q_dot of marker m, displacement and rotation; for a sliding marker from its stations."""
     if model.markers.line[m] >= 0:
         bent = work.lines.bent[model.markers.line[m]]
         return vector(bent), vector(bent[3:])
@@ -186,7 +186,7 @@ def marker_acceleration(model, work, m, out):
 
 @loops
 def elastic_acceleration(model, work, m, i):
-    """Return what q_ddot adds to acceleration and angular acceleration of marker m of body i, body axes."""
+    """Return the contribution of q_ddot to acceleration and angular acceleration of marker m of body i, body axes."""
     o = model.markers.psi0[m]
     if o < 0:
         return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -351,7 +351,7 @@ def take_column(matrix, first, k, x):
 
 @loops
 def marker_stiffness(model, work, m, c_k, H, turn):
-    """Add the derivative of minus the generalised forces of a held wrench on marker m to H and turn.
+    """Add the derivative of minus the generalised forces of a constant wrench on marker m to H and `turn`.
 
     A wrench fixed in space turns against the body (turn); one fixed in the marker turns with its elastic rotation.
     """

@@ -1,4 +1,4 @@
-"""What an integrator remembers after a step, and the results of output times; sizes as in `kernels.model`."""
+"""The memory of an integrator after a step, and the results of output times; sizes as in `kernels.model`."""
 
 from typing import NamedTuple
 
@@ -30,7 +30,8 @@ __all__ = [
 ]
 
 N_DIAGNOSTICS = 12
-#: columns of `Rows.diagnostics`: energies; momentum (3), and that about the origin (3); work, as in `Memory`
+#: columns of `Rows.diagnostics`: energies; momentum (3), and angular momentum about the origin (3); work, as in
+#: `Memory`
 KINETIC, STRAIN, GRAVITATION, SPRINGS, MOMENTUM, ANGULAR_MOMENTUM, WORK_GIVEN, WORK_TAKEN = 0, 1, 2, 3, 4, 7, 10, 11
 N_DRIFTS = 4
 OF_DISTANCES, OF_ANGLES, OF_DISTANCE_RATES, OF_ANGLE_RATES = range(N_DRIFTS)  #: columns of `Rows.drift`
@@ -39,7 +40,7 @@ n_t = Size("n_t")
 
 
 class Memory(NamedTuple):
-    """What an integrator knows after a step; overwritten by the next."""
+    """The memory of an integrator after a step, which the next step overwrites."""
 
     r: Array = real(n_b, 3, unit="m")
     p: Array = real(n_b, 4)  #: Euler parameters
@@ -49,10 +50,10 @@ class Memory(NamedTuple):
     a: Array = real(n_u, unit="m/s², rad/s², 1/s²")  #: algorithmic acceleration
     w: Array = real(n_w, unit="N, N m")
     work_given: Array = real(unit="J")  #: by forces and drives
-    work_taken: Array = real(unit="J")  #: by dampers, friction and modal damping
+    work_taken: Array = real(unit="J")  #: energy dissipated by dampers, friction and modal damping
     power_given: Array = real(unit="W")
     power_taken: Array = real(unit="W")
-    h: Array = real(unit="s")  #: size of the step to which `a` belongs
+    h: Array = real(unit="s")  #: size of the step for which `a` holds
     h_wanted: Array = real(unit="s")  #: of the next step
     n_accepted: IntArray = integer()  #: steps
     n_rejected: IntArray = integer()
@@ -73,12 +74,12 @@ class Rows(NamedTuple):
     diagnostics: Array = real(n_t, N_DIAGNOSTICS, unit="J, kg m/s, kg m²/s, J")
     drift: Array = real(n_t, n_c, N_DRIFTS, unit="m, rad, m/s, rad/s")
     angle: Array = real(n_t, n_angles, unit="rad")
-    load: Array = real(n_t, n_loads, 6, unit="N, N m")  #: on the markers of loads, ground axes
+    load: Array = real(n_t, n_loads, 6, unit="N, N m")  #: wrenches on the markers of loads, ground axes
     load_case: Array = real(n_t, n_body_loads)  #: factors of load cases
 
 
 def memory_at(state: State, u_dot: Array, w: Array, *, n_angles: int = 0) -> Memory:
-    """Return the memory at a state, a copy, with algorithmic accelerations equal to u_dot, before any step.
+    """Return a copy of the memory at a state, before any step, with algorithmic accelerations equal to u_dot.
 
     n_angles: how many angles are counted, all of the model or none.
     """
@@ -93,7 +94,7 @@ def memory_at(state: State, u_dot: Array, w: Array, *, n_angles: int = 0) -> Mem
 
 
 def new_rows(model: Model, n_t: int) -> Rows:
-    """Return room for the results of n_t output times."""
+    """Return empty results for n_t output times."""
     sizes = {
         "n_c": len(model.connections.size),
         "n_t": n_t,

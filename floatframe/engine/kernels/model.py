@@ -69,14 +69,14 @@ n_angles, n_laws, n_gaps = Size("angles"), Size("laws"), Size("gaps")
 
 
 class Bodies(NamedTuple):
-    """Bodies, and where their parts of vectors and matrices begin."""
+    """Bodies, and the indices of their parts in vectors and matrices."""
 
     kind: IntArray = integer(n_b)  #: type
     n_q: IntArray = integer(n_b)  #: modes
     q0: IntArray = integer(n_b + 1)  #: in q
     u0: IntArray = integer(n_b + 1)  #: in u
-    h0: IntArray = integer(n_b + 1)  #: of its matrix in the store of matrices
-    size: Array = real(n_b, unit="m")  #: of all that hangs together with the body, by which its errors are measured
+    h0: IntArray = integer(n_b + 1)  #: index of its matrix in the store of matrices
+    size: Array = real(n_b, unit="m")  #: size of the group of connected bodies, the reference of its errors
     end0: IntArray = integer(n_b + 1)  #: in `ends`
     ends: IntArray = integer(n_ends)  #: markers of the bodies that are ends of connections
     load0: IntArray = integer(n_b + 1)  #: in `loaded`
@@ -84,18 +84,18 @@ class Bodies(NamedTuple):
 
 
 class BodyTypes(NamedTuple):
-    """What bodies of one kind have in common; frame: that of the body."""
+    """Common data of bodies of one type; frame: that of the body."""
 
     mass: Array = real(n_t, unit="kg")
     S: Array = real(n_t, 3, unit="kg m")  #: first moment
     J0: Array = real(n_t, 3, 3, unit="kg m²")  #: inertia about the frame origin, undeformed
-    axis: Array = real(n_t, 3)  #: about which the inertia at the centre of mass is symmetric; zero: no such axis
+    axis: Array = real(n_t, 3)  #: axis of symmetry of the inertia at the centre of mass; zero: no such axis
     #: C1 [a,k], C2 [a,k], C3 [ab,k], S_ab [l,ab,k], C4 [l,a,k], M, K, D; of stiffened types (whose S_ab hold more, see
     #: compiling/stiffening.py) K_t [l,a,k], K_r [l,a,k]; of all types, flat
     blocks: Array = real(Size("numbers of types"), unit="kg m^n, K: N/m, D: N s/m")
     block0: IntArray = integer(n_t, N_BLOCKS)  #: where they begin
     is_diagonal: IntArray = integer(n_t, 3)  #: whether M, K, D are held as diagonals
-    is_stiffened: IntArray = integer(n_t)  #: whether geometric stiffness counts
+    is_stiffened: IntArray = integer(n_t)  #: whether geometric stiffness is included
 
 
 class Markers(NamedTuple):
@@ -104,30 +104,30 @@ class Markers(NamedTuple):
     body: IntArray = integer(n_m)  #: -1 for the ground
     position: Array = real(n_m, 3, unit="m")  #: undeformed, body frame
     triad: Array = real(n_m, 3, 3)  #: undeformed axes as columns, body frame
-    psi0: IntArray = integer(n_m)  #: where Psi [6, n_q] begins in `psi`, -1 for none
+    psi0: IntArray = integer(n_m)  #: index of Psi [6, n_q] in `psi`, -1 for none
     psi: Array = real(Size("numbers of psi"), unit="m, rad")
-    bend0: IntArray = integer(n_m)  #: where K_P [l, 6, k] begins in `bend`, -1 for none
+    bend0: IntArray = integer(n_m)  #: index of K_P [l, 6, k] in `bend`, -1 for none
     bend: Array = real(Size("numbers of bend"), unit="m, rad")
-    connection: IntArray = integer(n_m)  #: of which it is an end, -1 for none
-    sign: Array = real(n_m)  #: of the wrench: +1 at end A, -1 at end B
-    force: IntArray = integer(n_m)  #: where the force on it begins in the wrench of its connection, -1 for none
-    moment: IntArray = integer(n_m)  #: where the moment on it begins in the wrench of its connection, -1 for none
-    is_follower: IntArray = integer(n_m)  #: whether its wrench turns with it
-    x0: IntArray = integer(n_m)  #: Σ (6 + n_q) over the ends before it
-    line: IntArray = integer(n_m)  #: along which it slides, -1 for none
+    connection: IntArray = integer(n_m)  #: connection of which it is an end, -1 for none
+    sign: Array = real(n_m)  #: sign of the wrench: +1 at end A, -1 at end B
+    force: IntArray = integer(n_m)  #: index of the force on it in the wrench of its connection, -1 for none
+    moment: IntArray = integer(n_m)  #: index of the moment on it in the wrench of its connection, -1 for none
+    is_follower: IntArray = integer(n_m)  #: whether its wrench rotates with it
+    x0: IntArray = integer(n_m)  #: Σ (6 + n_q) over the previous ends
+    line: IntArray = integer(n_m)  #: line along which it slides, -1 for none
     accelerated: IntArray = integer(n_m)  #: number among the markers whose acceleration is an input of a law, or -1
-    a0: IntArray = integer(n_m)  #: Σ (6 + n_q) over the accelerated ends before it
+    a0: IntArray = integer(n_m)  #: Σ (6 + n_q) over the previous accelerated ends
 
 
 class Connections(NamedTuple):
-    """Joints, spring-dampers, bushings, contacts, couplers, user forces, elements: what has rows and unknowns."""
+    """Joints, spring-dampers, bushings, contacts, couplers, user forces, elements: all parts with rows and unknowns."""
 
     size: IntArray = integer(n_c)  #: number of wrench components = rows
     w0: IntArray = integer(n_c + 1)  #: first of them
     a: IntArray = integer(n_c)  #: marker A
     b: IntArray = integer(n_c)  #: marker B
     law: IntArray = integer(n_c)  #: JOINT, SPRING, BUSHING, CONTACT, COUPLER, USER_FORCE or ELEMENT
-    item: IntArray = integer(n_c)  #: number among the connections of its law
+    item: IntArray = integer(n_c)  #: number among the connections with the same law
     has_rates: IntArray = integer(n_c)  #: whether its rows depend on velocities
 
 
@@ -136,18 +136,19 @@ class JointRows(NamedTuple):
 
     kind: IntArray = integer(n_w)
     holds: IntArray = integer(n_w)  #: NOTHING, POSITION or VELOCITY
-    is_length: IntArray = integer(n_w)  #: whether what it holds is a length
+    is_length: IntArray = integer(n_w)  #: whether the held quantity is a length
     is_angle: IntArray = integer(n_w)  #: whether its coordinate is an angle
-    is_loaded: IntArray = integer(n_w)  #: whether it carries forces along its coordinate
+    is_loaded: IntArray = integer(n_w)  #: whether forces act along its coordinate
     x: Array = real(n_w, 3)
     y: Array = real(n_w, 3)
     z: Array = real(n_w, 3)
     u: Array = real(n_w, 3)
     c: Array = real(n_w, unit="m or rad")
-    part: IntArray = integer(n_w)  #: where the part of the wrench begins of which it speaks
-    motion: IntArray = integer(n_w)  #: its function of time, -1 for none
-    soft: Array = real(n_w, unit="1/kg or 1/(kg m²)")  #: compliance over c_k, zero but for redundant constraints
-    force0: IntArray = integer(n_w)  #: forces along its coordinate: first,
+    part: IntArray = integer(n_w)  #: index of the part of the wrench that it defines
+    motion: IntArray = integer(n_w)  #: number of its function of time, -1 for none
+    #: compliance divided by c_k, zero except for redundant constraints
+    soft: Array = real(n_w, unit="1/kg or 1/(kg m²)")
+    force0: IntArray = integer(n_w)  #: forces along its coordinate: index of the first
     force1: IntArray = integer(n_w)  #: and the end
 
 
@@ -159,8 +160,8 @@ class JointForces(NamedTuple):
     damping: Array = real(n_forces, unit="N s/m or N m s")
     preload: Array = real(n_forces, unit="N or N m")
     friction: Array = real(n_forces, unit="N or N m")
-    coefficient: Array = real(n_forces, unit="1 or m")  #: of friction by the normal force
-    speed: Array = real(n_forces, unit="m/s or rad/s")  #: at which friction is 76 % of its value
+    coefficient: Array = real(n_forces, unit="1 or m")  #: coefficient of friction that depends on the normal force
+    speed: Array = real(n_forces, unit="m/s or rad/s")  #: speed at which friction is 76 % of its value
     motor: IntArray = integer(n_forces)  #: function of time, -1 for none
     table: IntArray = integer(n_forces)  #: function of the coordinate, -1 for none
 
@@ -180,7 +181,7 @@ class Springs(NamedTuple):
     damping: Array = real(n_springs, unit="N s/m")
     free_length: Array = real(n_springs, unit="m")
     preload: Array = real(n_springs, unit="N")
-    table: IntArray = integer(n_springs)  #: tension as a function of the elongation, -1 for none
+    table: IntArray = integer(n_springs)  #: function of the tension over the elongation, -1 for none
 
 
 class Bushings(NamedTuple):
@@ -189,9 +190,9 @@ class Bushings(NamedTuple):
     stiffness: Array = real(n_bushings, 6, 6, unit="N/m, N, N m")
     damping: Array = real(n_bushings, 6, 6, unit="N s/m, N s, N m s")
     preload: Array = real(n_bushings, 6, unit="N, N m")
-    table: IntArray = integer(n_bushings, 6)  #: force as a function of each deformation, -1 for none
-    share: Array = real(n_bushings)  #: of the rotation of B against A that its axes make: 0 those of A, 1 of B
-    angle: IntArray = integer(n_bushings)  #: first of the three angles that count its turns, -1 where none do
+    table: IntArray = integer(n_bushings, 6)  #: function of the force over each deformation, -1 for none
+    share: Array = real(n_bushings)  #: share of the rotation of B relative to A in its axes: 0 those of A, 1 those of B
+    angle: IntArray = integer(n_bushings)  #: index of the first of the three angles that count its turns, -1 for none
 
 
 class Contacts(NamedTuple):
@@ -205,14 +206,14 @@ class Contacts(NamedTuple):
     dissipation: Array = real(n_contacts)  #: h
     friction: Array = real(n_contacts)  #: mu
     slip_speed: Array = real(n_contacts, unit="m/s")  #: v_s
-    slow: Array = real(n_contacts, unit="m/s")  #: least speed of approach
+    slow: Array = real(n_contacts, unit="m/s")  #: smallest approach speed
 
 
 class Gaps(NamedTuple):
-    """Gaps between bodies that meet, see kernels/connections/gap.py."""
+    """Gaps between bodies that can touch, see kernels/connections/gap.py."""
 
-    connection: IntArray = integer(n_gaps)  #: a contact or an element
-    output: IntArray = integer(n_gaps)  #: of the element that is the gap, -1 of a contact
+    connection: IntArray = integer(n_gaps)  #: connection: a contact or an element
+    output: IntArray = integer(n_gaps)  #: output of the element that is the gap, -1 for a contact
     stiffness: Array = real(n_gaps, unit="N/m^n, N m/rad^n")  #: k of the contact
     exponent: Array = real(n_gaps)  #: n
 
@@ -229,21 +230,21 @@ class Coordinates(NamedTuple):
 
     a: IntArray = integer(n_x)  #: marker A
     b: IntArray = integer(n_x)  #: marker B
-    row: IntArray = integer(n_x)  #: of its value, of the kind PUSH, TWIST or SPAN; that of its rate follows
+    row: IntArray = integer(n_x)  #: row of its value, of the kind PUSH, TWIST or SPAN; the row of its rate follows
     force: IntArray = integer(n_x)  #: first of its three rows of force or torque, -1 for none
     arm: IntArray = integer(n_x)  #: first of its three rows of moment on A, -1 for none
     factor: Array = real(n_x, unit="that of the coupler by that of the coordinate")  #: coefficient in a coupler
     core: IntArray = integer(n_x)  #: row of the unknown that is its force, or of the multiplier
-    size: Array = real(n_x, unit="m, rad")  #: over which the function of a user force changes
+    size: Array = real(n_x, unit="m, rad")  #: range over which the function of a user force changes
     speed: Array = real(n_x, unit="m/s, rad/s")  #: the same of its rate
 
 
 class Lines(NamedTuple):
     """Deformed lines with a marker that slides, see kernels/joints/deformed_line.py."""
 
-    marker: IntArray = integer(n_lines)  #: that slides, its position that of s = 0
+    marker: IntArray = integer(n_lines)  #: sliding marker; its position is that of s = 0
     other: IntArray = integer(n_lines)  #: marker B
-    row: IntArray = integer(n_lines)  #: with the prescribed s, -1 for none
+    row: IntArray = integer(n_lines)  #: row with the prescribed s, -1 for none
     axis: Array = real(n_lines, 3)  #: unit vector along the line, body axes
     station0: IntArray = integer(n_lines + 1)
 
@@ -260,8 +261,9 @@ class Users(NamedTuple):
 
     n_forces: IntArray = integer(n_users)
     n_states: IntArray = integer(n_users)
-    address: IntArray = integer(n_users)  #: of a C function of the user, 0 for expressions
-    tape0: IntArray = integer(n_users)  #: first of its tapes, those of the forces, then of the rates of the states
+    address: IntArray = integer(n_users)  #: address of a C function of the user, 0 for expressions
+    #: index of the first of its tapes: those of the forces, then those of the rates of the states
+    tape0: IntArray = integer(n_users)
     state0: IntArray = integer(n_users + 1)  #: first of its states
 
 
@@ -270,30 +272,34 @@ class Laws(NamedTuple):
 
     address: IntArray = integer(n_laws)  #: of the function of values
     tangent: IntArray = integer(n_laws)  #: of the function of their derivatives
-    head: IntArray = integer(n_laws, 8)  #: markers, numbers of each, states, multipliers, outputs, data, which move, 0
-    data0: IntArray = integer(n_laws + 1)  #: first number of its data
-    data: Array = real(Size("numbers of laws"))  #: of each, then the sizes of its inputs, see law_templates.py
-    row0: IntArray = integer(n_laws + 1)  #: first of its rows of wrenches in `source` and `factor`
-    source: IntArray = integer(Size("wrench rows of laws"))  #: number of the wrench as the function writes it
-    factor: Array = real(Size("wrench rows of laws"))  #: by which it becomes the unknown of the row, 1 or -1
-    state0: IntArray = integer(n_laws + 1)  #: first of its states among all
-    equation: IntArray = integer(Size("equations of laws"))  #: rows of multipliers that hold nothing
+    #: numbers of: markers, inputs of each, states, multipliers, outputs, data, moving markers, 0
+    head: IntArray = integer(n_laws, 8)
+    data0: IntArray = integer(n_laws + 1)  #: index of its first number in the data
+    #: index of the data of each, followed by the sizes of its inputs, see law_templates.py
+    data: Array = real(Size("numbers of laws"))
+    row0: IntArray = integer(n_laws + 1)  #: index of its first wrench row in `source` and `factor`
+    #: index of the wrench component in the outputs of the function
+    source: IntArray = integer(Size("wrench rows of laws"))
+    factor: Array = real(Size("wrench rows of laws"))  #: factor from it to the unknown of the row, 1 or -1
+    state0: IntArray = integer(n_laws + 1)  #: index of its first state among all states
+    equation: IntArray = integer(Size("equations of laws"))  #: multiplier rows that are no constraints
     equation_size: Array = real(Size("equations of laws"), unit="that of the multiplier")  #: typical
-    length: Array = real(n_laws, unit="m")  #: over which the law changes
-    time: Array = real(n_laws, unit="s")  #: over which it changes by the time alone; 0: not known
-    energy: IntArray = integer(n_laws)  #: outputs that are stored energy, power given and power lost, -1 for none
+    length: Array = real(n_laws, unit="m")  #: length over which the law changes
+    time: Array = real(n_laws, unit="s")  #: time over which it changes by time alone; 0: unknown
+    #: outputs with the stored energy, supplied power and dissipated power, -1 for none
+    energy: IntArray = integer(n_laws)
     given: IntArray = integer(n_laws)
     lost: IntArray = integer(n_laws)
-    stop0: IntArray = integer(n_laws + 1)  #: first of the outputs that end a run where they are above zero
+    stop0: IntArray = integer(n_laws + 1)  #: first of the outputs that end a run if they are above zero
     stop: IntArray = integer(Size("stops of laws"))  #: their numbers
 
 
 class States(NamedTuple):
     """States of user forces and elements."""
 
-    row: IntArray = integer(n_states)  #: of its value; those of its rate and algorithmic rate follow
+    row: IntArray = integer(n_states)  #: row of its value; the rows of its rate and algorithmic rate follow
     start: Array = real(n_states, unit="that of the state")  #: value at the start
-    size: Array = real(n_states, unit="that of the state")  #: typical, by which convergence is measured
+    size: Array = real(n_states, unit="that of the state")  #: typical size, the reference of convergence
 
 
 class Tapes(NamedTuple):
@@ -310,7 +316,7 @@ class Loads(NamedTuple):
     """Forces and torques on markers."""
 
     marker: IntArray = integer(n_loads)
-    factor: IntArray = integer(n_loads)  #: function of time by which it is multiplied, -1 for one
+    factor: IntArray = integer(n_loads)  #: function of time that multiplies it, -1 for none
     force: Array = real(n_loads, 3, unit="N")
     torque: Array = real(n_loads, 3, unit="N m")
 
@@ -320,37 +326,38 @@ class BodyLoads(NamedTuple):
 
     body: IntArray = integer(n_body_loads)
     factor: IntArray = integer(n_body_loads)  #: function of time
-    value0: IntArray = integer(n_body_loads)  #: where force (3), torque (3), modal forces begin in `values`
+    value0: IntArray = integer(n_body_loads)  #: index of force (3), torque (3), modal forces in `values`
     values: Array = real(Size("numbers of body loads"), unit="N, N m, N")
 
 
 class Elimination(NamedTuple):
-    """Block elimination of the connections, see kernels/schur.py: where blocks are stored, in which order they go."""
+    """Block elimination of the connections, see kernels/schur.py: storage and order of the blocks."""
 
     order: IntArray = integer(n_c)  #: connections in the order of elimination
-    diagonal: IntArray = integer(n_c)  #: where the diagonal block begins in the store of blocks
+    diagonal: IntArray = integer(n_c)  #: index of the diagonal block in the store of blocks
     n_store: IntArray = integer()  #: length of the store
-    pair_row: IntArray = integer(n_pairs)  #: pairs of ends on one body: marker whose rows,
+    pair_row: IntArray = integer(n_pairs)  #: pairs of ends on one body: marker of the rows,
     pair_column: IntArray = integer(n_pairs)  #: marker whose wrench,
     pair_block: IntArray = integer(n_pairs)  #: where the block begins
     after0: IntArray = integer(n_c + 1)  #: neighbours eliminated later than order[k] are after0[k]:after0[k + 1]
     after: IntArray = integer(Size("neighbours"))  #: the neighbour i,
-    after_lower: IntArray = integer(Size("neighbours"))  #: where block (i, j) begins,
-    after_upper: IntArray = integer(Size("neighbours"))  #: where block (j, i) begins
+    after_lower: IntArray = integer(Size("neighbours"))  #: index of block (i, j)
+    after_upper: IntArray = integer(Size("neighbours"))  #: index of block (j, i)
     update0: IntArray = integer(n_c + 1)  #: first of the n² target blocks of step k
-    update: IntArray = integer(Size("updates"))  #: where block (i, k) begins, over pairs of neighbours
+    update: IntArray = integer(Size("updates"))  #: index of block (i, k), for pairs of neighbours
 
 
 class Angles(NamedTuple):
     """Angles between bodies whose turns are counted, see kernels/turns.py; directions in the frames of their bodies."""
 
     holder: IntArray = integer(n_angles)  #: body with the axis, -1 for the ground
-    other: IntArray = integer(n_angles)  #: body that turns about it, -1 for the ground
+    other: IntArray = integer(n_angles)  #: body that rotates about it, -1 for the ground
     x: Array = real(n_angles, 3)  #: direction of the holder, normal to its axis x × z
     z: Array = real(n_angles, 3)  #: direction of the holder, from which y turns towards -x
     y: Array = real(n_angles, 3)  #: direction of the other body
-    sign: Array = real(n_angles)  #: -1 where the angle is counted the other way
-    part: IntArray = integer(n_angles)  #: -1; 0, 1, 2: of a rotation vector, y then is the axis of this number
+    sign: Array = real(n_angles)  #: -1 if the angle is counted in the opposite sense
+    #: -1; 0, 1, 2: component of a rotation vector, where y is the axis of this number
+    part: IntArray = integer(n_angles)
 
 
 class Model(NamedTuple):

@@ -1,4 +1,4 @@
-"""The memories after each of the steps of a call, from which any of them can be taken again."""
+"""The memories after each step of a call, from which any step can be repeated."""
 
 from floatframe.engine.kernels.compiler.compilation import inner
 
@@ -14,7 +14,7 @@ def keep_row(source, target, k):
 
 @inner
 def keep_past(past, memory, a, h, n_iterations):
-    """Keep the memory after a step of size h, of which the method remembers a, if there is room for it."""
+    """Store the memory after a step of size h, for which the method has the accelerations a, if space is left."""
     k = past.n
     if k >= past.h.shape[0]:
         return

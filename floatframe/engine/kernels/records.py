@@ -1,4 +1,4 @@
-"""Records of arrays, the shape, the unit and the kind of numbers of each declared once: where its record names it.
+"""Records of arrays; the shape, unit and number type of each array are declared once, in its record.
 
 A record is a named tuple of arrays and of other records. Made without values it holds their declarations, so that
 `Work()` declares all working arrays, and everything else follows from it:
@@ -25,7 +25,7 @@ Record = TypeVar("Record", bound=NamedTuple)
 
 @dataclass(frozen=True)
 class Size:
-    """A size of arrays: a number of things by its name, or factor * number + more."""
+    """A size of arrays: a named number of items, or factor * number + more."""
 
     name: str
     factor: int = 1
@@ -48,7 +48,7 @@ class Size:
 
 @dataclass(frozen=True)
 class Declared:
-    """What an array of a record is."""
+    """Declaration of an array of a record."""
 
     dtype: type
     shape: tuple[Size | int, ...]  #: () for one number
@@ -78,7 +78,7 @@ def zeros(declaration: Record, sizes: Mapping[str, int]) -> Record:
 
 
 def filled(declaration: Record, **values: Any) -> Record:
-    """Return a record with arrays made of lists of entries; of an array of one number, made of that.
+    """Return a record with arrays made from lists of entries; an array of one number is made from the number.
 
     A record in it is given as it is.
     """
@@ -95,13 +95,13 @@ def filled(declaration: Record, **values: Any) -> Record:
 
 
 def of_items(declaration: Record, items: Sequence[Mapping[str, Any]], **whole: Any) -> Record:
-    """Return a record with arrays made of items, each with one entry for each array, but for the arrays given whole."""
+    """Return a record with arrays from items with one entry per array, except for arrays given completely."""
     names = [name for name in declaration._fields if name not in whole]
     return filled(declaration, **{name: [item[name] for item in items] for name in names}, **whole)
 
 
 def leaves(record: Any, within: str = "") -> Iterator[tuple[str, Any]]:
-    """Return name and array, or declaration, of all in a record and the records in it."""
+    """Return name and array (or declaration) of all fields in a record and in the records in it."""
     for name, each in zip(record._fields, record, strict=True):
         if isinstance(each, tuple):
             yield from leaves(each, f"{within}{name}.")
@@ -138,7 +138,7 @@ def measured(declaration: Record, record: Record) -> dict[str, int]:
 
 
 def described(value: Any) -> str:
-    """Return what an array is, in words."""
+    """Return the description of an array for messages."""
     return f"{value.dtype} of shape {value.shape}" if isinstance(value, np.ndarray) else repr(value)
 
 

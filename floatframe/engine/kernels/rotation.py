@@ -152,7 +152,7 @@ def split_spin(e, th):
 
 @inner
 def turn_of_axis(e, omega):
-    """Return the part of the angular acceleration by which the axis e of a body carries its spin w about: w omega × e.
+    """Return the part of the angular acceleration due to the rotation of the axis e with the spin w: w omega × e.
 
     omega, alpha and all that follows are in axes of the body.
     """
@@ -161,14 +161,14 @@ def turn_of_axis(e, omega):
 
 @inner
 def after_spin(e, along, omega, rest):
-    """Return omega and alpha of omega and alpha - w omega × e in axes that the body has left by a turn `along` e."""
+    """Return omega, alpha from omega, alpha - w omega × e, in axes that the body has left by a rotation `along` e."""
     omega = turned_about(e, -along, omega)
     return omega, add(turned_about(e, -along, rest), turn_of_axis(e, omega))
 
 
 @inner
 def changed_spin(e, theta, omega, alpha, by_theta, by_omega, by_alpha):
-    """Return theta, omega and alpha of a body that spins, changed by what is linear in axes that do not spin with it.
+    """Return theta, omega and alpha of a spinning body after a change that is linear in axes that do not spin with it.
 
     These are those of the beginning of the step turned by exp(across): omega and alpha - w omega × e are changed there,
     and carried along by the change of theta, which is across + along e.
@@ -190,7 +190,7 @@ def turned_by_spin(e, theta):
 
 @inner
 def spin_jacobian(e, theta):
-    """Return the rotation of a body that spins by a change of theta, both in its axes: e along e, T(across) else."""
+    """Return the rotation of a spinning body for a change of theta, both in its axes: along e for e, else T(across)."""
     along, across = split_spin(e, theta)
     T = right_jacobian(turned_about(e, -along, across))
     bent = sub(e, turned(T, e))
@@ -214,7 +214,7 @@ def matrix_of_euler_parameters(p):
 
 @inner
 def rotate_euler_parameters(p, th):
-    """Return p * exp(th/2), made of length one again."""
+    """Return p * exp(th/2), normalised."""
     x = 0.25 * dot(th, th)
     b, c = scaled(0.5 * quotient_s(x), th), 1 - x * quotient_a(x)
     a = (p[1], p[2], p[3])

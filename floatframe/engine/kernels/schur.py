@@ -1,4 +1,4 @@
-"""Newton correction of the whole system: bodies eliminated one by one, connections in a small block-sparse system.
+"""Newton correction of the whole system: bodies are eliminated one by one, connections form a block-sparse system.
 
     H_i y_i - Σ_ends sign J_columnᵀ R_iᵀ mu = -c_k residual_i                                    (each body)
     Σ_ends P R_i J_row y + V mu             = -g                                                 (each connection)
@@ -38,8 +38,8 @@ __all__ = [
     "write_rates_to_close",
 ]
 
-SOFTER = 1e3  # s of `share_reactions`: well above the rounding of A
-SWEEPS = 5  # and how often: with soft 1e-9 of A, constraints of a condition of 1e4 share to 1e-10
+SOFTER = 1e3  # s of `share_reactions`: well above the rounding errors of A
+SWEEPS = 5  # number of iterations: with soft 1e-9 of A, constraints with a condition number of 1e4 share to 1e-10
 
 
 @inner
@@ -138,7 +138,7 @@ def assemble(model, work, c_k):
 
 @inner
 def add_accelerated(model, work, p, r, s, place):
-    """Add what row r of the first connection of pair p feels of its marker's acceleration by the wrench of the other.
+    """Add the effect on row r of the first connection of pair p of the marker acceleration due to the other wrench.
 
     place: where the row of the block begins in the store s.
     """
@@ -225,7 +225,7 @@ def solve_connections(elimination, connections, solver):
 
 @inner
 def take_accelerated(model, work, m, n, y, mu):
-    """Subtract what the rows of marker m feel of its acceleration by the correction y of its body."""
+    """Subtract the effect on the rows of marker m of its acceleration due to the correction y of its body."""
     c, o, motion = model.markers.connection[m], model.markers.a0[m], work.solver.motion
     R, P_a = work.state.R[model.markers.body[m]], work.connections.P_a[model.markers.accelerated[m]]
     for r in range(6):
@@ -282,7 +282,7 @@ def move_bodies(model, work, c_k):
 
 @inner
 def close_connections(model, work):
-    """Write mu for the residuals of the connections, and add to y what it moves."""
+    """Write mu for the residuals of the connections, and add the displacement due to mu to y."""
     mu = work.solver.mu
     for k in range(mu.shape[0]):
         mu[k] = -work.connections.g[k]
@@ -293,7 +293,7 @@ def close_connections(model, work):
 
 @inner
 def take_motions(model, work):
-    """Subtract what the rows of connections make of the motion y of the bodies from mu."""
+    """Subtract the effect of the motion y of the bodies on the rows of connections from mu."""
     bodies, markers, connections, solver = model.bodies, model.markers, model.connections, work.solver
     y, mu, motion = solver.y, solver.mu, solver.motion
     for i in range(bodies.kind.shape[0]):
@@ -321,7 +321,7 @@ def take_motions(model, work):
 
 @inner
 def velocity_gaps(model, work, by_rate):
-    """Write into mu by how much held positions move less than their rates ask for, and return the largest.
+    """Write into mu the difference between held positions and their rates in the correction, and return the largest.
 
     In unknowns: y by_rate is the change of velocities. The positions will be closed by a `correction`, which changes
     their rates by -by_rate g. Rows of positions that have no cheap rate, and all others, have no gap.
@@ -336,7 +336,7 @@ def velocity_gaps(model, work, by_rate):
 
 @inner
 def close_velocities(model, work):
-    """Write (y, mu) that closes the gaps in mu.
+    """Write the correction (y, mu) that closes the gaps in mu.
 
     Unknowns of rotation turn a body by `T_right` of them, velocities at once: y is what they turn it by. Its moments
     of inertia resist all of that, and mu holds against the unknowns alone: the rest is the `surplus`.
@@ -356,7 +356,7 @@ def close_velocities(model, work):
 
 @inner
 def write_rates_to_close(model, work, c, by_rate):
-    """Write into `solver.mu` by what velocities shall close the positions that connection c holds, over by_rate."""
+    """Write into `solver.mu` the velocity gaps of the held positions of connection c, divided by by_rate."""
     mu, g = work.solver.mu, work.connections.g
     write_held_rates(model, work, c, mu)
     for k in range(model.connections.w0[c], model.connections.w0[c + 1]):
@@ -365,7 +365,7 @@ def write_rates_to_close(model, work, c, by_rate):
 
 @inner
 def add_wrenches(model, work):
-    """Add the motion X mu that wrenches mu give to the bodies to y."""
+    """Add the motion X mu of the bodies due to the wrenches mu to y."""
     bodies, markers, connections, solver = model.bodies, model.markers, model.connections, work.solver
     y, mu = solver.y, solver.mu
     for i in range(bodies.kind.shape[0]):
@@ -375,7 +375,7 @@ def add_wrenches(model, work):
             c = markers.connection[m]
             o, w0, sign = markers.x0[m], connections.w0[c], markers.sign[m]
             size = 3 if markers.moment[m] < 0 else 6
-            wrench = solver.wrench  # of the correction on the marker, body axes
+            wrench = solver.wrench  # wrench of the correction on the marker, body axes
             for part in range(0, size, 3):
                 w_part = markers.force[m] if part == 0 else markers.moment[m]
                 if w_part >= 0:
@@ -391,7 +391,7 @@ def add_wrenches(model, work):
 
 @inner
 def assemble_masses(model, work, c_k):
-    """Factorise the masses of bodies and assemble the connections as accelerations feel them; whether that goes.
+    """Factorise the masses of bodies and assemble the connections for accelerations; return whether that succeeds.
 
     Modes without mass have c_k times their stiffness.
     """
@@ -412,7 +412,7 @@ def assemble_masses(model, work, c_k):
 
 @inner
 def settle_accelerations(model, work, c_k):
-    """Correct accelerations and wrenches of the iterate to those of its positions and velocities; whether there are.
+    """Correct accelerations and wrenches of the iterate for its positions and velocities; return whether they exist.
 
     M u_dot - Jᵀ w = f, G u_dot = -d(G)/dt u, by one step of Newton's method from those of a step, whose accelerations
     fulfil the second only as far as they are known by differences. `evaluate` has been called with c_k = 1.
@@ -450,7 +450,7 @@ def settle_accelerations(model, work, c_k):
 
 @inner
 def share_reactions(model, work, c_k):
-    """Share the reactions of the iterate among constraints that repeat others; whether that has an answer.
+    """Share the reactions of the iterate among redundant constraints; return whether a solution exists.
 
     Of all wrenches w' that act on the bodies as w does, Jᵀ w' = Jᵀ w, those of the least sum of soft lambda², lambda
     being the reaction along a row that may give way, `soft` its mobility. With A = G M⁻¹ Jᵀ and S = soft lambda of w,

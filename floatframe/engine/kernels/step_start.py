@@ -1,4 +1,4 @@
-"""What force elements with memory do at the beginning of a step, and accelerations where steps begin anew."""
+"""Force elements with memory at the beginning of a step, and accelerations where a motion restarts."""
 
 import math
 
@@ -13,13 +13,13 @@ from floatframe.model.joints.rows.kinds import NOTHING
 
 __all__ = ["accelerate", "begin_step", "hold_states"]
 
-SAME = 1e-10  # relative change of reactions below which they are those
+SAME = 1e-10  # relative change of reactions below which they have converged
 MOST_ITERATIONS = 10
 
 
 @inner
 def begin_step(model, work, memory, h, alpha_f):
-    """Take the unknowns of the last step as known, move angles and coordinates by their rates, and prepare states."""
+    """Set the known values from the last unknowns, advance angles and coordinates by their rates, prepare states."""
     for k in range(memory.w.shape[0]):
         work.state.w_start[k] = memory.w[k]
         work.state.w[k] = memory.w[k]
@@ -32,7 +32,7 @@ def begin_step(model, work, memory, h, alpha_f):
 
 @inner
 def hold_states(model, work, memory):
-    """Take what force elements remember as it is in the memory, with the rates of their laws."""
+    """Set the states of force elements from the memory, with the rates from their laws."""
     for k in range(memory.w.shape[0]):
         work.state.w_start[k] = memory.w[k]
     work.states.rho = 1.0
@@ -43,7 +43,7 @@ def hold_states(model, work, memory):
 
 @inner
 def accelerate(model, work, memory):
-    """Write the accelerations of the equations of motion at the iterate, which is the state of the memory, into it.
+    """Write the accelerations of the equations of motion at the iterate, the state in the memory, into the memory.
 
     M u_dot - Jᵀ w = f,  G u_dot = -d(G)/dt u, iterated where forces depend on reactions; the memory stays where there
     are none.

@@ -53,7 +53,7 @@ def angle_and_rate(angles, bodies, state, k):
 
 @inner
 def count_rotation(angles, bodies, state, memory, k, h):
-    """Take the rotation vector of which k is the first part into the memory."""
+    """Store the rotation vector whose first component is angle k in the memory."""
     holder, other = angles.holder[k], angles.other[k]
     x, z = in_ground(state, holder, angles.x[k]), in_ground(state, holder, angles.z[k])
     A = transposed((x, cross(z, x), z))
@@ -71,7 +71,7 @@ def count_rotation(angles, bodies, state, memory, k, h):
 
 @inner
 def count_turns(model, work, memory, h):
-    """Take the angles of the iterate into the memory, a step of size h after those that are there."""
+    """Store the angles of the iterate in the memory, a step of size h after the stored ones."""
     for k in range(memory.angle.shape[0]):
         if model.angles.part[k] == 0:
             count_rotation(model.angles, model.bodies, work.state, memory, k, h)

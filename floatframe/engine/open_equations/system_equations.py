@@ -100,8 +100,8 @@ class Equations:
         """Raise `ModelError` naming an element that can end a run, for methods that do not evaluate outputs."""
         if self.compiled.stop_words:
             raise ModelError(
-                f"{method}: {self.compiled.stop_words[0]}: an output that may end a run, which this method does not "
-                "look at; take integrate, or an element without stops"
+                f"{method}: {self.compiled.stop_words[0]}: an output may end a run, but this method does not "
+                "evaluate outputs; use integrate, or an element without stops"
             )
 
     # states

@@ -67,7 +67,7 @@ class CentralBody:
         return self.C1 if self.K_t is None else self.C1 + bent(self.K_t, q, 3)
 
     def drift(self, q: Array, omega: Array, q_dot: Array) -> Array:
-        """Return a, the velocity of the centre of mass against the frame origin, body axes, (..., 3)."""
+        """Return a, the velocity of the centre of mass relative to the frame origin, body axes, (..., 3)."""
         return cross(omega, self.center(q)) + turned(self.shapes(q), q_dot)
 
     def products(self, q: Array) -> Array:
@@ -146,8 +146,8 @@ def central_bodies(model: Model, names: tuple[str, ...], scheme: str) -> tuple[C
             M = known[t].mass_matrix(np.zeros(known[t].n))[3:, 3:]
             if len(M) and np.linalg.eigvalsh(M)[0] <= 1e-12 * np.abs(np.diag(M)).max():
                 raise ModelError(
-                    f"{scheme}: body {names[i]!r} has a mode without mass, whose velocity has no momentum; leave it "
-                    "out, or use generalized-alpha"
+                    f"{scheme}: body {names[i]!r} has a mode without mass, whose velocity has no momentum; "
+                    "remove it, or use generalized-alpha"
                 )
         bodies.append(known[t])
     return tuple(bodies)
@@ -234,7 +234,7 @@ class BodyStep:
     R_1: Array
     q_0: Array
     q_1: Array
-    R_m: Array  #: R_0 (1 + tilde(theta)/2); R_0 at one configuration
+    R_m: Array  #: R_0 (1 + tilde(theta)/2); R_0 at a single configuration
     d: Array  #: displacement of the centre of mass, ground axes, (..., 3)
     theta_G: Array  # noqa: N815  #: Cayley vector of the rotation, ground axes, (..., 3)
     dq: Array  #: (..., n)
@@ -260,7 +260,7 @@ def step_of(place: Placed, x: Array) -> BodyStep:
 
 
 def still(place: Placed, x: Array) -> BodyStep:
-    """Return the configuration of a placed body as both ends of a step, with increments x, (..., 6 + n).
+    """Return a step whose two ends are the configuration of a placed body, with increments x, (..., 6 + n).
 
     Its angular velocity is that of the momentum of the interval, (1 + theta²/4) theta/h (exactly, for turns about a
     principal axis).

@@ -1,4 +1,4 @@
-"""A discrete system as the compiled steps take it: constants, the pattern of derivatives, working arrays."""
+"""A discrete system in the arrays of the compiled steps: constants, sparsity of derivatives, working arrays."""
 
 import weakref
 from dataclasses import dataclass
@@ -43,7 +43,7 @@ def filter_of(body: CentralBody, h: float, rho_inf: float) -> Filter:
 
 
 def constants_of(ds: DiscreteSystem, h: float, rho_inf: float) -> tuple[Array, IntArray]:
-    """Return the constants of all types of bodies, flat, and where they begin, (n_t, N_BLOCKS)."""
+    """Return the constants of all types of bodies, flat, and the index of each, (n_t, N_BLOCKS)."""
     model, parts, place = ds.model, [], 0
     block0 = np.zeros((len(model.body_types.mass), N_BLOCKS), dtype=np.int64)
     done = set()
@@ -63,7 +63,7 @@ def constants_of(ds: DiscreteSystem, h: float, rho_inf: float) -> tuple[Array, I
 
 
 def pattern_of(ds: DiscreteSystem) -> tuple[Pattern, dict[str, int]]:
-    """Return where derivatives stand, and the numbers of blocks, their rows and colors.
+    """Return the sparsity of derivatives: the numbers of blocks, their rows and colors.
 
     A block acts on itself and on those with which it shares a connection. Blocks whose rows have none in common are
     changed together.
@@ -118,7 +118,7 @@ def pattern_of(ds: DiscreteSystem) -> tuple[Pattern, dict[str, int]]:
 
 
 def discrete_of(ds: DiscreteSystem, scheme: int, h: float, rho_inf: float) -> tuple[Discrete, dict[str, int]]:
-    """Return a system as the compiled steps see it for steps of size h, and the sizes of their working arrays."""
+    """Return a system in the arrays of the compiled steps of size h, and the sizes of their working arrays."""
     model = ds.model
     pattern, sizes = pattern_of(ds)
     blocks, block0 = constants_of(ds, h, rho_inf)
@@ -161,7 +161,7 @@ def discrete_of(ds: DiscreteSystem, scheme: int, h: float, rho_inf: float) -> tu
 
 
 def does_work(model: Model) -> bool:
-    """Whether something but potentials and modal damping does work."""
+    """Whether anything but potentials and modal damping does work."""
     springs = model.springs
     counts = (
         model.loads.marker, model.body_loads.body, model.joint_forces.motor, model.contacts.stiffness,
@@ -176,7 +176,7 @@ def does_work(model: Model) -> bool:
 
 
 def remembered_rows(model: Model) -> IntArray:
-    """Return the rows of the memory that connections remember from step to step."""
+    """Return the rows of the memory of connections."""
     contacts = model.connections.w0[:-1][model.connections.law == CONTACT] + V_0
     rows = [model.coordinates.row, model.states.row, model.states.row + 1, contacts, model.laws.equation]
     return np.concatenate(rows).astype(np.int64)
@@ -194,17 +194,17 @@ REMEMBERED = ("h", "band", "band_pivot", "is_due", "acceleration", "f_kept", "f_
 
 @dataclass(eq=False)
 class Kept:
-    """What goes with working arrays beside them: of the steps that led from one memory to another."""
+    """Data that belong to working arrays: for the steps from one memory to another."""
 
     key: tuple
     discrete: Discrete
     step: StepWork
-    before: object = None  #: memory from which they set out,
+    before: object = None  #: memory at the start of the steps,
     known: tuple[Array, ...] = ()  #: and what they knew
-    after: object = None  #: memory to which they led
+    after: object = None  #: memory at their end
 
     def go_on_from(self, carry: object, f: Array, *, is_anew: bool) -> None:
-        """Prepare the arrays for steps from a memory with multipliers f: as those before it left or found them.
+        """Prepare the arrays for steps from a memory with multipliers f: as the previous steps left or found them.
 
         is_anew: without what was known, as a run that goes on from a file begins.
         """
@@ -220,12 +220,12 @@ class Kept:
         self.before, self.known = carry, tuple(array.copy() for array in arrays)
 
 
-#: by the identity of an array of the working arrays; they live as long as it
+#: by the identity of an array of the working arrays, with whose lifetime they end
 KEPT: dict[int, Kept] = {}
 
 
 def kept_of(work: Work, ds: DiscreteSystem, scheme: int, h: float, rho_inf: float) -> Kept:
-    """Return what goes with working arrays for steps of size h."""
+    """Return the data of working arrays for steps of size h."""
     key, wanted = id(work.solver.pivot), (scheme, h, rho_inf)
     known = KEPT.get(key)
     if known is None or known.key != wanted:

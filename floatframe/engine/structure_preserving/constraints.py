@@ -1,4 +1,4 @@
-"""Constraints of joints over a step: their values at its end, and loads that do no work while joints stay closed.
+"""Constraints of joints over a step: values at its end, and loads that do no work while the joints are closed.
 
 A constraint is a sum of products of marker positions and directions; by the product rule with means,
 a_1·b_1 - a_0·b_0 = (a_1 - a_0)·b_mean + a_mean·(b_1 - b_0), each has discrete derivatives whose sum with the changes of
@@ -39,7 +39,7 @@ Loads = tuple[Load | None, Load | None]
 
 
 class Span:
-    """The times of a step, at its ends and where its forces are taken; and what connections remember there.
+    """The times at the ends of a step and of its forces, and the memory of connections there.
 
     w, (n_w,): in the rows of coordinates their values, angles counted through full turns; of states; of the speeds of
     approach of contacts. Of other rows it is not read.
@@ -60,7 +60,7 @@ class Span:
         self.angle, self.angle_rate = angle, angle_rate
 
     def rotation(self, first: int) -> Array:
-        """Return the rotation vector in the counted angles from `first` on where rates lead at t_force, (3,)."""
+        """Return the predicted rotation vector in the counted angles from `first` on at t_force, (3,)."""
         if self.angle is None or self.angle_rate is None:
             return np.zeros(3)
         own = slice(first, first + 3)
@@ -83,7 +83,7 @@ def held(model: Model, k: int, t: float) -> float:
 
 
 def turn_direction(model: Model, k: int, t: float) -> Array:
-    """Return the direction of marker A (TURN_B: of B, from where A turns back) of a prescribed angle at time t."""
+    """Return the direction of marker A (TURN_B: of B, with A rotating backwards) of a prescribed angle at time t."""
     angle = held(model, k, t) * (-1 if int(model.rows.kind[k]) == TURN_B else 1)
     return math.cos(angle) * model.rows.x[k] + math.sin(angle) * model.rows.z[k]
 
@@ -116,7 +116,7 @@ def constraint_value(model: Model, k: int, pair: Pair, span: Span) -> Array:
 
 
 def add_reaction(model: Model, k: int, pair: Pair, loads: Loads, span: Span, f: Array) -> None:
-    """Add the loads of row k with multiplier f, (...,): their work is f times the change of the row."""
+    """Add the loads of row k with multiplier f, (...,), whose work is f times the change of the row."""
     a, b = pair
     kind, x, y = int(model.rows.kind[k]), model.rows.x[k], model.rows.y[k]
     if kind_of(kind).is_length:
@@ -166,7 +166,7 @@ def reaction_direction(model: Model, k: int, pair: Pair, span: Span) -> Array:
 
 
 def rate_in_time(model: Model, k: int, pair: Pair, t: float) -> float:
-    """Return the rate of row k at one configuration while nothing moves: that of a prescribed motion."""
+    """Return the rate of row k at one configuration without motion: that of its prescribed motion."""
     if not is_driven(model, k):
         return 0.0
     a, b = pair
@@ -183,7 +183,7 @@ def rate_in_time(model: Model, k: int, pair: Pair, t: float) -> float:
 
 
 def end_angle(model: Model, k: int, pair: Pair) -> Array:
-    """Return the angle of row k at the end of the step: that of D from Z towards -E."""
+    """Return the angle of row k at the end of the step: of D, from Z towards -E."""
     a, b = pair
     D = b.ends(model.rows.y[k])[1]
     return arctan2(-dot(a.ends(model.rows.x[k])[1], D), dot(a.ends(model.rows.z[k])[1], D))
@@ -214,7 +214,7 @@ def angle_parts(model: Model, k: int, pair: Pair) -> tuple[Array, ...]:
 
 
 def angle_loads(model: Model, k: int, pair: Pair, loads: Loads, f: Array) -> None:
-    """Add the loads of a torque f, (...,), along the angle of row k: their work is f times its change."""
+    """Add the loads of a torque f, (...,), along the angle of row k, whose work is f times its change."""
     a, b = pair
     E, Z, D, S, C, kappa = angle_parts(model, k, pair)
     f = f * kappa
@@ -233,7 +233,7 @@ def angle_change(model: Model, k: int, pair: Pair) -> Array:
 
 
 def slip_change(model: Model, k: int, pair: Pair) -> tuple[Array, Array, Array]:
-    """Return the change of the distance of row k along its axis of A, the mean axis and the mean line from A to B."""
+    """Return the change of the distance of row k along its axis of A, the mean axis and the mean vector from A to B."""
     a, b = pair
     x = model.rows.x[k]
     E_0, E_1 = a.ends(x)

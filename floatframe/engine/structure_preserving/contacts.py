@@ -20,13 +20,13 @@ from floatframe.model.rotations import cross, dot
 
 __all__ = ["V_0", "contact_load", "speed_of_approach"]
 
-V_0 = 9  #: row of the speed of approach in a contact
-ALIKE = 0.02  #: difference of depths over their sum below which the quotient is a mean of forces
+V_0 = 9  #: index of the row of the approach speed in a contact
+ALIKE = 0.02  #: difference of depths relative to their sum, below which the quotient is the mean force
 GAUSS = ((-np.sqrt(0.6), 5 / 18), (0.0, 8 / 18), (np.sqrt(0.6), 5 / 18))  #: points and weights: exact to degree five
 
 
 def gaps(model: Model, c: int, pair: Pair) -> tuple[Array, Array, Array]:
-    """Return the gap of contact c where forces begin and end to act, and its change over the step."""
+    """Return the gap of contact c at the start and end of the force interval, and its change over the step."""
     a, b = pair
     i, own = int(model.connections.item[c]), model.contacts
     if own.is_sphere[i]:
@@ -45,13 +45,13 @@ def depth(gap: Array) -> Array:
 
 
 def power(x: Array, n: float) -> Array:
-    """Return xⁿ of numbers that are not negative, complex ones too."""
+    """Return xⁿ of non-negative numbers, also complex."""
     is_positive = np.real(x) > 0
     return np.where(is_positive, np.exp(n * np.log(np.where(is_positive, x, 1.0))), 0.0)
 
 
 def mean_force(k: float, n: float, x_0: Array, x_1: Array) -> Array:
-    """Return the change of k x^(n+1)/(n+1) over that of the depth, of gaps with these depths."""
+    """Return the change of k x^(n+1)/(n+1) divided by that of the depth, for gaps with these depths."""
     difference, both = x_1 - x_0, x_0 + x_1
     is_alike = np.abs(np.real(difference)) <= ALIKE * np.real(both)
     gauss = sum(w * power(0.5 * both + 0.5 * p * difference, n) for p, w in GAUSS)
@@ -63,12 +63,12 @@ def spring_force(k: float, n: float, gap_0: Array, gap_1: Array) -> Array:
     """Return f_s."""
     x_0, x_1 = depth(gap_0), depth(gap_1)
     is_partial = (np.real(gap_0) < 0) != (np.real(gap_1) < 0)
-    way = np.where(is_partial, gap_0 - gap_1, 1.0)  # of which a part is in contact
+    way = np.where(is_partial, gap_0 - gap_1, 1.0)  # for steps that are only partly in contact
     return mean_force(k, n, x_0, x_1) * np.where(is_partial, (x_1 - x_0) / way, 1.0)
 
 
 def contact_load(model: Model, c: int, pair: Pair, loads: Loads, span: Span) -> Array:
-    """Add the loads of contact c; return the work that restitution and friction take."""
+    """Add the loads of contact c, and return the work that restitution and friction dissipate."""
     a, b = pair
     i, k, own = int(model.connections.item[c]), int(model.connections.w0[c]), model.contacts
     gap_0, gap_1, change = gaps(model, c, pair)
@@ -101,7 +101,7 @@ def contact_load(model: Model, c: int, pair: Pair, loads: Loads, span: Span) -> 
 
 
 def speed_of_approach(model: Model, c: int, pair: Pair, span: Span) -> float:
-    """Return what the next step knows of v_0: in contact v_0, else minus the speed at which the gap closes."""
+    """Return v_0 for the next step: in contact v_0, otherwise minus the speed at which the gap closes."""
     slow = float(model.contacts.slow[model.connections.item[c]])
     known = float(span.w[int(model.connections.w0[c]) + V_0])
     _, gap, change = gaps(model, c, pair)

@@ -1,4 +1,4 @@
-"""Coordinates over a step: their values at its ends, how they change, and forces along them whose work is exact.
+"""Coordinates over a step: their values at its ends, their changes, and forces along them with exact work.
 
 A distance along an axis of A is a sum of products of a direction and a position, a distance of points the root of one,
 an angle that of discrete/constraints.py: each has a discrete derivative, so that a force Q along a coordinate does the
@@ -44,7 +44,7 @@ def has_two_ends(pair: Pair) -> bool:
 
 
 def span_parts(pair: Pair) -> tuple[Array, Array, Array]:
-    """Return the mean way from A to B, and the distances at both ends."""
+    """Return the mean vector from A to B, and the distances at both ends."""
     a, b = pair
     d_0, d_1 = b.x_0 - a.x_0, b.x_1 - a.x_1
     return 0.5 * (d_0 + d_1), np.sqrt(dot(d_0, d_0)), np.sqrt(dot(d_1, d_1))
@@ -64,7 +64,7 @@ def coordinate_change(model: Model, k: int, pair: Pair) -> Array:
 
 
 def coordinate_ends(model: Model, k: int, pair: Pair) -> tuple[Array, Array]:
-    """Return the coordinate of row k where forces begin and end to act; an angle at the end between -pi and pi."""
+    """Return the coordinate of row k at the start and end of the force interval; the final angle between -pi and pi."""
     kind, (a, b) = int(model.rows.kind[k]), pair
     if kind == PUSH:
         E_0, E_1 = a.ends(model.rows.x[k])
@@ -77,7 +77,7 @@ def coordinate_ends(model: Model, k: int, pair: Pair) -> tuple[Array, Array]:
 
 
 def counted(model: Model, k: int, x: Array, known: float) -> Array:
-    """Return the value of the coordinate of row k: of angles the one nearest to the value before."""
+    """Return the value of the coordinate of row k; for angles the value nearest to the previous one."""
     if not kind_of(model.rows.kind[k]).is_angle:
         return x
     return x + 2 * np.pi * np.floor((known - np.real(x)) / (2 * np.pi) + 0.5)
@@ -100,14 +100,14 @@ def add_coordinate_force(model: Model, k: int, pair: Pair, loads: Loads, Q: Arra
 
 
 def angle_axis(model: Model, k: int, holder: MarkerStep) -> Array:
-    """Return the unit axis of the angle of row k, fixed in the marker that holds it, by the mean of its directions."""
+    """Return the unit axis of the angle of row k, fixed in the marker with the axis: the mean of its directions."""
     E_0, E_1 = holder.ends(np.cross(model.rows.x[k], model.rows.z[k]))
     axis = 0.5 * (E_0 + E_1)
     return np.asarray(axis / np.sqrt(dot(axis, axis))[..., None])
 
 
 def coordinate_rate(model: Model, k: int, pair: Pair, h: float) -> Array:
-    """Return the mean rate of the coordinate of row k: of an angle that of the angular velocities about its axis."""
+    """Return the mean rate of the coordinate of row k; for an angle that of the angular velocities about its axis."""
     kind, (a, b) = int(model.rows.kind[k]), pair
     if kind in (PUSH, SPAN):
         return coordinate_change(model, k, pair) / h
@@ -116,7 +116,7 @@ def coordinate_rate(model: Model, k: int, pair: Pair, h: float) -> Array:
 
 
 def add_impulsive_force(model: Model, k: int, pair: Pair, loads: Loads, Q: Array) -> None:
-    """Add the loads of Q, (...,), along the coordinate of row k: impulse h Q and work h Q times its rate."""
+    """Add the loads of Q, (...,), along the coordinate of row k, with impulse h Q and work h Q times its rate."""
     kind, (a, b) = int(model.rows.kind[k]), pair
     if kind in (PUSH, SPAN):
         add_coordinate_force(model, k, pair, loads, Q)

@@ -32,7 +32,7 @@ def coupler_value(model: Model, c: int, pairs: list[Pair], span: Span) -> Array:
 
 
 def add_coupler_reaction(model: Model, c: int, pairs: list[Pair], loads: list[Loads], f: Array) -> None:
-    """Add the loads of coupler c with multiplier f, (...,): their work is f times the change of its row."""
+    """Add the loads of coupler c with multiplier f, (...,), whose work is f times the change of its row."""
     i = int(model.connections.item[c])
     scale = model.rows.x[int(model.elements.core[i]), 0]
     for p, pair, load in zip(coordinates_of(model, c, i), pairs, loads, strict=True):

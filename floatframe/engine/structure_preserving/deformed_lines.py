@@ -51,18 +51,18 @@ class DeformedLine:
 
     stations: tuple[BodyMarker, ...]
     s: Array  #: their places, (n_stations,)
-    e: Array  #: along the line, body axes
+    e: Array  #: direction of the line, body axes
     position: Array  #: of s = 0
-    row: int  #: with the prescribed place, -1 for none
+    row: int  #: row with the prescribed place, -1 for none
 
 
 @dataclass(frozen=True, eq=False)
 class Slide:
-    """How the sliding marker moves along the line over a step."""
+    """The motion of the sliding marker along the line over a step."""
 
     line: DeformedLine
-    t: Array  #: way by s, ground axes, (..., 3)
-    kappa: Array  #: turning of the axes by s, body axes, (..., 3)
+    t: Array  #: displacement by s, ground axes, (..., 3)
+    kappa: Array  #: rotation of the axes by s, body axes, (..., 3)
     tangent: Array  #: r' at the end of the step, ground axes
 
 
@@ -97,7 +97,7 @@ def functions(line: DeformedLine, s: Array, order: int) -> tuple[Array, Array, A
 
 
 def means(line: DeformedLine, s_0: Array, s_1: Array, order: int) -> tuple[Array, Array, Array]:
-    """Return the means over the way from s_0 to s_1 of the derivatives of a_j, b_j and l_j, of order 1 or 2.
+    """Return the means over the path from s_0 to s_1 of the derivatives of a_j, b_j and l_j, of order 1 or 2.
 
     Gauss' rule with two points between the stations that are passed.
     """
@@ -120,7 +120,7 @@ def combined(e: Array, a: Array, b: Array, d: Array, th: Array) -> Array:
 
 
 def place_of(line: DeformedLine, s: Array, x: Array, d: Array, th: Array) -> Array:
-    """Return the place nearest to a point x from that of s = 0, body axes, from a place s near by."""
+    """Return the place nearest to a point x relative to s = 0, body axes, starting from a nearby place s."""
     length = line.s[-1]
     is_close = False
     for _ in range(MOST):
@@ -128,7 +128,7 @@ def place_of(line: DeformedLine, s: Array, x: Array, d: Array, th: Array) -> Arr
         tangent, gap = line.e + D_1, x - s[..., None] * line.e - D
         change = dot(gap, tangent) / (dot(tangent, tangent) - dot(gap, D_2))
         s = s + change
-        if is_close:  # once more, for derivatives along imaginary parts
+        if is_close:  # one more iteration, for derivatives along imaginary parts
             break
         is_close = bool((np.abs(np.real(change)) <= CLOSE * length).all())
     return s
@@ -137,7 +137,7 @@ def place_of(line: DeformedLine, s: Array, x: Array, d: Array, th: Array) -> Arr
 def slid(
     model: Model, line: DeformedLine, marker: BodyMarker, step: BodyStep, b: MarkerStep, span: Span
 ) -> tuple[MarkerStep, Slide]:
-    """Return the sliding marker over a step of its body, at its place, and how it goes along the line."""
+    """Return the sliding marker over a step of its body, at its place, and its motion along the line."""
     body = marker.constants
     assert body is not None
     is_still = step.R_0 is step.R_1
@@ -187,7 +187,7 @@ def slid(
 
 
 def shapes(line: DeformedLine, s_0: Array, s_1: Array, q: Array) -> tuple[Array, Array]:
-    """Return the derivatives of displacement and rotation by q, (..., 3, n): means of those at both places."""
+    """Return the derivatives of displacement and rotation by q, (..., 3, n), as means over both places."""
     Psi = np.stack([station.shape.shapes(q) for station in line.stations], axis=-3)  # (..., n_stations, 6, n)
     Psi = np.swapaxes(Psi, -1, -3)  # (..., n, 6, n_stations)
     d, th = np.swapaxes(Psi[..., :3, :], -1, -2), np.swapaxes(Psi[..., 3:, :], -1, -2)  # (..., n, n_stations, 3)
@@ -198,11 +198,12 @@ def shapes(line: DeformedLine, s_0: Array, s_1: Array, q: Array) -> tuple[Array,
         by_q.append(combined(line.e, a, b, d, th))
         twist = dot((linear[..., None] * th).sum(axis=-2), line.e)[..., None] * line.e
         turning.append(cross(line.e, combined(line.e, a_1, b_1, d, th)) + twist)
-    return tuple(np.swapaxes(0.5 * (one + other), -1, -2) for one, other in (by_q, turning))  # type: ignore[return-value]
+    # type: ignore[return-value]
+    return tuple(np.swapaxes(0.5 * (one + other), -1, -2) for one, other in (by_q, turning))
 
 
 def normals(along: Array, y: Array) -> tuple[Array, Array, Array]:
-    """Return the unit vectors along a direction, nearest to y across it, and across both."""
+    """Return the unit vectors along a direction, normal to it nearest to y, and normal to both."""
     n_0 = along / np.sqrt(dot(along, along))[..., None]
     y = y - dot(y, n_0)[..., None] * n_0
     n_1 = y / np.sqrt(dot(y, y))[..., None]
@@ -244,7 +245,7 @@ def add_line_reaction(model: Model, k: int, pair: Pair, loads: Loads, slide: Sli
 
 
 def line_rate_in_time(model: Model, k: int, pair: Pair, slide: Slide, t: float) -> float:
-    """Return the rate of row k at one configuration while nothing moves: by the motion of the prescribed place."""
+    """Return the rate of row k at one configuration without motion: that of the prescribed place."""
     if slide.line.row < 0:
         return 0.0
     rate = value_of(model, int(model.rows.motion[slide.line.row]), t)[1]

@@ -1,4 +1,4 @@
-"""Forces over a step: loads whose work is the change of their potential, and what they give and take.
+"""Forces over a step: loads whose work is the change of their potential, and the work that they supply and dissipate.
 
 Springs act by the discrete derivative of their potential (Gonzalez 1996), here in closed form: with the lengths l_0,
 l_1 at both ends, |d_1|² - |d_0|² = 2 d_mean·(d_1 - d_0), so that the tension k ((l_0 + l_1)/2 - l_free) along
@@ -63,7 +63,7 @@ BINARY: dict[int, Callable[[float, float], float]] = {
     ex.DIVIDE: lambda x, y: x / y, ex.POWER: lambda x, y: x**y, ex.ATAN2: math.atan2,
     ex.LESS: lambda x, y: float(x < y), ex.MIN: min, ex.MAX: max,
 }  # fmt: skip
-STEP = 1e-5  #: of the differences by which derivatives are taken, by the sizes of the inputs
+STEP = 1e-5  #: relative step of differences for derivatives, by the sizes of the inputs
 
 
 def tape_at(model: Model, f: int, inputs: Array) -> float:
@@ -114,7 +114,7 @@ def user_values(model: Model, u: int, inputs: Array) -> Array:
 
 
 def sizes_of_inputs(model: Model, u: int) -> Array:
-    """Return sizes of t, x, v, z of user force u, (n_in,), by which differences are taken; nothing takes those by t."""
+    """Return sizes of t, x, v, z of user force u, (n_in,), for differences; derivatives by t are not used."""
     i = u + len(model.elements.core) - len(model.users.n_states)
     x = slice(int(model.elements.coordinate0[i]), int(model.elements.coordinate0[i + 1]))
     z = model.states.size[model.users.state0[u] : model.users.state0[u + 1]]
@@ -135,7 +135,10 @@ def element_of(model: Model, c: int) -> int:
 def inputs_of(
     model: Model, c: int, pairs: list[Pair], t: float, span: Span, z: Array, *, is_middle: bool
 ) -> tuple[Array, list[Array]]:
-    """Return t, x, v, z, (..., n_in), and the changes of the coordinates; x where forces end to act, or their mean."""
+    """Return t, x, v, z, (..., n_in), and the changes of the coordinates.
+
+    X at the end of the force interval, or the mean.
+    """
     x, v, changes = [], [], []
     for p, pair in zip(coordinates_of(model, c, element_of(model, c)), pairs, strict=True):
         k = int(model.coordinates.row[p])
@@ -152,7 +155,7 @@ def inputs_of(
 def user_force_load(
     model: Model, c: int, pairs: list[Pair], loads: list[Loads], span: Span, dz: Array, *, is_middle: bool
 ) -> Array:
-    """Add the loads of user force c; return the work they give. dz: changes of the states, (..., n_states)."""
+    """Add the loads of user force c, and return their work. dz: changes of the states, (..., n_states)."""
     z = span.w[list(state_rows(model, c))] + (0.5 * dz if is_middle else 0.0 * dz)
     inputs, changes = inputs_of(model, c, pairs, span.t_force, span, z, is_middle=is_middle)
     values = user_values(model, int(model.connections.item[c]), inputs)
@@ -218,7 +221,7 @@ def axial(A: Array) -> Array:
 
 
 def rotation_vector(R: Array) -> Array:
-    """Return the rotation vector of R, shorter than pi, (..., 3); complex numbers too."""
+    """Return the rotation vector of R, shorter than pi, (..., 3); also for complex numbers."""
     x = axial(R)
     sine2 = dot(x, x)
     cosine = 0.5 * (R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2] - 1)
@@ -240,7 +243,7 @@ def axes_change(marker: MarkerStep, mean: Array) -> Array:
 
 
 def bushing_load(model: Model, c: int, pair: Pair, loads: Loads, span: Span) -> tuple[Array, Array]:
-    """Add the loads of bushing c; return the work that its tables give, and that its damping takes."""
+    """Add the loads of bushing c, and return the work supplied by its tables and dissipated by its damping."""
     (a, b), i = pair, int(model.connections.item[c])
     (A_0, A_1), (B_0, B_1) = axes(a), axes(b)
     A, B, d = 0.5 * (A_0 + A_1), 0.5 * (B_0 + B_1), b.x_mean - a.x_mean
@@ -255,7 +258,7 @@ def bushing_load(model: Model, c: int, pair: Pair, loads: Loads, span: Span) -> 
     P = R_0 + 0.5 * tilde(relative_cayley(th_0, th_1)) @ R_0
     Q_0, Q_1 = rotation_exp(-share * th_0), rotation_exp(-share * th_1)
     Q, arm = 0.5 * (Q_0 + Q_1), turned(0.5 * (Q_0 + Q_1), 0.5 * (s_0 + s_1))
-    # the change of the deformations by the motion over the step
+    # change of the deformations due to the motion over the step
     dA, dB = axes_change(a, A), axes_change(b, B)
     psi = axial((transposed(dA) @ B + transposed(A) @ dB) @ transposed(P))
     dtheta = solved(Gamma, psi)
@@ -295,7 +298,7 @@ class Given:
     """Work of a force over a step."""
 
     given: Array | float = 0.0  #: that enters the system
-    taken: Array | float = 0.0  #: that a damper or friction takes
+    taken: Array | float = 0.0  #: work dissipated by a damper or friction
 
 
 def spring_load(model: Model, c: int, pair: Pair, loads: Loads, span: Span) -> Given:
@@ -359,7 +362,7 @@ def body_load(model: Model, k: int, body: CentralBody, step: BodyStep, load: Loa
 
 
 def coordinate_load(model: Model, k: int, pair: Pair, loads: Loads, span: Span, normal: Array) -> Given:
-    """Add the forces along the coordinate of row k (PUSH, TWIST, TWIST_B); normal: force in the joint across it."""
+    """Add the forces along the coordinate of row k (PUSH, TWIST, TWIST_B); normal: force in the joint normal to it."""
     is_angle = kind_of(model.rows.kind[k]).is_angle
     begin, end = coordinate_ends(model, k, pair)
     rate = coordinate_rate(model, k, pair, span.h)

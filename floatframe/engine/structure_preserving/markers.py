@@ -1,4 +1,4 @@
-"""Markers over a step: where they are, how they turn, and how loads on them act on their bodies, exactly in work.
+"""Markers over a step: positions, rotations, and loads on them with exact work on their bodies.
 
 Over a step (see rotation.py), with the lever l = (R_0 sigma_0 + R_1 sigma_1)/2 from the centre of mass, and for a
 direction E = R exp(Psi_r q) e = R eps of a marker,
@@ -39,7 +39,7 @@ class BodyMarker:
 
     @property
     def turns(self) -> bool:
-        """Whether it turns in its body."""
+        """Whether it rotates in its body."""
         psi, bend = self.shape.psi, self.shape.bend
         return psi is not None and (bool(np.any(psi[3:])) or bend is not None)
 

@@ -26,9 +26,9 @@ from floatframe.engine.structure_preserving.system import Connection, DiscreteSy
 __all__ = ["Scheme", "Solution", "StepError", "ends_of", "generalised_force", "remembered", "solve_step", "work_of"]
 
 TINY = 1e-20  #: of the imaginary parts
-SLOW = 0.1  #: ratio of corrections above which the derivatives are made anew
+SLOW = 0.1  #: ratio of successive corrections above which the derivatives are renewed
 ROUNDOFF = 2e-15  #: of a position
-DENSE_BELOW = 300  #: unknowns, from which on the matrix is sparse
+DENSE_BELOW = 300  #: number of unknowns above which the matrix is sparse
 
 
 class Scheme(Protocol):
@@ -36,20 +36,20 @@ class Scheme(Protocol):
 
     @property
     def acts_along(self) -> bool:
-        """Whether forces act along the step; else where it begins."""
+        """Whether forces act along the step; otherwise they act at its start."""
 
     def inertia(self, body: CentralBody, place: Placed, x: Array, h: float) -> Array:
         """Return h/2 times the change of momentum without loads, (..., 6 + n); modal forces of K and D included."""
 
     def force_step(self, place: Placed, x: Array) -> BodyStep:
-        """Return where forces act."""
+        """Return the configuration in which forces act."""
 
     def torque(self, place: Placed, x: Array, tau: Array) -> Array:
-        """Return what a torque in ground axes adds to the rotational residual, (..., 3)."""
+        """Return the contribution of a torque in ground axes to the rotational residual, (..., 3)."""
 
 
 class StepError(Exception):
-    """A step that could not be made; internal to the schemes."""
+    """A step that failed; internal to the schemes."""
 
     def __init__(self, words: str, excess: float, connection: int = -1) -> None:
         super().__init__(words)
@@ -68,7 +68,7 @@ class Solution:
 
 
 def local(function: Callable[[Array], Array], z: Array, *, with_derivative: bool) -> tuple[Array, Array | None]:
-    """Return function(z), (n,), and its derivative, (n, len(z)), if asked for."""
+    """Return function(z), (n,), and its derivative, (n, len(z)), if requested."""
     if not with_derivative:
         return function(z[None])[0], None
     values = function(z + 1j * TINY * np.eye(len(z)))
@@ -76,7 +76,7 @@ def local(function: Callable[[Array], Array], z: Array, *, with_derivative: bool
 
 
 def generalised_force(scheme: Scheme, place: Placed, x: Array, load: Load) -> Array:
-    """Return what a load adds to the residual, over -h²/2, (..., 6 + n)."""
+    """Return the contribution of a load to the residual, divided by -h²/2, (..., 6 + n)."""
     return np.concatenate([load.force, scheme.torque(place, x, load.torque), load.modal], axis=-1)
 
 
@@ -108,7 +108,7 @@ def body_residual(ds: DiscreteSystem, scheme: Scheme, i: int, place: Placed, spa
 def connection_residual(
     ds: DiscreteSystem, scheme: Scheme, connection: Connection, placed: list[Placed], span: Span, z: Array
 ) -> Array:
-    """Return what a connection adds to its bodies, and its rows, for z = (x of A, x of B, mu), (..., n)."""
+    """Return the contributions of a connection to its bodies, and its rows, for z = (x of A, x of B, mu), (..., n)."""
     x: dict[int, Array] = {}
     first = 0
     for i in connection.bodies:
@@ -144,7 +144,7 @@ def unknowns_of(ds: DiscreteSystem, connection: Connection) -> IntArray:
 def assemble(
     ds: DiscreteSystem, scheme: Scheme, placed: list[Placed], span: Span, z: Array, *, with_derivative: bool
 ) -> tuple[Array, list[tuple[IntArray, Array]]]:
-    """Return the residual of all unknowns, and the blocks of its derivative with their places."""
+    """Return the residual of all unknowns, and the blocks of its derivative with their positions."""
     residual, blocks = np.zeros(len(z)), []
     for i, place in enumerate(placed):
         at = np.arange(ds.model.bodies.u0[i], ds.model.bodies.u0[i + 1])
@@ -242,7 +242,7 @@ def solve_step(
 def work_of(
     ds: DiscreteSystem, scheme: Scheme, placed: list[Placed], span: Span, solution: Solution
 ) -> tuple[float, float]:
-    """Return the work that entered over a step, by forces and prescribed motions, and that taken by dampers.
+    """Return the work supplied over a step by forces and prescribed motions, and the work dissipated by dampers.
 
     Work of a prescribed motion is that of its multiplier.
     """
@@ -272,6 +272,6 @@ def work_of(
 
 
 def remembered(ds: DiscreteSystem, placed: list[Placed], span: Span, solution: Solution) -> Array:
-    """Return what connections remember at the end of a step, (n_w,)."""
+    """Return the memory of connections at the end of a step, (n_w,)."""
     steps = {i: step_of(place, x) for i, (place, x) in enumerate(zip(placed, solution.x, strict=True))}
     return ds.remembered([ends_of(ds, connection, steps, {}, span) for connection in ds.connections], span, solution.dz)

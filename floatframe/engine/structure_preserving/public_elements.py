@@ -1,4 +1,4 @@
-"""Public elements over a step: their law in the middle of it, and what their potential lacks there.
+"""Public elements over a step: their law in the middle of it, and the correction of their work.
 
 Marker m goes from r_0, A_0 to r_1, A_1 = cay(c) A_0. The law is asked once, at the middle of both places and both
 rotations with the rates of the step, and its wrench acts over the step,
@@ -51,19 +51,19 @@ __all__ = [
 ]
 
 
-WAY = 1 / 64  #: of the step, on which the gradient of the potential is taken
-#: of differences of sixth order at -3 to 3
+WAY = 1 / 64  #: fraction of the step over which the gradient of the potential is taken
+#: coefficients of sixth-order differences at -3 to 3
 FIRST = (-1 / 60, 9 / 60, -45 / 60, 0.0, 45 / 60, -9 / 60, 1 / 60)
-LEAST = 1e-6  #: of the length of the law: motions below it are none
-BALANCED = 1e-9  #: sum of wrenches over that of their sizes
-STEP = 1e-5  #: of the differences by which derivatives are taken, by the sizes of the inputs
+LEAST = 1e-6  #: motion relative to the length of the law, below which it counts as zero
+BALANCED = 1e-9  #: sum of wrenches relative to the sum of their norms, below which they balance
+STEP = 1e-5  #: relative step of differences for derivatives, by the sizes of the inputs
 
 
 Place = tuple[Array, Array]  #: position and axes of a marker
 
 
 class Motion:
-    """The markers of an element over a step, and what its law is asked with."""
+    """The markers of an element over a step, and the inputs of its law."""
 
     def __init__(self, model: Model, c: int, markers: list[MarkerStep], span: Span, *, is_middle: bool) -> None:
         self.model, self.c, self.i, self.span = model, c, int(model.connections.item[c]), span
@@ -83,30 +83,30 @@ class Motion:
 
     @property
     def between_points(self) -> bool:
-        """Whether it acts by forces alone."""
+        """Whether the element acts only by forces."""
         return not any(self.acts("moment", m) for m in range(len(self.markers)))
 
     @property
     def whole(self) -> int:
-        """The first marker on which it acts by all that it acts by; -1 for none."""
+        """The first marker with all kinds of loads of the element; -1 for none."""
         parts = [part for part in ("force", "moment") if any(self.acts(part, m) for m in range(len(self.markers)))]
         found = [m for m in range(len(self.markers)) if all(self.acts(part, m) for part in parts)]
         return found[0] if found else -1
 
     @property
     def is_apart(self) -> bool:
-        """Whether it is between bodies alone, so that its wrenches may balance."""
+        """Whether all markers are on bodies, so that the wrenches may balance."""
         return len(self.markers) > 1 and self.whole >= 0 and all(m.step is not None for m in self.markers)
 
     def along(self, s: Array | float) -> list[Place]:
-        """Return places and axes of the markers after a part s of the step from the middle."""
+        """Return positions and axes of the markers after a fraction s of the step from the middle."""
         return [
             (r + s * dr, rotation_exp(s * turn) @ A)
             for r, dr, turn, A in zip(self.r, self.dr, self.turn, self.A, strict=True)
         ]
 
     def inputs(self, t: float, places: list[Place], z: Array, lam: Array) -> Array:
-        """Return what the law is asked with, (..., n_in)."""
+        """Return the inputs of the law, (..., n_in)."""
         h, parts = self.span.h, [np.array([t])]
         for (r, A), dr, turn in zip(places, self.dr, self.turn, strict=True):
             parts += [r, A.reshape(*A.shape[:-2], 9), dr / h, turn / h]
@@ -115,7 +115,7 @@ class Motion:
         return np.concatenate([np.broadcast_to(part, (*shape, part.shape[-1])) for part in parts], axis=-1)
 
     def law(self, t: float, places: list[Place], z: Array, lam: Array) -> Array:
-        """Return what the law gives, with derivatives along imaginary parts."""
+        """Return the results of the law, with derivatives along imaginary parts."""
         laws, i = self.model.laws, self.i
         inputs = self.inputs(t, places, z, lam)
         flat = inputs.reshape(-1, inputs.shape[-1])
@@ -136,7 +136,7 @@ class Motion:
         return values.reshape(*inputs.shape[:-1], -1)
 
     def sizes(self, inputs: Array) -> Array:
-        """Return sizes of the inputs, (n, n_in), by which differences are taken; nothing takes those by the time."""
+        """Return sizes of the inputs, (n, n_in), for differences; derivatives by time are not used."""
         laws, i = self.model.laws, self.i
         n, _, n_z, n_lam, _, n_data = (int(each) for each in self.head[:6])
         known = laws.data[laws.data0[i] + n_data : laws.data0[i + 1]]
@@ -147,7 +147,7 @@ class Motion:
         return np.hstack([np.broadcast_to(places, (len(inputs), len(places))), unknowns])
 
     def wrenches(self, outputs: Array) -> Array:
-        """Return the wrenches of what the law gives, (..., n, 6)."""
+        """Return the wrenches among the results of the law, (..., n, 6)."""
         n = len(self.markers)
         return outputs[..., : 6 * n].reshape(*outputs.shape[:-1], n, 6)
 
@@ -158,7 +158,10 @@ def axes(marker: MarkerStep, end: int) -> Array:
 
 
 def way_turned(marker: MarkerStep, *, is_middle: bool) -> Array:
-    """Return c, the Cayley vector of the rotation of a marker; at one configuration its rotation by the increments."""
+    """Return c, the Cayley vector of the rotation of a marker.
+
+    At one configuration the rotation from its increments.
+    """
     if not is_middle or marker.step is None:
         return marker.turning()
     Q = axes(marker, 1) @ np.swapaxes(axes(marker, 0), -1, -2)
@@ -174,7 +177,7 @@ def half_turned(A: Array, c: Array) -> Array:
 
 
 def multiplier_rows(model: Model, c: int) -> tuple[int, ...]:
-    """Return the rows of the multipliers of element c, the last of its rows."""
+    """Return the multiplier rows of element c, which are its last rows."""
     n_lam, last = int(model.laws.head[int(model.connections.item[c]), 3]), int(model.connections.w0[c + 1])
     return tuple(range(last - n_lam, last))
 
@@ -194,7 +197,10 @@ def element_load(
     model: Model, c: int, markers: list[MarkerStep], loads: list[Load | None], span: Span, dz: Array, lam: Array, *,
     is_middle: bool,
 ) -> tuple[Array, Array]:  # fmt: skip
-    """Add the loads of element c; return the work that it gives and takes. dz: changes of states, (..., n_z)."""
+    """Add the loads of element c.
+
+    Return the work that it supplies and dissipates. dz: changes of states, (..., n_z).
+    """
     motion = Motion(model, c, markers, span, is_middle=is_middle)
     z = states_at(model, c, span, dz, 0.5 if is_middle else 0.0)
     outputs = motion.law(span.t_force, motion.along(0.0), z, lam)
@@ -214,7 +220,7 @@ def element_load(
 
 
 def work_of_law(motion: Motion, outputs: Array, on_bodies: Array) -> tuple[Array, Array]:
-    """Return the work that a law gives and takes by what it names, see kernels/connections/element_law.py."""
+    """Return the supplied and dissipated work that a law declares, see kernels/connections/element_law.py."""
     laws, i, h = motion.model.laws, motion.i, motion.span.h
     n, _, n_z, n_lam = (int(each) for each in motion.head[:4])
     energy, given, lost = (int(each[i]) for each in (laws.energy, laws.given, laws.lost))
@@ -230,7 +236,7 @@ def work_of_law(motion: Motion, outputs: Array, on_bodies: Array) -> tuple[Array
 
 
 def add_axes_moment(marker: MarkerStep, load: Load | None, M: Array) -> None:
-    """Add a moment whose work is M·c, c the Cayley vector of the rotation of the marker."""
+    """Add a moment with work M·c, c the Cayley vector of the rotation of the marker."""
     if marker.step is None or load is None:
         return
     load.torque += M
@@ -248,7 +254,7 @@ def add_axes_moment(marker: MarkerStep, load: Load | None, M: Array) -> None:
 
 
 def potential(motion: Motion, places: list[Place], z: Array, lam: Array) -> tuple[Array, Array]:
-    """Return U at places of the markers, and the wrenches there."""
+    """Return U for positions of the markers, and the wrenches there."""
     laws, rows = motion.model.laws, multiplier_rows(motion.model, motion.c)
     outputs = motion.law(motion.span.t_force, places, z, lam)
     n, _, n_z, n_lam = (int(each) for each in motion.head[:4])
@@ -262,13 +268,13 @@ def potential(motion: Motion, places: list[Place], z: Array, lam: Array) -> tupl
 
 
 def has_potential(motion: Motion) -> bool:
-    """Whether the law names an energy or holds positions."""
+    """Whether the law declares an energy or holds positions."""
     holds = motion.model.rows.holds[list(multiplier_rows(motion.model, motion.c))]
     return bool(motion.model.laws.energy[motion.i] >= 0 or (holds == POSITION).any())
 
 
 def correction(motion: Motion, wrenches: Array, z: Array, lam: Array) -> Array:
-    """Return the wrenches that do the work delta, (..., n, 6)."""
+    """Return the wrenches with the work delta, (..., n, 6)."""
     if not has_potential(motion):
         return np.zeros_like(wrenches)
     slope: Array | float = 0.0
@@ -295,7 +301,7 @@ def correction(motion: Motion, wrenches: Array, z: Array, lam: Array) -> Array:
 
 
 def is_balanced(wrenches: Array, r: list[Array]) -> bool:
-    """Whether wrenches at places balance."""
+    """Whether wrenches at given positions balance."""
     F, M = np.real(wrenches[..., :3]), np.real(wrenches[..., 3:])
     arms = [np.real(each - r[0]) for each in r]
     moment = M.sum(axis=-2) + sum(np.cross(arm, F[..., m, :]) for m, arm in enumerate(arms))
@@ -307,7 +313,7 @@ def is_balanced(wrenches: Array, r: list[Array]) -> bool:
 
 
 def ways_of_points(motion: Motion) -> list[tuple[Array, Array]]:
-    """Return the forces of points on each other as large as their distances change, and no moments.
+    """Return forces between points, as large as the changes of their distances, and no moments.
 
     Two points in one place have no line, and no forces on each other.
     """
@@ -351,7 +357,7 @@ def element_rates(model: Model, c: int, markers: list[MarkerStep], span: Span, d
 
 
 def element_values(model: Model, c: int, markers: list[MarkerStep], span: Span, dz: Array, lam: Array) -> list[Array]:
-    """Return what the multipliers of element c hold: positions at the end of the step, the rest in its middle."""
+    """Return the held quantities of the multipliers of element c: positions at the end of the step, others midway."""
     motion = Motion(model, c, markers, span, is_middle=True)
     first, n_lam = 6 * len(markers) + int(motion.head[2]), int(motion.head[3])
     t_m, z_m, z_1 = (0.5 * (span.t_0 + span.t_1), *(states_at(model, c, span, dz, part) for part in (0.5, 1.0)))

@@ -1,4 +1,4 @@
-"""A compiled system as the discrete schemes see it, and the loads of its joints and forces over a step."""
+"""A compiled system for the discrete schemes, and the loads of its joints and forces over a step."""
 
 from dataclasses import dataclass
 
@@ -64,20 +64,23 @@ __all__ = ["Connection", "DiscreteSystem", "Ends", "discrete_system"]
 
 @dataclass(frozen=True, eq=False)
 class Connection:
-    """A joint, force or coupler between markers A and B; of couplers and user forces those of each coordinate."""
+    """A joint, force or coupler between markers A and B.
+
+    For couplers and user forces the markers of each coordinate.
+    """
 
     number: int
     ends: tuple[BodyMarker, ...]
-    held: tuple[int, ...]  #: rows that hold something
+    held: tuple[int, ...]  #: constraint rows
     loaded: tuple[int, ...]  #: rows with forces along their coordinate
     first: int  #: first multiplier
     states: tuple[int, ...]  #: rows of its states
-    first_state: int  #: number of the first of them among all
-    line: DeformedLine | None = None  #: along which marker A slides
+    first_state: int  #: number of the first constraint row among all
+    line: DeformedLine | None = None  #: line along which marker A slides
 
     @property
     def bodies(self) -> tuple[int, ...]:
-        """Numbers of its bodies, each once."""
+        """Numbers of its bodies, without duplicates."""
         return tuple(sorted({end.body for end in self.ends} - {-1}))
 
 
@@ -87,7 +90,7 @@ class Ends:
 
     markers: list[MarkerStep]
     loads: list[Load | None]
-    slide: Slide | None = None  #: of a marker A that slides along a line
+    slide: Slide | None = None  #: for a marker A that slides along a line
 
     @property
     def pairs(self) -> list[Pair]:
@@ -116,11 +119,11 @@ class DiscreteSystem:
 
     @property
     def held(self) -> IntArray:
-        """The rows that hold something, one for each multiplier."""
+        """The constraint rows, one for each multiplier."""
         return np.array([k for c in self.connections for k in c.held], dtype=np.int64)
 
     def own_loads(self, i: int, step: BodyStep, load: Load, span: Span) -> Given:
-        """Add gravity, point forces and load cases on body i; gravity has a potential and gives no work."""
+        """Add gravity, point forces and load cases on body i; gravity has a potential and supplies no work."""
         body = self.bodies[i]
         load.force += body.m * self.model.gravity
         given: Array | float = 0.0
@@ -161,7 +164,7 @@ class DiscreteSystem:
         return Given(given, taken)
 
     def add_row(self, connection: Connection, k: int, ends: Ends, span: Span, f: Array) -> None:
-        """Add the loads of held row k with multiplier f, (...,); those of elements are among their forces."""
+        """Add the loads of constraint row k with multiplier f, (...,); the loads of elements are among their forces."""
         kind, pair, loads = int(self.model.rows.kind[k]), ends.pairs[0], ends.of_loads[0]
         if ends.slide is not None:
             add_line_reaction(self.model, k, pair, loads, ends.slide, f)
@@ -194,7 +197,7 @@ class DiscreteSystem:
         return constraint_value(self.model, k, pair, span)
 
     def rate_in_time(self, k: int, ends: Ends, t: float) -> float:
-        """Return the rate of held row k at one configuration while nothing moves."""
+        """Return the rate of constraint row k at one configuration without motion."""
         if ends.slide is not None:
             return line_rate_in_time(self.model, k, ends.pairs[0], ends.slide, t)
         if int(self.model.rows.kind[k]) != COUPLE:
@@ -203,7 +206,7 @@ class DiscreteSystem:
         return 0.0 if motion < 0 else -float(self.model.rows.x[k, 0]) * value_of(self.model, motion, t)[1]
 
     def is_driven(self, connection: Connection, k: int) -> bool:
-        """Whether held row k of a connection does the work of a prescribed motion."""
+        """Whether constraint row k of a connection does the work of a prescribed motion."""
         driven = connection.line is not None and connection.line.row >= 0
         return driven or bool(self.model.rows.motion[k] >= 0)
 
@@ -221,7 +224,7 @@ class DiscreteSystem:
         return dz - span.h * rates
 
     def remembered(self, ends: list[Ends], span: Span, dz: Array) -> Array:
-        """Return what connections remember at the end of a step, (n_w,), by their ends over it."""
+        """Return the memory of connections at the end of a step, (n_w,), from their ends over it."""
         model, w = self.model, span.w.copy()
         for connection, own in zip(self.connections, ends, strict=True):
             c = connection.number
@@ -239,7 +242,7 @@ class DiscreteSystem:
 
 
 def normal_force(model: Model, k: int, connection: Connection, pair: Pair, f: Array, span: Span) -> Array:
-    """Return the size of the force in a joint across the axis of its row k."""
+    """Return the size of the force in a joint normal to the axis of its row k."""
     a, _ = pair
     F = np.zeros((*f.shape[:-1], 3), f.dtype)
     for j, row in enumerate(connection.held):
@@ -308,7 +311,7 @@ def ends_of(model: Model, c: int) -> list[int]:
 
 
 def require_known(compiled: CompiledSystem, scheme: str) -> None:
-    """Raise `ModelError` naming the joint or element that the scheme does not know."""
+    """Raise `ModelError` with the name of a joint or element that the scheme does not support."""
     model = compiled.model
     for c, name in enumerate(compiled.connection_names):
         kinds = model.rows.kind[model.connections.w0[c] : model.connections.w0[c + 1]]
@@ -323,7 +326,7 @@ def require_known(compiled: CompiledSystem, scheme: str) -> None:
 
 
 def require_known_element(model: Model, c: int, name: str, scheme: str) -> None:
-    """Raise `ModelError` if element c is one that the scheme does not know."""
+    """Raise `ModelError` if the scheme does not support element c."""
     first = int(model.connections.a[c])
     markers = range(first, first + int(model.laws.head[int(model.connections.item[c]), 0]))
     if (model.markers.accelerated[list(markers)] >= 0).any():

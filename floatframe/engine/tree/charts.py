@@ -1,4 +1,4 @@
-"""Charts of joints: their coordinates as columns of motion of marker B as seen from marker A (docs/relative.md §2)."""
+"""Charts of joints: their coordinates as columns of the motion of marker B relative to A (docs/relative.md §2)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -28,19 +28,19 @@ ZERO = np.zeros(3)
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """One coordinate: unit rate moves B by a screw that is fixed in A (through its point) or in B."""
+    """One coordinate: with unit rate B moves by a screw that is fixed in A (through its point) or in B."""
 
     name: str  #: of the coordinate, "" where the joint has no name for it
-    tau: Array = field(default_factory=lambda: ZERO)  #: velocity of the point of B as seen from A, axes of A, (3,)
+    tau: Array = field(default_factory=lambda: ZERO)  #: velocity of the point of B relative to A, axes of A, (3,)
     alpha: Array = field(default_factory=lambda: ZERO)  #: angular velocity, axes of the side, (3,)
     side: int = SIDE_A
     unit: str = "rad"  #: of the coordinate
-    #: of this coordinate by another name of it (a screw: angle = 1/slope distance)
+    #: factor of this coordinate to another of the same freedom (a screw: angle = 1/slope distance)
     factors: tuple[tuple[str, float], ...] = ()
 
 
 def turns_in_b() -> tuple[Column, ...]:
-    """Return free rotation: three columns fixed in B, the group of rotations."""
+    """Return free rotation: three columns fixed in B, the rotation group."""
     return tuple(Column(f"turn {axis}", alpha=e, side=SIDE_B) for axis, e in zip("xyz", np.eye(3), strict=True))
 
 
@@ -71,7 +71,7 @@ def screw(joint: ScrewJoint, A_a: Array, A_b: Array) -> tuple[Column, ...]:
 
 
 def universal(joint: UniversalJoint, A_a: Array, A_b: Array) -> tuple[Column, ...]:
-    """Angle of the cross about the axis of A, of B about that of B."""
+    """Angle of the cross about the axis of A, and of B about the axis of B."""
     return (Column("angle", alpha=joint.axis), Column("angle_b", alpha=joint.axis_b, side=SIDE_B))
 
 
@@ -92,7 +92,7 @@ def spherical(joint: SphericalJoint, A_a: Array, A_b: Array) -> tuple[Column, ..
 
 
 def fixed(joint: FixedJoint, A_a: Array, A_b: Array) -> tuple[Column, ...]:
-    """Nothing."""
+    """No motion."""
     return ()
 
 
@@ -101,7 +101,7 @@ def constant_orientation(joint: ConstantOrientation, A_a: Array, A_b: Array) -> 
     return moves_in_a()
 
 
-#: chart of each joint that has one; all others stay constraints
+#: chart of each joint that has one; all other joints remain constraints
 CHARTS: dict[type, Callable[[Any, Array, Array], tuple[Column, ...]]] = {
     RevoluteJoint: revolute,
     PrismaticJoint: prismatic,
@@ -114,11 +114,11 @@ CHARTS: dict[type, Callable[[Any, Array, Array], tuple[Column, ...]]] = {
     ConstantOrientation: constant_orientation,
 }
 
-#: of a body that hangs at nothing: translation along ground axes, rotation about its own
+#: chart of an unconnected body: translation along ground axes, rotation about its own axes
 FREE = (*moves_in_a(), *turns_in_b())
 
 
 def chart_of(joint: object, A_a: Array, A_b: Array) -> tuple[Column, ...] | None:
-    """Return the columns of a joint whose marker axes are A_a, A_b, (3, 3), as placed; None if it has no chart."""
+    """Return the columns of a joint with assembled marker axes A_a, A_b, (3, 3); None if it has no chart."""
     chart = CHARTS.get(type(joint))
     return None if chart is None else chart(joint, A_a, A_b)

@@ -1,4 +1,4 @@
-"""The two formulations by their names: coordinates of bodies, or of joints."""
+"""The two formulations by name: coordinates of bodies, or of joints."""
 
 from fe_models.foundation.words import nearest
 from floatframe.errors import ModelError
@@ -9,7 +9,7 @@ FORMULATIONS = ("absolute", "relative")  #: by their names
 
 
 def is_relative(formulation: str) -> bool:
-    """Whether a formulation is the one in coordinates of joints; `ModelError` if there is none of that name."""
+    """Whether a formulation is the one in coordinates of joints; `ModelError` if the name is unknown."""
     if formulation not in FORMULATIONS:
         raise ModelError(
             f"formulation: expected one of {', '.join(FORMULATIONS)}, got {formulation!r}"

@@ -32,13 +32,13 @@ from floatframe.model.system import System
 
 __all__ = ["AccelerationDerivatives", "ForceDerivatives", "RelativeModel", "relative_model"]
 
-UNIT_DEFECT = 1e-6  #: by which the length of Euler parameters may differ from one
+UNIT_DEFECT = 1e-6  #: allowed deviation of the length of Euler parameters from one
 
 
 class ForceDerivatives(NamedTuple):
     """Derivatives of the forces of a motion, each (n_rates, n_rates); row: force, column: coordinate."""
 
-    by_z: Array  #: along the rates, the others held [N/rad, ...]
+    by_z: Array  #: by positions along the rates, with rates and accelerations fixed [N/rad, ...]
     by_z_dot: Array
     by_z_ddot: Array  #: the mass matrix
 
@@ -46,14 +46,14 @@ class ForceDerivatives(NamedTuple):
 class AccelerationDerivatives(NamedTuple):
     """Derivatives of the accelerations under forces, each (n_rates, n_rates); row: acceleration."""
 
-    by_z: Array  #: along the rates, rates and forces held
+    by_z: Array  #: by positions along the rates, with rates and forces fixed
     by_z_dot: Array
     by_force: Array  #: M⁻¹
 
 
 @dataclass(frozen=True, eq=False)
 class RelativeModel:
-    """Equations of a tree of rigid and flexible bodies: M(z) z_ddot + h(z, z_dot) = forces, never written out.
+    """Equations of a tree of rigid and flexible bodies: M(z) z_ddot + h(z, z_dot) = forces, evaluated by recursion.
 
     Positions z, (n_z,), rates z_dot, accelerations and forces, (n_rates,), stand body by body in the order of the
     system: those of the joint that carries the body, in the order of its coordinates, then its modal coordinates.
@@ -273,7 +273,7 @@ class RelativeModel:
         return z, np.asarray(np.linalg.lstsq(T, engine.u, rcond=None)[0], dtype=float)
 
     def moved(self, z: Array, dz: Array) -> Array:
-        """Return z moved by dz, (n_rates,), along the rates: rotations by the exponential map, all else by sums."""
+        """Return z moved by dz, (n_rates,), along the rates: rotations by the exponential map, others by addition."""
         x, dx = checked("moved: z", z, self.n_z).copy(), checked("moved: dz", dz, self.n_rates)
         nodes, e = self.expansion.nodes, self.expansion
         for kind, n, x0, v0 in zip(nodes.kind, nodes.n_z, nodes.x0, nodes.v0, strict=True):
@@ -322,7 +322,7 @@ class RelativeModel:
         return J
 
     def own_arm(self, k: int) -> Array:
-        """Return from the origin of node k to its joint, frame of the node, (3,)."""
+        """Return the vector from the origin of node k to its joint, frame of the node, (3,)."""
         m = int(self.expansion.nodes.own[k])
         return np.zeros(3) if m < 0 else self.marker_work.markers.rho[m]
 
@@ -360,7 +360,7 @@ class RelativeModel:
 
     @cached_property
     def none(self) -> Dense:
-        """Matrices without entries, for what needs none."""
+        """Empty matrices, for tasks that need none."""
         return new_dense(self.expansion.nodes, self.n_rates, 0, is_whole=False)
 
     @cached_property
@@ -379,7 +379,7 @@ class RelativeModel:
         return table_of(self.dense)
 
     def run(self, what: int, times: int = 1) -> None:
-        """Run the kernels; `ModelError` where there is no inertia along a coordinate."""
+        """Run the kernels; `ModelError` if there is no inertia along a coordinate."""
         table = self.dense_table if what in (MASS, TANGENTS) else self.none_table
         self.require(self.ready.run(what, table, times))
 
@@ -388,13 +388,13 @@ class RelativeModel:
         if node >= 0:
             first = int(self.expansion.nodes.v0[node])
             raise ModelError(
-                f"forward_dynamics: what hangs at {quoted(self.rate_names[first])} has no inertia along it in this "
+                f"forward_dynamics: the subtree of {quoted(self.rate_names[first])} has no inertia along it in this "
                 "position"
             )
 
 
 def shifted(columns: Array, p: Array) -> Array:
-    """Return motions (n, 6) of a point p further."""
+    """Return motions (n, 6), transferred to a point at p."""
     return np.concatenate([columns[:, :3] + np.cross(columns[:, 3:], p), columns[:, 3:]], axis=1)
 
 
@@ -423,8 +423,8 @@ def relative_model(system: System) -> RelativeModel:
     for kind, named in (("force", others), ("coupler", system.couplers), ("element", system.elements)):
         if named:
             raise ModelError(
-                f"{where}: expected bodies, joints and gravity, got {kind} {named[0].name!r}; give what acts to "
-                "inverse_dynamics or forward_dynamics, or integrate the system"
+                f"{where}: expected bodies, joints and gravity, got {kind} {named[0].name!r}; give its forces "
+                "to inverse_dynamics or forward_dynamics, or integrate the system"
             )
     found = tree_of(system)
     for names, why in ((found.cut, "closes a loop"), (found.constrained, "has no coordinates that place a body")):

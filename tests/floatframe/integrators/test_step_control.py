@@ -101,7 +101,7 @@ def test_a_step_that_fails_is_divided_and_steps_grow_again():
 
 
 def test_least_step_is_named_where_the_error_stays_above_the_tolerance():
-    with pytest.raises(ConvergenceError, match=r"error_tolerance = 1e-10 down to the least step, h_min = 0.01"):
+    with pytest.raises(ConvergenceError, match=r"error_tolerance = 1e-10 down to the smallest step, h_min = 0.01"):
         integrate(pendulum(), GeneralizedAlpha(0.8, error_tolerance=1e-10, h_min=0.01), T_END, 0.05)
 
 

@@ -27,7 +27,7 @@ SIGNATURES = {
     "tangent": "tangent(t, x, z, lam, data, slopes)",
 }
 
-#: made of functions by numba, by function and template; both are kept alive
+#: compiled from functions of numba, by function and template; both are kept alive
 compiled: dict[tuple[int, str], tuple[Any, Any]] = {}
 
 
@@ -48,14 +48,14 @@ def law_callbacks(where: str, law: ElementLaw, head: tuple[int, ...]) -> tuple[C
 
 
 def is_compiled(function: Callable[..., None]) -> bool:
-    """Whether a function is one of numba."""
+    """Return whether a function is compiled by numba."""
     from numba.core.dispatcher import Dispatcher
 
     return isinstance(function, Dispatcher)
 
 
 def callback(where: str, function: Callable[..., None], kind: str, head: tuple[int, ...]) -> Callback:
-    """Return a function of an element behind a C function, by the template of a kind."""
+    """Return a user's function for an element as a C function, by the template of its kind."""
     from floatframe.engine.compiling.callbacks import law_templates
 
     templates = {
@@ -71,7 +71,7 @@ def callback(where: str, function: Callable[..., None], kind: str, head: tuple[i
 
 
 def compiled_callback(where: str, function: Any, kind: str, template: Callable[[int], FunctionType]) -> Callback:
-    """Return a function of numba behind a C function."""
+    """Return a function of numba as a C function."""
     from numba import cfunc, types
     from numba.core.errors import NumbaError
 
@@ -84,7 +84,7 @@ def compiled_callback(where: str, function: Any, kind: str, template: Callable[[
         try:
             try:
                 whole = cfunc(signature, cache=digest is not None, error_model="numpy")(made)
-            except RuntimeError:  # nowhere to keep the cache
+            except RuntimeError:  # no folder for the cache
                 whole = cfunc(signature, error_model="numpy")(made)
         except (NumbaError, NotImplementedError) as error:
             name = "tangent" if kind == "given" else "function"
@@ -100,7 +100,7 @@ def compiled_callback(where: str, function: Any, kind: str, template: Callable[[
 
 
 def filled(template: Callable[[int], FunctionType], function: Any, digest: int) -> FunctionType:
-    """Return the function that a template makes, with the function of the user in the place of `law`.
+    """Return the function of a template with the user's function in place of `law`.
 
     Its name says the digest, so that each law has an index of its own in the cache: two processes that add different
     laws to one index at the same moment give both the same file, and the code of one law under the key of the other.
@@ -120,7 +120,7 @@ def array_at(pointer: Any, shape: Any) -> Array:
 def python_callback(
     where: str, function: Any, kind: str, template: Callable[[int], FunctionType], head: tuple[int, ...]
 ) -> Callback:
-    """Return a Python function behind a C function; after an error it answers with what is no number."""
+    """Return a Python function as a C function; after an error it returns NaN."""
     n, width, n_z, n_lam, n_seen, _, _, _ = head
     n_out = 6 * n + n_z + n_lam
     size = n_out + n_seen if kind == "value" else n_out * ((width - 6) * n + n_z + n_lam)
@@ -132,7 +132,7 @@ def python_callback(
         try:
             if kept_callback.error is None:
                 made(head_at, inputs_at, data_at, outputs_at)
-        except BaseException as error:  # it is raised again when the kernels have returned
+        except BaseException as error:  # the error is raised again after the kernels have returned
             kept_callback.error = error
         if kept_callback.error is not None:
             np.ctypeslib.as_array(outputs_at, (size,))[:] = np.nan
@@ -144,7 +144,7 @@ def python_callback(
 
 
 def called_law(address: int, head: tuple[int, ...], data: Array, inputs: Array, n_out: int) -> Array:
-    """Return what a function of an element gives for inputs, (n_t, 1 + n 18 + n_z + n_lam): (n_t, n_out)."""
+    """Return the outputs of a function of an element for inputs, (n_t, 1 + n 18 + n_z + n_lam): (n_t, n_out)."""
     function = C_FUNCTION(address)
     numbers = np.ascontiguousarray(data, dtype=float)
     sizes = np.array(head, dtype=np.int64)

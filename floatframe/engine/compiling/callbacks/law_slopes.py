@@ -1,4 +1,4 @@
-"""Derivatives of the law of an element by differences of fourth order: of its outputs, and to check its own."""
+"""Derivatives of the law of an element by fourth-order differences: of its outputs, and to check its own tangent."""
 
 from collections.abc import Sequence
 
@@ -10,9 +10,9 @@ from floatframe.model.rotations import rotation_exp
 
 __all__ = ["difference_slopes"]
 
-STEP = 1e-4  #: of differences, relative
-LEAST = 1e-3  #: size of a state or multiplier near zero
-N_MOTIONS = 5  #: sizes of motions, before those of states
+STEP = 1e-4  #: relative step of the differences
+LEAST = 1e-3  #: size of a state or multiplier whose value is near zero
+N_MOTIONS = 5  #: sizes of motions; those of states follow
 STENCIL = ((-2, 1 / 12), (-1, -8 / 12), (1, 8 / 12), (2, -1 / 12))  #: of fourth order
 
 
@@ -35,7 +35,7 @@ def varied(inputs: Array, n: int, width: int, k: int, step: float) -> Array:
 
 
 def size_of(sizes: Sequence[float], inputs: Array, n: int, width: int, k: int) -> float:
-    """Return the size by which variation k is measured, of the sizes that `PlacedLaw.sizes` gives."""
+    """Return the size of variation k, from the sizes in `PlacedLaw.sizes`."""
     per = width - 6
     if k >= per * n:
         own = sizes[N_MOTIONS + k - per * n]
@@ -48,7 +48,7 @@ def difference_slopes(
     address: int, head: tuple[int, ...], data: Array | Sequence[float], inputs: Array, sizes: Sequence[float],
     step: float = STEP,
 ) -> Array:  # fmt: skip
-    """Return d(wrenches, rates, held, outputs) by all variations at inputs, (6 n + n_z + n_lam + n_seen, n_columns).
+    """Return d(wrenches, rates, held, outputs)/d(inputs) for all variations, (6 n + n_z + n_lam + n_seen, n_columns).
 
     sizes: by which inputs are measured, see `PlacedLaw.sizes`.
     """

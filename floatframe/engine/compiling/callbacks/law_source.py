@@ -11,11 +11,11 @@ __all__ = ["digest_of"]
 
 
 class NoKeyError(Exception):
-    """Something has no key."""
+    """A key is impossible for something."""
 
 
 def digest_of(function: Any) -> int | None:
-    """Return a number above zero for a function of numba; None if it refers to what has no key."""
+    """Return a positive key of a numba function; None if it refers to something without a key."""
     digest = hashlib.sha256()
     try:
         add_value(digest, function, set())
@@ -25,14 +25,14 @@ def digest_of(function: Any) -> int | None:
 
 
 def add_value(digest: Any, value: Any, seen: set[int]) -> None:
-    """Add what a name stands for."""
+    """Add to the key the object that a name refers to."""
     if id(value) in seen:
         return
     if isinstance(getattr(value, "py_func", None), FunctionType):  # of numba
         seen.add(id(value))
         digest.update(repr(sorted(getattr(value, "targetoptions", {}).items(), key=str)).encode())
         add_function(digest, value.py_func, seen)
-    elif isinstance(value, FunctionType):  # overloaded for numba in its module, or known to it by name
+    elif isinstance(value, FunctionType):  # overloaded for numba in its module, or registered with it by name
         seen.add(id(value))
         add_function(digest, value, seen)
         file = Path(value.__code__.co_filename)
@@ -53,7 +53,7 @@ def add_value(digest: Any, value: Any, seen: set[int]) -> None:
 
 
 def add_function(digest: Any, function: FunctionType, seen: set[int]) -> None:
-    """Add the code of a function, its module, which compiled code asks for, and all that its names stand for."""
+    """Add to the key the code of a function, its module, which compiled code uses, and all objects that it names."""
     digest.update(str(function.__module__).encode())
     add_code(digest, function.__code__)
     for cell in function.__closure__ or ():
@@ -69,7 +69,7 @@ def add_function(digest: Any, function: FunctionType, seen: set[int]) -> None:
 
 
 def add_members(digest: Any, module: ModuleType, names: list[str], seen: set[int]) -> None:
-    """Add what a function may take from a module."""
+    """Add to the key the parts of a module that a function may use."""
     digest.update(f"{module.__name__} {getattr(module, '__version__', '')}".encode())
     if module.__name__.split(".")[0] in ("math", "cmath", "numpy", "numba"):
         return
@@ -89,7 +89,7 @@ def names_of(code: CodeType) -> list[str]:
 
 
 def add_code(digest: Any, code: CodeType) -> None:
-    """Add the code of a function without the numbers of its lines."""
+    """Add to the key the code of a function, without its line numbers."""
     digest.update(code.co_code + repr((code.co_names, code.co_varnames, code.co_argcount)).encode())
     for each in code.co_consts:
         if isinstance(each, CodeType):

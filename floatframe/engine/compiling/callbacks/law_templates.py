@@ -1,4 +1,4 @@
-"""C functions around the law of an element: its values, and its derivatives by a step along the imaginary axis or not.
+"""C functions of the law of an element: its values, and its derivatives by complex steps or differences.
 
     void f(const int64 *head, const double *inputs, const double *data, double *outputs)
 
@@ -19,18 +19,18 @@ __all__ = ["complex_template", "difference_template", "given_template", "value_t
 
 HEAD = 8
 TINY = 1e-30  # step along the imaginary axis
-STEP = 1e-6  # of central differences, relative to the sizes of inputs
-SIZES = 5  # of motions, before those of states
-LEAST = 1e-3  # size of states and multipliers where nothing else is known
-ROUNDING = 2e-15  # of a number, below which a step is lost in it
+STEP = 1e-6  # relative step of central differences, by the sizes of inputs
+SIZES = 5  # sizes of motions; those of states follow
+LEAST = 1e-3  # size of states and multipliers if no other is known
+ROUNDING = 2e-15  # fraction of a number below which a step is lost in rounding
 
 
 def law(*arguments):
-    """Stand for the function of the user."""
+    """Placeholder for the user's function."""
 
 
 def value_template(digest):
-    """Return the function that gives the values."""
+    """Return the function of the values."""
 
     def value(head_at, inputs_at, data_at, outputs_at):
         head = carray(head_at, HEAD)
@@ -51,7 +51,7 @@ def value_template(digest):
 
 
 def given_template(digest):
-    """Return the function that gives the derivatives as the user does."""
+    """Return the function of the derivatives that the user has given."""
 
     def slopes(head_at, inputs_at, data_at, slopes_at):
         head = carray(head_at, HEAD)
@@ -67,7 +67,7 @@ def given_template(digest):
 
 
 def complex_template(digest):
-    """Return the function that takes the derivatives by a step along the imaginary axis."""
+    """Return the function of the derivatives by a complex step."""
 
     def slopes(head_at, inputs_at, data_at, slopes_at):
         head = carray(head_at, HEAD)
@@ -118,7 +118,7 @@ def complex_template(digest):
 
 
 def difference_template(digest):
-    """Return the function that takes the derivatives by central differences."""
+    """Return the function of the derivatives by central differences."""
 
     def slopes(head_at, inputs_at, data_at, slopes_at):
         head = carray(head_at, HEAD)
@@ -141,7 +141,7 @@ def difference_template(digest):
             if m < n and not (moving >> m) & 1:
                 continue
             first = 1 + m * width
-            at = o + k - per * n  # of what moves, among the inputs
+            at = o + k - per * n  # indices of the inputs that move
             if m < n and j < 3:
                 at, size = first + j, sizes[0]
             elif m < n and j < 6:
@@ -158,7 +158,7 @@ def difference_template(digest):
             way = 2 * h
             for side in range(2):
                 s = h if side == 0 else -h
-                if m < n and 3 <= j < 6:  # A turned by the rotation vector s e
+                if m < n and 3 <= j < 6:  # A rotated by the rotation vector s e
                     b, c = (j - 2) % 3, (j - 1) % 3
                     sin, cos = np.sin(s), np.cos(s)
                     for i in range(3):

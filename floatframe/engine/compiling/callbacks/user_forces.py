@@ -18,11 +18,11 @@ C_FUNCTION = ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_double), ctypes.POIN
 
 @dataclass
 class Callback:
-    """A function with its address; what it raised last, since an error cannot pass through the kernels."""
+    """A function with its address, and its last error, because an error cannot pass through the kernels."""
 
-    name: str  #: of the force or element, in words
+    name: str  #: name of the force or element for messages
     address: int
-    keeps: Any  #: what must live as long as the address is used
+    keeps: Any  #: objects that must live as long as the address is used
     error: BaseException | None = None
 
 
@@ -43,7 +43,7 @@ def callback_of(force: UserForce, n_coordinates: int) -> Callback:
 
 
 def compiled_callback(force: UserForce, n: int, n_forces: int, n_states: int) -> Callback:
-    """Return a function made by numba.njit behind a C function."""
+    """Return a function made by numba.njit as a C function."""
     from numba import carray, cfunc, types
     from numba.core.errors import NumbaError
 
@@ -70,7 +70,7 @@ def compiled_callback(force: UserForce, n: int, n_forces: int, n_states: int) ->
 
 
 def python_callback(force: UserForce, n: int, n_forces: int, n_states: int) -> Callback:
-    """Return a Python function behind a C function; after an error it answers with what is no number."""
+    """Return a Python function as a C function; after an error it returns NaN."""
     function = force.function
     assert function is not None  # the caller knows
     n_in, n_out = 1 + 2 * n + n_states, n_forces + n_states
@@ -84,7 +84,7 @@ def python_callback(force: UserForce, n: int, n_forces: int, n_states: int) -> C
                 y[:] = np.nan
             else:
                 function(x[0], x[1 : 1 + n], x[1 + n : 1 + 2 * n], x[1 + 2 * n :], y[:n_forces], y[n_forces:])
-        except BaseException as error:  # it is raised again when the kernels have returned
+        except BaseException as error:  # the error is raised again after the kernels have returned
             callback.error = error
             y[:] = np.nan
         np.ctypeslib.as_array(outputs, (n_out,))[:] = y
@@ -96,7 +96,7 @@ def python_callback(force: UserForce, n: int, n_forces: int, n_states: int) -> C
 
 
 def raise_errors_of(callbacks: Sequence[Callback]) -> None:
-    """Raise what a user's function has raised inside the kernels."""
+    """Raise the error that a user's function has raised inside the kernels."""
     for callback in callbacks:
         error, callback.error = callback.error, None
         if error is None:

@@ -1,1 +1,1 @@
-"""How kernels are compiled: the decorators, the lean pipeline with its passes and lowering, plain numba instead."""
+"""Compilation of kernels: the decorators, the lean pipeline with its passes and lowering, and plain numba."""

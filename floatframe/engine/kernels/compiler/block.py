@@ -1,4 +1,4 @@
-"""The type of the arrays in kernels: contiguous, owned by Python, indexed from zero up.
+"""The type of the arrays in kernels: contiguous, owned by Python, indexed from zero.
 
 It is numba's array type with its own code for numbers and parts: no test for negative indices or for the end of a
 slice that is given, no counted references, and as argument no more than the address and the shape.
@@ -15,7 +15,7 @@ from numba.np.arrayobj import getitem_array_tuple, getitem_arraynd_intp, setitem
 
 __all__ = ["Block", "make_block"]
 
-N_ITEMS, ITEM_SIZE, DATA, SHAPE, STRIDES = 2, 3, 4, 5, 6  # places in numba's structure of an array
+N_ITEMS, ITEM_SIZE, DATA, SHAPE, STRIDES = 2, 3, 4, 5, 6  # positions of fields in numba's structure of an array
 WORD = ir.IntType(64)
 BYTES = 8  # of a number
 
@@ -27,7 +27,7 @@ class Block(types.Array):
         super().__init__(dtype, ndim, "C", name=f"block({dtype}, {ndim}d)")
 
     def copy(self, dtype=None, ndim=None, layout=None, readonly=None):
-        """Return the type of a part: a block while it is contiguous."""
+        """Return the type of a part, which is a block if it is contiguous."""
         if layout in (None, "C"):
             return Block(dtype or self.dtype, self.ndim if ndim is None else ndim)
         return super().copy(dtype, ndim, layout, readonly)
@@ -35,7 +35,7 @@ class Block(types.Array):
 
 @register_model(Block)
 class BlockModel(models.ArrayModel):
-    """numba's structure of an array; as argument the address and the shape."""
+    """numba's structure of an array; as an argument its address and shape."""
 
     def get_argument_type(self):
         """Return the types of the parts of an argument."""
@@ -80,7 +80,7 @@ def shape_of(builder, block, value):
 
 
 def offset_of(context, builder, block, value, kinds, indices):
-    """Return how many numbers stand before that at the indices; missing indices are zero."""
+    """Return the number of elements before the one at the indices; missing indices are zero."""
     offset = None
     for k in range(block.ndim):
         if offset is not None:
@@ -135,7 +135,7 @@ def get_part(context, builder, signature, value, kinds, indices):
 @lower_builtin(operator.getitem, Block, types.SliceType)
 @lower_builtin(operator.getitem, Block, types.BaseTuple)
 def get_item(context, builder, signature, arguments):
-    """Return one number or a contiguous part; what else there is as numba does it."""
+    """Return one number or a contiguous part; other indices are left to numba."""
     block, kind = signature.args
     kinds, indices = parts_of(builder, kind, arguments[1])
     if is_number(block, kinds):
@@ -150,7 +150,7 @@ def get_item(context, builder, signature, arguments):
 @lower_builtin(operator.setitem, Block, types.Integer, types.Number)
 @lower_builtin(operator.setitem, Block, types.BaseTuple, types.Number)
 def set_item(context, builder, signature, arguments):
-    """Write one number, or many as numba does it."""
+    """Write one number; other assignments are left to numba."""
     block, kind, of_value = signature.args
     kinds, indices = parts_of(builder, kind, arguments[1])
     if not is_number(block, kinds):
@@ -163,7 +163,7 @@ def set_item(context, builder, signature, arguments):
 
 @lower_builtin("array.reshape", Block, types.BaseTuple)
 def reshape(context, builder, signature, arguments):
-    """Return the same numbers in another shape; that their number is the same is not tested."""
+    """Return the same numbers in another shape; their number is not checked."""
     kinds, shape = parts_of(builder, signature.args[1], arguments[1])
     shape = [context.cast(builder, n, kind, types.intp) for n, kind in zip(shape, kinds, strict=True)]
     data = builder.extract_value(arguments[0], DATA)
@@ -186,5 +186,5 @@ def get_shape(context, builder, kind, value):
 
 @lower_getattr(Block, "size")
 def get_size(context, builder, kind, value):
-    """Return how many numbers there are."""
+    """Return the number of elements."""
     return builder.extract_value(value, N_ITEMS)

@@ -1,4 +1,4 @@
-"""Which compiler makes the kernels: the lean one with a numba that it knows, else plain numba.
+"""Choice of the compiler for the kernels: the lean one for supported versions of numba, otherwise plain numba.
 
 The lean compiler (kernels/compiler/lean.py) replaces inner parts of numba, which change from one version to the next.
 Plain numba makes the same kernels with any version the project supports: it compiles several times as long, once, and
@@ -13,15 +13,15 @@ from floatframe.errors import FloatframeError
 
 __all__ = ["KNOWN_VERSIONS", "VARIABLE", "is_lean", "words"]
 
-KNOWN_VERSIONS = ("0.68",)  #: of numba, whose inner parts the lean compiler fits
-VARIABLE = "FLOATFRAME_COMPILER"  #: environment variable that asks for one of `CHOICES`
+KNOWN_VERSIONS = ("0.68",)  #: versions of numba whose internals the lean compiler supports
+VARIABLE = "FLOATFRAME_COMPILER"  #: environment variable that selects one of `CHOICES`
 CHOICES = ("lean", "plain")
 
 installed = ".".join(numba.__version__.split(".")[:2])
 
 
 def chosen() -> str:
-    """Return the compiler to use; `FloatframeError` if the one that is asked for does not exist or cannot serve."""
+    """Return the compiler to use; `FloatframeError` if the requested one does not exist or is unusable."""
     asked = os.environ.get(VARIABLE, "")
     if asked not in ("", *CHOICES):
         raise FloatframeError(f"environment variable {VARIABLE}: expected one of {', '.join(CHOICES)}, got {asked!r}")
@@ -37,7 +37,7 @@ is_lean = chosen() == "lean"
 
 
 def words() -> str:
-    """Return how the kernels are compiled, in one line for the user."""
+    """Return the way in which the kernels are compiled, in one line for the user."""
     if is_lean:
         return f"lean, with numba {numba.__version__}"
     asked = f"asked for by {VARIABLE}"

@@ -1,4 +1,4 @@
-"""How kernels are compiled: the decorators of their functions, and the type of their arrays.
+"""The decorators of compiled functions, and the type of their arrays.
 
 `inner` is for functions that only compiled code calls, `loops` for those of them whose loops run over modes or
 matrices, `matrix_loops` for long ones of these with many callers, `small` for what is written into its
@@ -36,8 +36,11 @@ __all__ = ["array_type", "array_value", "entry", "inner", "kept_entry", "loops",
 
 
 def kept_entry(function):
-    """Return the compiled function that Python calls, kept on disk; without room for it compiled in each process."""
+    """Return the compiled function that Python calls.
+
+    It is stored on disk, or compiled in each process if impossible.
+    """
     try:
         return entry(function)
-    except RuntimeError:  # nowhere to keep the cache
+    except RuntimeError:  # no folder for the cache
         return entry(function, cache=False)

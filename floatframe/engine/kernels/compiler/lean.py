@@ -1,4 +1,4 @@
-"""The lean compiler of kernels: inner functions to intermediate code only, which an entry optimises once, all together.
+"""The lean compiler of kernels: inner functions to intermediate code only, which an entry optimises once together.
 
 Left alone, numba optimises each function and makes machine code of it, and optimises everything below it once more
 with each caller; it also looks up what an operator means for numbers at every single place, and looks in each function
@@ -62,14 +62,13 @@ __all__ = [
 
 
 # the passes of numba that a kernel goes through: byte code, types, one assignment a variable, code of LLVM ------------
-# numba also looks in each function for closures, generators, parallel loops, array expressions and calls to write out
-# in line, and finds out after each pass how long variables live. Kernels have none of these and own nothing that must
-# be freed.
+# numba also searches each function for closures, generators, parallel loops, array expressions and calls to inline, and
+# analyses the lifetimes of variables after each pass. Kernels have none of these and own nothing that must be freed.
 
 
 @register_pass(mutates_CFG=False, analysis_only=False)
 class ConstantIndices(FunctionPass):
-    """Constant indices of tuples are known to the types; of numba's rewrites the one that kernels need."""
+    """Types use constant indices of tuples; this is the only rewrite of numba that kernels need."""
 
     _name = "constant_indices"
 
@@ -127,7 +126,7 @@ class KernelLowering(NativeLowering):
 
 
 class Passes(PassManager):
-    """Passes in their order, without analyses of lifetimes after each of them."""
+    """Passes in order, without analyses of lifetimes after each of them."""
 
     def _runPass(self, index, pss, internal_state):
         pss.analysis = self._analysis
@@ -155,18 +154,18 @@ def pipeline(state, back):
 
 
 class WithoutEngine:
-    """Stands for the code generator of a library that is never run on its own."""
+    """Replaces the code generator for a library that never runs on its own."""
 
     @staticmethod
     def set_env(name, environment):
-        """Leave the environment of Python objects alone: inner functions use none."""
+        """Leave the environment of Python objects unchanged, because inner functions use none."""
 
 
 class InnerLibrary(JITCodeLibrary):
     """The intermediate code of an inner function (1)."""
 
     def add_ir_module(self, ir_module):
-        """Read the code of the function, the only module here: it is not linked into an empty one first."""
+        """Parse the code of the function, the only module here, without linking it into an empty one first."""
         self._raise_if_finalized()
         module = parse_assembly(cgutils.normalize_ir_text(str(ir_module)))
         module.name = ir_module.name
@@ -182,7 +181,7 @@ class InnerLibrary(JITCodeLibrary):
         return self._final_module
 
     def finalize(self):
-        """Take note of what is called: no linking, no optimisation, no machine code."""
+        """Register the called functions: no linking, no optimisation, no machine code."""
         self._raise_if_finalized()
         for library in dict.fromkeys(self._linking_libraries):
             self._reload_init.update(library._reload_init)
@@ -201,10 +200,10 @@ class InnerLibrary(JITCodeLibrary):
 
 
 class EntryLibrary(JITCodeLibrary):
-    """The code of an entry and of all that it calls (2)."""
+    """The code of an entry and of all functions that it calls (2)."""
 
     def finalize(self):
-        """Link, optimise, make machine code."""
+        """Link, optimise, and generate machine code."""
         libraries: dict = {}
         for library in self._linking_libraries:
             with_callees(library, libraries)
@@ -217,7 +216,7 @@ class EntryLibrary(JITCodeLibrary):
 
 
 def with_callees(library, known):
-    """Add a library and all that its code calls to the known ones."""
+    """Add a library and all libraries that its code calls to the known ones."""
     if library not in known:
         known[library] = None
         for other in library._linking_libraries:
@@ -245,12 +244,12 @@ plain_variables_in = Inst._rec_list_vars
 
 
 def without_warnings(self, filename=None, lineno=None):
-    """Return a context that does nothing, in the place of one that keeps the warnings of a statement."""
+    """Return a context that does nothing, in place of the one that collects warnings of a statement."""
     return nullcontext()
 
 
 def needed_rewrites(self, rewrites, code):
-    """Apply the rewrites of byte code that kernels may need: none of those of `with` and of keyword dictionaries."""
+    """Apply the rewrites of byte code that kernels may need, without those for `with` and keyword dictionaries."""
     return plain_rewrites(self, [each for each in rewrites if each.__name__ not in NOT_NEEDED], code)
 
 
@@ -297,7 +296,7 @@ def remembered_calls() -> Iterator[None]:
 
 @contextmanager
 def without_garbage_collection() -> Iterator[None]:
-    """(3): do not walk through the hundreds of thousands of objects of a compilation again and again."""
+    """(3): avoid repeated walks through the hundreds of thousands of objects of a compilation."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:
@@ -310,7 +309,8 @@ def without_garbage_collection() -> Iterator[None]:
 class InnerCompiler(CompilerBase):
     """The pipeline of an inner function."""
 
-    attributes: tuple[str, ...] = ("optsize",)  #: of the function in LLVM: small code, its loops are short
+    #: LLVM attribute of the function: small code, because its loops are short
+    attributes: tuple[str, ...] = ("optsize",)
 
     def define_pipelines(self):
         """Return the one pipeline."""
@@ -340,19 +340,19 @@ class EntryCompiler(CompilerBase):
 
 
 class LoopCompiler(InnerCompiler):
-    """The same for a function whose loops run over modes or matrices: they are unrolled and made of vectors."""
+    """The same for a function whose loops run over modes or matrices: they are unrolled and vectorised."""
 
     attributes = ()
 
 
 class SmallCompiler(InnerCompiler):
-    """The same for a function of a few operations, or with one caller: it is written into its callers."""
+    """The same for a function of a few operations, or with one caller: it is inlined into its callers."""
 
     attributes = ("alwaysinline",)
 
 
 class MatrixLoopCompiler(InnerCompiler):
-    """The same for such a function that is not written into its callers: it is long, and they are many."""
+    """The same for such a function that is not inlined, because it is long and has many callers."""
 
     attributes = ("noinline",)
 
@@ -372,11 +372,11 @@ def decorator(pipeline_class, **options):
     )
 
 
-inner = decorator(InnerCompiler)  #: for functions that only compiled code calls
-small = decorator(SmallCompiler)  #: the same for a few operations
-loops = decorator(LoopCompiler)  #: the same where loops run over modes or matrices (5)
+inner = decorator(InnerCompiler)  #: decorator of functions that only compiled code calls
+small = decorator(SmallCompiler)  #: the same for functions of a few operations
+loops = decorator(LoopCompiler)  #: the same for functions with loops over modes or matrices (5)
 matrix_loops = decorator(MatrixLoopCompiler)  #: the same for long functions with many callers
-view = decorator(LoopCompiler, _nrt=True)  #: the same for a function that returns a part of an array
+view = decorator(LoopCompiler, _nrt=True)  #: the same for functions that return a part of an array
 
 
 def entry(function, *, cache=True):

@@ -1,4 +1,4 @@
-"""From numba's intermediate code of an inner function to LLVM's, without what kernels have no need of.
+"""From numba's intermediate code of an inner function to LLVM code, without features that kernels do not need.
 
 Kernels own no memory and raise no errors, so that here
 
@@ -36,13 +36,13 @@ OPERATIONS = {
 
 
 def single_assignments(blocks):
-    """Return the variables with one assignment, which comes before every use on all ways (2)."""
+    """Return the variables with one assignment, which precedes every use on all paths (2)."""
     assigned = defaultdict(list)
     for label, block in blocks.items():
         for statement in block.find_insts(ir.Assign):
             assigned[statement.target.name].append(label)
     used = defaultdict(set)
-    for label, names in compute_use_defs(blocks).usemap.items():  # used in a block before an assignment there
+    for label, names in compute_use_defs(blocks).usemap.items():  # variables used in a block before an assignment there
         for name in names:
             used[name].add(label)
     dominators = compute_cfg_from_blocks(blocks).dominators()
@@ -68,28 +68,28 @@ class KernelLower(Lower):
             self.function.attributes.add(attribute)
 
     def incref(self, typ, val):
-        """Count nothing (1)."""
+        """Do not count references (1)."""
 
     def decref(self, typ, val):
-        """Count nothing (1)."""
+        """Do not count references (1)."""
 
     def delvar(self, name):
-        """Leave the variable as it is (1)."""
+        """Leave the variable unchanged (1)."""
 
     def alloca_lltype(self, name, lltype, datamodel=None):
-        """Return a place on the stack, not set to zero (1)."""
+        """Return a place on the stack without initialisation (1)."""
         with self.builder.goto_entry_block():
             return self.builder.alloca(lltype, name=name)
 
     def storevar(self, value, name, argidx=None):
-        """Give a variable a value (1, 2)."""
+        """Assign a value to a variable (1, 2)."""
         if name in self._singly_assigned_vars:
             self._blk_local_varmap[name] = value
         else:
             self.builder.store(value, self.getvar(name))
 
     def lower_assign(self, ty, inst):
-        """Return the value of an assignment; a kernel as a value is nothing."""
+        """Return the value of an assignment; a kernel as a value has none."""
         if isinstance(ty, types.Dispatcher):
             return self.context.get_dummy_value()
         return super().lower_assign(ty, inst)
@@ -142,7 +142,7 @@ class KernelLower(Lower):
 
 
 def call_of_kernel(fndesc, libraries):
-    """Return what writes a call of a kernel (3); it keeps numba's convention of calls."""
+    """Return the function that writes a call of a kernel (3), with numba's calling convention."""
 
     def write_call(context, builder, signature, arguments):
         function = context.declare_function(builder.module, fndesc)
@@ -161,16 +161,16 @@ def call_of_kernel(fndesc, libraries):
 
 
 class KernelContext(CPUContext):
-    """numba's context of compilation in which the functions compiled are kernels."""
+    """numba's context of compilation for functions that are kernels."""
 
     @classmethod
     def of(cls, context):
-        """Return a context for kernels that shares all that the given one knows."""
+        """Return a context for kernels that shares all data of the given one."""
         shared = context.subtarget()
         shared.__class__ = cls
         return shared
 
     def insert_user_function(self, func, fndesc, libs=()):
-        """Take note of how a kernel is called."""
+        """Register how a kernel is called."""
         write_call = call_of_kernel(fndesc, libs)
         self._defns[func].append(write_call, write_call.signature)

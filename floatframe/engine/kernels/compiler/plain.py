@@ -1,4 +1,4 @@
-"""Kernels compiled by plain numba, of any version the project supports: longer, and with nothing but its public parts.
+"""Kernels compiled by plain numba of any supported version: slower to compile, but only with its public interface.
 
 The names are those of kernels/compiler/lean.py, which says what they are for.
 """

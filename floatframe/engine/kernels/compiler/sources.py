@@ -1,4 +1,4 @@
-"""The sources that compiled kernels are made of: a module and all modules of the project that it imports.
+"""The sources of compiled kernels: a module and all modules of the project that it imports.
 
 Kernels take codes and constants from modules outside their folder, whose change must reach them as well.
 """
@@ -18,7 +18,7 @@ STATEMENT = re.compile(
 
 
 def imported_modules(text: str) -> set[str]:
-    """Return what the import statements of a source name: modules, and names in them, which may be modules too."""
+    """Return the names in the import statements of a source: modules, and names in them, which may be modules too."""
     found = set()
     for module, names, plain in STATEMENT.findall(text):
         words = re.findall(r"[\w.]+", re.sub(r"#[^\n]*|\bas[ \t]+\w+", "", names or plain))
@@ -40,7 +40,7 @@ def source_files(module: str, root: Path = ROOT) -> list[Path]:
 
 
 def source_digest(module: str, *extra: str, root: Path = ROOT) -> int:
-    """Return a number above zero that changes with the source of a module, of any that it imports, and with `extra`."""
+    """Return a positive key that changes with the source of a module, of all that it imports, and with `extra`."""
     digest = hashlib.sha256(repr(extra).encode())
     for path in source_files(module, root):
         text = path.read_bytes()

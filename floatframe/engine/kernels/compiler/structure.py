@@ -1,4 +1,4 @@
-"""Records of arrays as the kernels see them: each is one pointer to a table of addresses and shapes.
+"""Records of arrays in the kernels: each is one pointer to a table of addresses and shapes.
 
 A table has for each array of a record, in its order, the address and then the shape; a record in a record has its part
 of the table. A kernel that reads `work.markers.r` gets the array back from there; one number (declared without a shape)
@@ -28,12 +28,12 @@ WORD = ir.IntType(64)
 
 
 def n_words(declared) -> int:
-    """Return the length of the table of an array, number or record."""
+    """Return the length of the table for an array, number or record."""
     return 1 + len(declared.shape) if isinstance(declared, Declared) else sum(map(n_words, declared))
 
 
 def type_of(declared) -> types.Type:
-    """Return the type in kernels of an array, number or record."""
+    """Return the kernel type of an array, number or record."""
     if not isinstance(declared, Declared):
         return Structure(declared)
     number = from_dtype(np.dtype(declared.dtype))
@@ -44,7 +44,7 @@ class Structure(types.Type):
     """A pointer to a table, with a named array, number or record for each field of a declaration."""
 
     def __init__(self, declaration):
-        self.fields: dict[str, tuple[types.Type, int]] = {}  # name: (type, where its part of the table begins)
+        self.fields: dict[str, tuple[types.Type, int]] = {}  # name: (type, index of its part of the table)
         place = 0
         for name, declared in zip(declaration._fields, declaration, strict=True):
             self.fields[name] = type_of(declared), place
@@ -62,7 +62,7 @@ class StructureFields(AttributeTemplate):
     key = Structure
 
     def generic_resolve(self, structure, name):  # type: ignore[override]
-        """Return the type of a field, None if there is none of that name."""
+        """Return the type of a field, None if there is no such name."""
         return structure.fields.get(name, (None,))[0]
 
 
@@ -81,7 +81,7 @@ def address_of(context, builder, number, pointer, place):
 
 @lower_getattr_generic(Structure)
 def get_field(context, builder, structure, pointer, name):
-    """Return a field: the array made of its address and shape in the table, a number, or a record."""
+    """Return a field: an array made from its address and shape in the table, a number, or a record."""
     kind, place = structure.fields[name]
     if isinstance(kind, Structure):
         table = builder.bitcast(pointer, WORD.as_pointer())
@@ -134,7 +134,7 @@ def table_of(record) -> IntArray:
 
 
 def table_of_numbers(declaration, values: Mapping[str, float]) -> tuple[IntArray, Array]:
-    """Return the table of a record of numbers, zero where none is given, and these, which the caller keeps alive."""
+    """Return the table of a record of numbers (zero if not given) and the numbers, which the caller keeps alive."""
     reals = np.zeros(len(declaration))
     integers = reals.view(np.int64)
     left = len(values)
@@ -148,12 +148,12 @@ def table_of_numbers(declaration, values: Mapping[str, float]) -> tuple[IntArray
     return reals.__array_interface__["data"][0] + reals.itemsize * np.arange(len(declaration)), reals
 
 
-KEPT = 4  # tables of as many records
+KEPT = 4  # number of records whose tables are cached
 kept: list[tuple[Any, IntArray]] = []
 
 
 def kept_table_of(record) -> IntArray:
-    """Return `table_of` a record that is used again and again, from what is kept; to make one takes as long as a step.
+    """Return `table_of` for a record that is used repeatedly, from a cache, since making it takes as long as a step.
 
     A record that is kept stays alive, so that what is found belongs to this very record.
     """

@@ -1,1 +1,1 @@
-"""Kernels of what acts between markers: joints, springs, bushings, contacts, couplers, user forces."""
+"""Kernels of connections between markers: joints, springs, bushings, contacts, couplers, user forces."""

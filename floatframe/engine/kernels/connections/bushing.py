@@ -1,4 +1,4 @@
-"""A bushing: force and torque of a potential of six deformations between two markers, with damping.
+"""A bushing: force and torque from a potential of six deformations between two markers, with damping.
 
 The axes C are those of A turned by a share of the rotation of B against A: 0 (axes of A), 1 (of B), or 1/2 (half way,
 where A and B can be exchanged). With d = r_B - r_A and theta the rotation vector of A_Aᵀ A_B, whose components are the
@@ -51,18 +51,20 @@ from floatframe.engine.kernels.vector import (
 __all__ = ["bushing_energy", "bushing_power", "bushing_state", "bushing_variation", "continued", "rotation_vector"]
 
 SERIES_BELOW = 0.01  # t² at the switch
-NEAR_FULL_TURN = 1e-6  # t below which its direction is noise beside that of full turns
-A1, A2, A3, A4, A5 = 1 / 24, 7 / 5760, 31 / 967680, 127 / 154828800, 73 / 3503554560  # of alpha - 1 in t², half way
-B1, B2, B3, B4, B5 = 1 / 12, 1 / 720, 1 / 30240, 1 / 1209600, 1 / 47900160  # of 1 - alpha in t², axes of A or B
+# value of t below which the direction of the rotation vector is only rounding, compared with full turns
+NEAR_FULL_TURN = 1e-6
+# series of alpha - 1 in t², half way
+A1, A2, A3, A4, A5 = 1 / 24, 7 / 5760, 31 / 967680, 127 / 154828800, 73 / 3503554560
+B1, B2, B3, B4, B5 = 1 / 12, 1 / 720, 1 / 30240, 1 / 1209600, 1 / 47900160  # series of 1 - alpha in t², axes of A or B
 
 
 @inner
 def rotation_vector(A, B):
-    """Return the rotation vector of R = Aᵀ B, no longer than pi, by a quaternion (w, x) of any length."""
+    """Return the rotation vector of R = Aᵀ B, at most pi long, from a quaternion (w, x) of any length."""
     R = product(transposed(A), B)
     w = 1.0 + R[0][0] + R[1][1] + R[2][2]  # 4 w², and 4 w times x
     x = (R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1])
-    if w < 1.0:  # more than 90 degrees: 4 times the largest of x, y, z times all of them
+    if w < 1.0:  # more than 90 degrees: the products of x, y, z with the largest of them, times 4
         k = 0 if R[0][0] >= R[1][1] and R[0][0] >= R[2][2] else (1 if R[1][1] >= R[2][2] else 2)
         symmetric = (
             (2.0 + 2 * R[0][0] - w, R[0][1] + R[1][0], R[0][2] + R[2][0]),
@@ -113,7 +115,7 @@ def scalars(t2, share):
 
 @inner
 def scalars_half_way(t2):
-    """Return what `scalars` does, half way."""
+    """Return the same as `scalars`, half way."""
     if t2 < SERIES_BELOW:
         y2 = t2 / 16
         return (
@@ -154,7 +156,7 @@ def by_dS(s, k, h, u, sigma):
 
 @inner
 def axes_of(A, B, theta, share):
-    """Return the axes in which a bushing acts, of A, of B, or half way between them."""
+    """Return the axes of a bushing: those of A, of B, or half way between them."""
     if share == 0.0:
         return matrix(A)
     if share == 1.0:
@@ -170,7 +172,7 @@ def law(row, x):
 
 @inner
 def bushing_state(model, work, c):
-    """Write what follows from the motion of bushing c into work.bushing, F, M and N into work.pair."""
+    """Write the deformations of bushing c into work.bushing, and F, M and N into work.pair."""
     a, b, i, markers = model.connections.a[c], model.connections.b[c], model.connections.item[c], work.markers
     s, K, D = work.bushing, model.bushings.stiffness[i], model.bushings.damping[i]
     share, angle = model.bushings.share[i], model.bushings.angle[i]
@@ -262,7 +264,7 @@ def bushing_energy(model, work, c):
 
 @inner
 def bushing_power(model, work, c):
-    """Return the power that enters by tables, and that taken by damping."""
+    """Return the power that enters by tables, and the power dissipated by damping."""
     s, i = work.bushing, model.connections.item[c]
     bushing_state(model, work, c)
     given, taken = 0.0, 0.0

@@ -1,4 +1,4 @@
-"""Residual rows of connections in terms of the motion of their markers.
+"""Residual rows of connections as functions of the motion of their markers.
 
 The rows of a connection have its wrench w as unknown. Those of a joint that hold something are in the unit of it; rows
 that say what the wrench is are multiplied by c_k, so that their unknown is c_k dw. Formulas of all kinds of rows are in
@@ -141,7 +141,7 @@ def joint_row_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
 
 @small
 def has_cheap_rate(model, c, k):
-    """Whether row k of connection c holds a position whose rate is known without its second rate.
+    """Whether row k of connection c holds a position whose rate can be computed without its second rate.
 
     Not of elements: theirs asks for the law many times.
     """
@@ -151,7 +151,7 @@ def has_cheap_rate(model, c, k):
 
 @inner
 def write_held_rates(model, work, c, rate):
-    """Write the rates of the positions that joint or coupler c holds, as far as `has_cheap_rate`."""
+    """Write the rates of the held positions of joint or coupler c, if `has_cheap_rate`."""
     law, a, b, markers = model.connections.law[c], model.connections.a[c], model.connections.b[c], work.markers
     if law == COUPLER:
         rate[model.elements.core[model.connections.item[c]]] = coupler_rate(model, work, c)
@@ -164,7 +164,7 @@ def write_held_rates(model, work, c, rate):
         kind = model.rows.kind[k]
         if kind == POINT:
             rate[k] = -dot(vector(model.rows.x[k]), v)
-        elif kind == DOT:  # E · D, which is held by what turns about E × D
+        elif kind == DOT:  # E · D, which a rotation about E × D changes
             E, D = direction(markers, a, model.rows.x[k]), direction(markers, b, model.rows.y[k])
             rate[k] = -dot(cross(E, D), omega)
         elif model.rows.holds[k] == POSITION:
@@ -176,7 +176,7 @@ def write_held_rates(model, work, c, rate):
 
 @inner
 def row_rates(model, work, k, a, b):
-    """Return the rate of what row k holds, and its second rate at zero u_dot; zero for rows that hold nothing.
+    """Return the rate of the held quantity of row k, and its second rate at zero u_dot; zero for other rows.
 
     Of a velocity that is held: it, and its rate. `work.markers.bias` holds the accelerations of markers at zero u_dot.
     """
@@ -208,7 +208,7 @@ def constraint_rates(model, work):
 
 @inner
 def connection_rates(model, work, c):
-    """Write what `constraint_rates` does for the rows of connection c, from accelerations in `work.markers.bias`."""
+    """Write the same as `constraint_rates` for the rows of connection c, from accelerations in `work.markers.bias`."""
     rate, bias = work.connections.rate, work.connections.bias
     a, b = model.connections.a[c], model.connections.b[c]
     for k in range(model.connections.w0[c], model.connections.w0[c + 1]):

@@ -19,12 +19,12 @@ from floatframe.engine.kernels.vector import add, cross, dot, norm, put, scaled,
 
 __all__ = ["contact_energy", "contact_power", "contact_state", "contact_variation"]
 
-V_0 = 9  # place of the speed of approach among the unknowns, after F, M, N
+V_0 = 9  # index of the approach speed among the unknowns, after F, M, N
 
 
 @inner
 def contact_state(model, work, c):
-    """Write what follows from the motion of contact c into work.contact, F, M, N and v_0 into work.pair."""
+    """Write the contact quantities of contact c into work.contact, and F, M, N and v_0 into work.pair."""
     a, b, i, markers = model.connections.a[c], model.connections.b[c], model.connections.item[c], work.markers
     s, own, w0 = work.contact, model.contacts, model.connections.w0[c]
     omega_a, omega_b = vector(markers.omega[a]), vector(markers.omega[b])
@@ -55,7 +55,7 @@ def contact_state(model, work, c):
 
 @inner
 def normal_force(model, work, c):
-    """Write f, its derivatives by depth and rate, and v_0 with its derivative by the rate."""
+    """Write f with its derivatives by depth and rate, and v_0 with its derivative by the rate."""
     s, own, i = work.contact, model.contacts, model.connections.item[c]
     start, slow = work.state.w_start[model.connections.w0[c] + V_0], own.slow[i]
     s.depth, s.f, s.f_by_depth, s.f_by_rate, s.v_0_by_rate = max(-s.gap, 0.0), 0.0, 0.0, 0.0, 0.0
@@ -118,7 +118,7 @@ def contact_energy(model, work, c):
 
 @inner
 def contact_power(model, work, c):
-    """Return the power taken by restitution and friction."""
+    """Return the power dissipated by restitution and friction."""
     s, own, i = work.contact, model.contacts, model.connections.item[c]
     contact_state(model, work, c)
     spring = own.stiffness[i] * s.depth ** own.exponent[i]

@@ -1,4 +1,4 @@
-"""Coordinates of joints or markers through which couplers and user forces see and move the system.
+"""Coordinates of joints or markers through which couplers and user forces act on the system.
 
 A coordinate has a value x, its rate v and a force Q that acts to increase x (its power is Q v). With d = r_B - r_A and
 e an axis of A:
@@ -58,14 +58,14 @@ def relative_rotation(markers, a, b):
 
 @inner
 def turning_gradient(model, work, k, a, b):
-    """Return the derivative of an angle by the rotation of A; by that of B it is the opposite."""
+    """Return the derivative of an angle by the rotation of A; the derivative by that of B is its opposite."""
     _, t = turned_angle(model.rows, work.markers, k, a, b)
     return t
 
 
 @inner
 def coordinate_motion(model, work, p):
-    """Return value and rate of coordinate p; an angle is the one nearest to the unknown X."""
+    """Return value and rate of coordinate p; an angle is the value nearest to the unknown X."""
     rows, markers = model.rows, work.markers
     a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
     if rows.kind[k] == SPAN:
@@ -79,7 +79,7 @@ def coordinate_motion(model, work, p):
 
 @inner
 def predict_coordinate(coordinates, state, p, h):
-    """Move the unknown X of coordinate p by its rate, so that a fast angle is followed."""
+    """Advance the unknown X of coordinate p by its rate, so that a fast angle is tracked."""
     k = coordinates.row[p]
     state.w[k] += h * state.w[k + 1]
 
@@ -135,7 +135,7 @@ def coordinate_gradient(model, work, p, r, by_x, by_v):
     else:
         add_pair(P_a, P_b, r, 3, scaled(by_x, turning_gradient(model, work, k, a, b)))
         add_pair(P_a, P_b, r, 9, scaled(-by_v, e))
-        P = P_b if kind == TWIST_B else P_a  # of the marker that holds the axis
+        P = P_b if kind == TWIST_B else P_a  # index of the marker with the axis
         put_sum(P[r], 3, scaled(by_v, cross(e, relative_rotation(markers, a, b))))
 
 
@@ -153,7 +153,7 @@ def coordinate_derivatives(model, work, c, p, Q, column, by_unknown, c_k):
         return
     e, d, kind = force_direction(model, work, p), distance(work.markers, a, b), model.rows.kind[k]
     P = P_b if kind == TWIST_B else P_a
-    for i in range(3):  # row of F + Q e along an axis of the ground
+    for i in range(3):  # row of F + Q e for an axis of the ground
         axis, r = unit(i), f - w0 + i
         V[r, r] = 1.0
         V[r, column - w0] = by_unknown * dot(axis, e)
@@ -164,7 +164,7 @@ def coordinate_derivatives(model, work, c, p, Q, column, by_unknown, c_k):
     if m < 0:
         return
     F = vector(work.state.w[f:])
-    for i in range(3):  # row of M - d × F along an axis of the ground
+    for i in range(3):  # row of M - d × F for an axis of the ground
         axis, r = unit(i), m - w0 + i
         V[r, r] = 1.0
         put(V[r], f - w0, cross(d, axis))  # axis · (d × dF) = dF · (axis × d)
@@ -173,7 +173,7 @@ def coordinate_derivatives(model, work, c, p, Q, column, by_unknown, c_k):
 
 @inner
 def coordinate_tangent_rate(model, work, p):
-    """Return the rate of coordinate p as its gradient gives it; of an angle between axes not parallel it is not v."""
+    """Return the rate of coordinate p from its gradient; for an angle between non-parallel axes it differs from v."""
     rows = model.rows
     a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
     if rows.kind[k] == SPAN or rows.kind[k] == PUSH:
@@ -184,7 +184,10 @@ def coordinate_tangent_rate(model, work, p):
 
 @inner
 def coordinate_second_rate(model, work, p, bias_a, bias_b):
-    """Return the second rate of coordinate p for given accelerations (6) of both markers; angles: of parallel axes."""
+    """Return the second rate of coordinate p for given accelerations (6) of both markers.
+
+    For angles with parallel axes.
+    """
     markers = work.markers
     a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
     kind = model.rows.kind[k]

@@ -64,7 +64,7 @@ def coupler_derivatives(model, work, c, c_k):
 
 @inner
 def coupler_rate(model, work, c):
-    """Return the rate of the held row of coupler c; zero while it is not engaged."""
+    """Return the rate of the constraint row of coupler c; zero while it is not engaged."""
     i = model.connections.item[c]
     k = model.elements.core[i]
     if model.rows.kind[k] == RELEASED:
@@ -78,7 +78,7 @@ def coupler_rate(model, work, c):
 
 @inner
 def coupler_rates(model, work, c, rate, bias):
-    """Write the rate of the held row of coupler c, and its second rate at zero u_dot."""
+    """Write the rate of the constraint row of coupler c, and its second rate at zero u_dot."""
     i = model.connections.item[c]
     k = model.elements.core[i]
     rate[k], bias[k] = coupler_rate(model, work, c), 0.0
@@ -96,7 +96,7 @@ def coupler_rates(model, work, c, rate, bias):
 
 @inner
 def coupler_power(model, work, c):
-    """Return the power that enters where the constant of the coupler changes with time: lam dc/dt."""
+    """Return the power that enters if the constant of the coupler changes with time: lam dc/dt."""
     k = model.elements.core[model.connections.item[c]]
     if model.rows.kind[k] == RELEASED:
         return 0.0

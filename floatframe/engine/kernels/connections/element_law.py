@@ -1,4 +1,4 @@
-"""Public elements: wrenches, rates of states and what is held, as functions that are called by their address.
+"""Public elements: wrenches, rates of states and held quantities, from functions that are called by address.
 
 The law of an element with n markers, states z and multipliers lam gives, from the motion x of the markers,
 
@@ -29,12 +29,13 @@ from floatframe.model.joints.rows.kinds import NOTHING, POSITION, VELOCITY
 
 __all__ = ["law_derivatives", "law_power", "law_rates", "law_rows", "law_values"]
 
-MOST_LEVELS, SHORTEST, LONGER = 22, 2.0**-20, 4.0  #: of steps where the time over which a law changes is not known
-ROUNDING = 1e-15  #: of places, in differences
-REACH = 5e-3  #: way along the motion on which rates are taken, as a part of the length over which the law changes
-#: of differences of sixth order at -3 to 3
+#: number of steps that replaces an unknown time over which a law changes
+MOST_LEVELS, SHORTEST, LONGER = 22, 2.0**-20, 4.0
+ROUNDING = 1e-15  #: relative step of positions in differences
+REACH = 5e-3  #: displacement for the differences of rates, relative to the length over which the law changes
+#: coefficients of sixth-order differences at -3 to 3
 FIRST = (-1 / 60, 9 / 60, -45 / 60, 0.0, 45 / 60, -9 / 60, 1 / 60)
-FOURTH_FIRST = (0.0, 1 / 12, -8 / 12, 0.0, 8 / 12, -1 / 12, 0.0)  #: the same of fourth order
+FOURTH_FIRST = (0.0, 1 / 12, -8 / 12, 0.0, 8 / 12, -1 / 12, 0.0)  #: coefficients of fourth-order differences
 FOURTH_SECOND = (0.0, -1 / 12, 16 / 12, -30 / 12, 16 / 12, -1 / 12, 0.0)
 SECOND = (2 / 180, -27 / 180, 270 / 180, -490 / 180, 270 / 180, -27 / 180, 2 / 180)
 
@@ -71,7 +72,7 @@ def law_inputs(model, work, c):
 
 @inner
 def law_call(model, work, i, outputs):
-    """Write what the law i gives for the inputs."""
+    """Evaluate law i for the inputs and write its results."""
     data = model.laws.data[model.laws.data0[i] : model.laws.data0[i + 1]]
     call_law(model.laws.address[i], model.laws.head[i], work.laws.inputs, data, outputs)
 
@@ -116,7 +117,7 @@ def law_rows(model, work, c, c_k):
 
 @inner
 def note_what_is_no_number(model, work, c):
-    """Write down the first element of a step whose law gives what is no number for a motion that is one."""
+    """Record the first element of a step whose law is not finite for a finite motion."""
     head = model.laws.head[model.connections.item[c]]
     total = 0.0
     for k in range(6 * head[0] + head[2] + head[3]):
@@ -182,7 +183,7 @@ def law_derivatives(model, work, c, c_k):
 
 @inner
 def add_slopes(model, work, V, a, n, n_z, n_lam, per, states, r, by_motion, by_unknown, own):
-    """Add derivatives of one output to row r of P, P_a and V, multiplied by a factor each."""
+    """Add derivatives of one output to row r of P, P_a and V, each multiplied by a factor."""
     for m in range(n):
         for j in range(12):
             work.connections.P[a + m, r, j] = by_motion * own[per * m + j]
@@ -198,7 +199,7 @@ def add_slopes(model, work, V, a, n, n_z, n_lam, per, states, r, by_motion, by_u
 
 @inner
 def held_slopes(work, V, a, n, n_z, n_lam, per, states, r, holds, c_k, own):
-    """Write the derivatives of what is held into row r of P and V."""
+    """Write the derivatives of the held quantities into row r of P and V."""
     for m in range(n):
         for j in range(12):
             if holds == POSITION:
@@ -217,7 +218,7 @@ def held_slopes(work, V, a, n, n_z, n_lam, per, states, r, holds, c_k, own):
 
 @inner
 def law_rates(model, work, c, rate, bias):
-    """Write the rates of what element c holds, and the second rates at zero u_dot, of its rows of multipliers.
+    """Write the rates of the held quantities of element c, and their second rates at zero u_dot, for multiplier rows.
 
     From the values along the motion with the accelerations of `work.markers.bias`: differences of sixth order, by
     steps in which neither the motion nor the time changes the law much. Where the time over which it changes is not
@@ -260,10 +261,10 @@ def law_rates(model, work, c, rate, bias):
 
 @inner
 def rates_by_steps(model, work, c, h, rate, bias):
-    """Write the differences of `law_rates` by steps of h; return how far those of fourth order are from them [g/s²]."""
+    """Write the differences of `law_rates` with steps h; return the deviation of fourth-order differences [g/s²]."""
     i, a, w0 = model.connections.item[c], model.connections.a[c], model.connections.w0[c]
     size = model.connections.size[c]
-    laws, fourth = model.laws, work.laws.slopes  # which derivatives overwrite
+    laws, fourth = model.laws, work.laws.slopes  # data that the derivatives overwrite
     n, n_z, n_lam = laws.head[i, 0], laws.head[i, 2], laws.head[i, 3]
     for j in range(n_lam):
         rate[w0 + size - n_lam + j], bias[w0 + size - n_lam + j] = 0.0, 0.0
@@ -326,7 +327,7 @@ def power_on_bodies(model, work, c):
 
 @inner
 def law_power(model, work, c):
-    """Return the energy that element c holds, the power it gives to the system, and what it takes; at the iterate.
+    """Return the energy of element c, the power that it supplies, and the power that it dissipates, at the iterate.
 
     An output that ends the run is noted.
 

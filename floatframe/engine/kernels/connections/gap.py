@@ -1,4 +1,4 @@
-"""Gaps between bodies that meet, and how short a step has to be near them.
+"""Gaps between bodies that can touch, and the step size near contacts.
 
 A gap is above zero while nothing touches; below zero it is minus the depth x of a contact with the spring k xⁿ. With
 J its derivative by the motion of its markers and 1/m = J M⁻¹ Jᵀ, a contact of the speed v at the depth x holds the
@@ -42,19 +42,19 @@ from floatframe.engine.kernels.vector import (
 
 __all__ = ["gap_of_markers", "next_step", "step_before_contact", "step_of_gap", "take_ends"]
 
-FINE = 30.0  # fine steps in a contact
-CALM = 0.1  # change of the depth of a contact in a step, by its depth, that any step may make
-LONGER = 1.01  # fine steps may be longer by this
-NONE = 1e-13  # depth of a contact, by the distance of its markers from the origin, below which there is none
-PARTS = 4  # places on the way of a step at which gaps are looked at
-SMALL = 1e-6  # way of a marker on which derivatives of gaps are taken, by the length of the law; angle [rad]
-NEAR = 0.05  # of a fine step: how well the time of the first touch is found
+FINE = 30.0  # number of fine steps in a contact
+CALM = 0.1  # change of the depth of a contact in a step, relative to its depth, that is always allowed
+LONGER = 1.01  # factor by which fine steps may be longer
+NONE = 1e-13  # depth of a contact, relative to the distance of its markers from the origin, below which it is rounding
+PARTS = 4  # number of points in a step at which gaps are evaluated
+SMALL = 1e-6  # displacement of a marker for derivatives of gaps, relative to the length of the law; angle [rad]
+NEAR = 0.05  # fraction of a fine step: accuracy of the time of the first contact
 MOST_SEARCHES = 40
 
 
 @inner
 def last_marker(model, c):
-    """Return one more than the last marker of connection c."""
+    """Return the number of the last marker of connection c, plus one."""
     n = model.laws.head[model.connections.item[c], 0] if model.connections.law[c] == ELEMENT else 2
     return model.connections.a[c] + n
 
@@ -84,7 +84,7 @@ def place_markers(model, work, c):
 
 @inner
 def gap_after(model, work, g, t, e):
-    """Return gap g a time e after t, at which the iterate is; accelerations stand in `work.markers.bias`."""
+    """Return gap g at the time e after t; the iterate is at t, and its accelerations are in `work.markers.bias`."""
     c = model.gaps.connection[g]
     for m in range(model.connections.a[c], last_marker(model, c)):
         marker_motion(model, work, m)
@@ -103,7 +103,7 @@ def gap_after(model, work, g, t, e):
 
 @inner
 def take_gap(model, work, g, t):
-    """Keep gap g at the time t, at which the iterate is: the beginning of a step."""
+    """Store gap g at the time t of the iterate, the beginning of a step."""
     place_markers(model, work, model.gaps.connection[g])
     work.state.time = t
     work.gaps.start[g] = gap_of_markers(model, work, g)
@@ -111,7 +111,7 @@ def take_gap(model, work, g, t):
 
 @inner
 def is_far(model, work, c, gap, h):
-    """Whether the markers of a contact of spheres do not come near to each other in a step of size h."""
+    """Whether the markers of a contact of spheres remain apart in a step of size h."""
     if model.connections.law[c] == ELEMENT:
         return False
     a, b, markers = model.connections.a[c], model.connections.b[c], work.markers
@@ -123,7 +123,7 @@ def is_far(model, work, c, gap, h):
 
 @inner
 def nearest_time(model, work, c):
-    """Return the time after which two spheres on straight ways are nearest; below zero where it is gone."""
+    """Return the time of the smallest distance of two spheres on straight paths; below zero if it has passed."""
     if model.connections.law[c] == ELEMENT or not model.contacts.is_sphere[model.connections.item[c]]:
         return -1.0
     a, b, markers = model.connections.a[c], model.connections.b[c], work.markers
@@ -134,7 +134,7 @@ def nearest_time(model, work, c):
 
 @inner
 def step_before_contact(model, work, t, h):
-    """(1): keep all gaps at the iterate, the beginning of a step at t; return the step, h at most, to take from it."""
+    """(1): store all gaps of the iterate, the beginning of a step at t; return the allowed step, at most h."""
     for g in range(model.gaps.connection.shape[0]):
         take_gap(model, work, g, t)
         if work.gaps.start[g] < 0.0:
@@ -149,7 +149,7 @@ def step_before_contact(model, work, t, h):
 
 @inner
 def step_to_gap(model, work, g, t, h):
-    """Return the step, h at most, that ends before gap g closes."""
+    """Return the step, at most h, that ends before gap g closes."""
     nearest = nearest_time(model, work, model.gaps.connection[g])
     before, open_gap, e, gap = 0.0, work.gaps.start[g], 0.0, 0.0
     for k in range(PARTS):
@@ -173,7 +173,7 @@ def step_to_gap(model, work, g, t, h):
 
 @inner
 def touching_time(model, work, g, t, low, open_gap, high, gap, fine):
-    """Return when gap g closes, between two times, by false positions that halve the end that stays (Illinois)."""
+    """Return the time between two times at which gap g closes, by false position with the Illinois modification."""
     side = 0
     for _ in range(MOST_SEARCHES):
         if high - low <= NEAR * fine:
@@ -199,7 +199,7 @@ def touching_time(model, work, g, t, low, open_gap, high, gap, fine):
 
 @inner
 def step_of_gap(model, work, g, t, depth, speed):
-    """Return the fine step of gap g for a depth and a speed, with the iterate at t; infinite for no motion."""
+    """Return the fine step of gap g for a depth and a speed, with the iterate at t; infinite without motion."""
     k, n = model.gaps.stiffness[g], model.gaps.exponent[g]
     mobility = rigid_mobility(model, work, g, t)
     if mobility <= 0.0 or (speed == 0.0 and depth == 0.0):
@@ -213,13 +213,13 @@ def step_of_gap(model, work, g, t, depth, speed):
 
 @inner
 def depth_of(k, n, mobility, depth, speed):
-    """Return how deep a contact goes that is as deep, and has the speed."""
+    """Return the largest depth that a contact reaches from a depth with a speed."""
     return (depth ** (n + 1.0) + 0.5 * (n + 1.0) * speed * speed / (mobility * k)) ** (1.0 / (n + 1.0))
 
 
 @inner
 def put_unit_wrench(model, work, g, t):
-    """Write the wrenches on the markers of gap g that do the work of its change, ground axes."""
+    """Write the wrenches on the markers of gap g that are conjugate to its change, ground axes."""
     c = model.gaps.connection[g]
     a, markers, wrench = model.connections.a[c], work.markers, work.gaps.wrench
     place_markers(model, work, c)
@@ -254,7 +254,7 @@ def put_unit_wrench(model, work, g, t):
 
 @inner
 def is_first_on_body(model, first, m):
-    """Whether marker m, of those from `first` on, is the first of them on its body."""
+    """Whether marker m is the first marker on its body, counted from marker `first`."""
     i = model.markers.body[m]
     if i < 0:
         return False
@@ -310,7 +310,7 @@ def body_mobility(model, t, f, tau):
 
 @inner
 def modal_mobility(model, work, g, stiffness):
-    """Return what modes add to the mobility of gap g, for the wrenches that `rigid_mobility` has left."""
+    """Return the contribution of modes to the mobility of gap g, for the wrenches left by `rigid_mobility`."""
     c = model.gaps.connection[g]
     first, last, total = model.connections.a[c], last_marker(model, c), 0.0
     for m in range(first, last):
@@ -342,7 +342,7 @@ def modal_number(model, t, n, which, k):
 
 @inner
 def step_after_gap(model, work, g, end, t, h):
-    """(2): return the step that gap g allows after one of size h to the value `end`; below h: that one is too long."""
+    """(2): return the step that gap g allows after one of size h to the value `end`; below h: that step is too long."""
     start = work.gaps.start[g]
     x_0, x_1 = max(-start, 0.0), max(-end, 0.0)
     deepest, change = max(x_0, x_1), abs(x_1 - x_0)
@@ -360,14 +360,17 @@ def step_after_gap(model, work, g, end, t, h):
 
 @inner
 def take_ends(model, work):
-    """Keep all gaps for the motion of the markers in `work`: the end of a step."""
+    """Store all gaps for the motion of the markers in `work`, at the end of a step."""
     for g in range(model.gaps.connection.shape[0]):
         work.gaps.end[g] = gap_of_markers(model, work, g)
 
 
 @inner
 def next_step(model, work, t, h):
-    """Return the longest step that all gaps allow after one of size h; below h: it is too long. The iterate is at t."""
+    """Return the longest step that all gaps allow after a step of size h to the iterate at t.
+
+    Below h: it is too long.
+    """
     longest = math.inf
     work.gaps.shortest, work.gaps.n_closed = -1, 0
     for g in range(model.gaps.connection.shape[0]):

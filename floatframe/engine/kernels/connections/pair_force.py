@@ -1,4 +1,4 @@
-"""Forces between two markers that follow from their relative motion: bushings and contacts.
+"""Forces between two markers that depend on their relative motion: bushings and contacts.
 
 The wrench w = (F on A, M on A, N with -N on B) has the rows w - law(motion) = 0; a contact has one unknown more, its
 speed of approach. Their derivatives are taken along unit variations of r_B - r_A, the rotations of A and B, and the
@@ -25,7 +25,7 @@ __all__ = ["pair_derivatives", "pair_energy", "pair_power", "pair_rows"]
 
 @inner
 def pair_state(model, work, c):
-    """Write the wrench that follows from the motion of the markers of connection c into work.pair."""
+    """Write the wrench of connection c for the motion of its markers into work.pair."""
     if model.connections.law[c] == BUSHING:
         bushing_state(model, work, c)
     else:
@@ -62,7 +62,7 @@ def pair_derivatives(model, work, c, c_k):
         else:
             contact_variation(model, work, c)
         pair.motion[k] = 0.0
-        part, j = k // 3 % 3, 6 * (k // 9) + k % 3  # d, phi_A or phi_B; column in P of r or v
+        part, j = k // 3 % 3, 6 * (k // 9) + k % 3  # d, phi_A or phi_B; column of r or v in P
         for r in range(size):
             change = c_k * pair.change[r]
             if part == 0:
@@ -75,7 +75,7 @@ def pair_derivatives(model, work, c, c_k):
 
 @inner
 def pair_energy(model, work, c):
-    """Return the energy held by connection c."""
+    """Return the energy of connection c."""
     if model.connections.law[c] == BUSHING:
         return bushing_energy(model, work, c)
     return contact_energy(model, work, c)
@@ -83,7 +83,7 @@ def pair_energy(model, work, c):
 
 @inner
 def pair_power(model, work, c):
-    """Return the power that enters by tables of connection c, and that taken by damping and friction."""
+    """Return the power that enters by tables of connection c, and the power dissipated by damping and friction."""
     if model.connections.law[c] == BUSHING:
         return bushing_power(model, work, c)
     return 0.0, contact_power(model, work, c)

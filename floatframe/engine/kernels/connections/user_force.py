@@ -139,7 +139,7 @@ def binary(op, x, y):
 
 @inner
 def tape_value(tapes, functions, f, inputs, registers):
-    """Return the value of tape f at the inputs; what its operations yield stays in the registers."""
+    """Return the value of tape f at the inputs; the results of its operations remain in the registers."""
     results = registers.results
     first, last = tapes.operation0[f], tapes.operation0[f + 1]
     for k in range(first, last):
@@ -151,7 +151,7 @@ def tape_value(tapes, functions, f, inputs, registers):
             value = inputs[a]
         elif op == CALL:
             value, _, _ = time_function(functions, b, results[a])
-        elif op == SELECT:  # the operation before holds the condition
+        elif op == SELECT:  # the previous operation has the condition
             value = results[a] if results[k - first - 1] != 0.0 else results[b]
         elif op < ADD:
             value, _ = unary(op, results[a])
@@ -199,9 +199,9 @@ def tape_gradient(tapes, functions, f, inputs, registers, gradient):
 # user force -----------------------------------------------------------------------------------------------------------
 
 
-STEP = 1e-7  # of differences of users' functions, relative to the sizes of coordinates and states
+STEP = 1e-7  # relative step of differences of users' functions, by the sizes of coordinates and states
 LEAST_STEP = 1e-9  # of states
-ROUNDING = 2e-15  # of a number, below which a step is lost in it
+ROUNDING = 2e-15  # fraction of a number below which a step is lost in rounding
 
 
 @inner
@@ -229,14 +229,17 @@ def gather_inputs(model, work, c):
 
 @inner
 def user_values(model, work, c):
-    """Write forces and rates of states into work.users.outputs; return how many coordinates, inputs and outputs."""
+    """Write forces and rates of states into work.users.outputs.
+
+    Return the numbers of coordinates, inputs and outputs.
+    """
     n, n_in = gather_inputs(model, work, c)
     return n, n_in, user_outputs(model, work, c)
 
 
 @inner
 def user_outputs(model, work, c):
-    """Write forces and rates of states for work.users.inputs into work.users.outputs; return how many."""
+    """Write forces and rates of states for work.users.inputs into work.users.outputs; return the numbers as above."""
     u = model.connections.item[c]
     n_out = model.users.n_forces[u] + model.users.n_states[u]
     if model.users.address[u] != 0:
@@ -250,7 +253,7 @@ def user_outputs(model, work, c):
 
 @inner
 def user_gradients(model, work, c):
-    """Write the derivatives of all outputs by all inputs into `gradients`, row by row; return numbers as above."""
+    """Write the derivatives of all outputs by all inputs into `gradients`, row by row; return the numbers as above."""
     u = model.connections.item[c]
     n, n_in, n_out = user_values(model, work, c)
     if model.users.address[u] == 0:
@@ -259,7 +262,7 @@ def user_gradients(model, work, c):
             tape_gradient(model.tapes, model.functions, f, work.users.inputs, work.tapes, gradient)
         return n, n_in, n_out
     first = model.elements.coordinate0[element_of(model, c)]
-    for k in range(1, n_in):  # nothing takes those by the time
+    for k in range(1, n_in):  # derivatives by time are not used
         here = work.users.inputs[k]
         if k <= n:
             step = STEP * model.coordinates.size[first + k - 1]
@@ -371,7 +374,7 @@ def begin_states(rows, states, memory, h, alpha_f):
 
 @inner
 def resize_states(rows, memory, ratio):
-    """Turn the algorithmic rates into those of steps that are longer by `ratio`."""
+    """Convert the algorithmic rates to steps that are longer by the factor `ratio`."""
     for s in range(rows.shape[0]):
         k = rows[s]
         memory.w[k + 2] = memory.w[k + 1] + ratio * (memory.w[k + 2] - memory.w[k + 1])

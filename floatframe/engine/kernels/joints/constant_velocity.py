@@ -1,4 +1,4 @@
-"""Two shafts that turn equally: rows of the constant-velocity joint.
+"""Rows of the constant-velocity joint, for two shafts with equal rotations.
 
 With E, Z normal to the shaft of A and to each other, and D, U those directions of B that lay along them when both
 shafts were in line, B is A turned straight from shaft to shaft, about an axis normal to both, if

@@ -13,14 +13,14 @@ __all__ = ["coordinate_force", "coordinate_power", "coordinate_strain"]
 
 @inner
 def excess(forces, i, is_angle, x):
-    """Return a coordinate less its free value; of an angle the value between -pi and pi."""
+    """Return a coordinate minus its free value; for an angle the value between -pi and pi."""
     x -= forces.free[i]
     return x - 2 * math.pi * math.floor(x / (2 * math.pi) + 0.5) if is_angle else x
 
 
 @inner
 def coordinate_force(model, work, k, is_angle, x, v, normal):
-    """Return the force of row k that acts to increase its coordinate x, and its derivatives by x, v and `normal`.
+    """Return the force of row k in the direction of its coordinate x, and its derivatives by x, v and `normal`.
 
     -k x - c v + preload + motor(t) + characteristic(x) - (T + mu normal) tanh(v/v_0), summed over the forces there.
     """
@@ -59,7 +59,7 @@ def coordinate_strain(model, k, is_angle, x):
 
 @inner
 def coordinate_power(model, work, k, is_angle, x, v, Q):
-    """Return the power that enters by row k, and that taken by dampers and friction; Q: its whole force."""
+    """Return the power supplied by row k, and the power dissipated by dampers and friction; Q: its total force."""
     given, springs = 0.0, 0.0
     f, functions = model.joint_forces, model.functions
     for i in range(model.rows.force0[k], model.rows.force1[k]):

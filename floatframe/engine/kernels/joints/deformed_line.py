@@ -55,7 +55,10 @@ MOST, CLOSE = 30, 1e-14
 
 @inner
 def piece(lines, stations, k, s):
-    """Return the first of the two stations about s and their distance; before or after the line: the nearest piece."""
+    """Return the first of the two stations around s and their distance.
+
+    Beyond the ends of the line the nearest piece.
+    """
     j, last = lines.station0[k], lines.station0[k + 1] - 2
     while j < last and s > stations.s[j + 1]:
         j += 1
@@ -148,7 +151,7 @@ def place_of(model, work, k, b):
 
 @inner
 def slide_marker(model, work, k):
-    """Put the sliding marker of line k to its place and write its motion; all other markers have theirs."""
+    """Move the sliding marker of line k to its position and write its motion; all other markers are known."""
     m, b, row = model.lines.marker[k], model.lines.other[k], model.lines.row[k]
     i, e, markers = model.markers.body[m], vector(model.lines.axis[k]), work.markers
     is_driven = row >= 0
@@ -209,7 +212,7 @@ def slide_marker(model, work, k):
 
 @inner
 def turning_change(T, th, s_dot, th_t, th_s, th_st, th_ss):
-    """Return d(T th_s)/dt + d(T th_t)/ds s_dot, both with the place, in a body that stands; _t: at one place.
+    """Return d(T th_s)/dt + d(T th_t)/ds s_dot along the moving place, with the body at rest; _t: at a fixed place.
 
     What s_dot times it adds to the angular acceleration of axes that turn with T (th_t + th_s s_dot).
     """
@@ -241,7 +244,7 @@ def shapes(model, work, m, m_1, m_2, e, value, slopes, l_2):
 
 @inner
 def normal(model, work, row, a):
-    """Return n_i of row k, ground axes: 0 along the line, 1 nearest to y of the marker, 2 across both."""
+    """Return n_i of row k, ground axes: 0 along the line, 1 nearest to y of the marker, 2 normal to both."""
     part, n_0 = model.rows.part[row], vector(work.lines.n_0[model.markers.line[a]])
     if part == 0:
         return n_0
@@ -254,14 +257,14 @@ def normal(model, work, row, a):
 
 @inner
 def line_value(model, work, k, a, b):
-    """LINE: n_i · d; A follows the point of B, so that its axes do not count."""
+    """LINE: n_i · d; A follows the point of B, so its axes do not contribute."""
     n, zero = normal(model, work, k, a), (0.0, 0.0, 0.0)
     return dot(n, distance(work.markers, a, b)), n, zero, zero
 
 
 @inner
 def place_rates(model, work, a):
-    """Return the rate of the place where it is prescribed, else 0; what is left of its second rate; the change of B.
+    """Return the rate of the place if prescribed, else 0, the remainder of its second rate, and the change due to B.
 
     r_ddot of the place = a + 2 s_dot r'_dot + s_dot² r'' + s_ddot r', A fixed in the line.
     """
@@ -287,7 +290,7 @@ def line_rates(model, work, k, a, b):
 
 @inner
 def line_turn_value(model, work, k, a, b):
-    """LINE_TURN: E · D; A turns also with kappa s_dot, where s follows the points."""
+    """LINE_TURN: E · D; A also rotates with kappa s_dot if s follows the points."""
     rows = model.rows
     line, j = work.lines, model.markers.line[a]
     E, D = direction(work.markers, a, rows.x[k]), direction(work.markers, b, rows.y[k])
@@ -314,7 +317,7 @@ def line_turn_rates(model, work, k, a, b):
 
 @inner
 def free_moment(model, work, a):
-    """Return n_0, and kappa / |r'| where the joint carries a moment, else zero."""
+    """Return n_0, and kappa / |r'| if the joint transmits a moment, else zero."""
     j, line = model.markers.line[a], work.lines
     f = 1.0 / line.slope[j] if model.markers.moment[a] >= 0 else 0.0
     return vector(line.n_0[j]), scaled(f, vector(line.kappa[j]))

@@ -1,4 +1,4 @@
-"""Rows that hold something of two markers: what it is, how it changes with them, and with time alone.
+"""Constraint rows of two markers: their values, and their derivatives by the motion and by time alone.
 
 What a row holds, g, depends on d = r_B - r_A, on the axes of both markers and on time, so that
 
@@ -72,7 +72,7 @@ def product(E, D):
 
 @inner
 def product_rates(o, p, E, E_1, E_2, D):
-    """Return dg/dt and beta of E · D, E_1 and E_2 the rates of E as A sees it."""
+    """Return dg/dt and beta of E · D, with E_1 and E_2 the rates of E relative to A."""
     E_dot, D_dot = add(cross(o, E), E_1), cross(p, D)
     E_ddot = add(add(turned_twice(o, E), scaled(2.0, cross(o, E_1))), E_2)
     return dot(E_1, D), dot(E_ddot, D) + 2 * dot(E_dot, D_dot) + dot(E, cross(p, D_dot))
@@ -88,7 +88,7 @@ def point_value(model, work, k, a, b):
 
 @inner
 def point_rates(model, work, k, a, b):
-    """POINT: there is no more than the motion of the points."""
+    """POINT: only the motion of the points contributes."""
     return 0.0, 0.0
 
 
@@ -110,7 +110,7 @@ def angle_rates(model, work, k, a, b):
 
 @inner
 def turning_direction(model, work, k, a, sense):
-    """Return E cos f + Z sin f, and E', E'', ground axes; sense -1: the angle counts from B."""
+    """Return E cos f + Z sin f, and E', E'', ground axes; sense -1: the angle is measured from B."""
     f, rate, second = prescribed(model, work, k)
     c, s, x, z = math.cos(f), sense * math.sin(f), vector(model.rows.x[k]), vector(model.rows.z[k])
     E = turned(work.markers.A[a], add(scaled(c, x), scaled(s, z)))
@@ -136,7 +136,7 @@ def turn_rates(model, work, k, a, b):
 
 @inner
 def turn_b_value(model, work, k, a, b):
-    """TURN_B: TURN with A and B exchanged; seen from B, A turns back."""
+    """TURN_B: TURN with A and B exchanged; relative to B, A rotates backwards."""
     E, _, _ = turning_direction(model, work, k, b, -1.0)
     g, n, m_b, m_a = product(E, direction(work.markers, a, model.rows.y[k]))
     return g, n, m_a, m_b
@@ -189,7 +189,7 @@ def distance_rates(model, work, k, a, b):
 
 @inner
 def screw_value(model, work, k, a, b):
-    """SCREW: E · d - c th, E the axis and th the angle of D about it, of all turns the nearest."""
+    """SCREW: E · d - c th, with E the axis and th the angle of D about it, counted to the nearest turn."""
     rows, markers = model.rows, work.markers
     c, d, E = rows.c[k], distance(markers, a, b), axis_between(rows, markers, k, a)
     th, t = angle_between(rows, markers, k, a, b)
@@ -200,6 +200,6 @@ def screw_value(model, work, k, a, b):
 
 @inner
 def screw_rates(model, work, k, a, b):
-    """SCREW: the second rate of the angle is that of parallel axes."""
+    """SCREW: the second rate of the angle is that for parallel axes."""
     markers = work.markers
     return 0.0, along_rates(markers, a, b, axis_between(model.rows, markers, k, a))

@@ -1,4 +1,4 @@
-"""Relative motion of two markers: what rows of joints and coordinates are made of."""
+"""Relative motion of two markers, from which rows of joints and coordinates are made."""
 
 import math
 
@@ -24,7 +24,10 @@ __all__ = [
 
 @inner
 def prescribed(model, work, k):
-    """Return the motion of row k at the time of the iterate, its rate and its second rate; its constant without."""
+    """Return the motion of row k at the time of the iterate, its rate and its second rate.
+
+    Its constant if not driven.
+    """
     if model.rows.motion[k] < 0:
         return model.rows.c[k], 0.0, 0.0
     return time_function(model.functions, model.rows.motion[k], work.state.time)
@@ -50,7 +53,7 @@ def relative_velocity(markers, a, b):
 
 @inner
 def slip(markers, a, b, d):
-    """Return the velocity of the point of B as seen from A: v_B - v_A - omega_A × d."""
+    """Return the velocity of the point of B relative to A: v_B - v_A - omega_A × d."""
     return sub(relative_velocity(markers, a, b), cross(vector(markers.omega[a]), d))
 
 

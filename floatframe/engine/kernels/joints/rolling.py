@@ -41,7 +41,7 @@ def rim(rows, markers, k, a, b):
 
 @inner
 def rim_velocity(markers, a, b, rho):
-    """Return V, the velocity of the rim at the contact as seen from A."""
+    """Return V, the velocity of the rim at the contact relative to A."""
     of_b = cross(vector(markers.omega[b]), rho)
     of_a = cross(vector(markers.omega[a]), add(distance(markers, a, b), rho))
     return sub(add(relative_velocity(markers, a, b), of_b), of_a)
@@ -107,7 +107,7 @@ def roll_rates(model, work, k, a, b):
 
 @inner
 def roll_by_place(model, work, k, r, a, b, P_a, P_b):
-    """Write the derivative of a row ROLL by the places of the markers into row r of P."""
+    """Write the derivative of a ROLL row by the positions of the markers into row r of P."""
     rows, markers = model.rows, work.markers
     N, n, c, s, rho = rim(rows, markers, k, a, b)
     omega_a, omega_b = vector(markers.omega[a]), vector(markers.omega[b])

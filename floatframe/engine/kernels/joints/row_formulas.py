@@ -57,7 +57,7 @@ __all__ = [
 ]
 
 
-# one compiled function that calls another by a code: `if code == ...` written from a table ----------------------------
+# a compiled function that selects another by a code: `if code == ...` written from a table ----------------------------
 
 
 def by_code(name: str, functions: Mapping[int, Callable[..., Any]], arguments: str) -> Callable[..., Any]:
@@ -88,15 +88,16 @@ Function = Callable[..., Any]
 
 
 class Held(NamedTuple):
-    """Of a row that holds something."""
+    """Functions of a constraint row."""
 
     value: Function  #: (model, work, k, a, b) -> g, n, m_a, m_b
     rates: Function  #: (model, work, k, a, b) -> dg/dt, beta
-    by_place: Function | None = None  #: of a velocity: (model, work, k, r, a, b, P_a, P_b), its change with places
+    #: for a velocity constraint: (model, work, k, r, a, b, P_a, P_b), its derivative by positions
+    by_place: Function | None = None
 
 
 class Wrench(NamedTuple):
-    """Of a row that says what the wrench is."""
+    """Functions of a row that defines the wrench."""
 
     value: Function  #: (model, work, k, a, b, w) -> number
     derivatives: Function  #: (model, work, k, r, a, b, w, c_k, P_a, P_b, V)

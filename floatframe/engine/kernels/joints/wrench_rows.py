@@ -1,4 +1,4 @@
-"""Rows that say what the wrench of a joint is: none along what is free, its parts on A and B balance.
+"""Rows that define the wrench of a joint: zero along free directions, and its parts on A and B are in balance.
 
 A kind is two functions: `value`(model, work, k, a, b, w) with w the wrench of the connection, and
 `derivatives`(model, work, k, r, a, b, w, c_k, P_a, P_b, V), which writes row r of P (times c_k) and V; both are zero
@@ -77,7 +77,7 @@ def thread_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
 
 @small
 def arm_value(model, work, k, a, b, w):
-    """ARM: x · (M - N - d × F), x in ground axes; N is missing where nothing acts on B but the force."""
+    """ARM: x · (M - N - d × F), x in ground axes; N is omitted if only the force acts on B."""
     M = sub(vector(w[MOMENT:]), cross(distance(work.markers, a, b), vector(w)))
     if len(w) > MOMENT_B:
         M = sub(M, vector(w[MOMENT_B:]))

@@ -1,1 +1,1 @@
-"""Steps of the conserving, decaying and variational schemes in compiled loops; formulas as in the room above."""
+"""Compiled steps of the conserving, decaying and variational schemes; formulas as in the parent package."""

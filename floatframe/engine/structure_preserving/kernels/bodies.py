@@ -62,7 +62,7 @@ def shapes(discrete, t, n, q, out):
 
 @loops
 def center(discrete, t, n, q, C):
-    """Return s(q) over the mass, for C = shapes(q)."""
+    """Return s(q) divided by the mass, for C = shapes(q)."""
     s = vector(discrete.center[t])
     both = add(column_sum(block(discrete, t, C1, 3 * n), n, q), column_sum(C, n, q))
     return add(s, scaled(0.5, both))
@@ -201,7 +201,7 @@ def put_momenta(model, discrete, step, i, q, w, P):
 
 @inner
 def move_bodies(model, step):
-    """Take the end of the step as the configuration from which it goes on."""
+    """Use the end of the step as the configuration at which the next one starts."""
     for i in range(model.bodies.kind.shape[0]):
         n, q0, u0 = model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
         p, half = step.p_0[i], scaled(0.5, vector(step.z[u0 + 3 :]))
@@ -241,7 +241,7 @@ def keep_bodies(model, discrete, step, memory):
 
 @inner
 def body_step(model, discrete, step, i):
-    """Write how body i moves over the step by its unknowns.
+    """Write the motion of body i over the step from its unknowns.
 
     Forces of the variational scheme act at one configuration. The angular velocity there that belongs to the momentum
     of the interval is (1 + theta²/4) theta/h (exactly, for turns about a principal axis).
@@ -357,7 +357,7 @@ def body_inertia(model, discrete, step, i):
 
 @loops
 def subtract_elastic(discrete, step, t, n, q_mean, dq, N):
-    """Subtract K q and D dq/h from modal forces, q with its part that dissipates."""
+    """Subtract K q and D dq/h from modal forces, with the dissipating part in q."""
     K, D, q = block(discrete, t, STIFFNESS, n * n), block(discrete, t, DAMPING, n * n), step.vector
     for k in range(n):
         q[k] = q_mean[k]

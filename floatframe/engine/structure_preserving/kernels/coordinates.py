@@ -28,7 +28,7 @@ def add_pair(step, a, b, F):
 
 @inner
 def span_lengths(step, a, b):
-    """Return the distances of two points where forces begin and end to act."""
+    """Return the distances of two points at the start and end of the force interval."""
     d_0 = sub(vector(step.x_0[b]), vector(step.x_0[a]))
     return norm(d_0), norm(sub(vector(step.x_f[b]), vector(step.x_f[a])))
 
@@ -64,7 +64,7 @@ def coordinate_at(model, x, A, k, a, b):
 
 @inner
 def coordinate_ends(model, step, k, a, b, change):
-    """Return the coordinate of row k where forces begin and end to act, for its change; angles not counted."""
+    """Return the coordinate of row k at the start and end of the force interval; angles are not counted."""
     end = coordinate_at(model, step.x_f, step.A_f, k, a, b)
     if step.is_still:
         return end, end
@@ -73,7 +73,7 @@ def coordinate_ends(model, step, k, a, b, change):
 
 @inner
 def counted(model, k, x, known):
-    """Return the value of the coordinate of row k: of angles the one nearest to the value before."""
+    """Return the value of the coordinate of row k; for angles the value nearest to the previous one."""
     if not model.rows.is_angle[k]:
         return x
     return x + 2 * math.pi * math.floor((known - x) / (2 * math.pi) + 0.5)
@@ -106,7 +106,7 @@ def add_coordinate_force(model, discrete, step, k, a, b, Q):
 
 @inner
 def angle_axis(model, step, k, a):
-    """Return the unit axis of the angle of row k, fixed in marker a, by the mean of its directions."""
+    """Return the unit axis of the angle of row k, fixed in marker a, from the mean of its directions."""
     axis = mean_direction(step, a, cross(vector(model.rows.x[k]), vector(model.rows.z[k])))
     length = norm(axis)
     return scaled(1.0 / length, axis) if length > 0.0 else axis
@@ -114,7 +114,7 @@ def angle_axis(model, step, k, a):
 
 @inner
 def coordinate_rate(model, discrete, step, k, a, b):
-    """Return the mean rate of the coordinate of row k: of an angle that of the angular velocities about its axis."""
+    """Return the mean rate of the coordinate of row k; for an angle that of the angular velocities about its axis."""
     kind = model.rows.kind[k]
     if kind == PUSH or kind == SPAN:
         return coordinate_change(model, discrete, step, k, a, b) / step.h
@@ -124,7 +124,7 @@ def coordinate_rate(model, discrete, step, k, a, b):
 
 @inner
 def add_impulsive_force(model, discrete, step, k, a, b, Q):
-    """Add the loads of a force or torque Q along the coordinate of row k: impulse h Q and work h Q times its rate."""
+    """Add the loads of a force or torque Q along the coordinate of row k: impulse h Q, work h Q times its rate."""
     kind = model.rows.kind[k]
     if kind == PUSH or kind == SPAN:
         add_coordinate_force(model, discrete, step, k, a, b, Q)

@@ -1,4 +1,4 @@
-"""A point that slides along the deformed line of a body, formulas as in the module of that name above."""
+"""A point that slides along the deformed line of a body; formulas as in the module of the same name above."""
 
 import math
 
@@ -101,7 +101,7 @@ def place_of(model, step, k, end, x):
 
 @inner
 def found_place(model, step, k, end, t, R, center, way):
-    """Return the place of line k at one end: prescribed at t, or nearest to B, `way` from the centre of mass."""
+    """Return the place of line k at one end: prescribed at t, or nearest to B, at `way` from the centre of mass."""
     if model.lines.row[k] >= 0:
         value, _ = held(model, model.lines.row[k], t)
         return value
@@ -120,7 +120,7 @@ def on_line(model, step, k, end, s, center):
 
 @inner
 def begin_lines(model, step):
-    """Write the sliding markers where the step begins; all others are there."""
+    """Write the sliding markers at the beginning of the step; all other markers are known."""
     for k in range(model.lines.marker.shape[0]):
         m, b = model.lines.marker[k], model.lines.other[k]
         i = model.markers.body[m]
@@ -141,14 +141,14 @@ def begin_lines(model, step):
 
 @inner
 def line_steps(model, discrete, step):
-    """Write how the sliding markers move over the step; all others are known."""
+    """Write the motion of the sliding markers over the step; all other markers are known."""
     for k in range(model.lines.marker.shape[0]):
         line_step(model, discrete, step, k)
 
 
 @inner
 def line_step(model, discrete, step, k):
-    """Write how the sliding marker of line k moves, at its place and along the line."""
+    """Write the motion of the sliding marker of line k, at its place and along the line."""
     m, b = model.lines.marker[k], model.lines.other[k]
     i = model.markers.body[m]
     n, q0, R_m = model.bodies.n_q[i], model.bodies.q0[i], matrix(step.R_m[i])
@@ -189,7 +189,7 @@ def line_step(model, discrete, step, k):
 
 @loops
 def put_shapes(model, discrete, step, k, s_0, s_1):
-    """Write the derivatives of place and rotation of the sliding marker by q: means of those at both places."""
+    """Write the derivatives of position and rotation of the sliding marker by q, as means over both places."""
     m, e = model.lines.marker[k], vector(model.lines.axis[k])
     n, psi = model.bodies.n_q[model.markers.body[m]], step.psi
     own = psi[6 * discrete.psi0[m] : 6 * discrete.psi0[m] + 6 * n]
@@ -215,7 +215,7 @@ def put_shapes(model, discrete, step, k, s_0, s_1):
 
 @inner
 def ways_by_place(model, step, k, end, s_0, s_1):
-    """Return T and T_r: by Gauss' rule with two points between the stations that are passed."""
+    """Return T and T_r by Gauss' rule with two points between the passed stations."""
     e, way = vector(model.lines.axis[k]), s_1 - s_0
     T, slope = e, (0.0, 0.0, 0.0)
     T_r = (0.0, 0.0, 0.0)
@@ -239,7 +239,7 @@ def ways_by_place(model, step, k, end, s_0, s_1):
 
 @inner
 def normal(model, k, along, y):
-    """Return the unit vector of row k: along a direction, nearest to y across it, or across both."""
+    """Return the unit vector of row k: along a direction, normal to it nearest to y, or normal to both."""
     n_0 = scaled(1.0 / norm(along), along)
     if model.rows.part[k] == 0:
         return n_0
@@ -288,7 +288,7 @@ def add_line_reaction(model, discrete, step, k, a, b, f):
 
 @inner
 def line_change(model, discrete, step, k, a, b):
-    """Return the change of row k, LINE or LINE_TURN, by the motion alone: the work of a unit multiplier."""
+    """Return the change of row k, LINE or LINE_TURN, due to the motion alone: the work of a unit multiplier."""
     d = sub(vector(step.dx[b]), vector(step.dx[a]))
     if model.rows.kind[k] != LINE_TURN:
         return dot(mean_normal(model, step, k, a), d)
@@ -302,7 +302,7 @@ def line_change(model, discrete, step, k, a, b):
 
 @inner
 def line_rate(model, step, k, a, b, t):
-    """Return the rate of row k while nothing moves: by the motion of the prescribed place."""
+    """Return the rate of row k without motion: that of the prescribed place."""
     line = model.markers.line[a]
     if model.lines.row[line] < 0:
         return 0.0

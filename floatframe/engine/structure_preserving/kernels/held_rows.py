@@ -1,4 +1,4 @@
-"""Rows that hold something over a step, of joints and couplers: one place that knows all kinds."""
+"""Constraint rows of joints and couplers over a step, for all kinds."""
 
 import math
 
@@ -48,7 +48,7 @@ def row_value(model, step, c, k):
 
 @inner
 def add_reaction(model, discrete, step, c, k, f):
-    """Add the loads of row k of connection c with multiplier f: their work is f times the change of the row."""
+    """Add the loads of row k of connection c with multiplier f, whose work is f times the change of the row."""
     kind, a, b = model.rows.kind[k], model.connections.a[c], model.connections.b[c]
     if kind == COUPLE:
         add_coupler_reaction(model, discrete, step, c, f)
@@ -64,7 +64,7 @@ def add_reaction(model, discrete, step, c, k, f):
 
 @inner
 def row_change(model, discrete, step, c, k):
-    """Return the change of row k over the step, by the motion alone; those of a rolling disc are in no such need."""
+    """Return the change of row k over the step due to the motion alone; rows of a rolling disc do not need it."""
     kind, a, b = model.rows.kind[k], model.connections.a[c], model.connections.b[c]
     if kind == COUPLE:
         return coupler_change(model, discrete, step, c)
@@ -75,7 +75,7 @@ def row_change(model, discrete, step, c, k):
 
 @inner
 def row_rate(model, step, c, k, t):
-    """Return the rate of row k at the beginning of a step while nothing moves: that of a prescribed motion."""
+    """Return the rate of row k at the beginning of a step without motion: that of its prescribed motion."""
     kind, a, b = model.rows.kind[k], model.connections.a[c], model.connections.b[c]
     if kind == COUPLE:
         return coupler_rate(model, c, t)

@@ -1,4 +1,4 @@
-"""Forces over a step, formulas as in `structure_preserving.forces`; each returns its work: given, taken."""
+"""Forces over a step, formulas as in `structure_preserving.forces`; each returns its work: supplied, dissipated."""
 
 import math
 
@@ -59,7 +59,7 @@ def spring_load(model, step, c):
 
 @inner
 def point_load(model, step, k):
-    """Add load k, fixed in space or in its marker; return the work given."""
+    """Add load k, fixed in space or in its marker, and return the supplied work."""
     m, factor, work = model.loads.marker[k], 1.0, 0.0
     if model.loads.factor[k] >= 0:
         factor, _, _ = time_function(model.functions, model.loads.factor[k], step.t_force)
@@ -76,7 +76,7 @@ def point_load(model, step, k):
 
 @loops
 def body_load(model, discrete, step, k):
-    """Add load case k of a body, in its axes about its frame origin; return the work given."""
+    """Add load case k of a body, in its axes about its frame origin, and return the supplied work."""
     i, first = model.body_loads.body[k], model.body_loads.value0[k]
     n, u0, q0 = model.bodies.n_q[i], model.bodies.u0[i], model.bodies.q0[i]
     factor, _, _ = time_function(model.functions, model.body_loads.factor[k], step.t_force)
@@ -97,7 +97,7 @@ def body_load(model, discrete, step, k):
 
 @inner
 def normal_force(model, discrete, step, c, k):
-    """Return the size of the force in joint c across the axis of its row k."""
+    """Return the size of the force in joint c normal to the axis of its row k."""
     a, b = model.connections.a[c], model.connections.b[c]
     F = (0.0, 0.0, 0.0)
     for j in range(discrete.first[c], discrete.first[c + 1]):
@@ -113,7 +113,7 @@ def normal_force(model, discrete, step, c, k):
 
 @inner
 def coordinate_load(model, discrete, step, k, a, b, normal):
-    """Add the forces along the coordinate of row k (PUSH, TWIST, TWIST_B); normal: force in the joint across it.
+    """Add the forces along the coordinate of row k (PUSH, TWIST, TWIST_B); normal: force in the joint normal to it.
 
     Springs do the work of the change of their potential; the impulse of all others is h times their force.
     """

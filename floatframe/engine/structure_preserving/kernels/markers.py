@@ -33,7 +33,7 @@ NONE = (0.0, 0.0, 0.0)
 
 @loops
 def deformation(model, step, m, i, q, s):
-    """Return the place of marker m from the centre of mass and its elastic rotation; s: centre of mass."""
+    """Return the position of marker m from the centre of mass and its elastic rotation; s: centre of mass."""
     n, o = model.bodies.n_q[i], model.markers.psi0[m]
     sigma = sub(vector(model.markers.position[m]), s)
     if o < 0:
@@ -72,7 +72,7 @@ def times(A, n, x):
 
 @inner
 def begin_markers(model, discrete, step):
-    """Write the markers at the configuration where a step begins."""
+    """Write the markers in the configuration at the start of a step."""
     for m in range(model.markers.body.shape[0]):
         i = model.markers.body[m]
         if i < 0:
@@ -104,7 +104,7 @@ def begin_markers(model, discrete, step):
 
 @loops
 def marker_step(model, discrete, step, m):
-    """Write how marker m moves over the step of its body."""
+    """Write the motion of marker m over the step of its body."""
     i = model.markers.body[m]
     put(step.F[m], 0, NONE)
     put(step.T[m], 0, NONE)
@@ -150,7 +150,7 @@ def marker_step(model, discrete, step, m):
 
 @inner
 def put_end_of_forces(step, m):
-    """Write where the forces on marker m end to act: at the end of the step, or where it begins."""
+    """Write the end of the force interval of marker m: the end of the step, or its start."""
     if step.is_still:
         put(step.x_f[m], 0, vector(step.x_0[m]))
         put_matrix(step.A_f[m], matrix(step.A_0[m]))
@@ -192,13 +192,13 @@ def half_turn(th):
 
 @inner
 def ends(step, m, e):
-    """Return the direction e of a marker where its forces begin and end to act."""
+    """Return the direction e of a marker at the start and end of the force interval."""
     return turned(step.A_0[m], e), turned(step.A_f[m], e)
 
 
 @inner
 def change(model, discrete, step, m, e, mean):
-    """Return how the direction e of a marker changes over the step; mean: its mean."""
+    """Return the change of the direction e of a marker over the step; mean: its mean."""
     i = model.markers.body[m]
     if i < 0:
         return NONE
@@ -226,7 +226,7 @@ def add_force(step, m, F):
 
 @inner
 def add_direction(model, discrete, step, m, e, G):
-    """Add a load on direction e of a marker: its work is G · dE."""
+    """Add a load on direction e of a marker, with work G · dE."""
     E_0, E_1 = ends(step, m, e)
     put_sum(step.T[m], 0, cross(scaled(0.5, add(E_0, E_1)), G))
     i = model.markers.body[m]
@@ -236,7 +236,7 @@ def add_direction(model, discrete, step, m, e, G):
 
 @inner
 def add_moment(model, step, m, T):
-    """Add a moment on a marker: its work is that by its turning."""
+    """Add a moment on a marker, whose work is that over its rotation."""
     put_sum(step.T[m], 0, T)
     i = model.markers.body[m]
     if i >= 0:

@@ -1,4 +1,4 @@
-"""Newton's method for one step, see `structure_preserving.newton`, with factors that serve for many steps.
+"""Newton's method for one step, see `structure_preserving.newton`, with factors that are reused in many steps.
 
 Unknowns and residuals of a body are in its axes at the beginning of the step, so that the matrix does not turn with it.
 Derivatives are differences of residuals, those of unknowns far from each other by one evaluation.
@@ -105,9 +105,10 @@ def band_solve(A, pivot, below, above, b):
 # newton ---------------------------------------------------------------------------------------------------------------
 
 
-SLOW = 0.25  # ratio of corrections above which the derivatives are made anew
-MANY = 7  # iterations of a step after which the next one starts with new factors
-LEFT = 1e-2  # of what a correction may be, what is left after it may be: the factors are not those of the iterate
+SLOW = 0.25  # ratio of successive corrections above which the derivatives are renewed
+MANY = 7  # number of iterations of a step after which the next one starts with new factors
+# error after a correction relative to the allowed correction, because the factors are not those of the iterate
+LEFT = 1e-2
 ROUNDOFF = 2e-15  # of a position
 CONVERGED, NOT_CONVERGED, SINGULAR, NO_ACCELERATION, STOPPED, UNRESOLVED = range(6)
 
@@ -126,7 +127,7 @@ def move(model, discrete, step):
 
 @inner
 def add_loads(model, work, discrete, step):
-    """Add all forces but reactions to the loads on markers and bodies, and sum their work over the step."""
+    """Add all forces except reactions to the loads on markers and bodies, and sum their work over the step."""
     given, taken = 0.0, 0.0
     for i in range(model.bodies.kind.shape[0]):
         weight = scaled(model.body_types.mass[model.bodies.kind[i]], vector(model.gravity))
@@ -144,7 +145,7 @@ def add_loads(model, work, discrete, step):
 
 @inner
 def connection_load(model, work, discrete, step, c):
-    """Add the forces of connection c; return the work they give and take."""
+    """Add the forces of connection c, and return the work that they supply and dissipate."""
     law = model.connections.law[c]
     if law == SPRING:
         return spring_load(model, step, c)
@@ -232,7 +233,7 @@ def write_state_residual(model, work, discrete, step, c):
 
 @inner
 def put_changes(model, discrete, step):
-    """Write by how much unknowns are changed for derivatives: by SMALL of their size, so far as it is known.
+    """Write the changes of unknowns for derivatives: SMALL times their size, if known.
 
     A multiplier of an equation of its own, or a state, may be of any size; a change of far less than that is lost in
     the rounding of what depends on it.
@@ -250,7 +251,7 @@ def put_changes(model, discrete, step):
 
 @inner
 def factorize(model, work, discrete, step, stage):
-    """Write the factors of the derivatives of the residual; return whether there are."""
+    """Write the factors of the derivatives of the residual, and return whether they exist."""
     pattern, A, n = discrete.pattern, step.band[stage], step.z.shape[0]
     below, above = pattern.below, pattern.above
     for i in range(n):
@@ -280,7 +281,7 @@ def factorize(model, work, discrete, step, stage):
 
 @inner
 def correct(model, discrete, step, stage):
-    """Add Newton's correction to the unknowns; return its norm, and write the largest of states over their sizes."""
+    """Add Newton's correction to the unknowns; return its norm, and write the largest relative correction of states."""
     pattern, total, first_state = discrete.pattern, 0.0, step.load.shape[0] + step.f.shape[0]
     step.state_change = 0.0
     for i in range(step.z.shape[0]):
@@ -313,7 +314,7 @@ def size_of(discrete, step):
 
 @inner
 def smallest(model, step, order):
-    """Return by how much corrections may differ from zero: tolerance times the fall in a step, and rounding."""
+    """Return the allowed correction: tolerance times the displacement in a step, plus rounding."""
     floor, mass = 0.0, 0.0
     for i in range(model.bodies.kind.shape[0]):
         m, size = model.body_types.mass[model.bodies.kind[i]], order.length
@@ -351,7 +352,7 @@ def solve(model, work, discrete, step, order, stage, is_exact):
         allowed = order.tolerance * size_of(discrete, step) + least
         change = max(change, step.state_change * allowed / order.tolerance)
         step.excess = change / allowed
-        left = change * min(change / last, 1.0)  # what the next correction would be
+        left = change * min(change / last, 1.0)  # estimate of the next correction
         is_rounding = change <= 1e3 * allowed and change > 0.5 * last and iteration > 2
         if (change <= allowed and left <= LEFT * allowed) or is_rounding:
             if iteration >= MANY:

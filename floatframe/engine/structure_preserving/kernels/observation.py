@@ -1,7 +1,7 @@
 """Accelerations and reactions at the end of a step, from the equations of motion, as in `initial_conditions.initial`.
 
-    (2) W du - Jᵀ w = 0,       G du = -G u              velocities that fulfil the joints, W = M + s K
-    (3) M u_dot - Jᵀ w = f,    G u_dot = -d(G)/dt u     there
+(2) W du - Jᵀ w = 0,       G du = -G u              velocities that fulfil the joints, W = M + s K
+(3) M u_dot - Jᵀ w = f,    G u_dot = -d(G)/dt u     there
 """
 
 import math
@@ -17,13 +17,13 @@ from floatframe.model.joints.rows.kinds import NOTHING
 
 __all__ = ["observe"]
 
-SAME = 1e-10  # relative change of reactions below which they are those
+SAME = 1e-10  # relative change of reactions below which they have converged
 MOST_ITERATIONS = 30
 
 
 @inner
 def factorize(model, work, discrete, is_weighted):
-    """Factorise the matrices of (2), if is_weighted, or (3); return whether they have factors."""
+    """Factorise the matrices of (2), if is_weighted, or (3); return whether they are regular."""
     linearize(model, work, 1.0, 0.0, 0.0)
     if is_weighted:
         for i in range(model.bodies.kind.shape[0]):
@@ -40,7 +40,7 @@ def factorize(model, work, discrete, is_weighted):
 
 @inner
 def put_in_ground_axes(model, work, out, is_sum):
-    """Write or add the correction of bodies, translations turned from body to ground axes."""
+    """Write or add the correction of bodies, with translations rotated from body to ground axes."""
     for i in range(model.bodies.kind.shape[0]):
         n, u0 = model.bodies.n_q[i], model.bodies.u0[i]
         dx = turned(work.state.R[i], vector(work.solver.y[u0:]))
@@ -54,7 +54,7 @@ def put_in_ground_axes(model, work, out, is_sum):
 
 @inner
 def begin(model, work, memory, t):
-    """Take the state in the memory without accelerations and with nothing known of reactions."""
+    """Use the state in the memory without accelerations and with unknown reactions."""
     load_state(work.state, memory)
     work.state.time = t
     for k in range(work.state.u_dot.shape[0]):
@@ -64,7 +64,7 @@ def begin(model, work, memory, t):
     for k in range(work.state.w.shape[0]):
         work.state.w_start[k] = memory.w[k]
     work.states.rho = 1.0
-    for s in range(model.states.row.shape[0]):  # they stay, their rates are those of their laws
+    for s in range(model.states.row.shape[0]):  # states are constant, with the rates from their laws
         z = memory.w[model.states.row[s]]
         work.state.w[model.states.row[s]], work.states.base[s] = z, z
         work.states.kappa[s], work.states.rate_base[s] = 0.0, 0.0
@@ -76,7 +76,9 @@ def begin(model, work, memory, t):
 
 @inner
 def observe(model, work, discrete, step, memory, t, rows):
-    """Write the next row of the results, with accelerations and reactions, which the memory learns; whether it could.
+    """Write the next row of the results, with accelerations and reactions, also into the memory.
+
+    Return whether they exist.
 
     Reactions that friction depends on are found by iteration. What connections remember stays as the step left it, so
     that outputs do not change the motion.

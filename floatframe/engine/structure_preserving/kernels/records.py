@@ -1,4 +1,4 @@
-"""What the compiled steps know of a system besides its model, and their working arrays.
+"""Data of a system for the compiled steps in addition to its model, and their working arrays.
 
 Sizes as in `kernels.model`, and n_z: unknowns of a step, n_u increments of the bodies (d, theta in the axes of the body
 at the beginning of the step, dq), then n_mu multipliers, then changes of states. Blocks are the bodies and then the
@@ -21,47 +21,48 @@ CONSERVING, VARIATIONAL = range(2)
 #: columns of `Discrete.block0`: those of `discrete.bodies.CentralBody` by name, and the filters of dissipation
 C1, BENT, C2, INERTIA, PRODUCTS, TURNED_PRODUCTS, MASS, STIFFNESS, DAMPING, FILTER, STIFFNESS_FILTER = range(11)
 N_BLOCKS = 11
-SMALL = 1e-7  #: by which unknowns are changed for derivatives, of the size of the system, rad, or of their own size
+#: changes of unknowns for derivatives, relative to the size of the system, in rad, or relative to their own size
+SMALL = 1e-7
 
 n_mu, n_z, n_blocks = (Size(name) for name in ("n_mu", "n_z", "blocks of unknowns"))
 
 
 class Pattern(NamedTuple):
-    """Where the derivatives of the residual stand, and which columns of them are found by one evaluation."""
+    """The sparsity of the derivatives of the residual, and the columns that one evaluation determines."""
 
-    place: IntArray = integer(n_z)  #: of each unknown in the order of elimination
-    block: IntArray = integer(n_z)  #: to which each unknown belongs
-    row0: IntArray = integer(n_blocks + 1)  #: rows that depend on a block,
+    place: IntArray = integer(n_z)  #: number of each unknown in the elimination order
+    block: IntArray = integer(n_z)  #: block of each unknown
+    row0: IntArray = integer(n_blocks + 1)  #: rows that depend on a block
     row: IntArray = integer(Size("rows of blocks"))  #: their numbers
-    color0: IntArray = integer(Size("colors") + 1)  #: unknowns that are changed together,
+    color0: IntArray = integer(Size("colors") + 1)  #: unknowns that are changed together
     column: IntArray = integer(n_z)  #: their numbers
-    below: IntArray = integer()  #: numbers of a row before its diagonal, in the order of elimination
+    below: IntArray = integer()  #: number of entries in a row before its diagonal, in elimination order
     above: IntArray = integer()  #: and after it
 
 
 class Discrete(NamedTuple):
-    """A system as the steps see it."""
+    """A system in the arrays of the steps."""
 
     scheme: IntArray = integer()  #: CONSERVING or VARIATIONAL
     center: Array = real(n_t, 3, unit="m")  #: undeformed centre of mass in the frame
     is_bent: IntArray = integer(n_t)  #: whether 1C depends on q
-    is_filtered: IntArray = integer()  #: whether modes that h does not resolve dissipate
+    is_filtered: IntArray = integer()  #: whether unresolved modes dissipate
     is_loaded: IntArray = integer()  #: whether forces or drives do work
     blocks: Array = real(Size("numbers of steps"))
     block0: IntArray = integer(n_t, N_BLOCKS)  #: where they begin
-    turns: IntArray = integer(n_m)  #: whether a marker turns in its body
-    psi0: IntArray = integer(n_m)  #: Σ n over the markers before it
+    turns: IntArray = integer(n_m)  #: whether a marker rotates in its body
+    psi0: IntArray = integer(n_m)  #: Σ n over the previous markers
     first: IntArray = integer(n_c + 1)  #: multipliers of a connection
-    row: IntArray = integer(n_mu)  #: of each multiplier among the rows of the model
+    row: IntArray = integer(n_mu)  #: row of the model of each multiplier
     is_driven: IntArray = integer(n_mu)  #: whether a multiplier does the work of a prescribed motion
     weight: Array = real(n_u, unit="kg, kg m²")  #: of the norm of corrections
-    remembered: IntArray = integer(Size("remembered"))  #: rows of the memory that connections remember
-    scale: Array = real(n_z)  #: by which unknowns are scaled in the matrix,
+    remembered: IntArray = integer(Size("remembered"))  #: rows of the memory of connections
+    scale: Array = real(n_z)  #: scale factors of unknowns in the matrix
     row_scale: Array = real(n_z)  #: and residuals
-    delta: Array = real(n_z)  #: least by which unknowns are changed for derivatives
-    equation: IntArray = integer(Size("equations of laws"))  #: multipliers of elements that hold nothing
+    delta: Array = real(n_z)  #: smallest changes of unknowns for derivatives
+    equation: IntArray = integer(Size("equations of laws"))  #: multipliers of elements without constraints
     is_linear: IntArray = integer()  #: whether the equations of motion are linear in reactions
-    weighted: Array = real(Size("numbers of s K"), unit="kg m²")  #: s K of each body, by which velocities are closed
+    weighted: Array = real(Size("numbers of s K"), unit="kg m²")  #: s K of each body, used to close velocities
     weighted0: IntArray = integer(n_b)  #: where it begins
     pattern: Pattern = Pattern()
 
@@ -72,7 +73,7 @@ class StepWork(NamedTuple):
     h: Array = real(unit="s")
     t_0: Array = real(unit="s")
     t_1: Array = real(unit="s")
-    t_force: Array = real(unit="s")  #: at which forces are taken
+    t_force: Array = real(unit="s")  #: time of the forces
     is_still: IntArray = integer()  #: whether forces act at one configuration
     is_closing: IntArray = integer()  #: 0 while positions are closed, 1 for forces at the end, 2 for velocities
     given: Array = real(unit="J")  #: work over the step
@@ -97,8 +98,8 @@ class StepWork(NamedTuple):
     V: Array = real(9 * n_most, unit="kg m²")  #: `CentralBody.products`
     W: Array = real(9 * n_most, unit="kg m²")
     C: Array = real(3 * n_most)  #: `CentralBody.shapes`
-    C_mean: Array = real(3 * n_q)  #: those at q_mean, of each body
-    C_interval: Array = real(3 * n_most)  #: those of the middle of a variational step
+    C_mean: Array = real(3 * n_q)  #: values at q_mean, of each body
+    C_interval: Array = real(3 * n_most)  #: values in the middle of a variational step
     middle: Array = real(n_most)  #: q there
     force: Array = real(n_most)
     vector: Array = real(n_most)
@@ -115,7 +116,7 @@ class StepWork(NamedTuple):
     A_0: Array = real(n_m, 3, 3)
     x_1: Array = real(n_m, 3, unit="m")
     A_1: Array = real(n_m, 3, 3)
-    x_f: Array = real(n_m, 3, unit="m")  #: where forces end to act: x_1, or x_0 if still
+    x_f: Array = real(n_m, 3, unit="m")  #: end of the force interval: x_1, or x_0 if still
     A_f: Array = real(n_m, 3, 3)
     E_mean: Array = real(n_m, 3, 3)  #: mean axes in the body
     lever: Array = real(n_m, 3, unit="m")
@@ -131,8 +132,8 @@ class StepWork(NamedTuple):
     station_d: Array = real(2, n_stations, 3, unit="m")  #: displacements of stations at both ends, body axes
     station_th: Array = real(2, n_stations, 3, unit="rad")  #: and rotations
     line_s: Array = real(n_lines, 2, unit="m")  #: places at both ends
-    line_t: Array = real(n_lines, 3)  #: way of the sliding marker by its place
-    line_kappa: Array = real(n_lines, 3, unit="rad/m")  #: turning of its axes by its place, body axes
+    line_t: Array = real(n_lines, 3)  #: displacement of the sliding marker by its place
+    line_kappa: Array = real(n_lines, 3, unit="rad/m")  #: rotation of its axes by its place, body axes
     line_end: Array = real(n_lines, 3)  #: r' at the end of the step
     # markers of public elements
     r_law: Array = real(n_m, 3, unit="m")  #: in the middle of the step
@@ -140,26 +141,27 @@ class StepWork(NamedTuple):
     d_law: Array = real(n_m, 3, unit="m")  #: way over the step
     turn: Array = real(n_m, 3, unit="rad")  #: Cayley vector of the rotation over the step
     wrench: Array = real(n_m, 6, unit="N, N m")
-    way: Array = real(n_m, 6, unit="m, m² rad")  #: along which the potential is made up for
+    way: Array = real(n_m, 6, unit="m, m² rad")  #: direction of the correction of the potential
     # connections
-    known: Array = real(n_w)  #: what they remember, in its rows of the memory
-    angle: Array = real(n_angles, unit="rad")  #: counted angles where rates lead at t_force: rotations are next to it
-    xi: Array = real(6, unit="m, rad")  #: mean deformations of a bushing,
+    known: Array = real(n_w)  #: memory of connections, in its rows
+    #: counted angles predicted at t_force; the counted rotations are those nearest to them
+    angle: Array = real(n_angles, unit="rad")
+    xi: Array = real(6, unit="m, rad")  #: mean deformations of a bushing
     dxi: Array = real(6, unit="m, rad")  #: their changes,
-    xi_force: Array = real(6, unit="N, N m")  #: and the forces that belong to them
+    xi_force: Array = real(6, unit="N, N m")  #: forces for these deformations
     # unknowns
     z: Array = real(n_z)
     residual: Array = real(n_z)
-    base: Array = real(n_z)  #: residual from which derivatives are taken,
+    base: Array = real(n_z)  #: residual at the base point of differences
     center: Array = real(n_z)  #: unknowns there,
-    delta: Array = real(n_z)  #: by which they are changed
+    delta: Array = real(n_z)  #: changes of unknowns
     right: Array = real(n_z)
     f: Array = real(n_mu, unit="N, N m")  #: multipliers
-    change: Array = real(n_mu)  #: of rows by the motion over the step
+    change: Array = real(n_mu)  #: changes of rows due to the motion over the step
     kept: Array = real(n_mu, unit="N, N m")
-    elastic: Array = real(n_u, unit="N m")  #: modal forces of the middle of a variational step
+    elastic: Array = real(n_u, unit="N m")  #: modal forces in the middle of a variational step
     f_kept: Array = real(n_mu, unit="N, N m")  #: those of the last step
-    f_size: Array = real(n_mu, unit="N, N m")  #: typical sizes of those that hold nothing, by the steps before
+    f_size: Array = real(n_mu, unit="N, N m")  #: typical sizes of multipliers without constraints, from previous steps
     band: Array = real(2, n_z, Size("width"))  #: factors of the matrices of both stages
     band_pivot: IntArray = integer(2, n_z)
     is_due: IntArray = integer(2)  #: whether to factorise at the next iterate
@@ -167,4 +169,5 @@ class StepWork(NamedTuple):
     n_factors: IntArray = integer()
     excess: Array = real()
     state_change: Array = real()  #: largest relative correction of a state
-    acceleration: Array = real(n_u)  #: change of w over the last step over h, v in body axes; for the start of Newton
+    #: change of w over the last step divided by h, v in body axes; for the initial guess of Newton's method
+    acceleration: Array = real(n_u)

@@ -23,7 +23,7 @@ def held(model, k, t):
 
 @inner
 def turn_direction(model, k, t):
-    """Return the direction of marker A (TURN_B: of B, from where A turns back) of a prescribed angle at time t."""
+    """Return the direction of marker A (TURN_B: of B, with A rotating backwards) of a prescribed angle at time t."""
     angle, _ = held(model, k, t)
     if model.rows.kind[k] == TURN_B:
         angle = -angle
@@ -48,7 +48,7 @@ def point_axis(model, step, k, a, b):
 
 @inner
 def mean_distance(step, a, b):
-    """Return the mean of the way from A to B."""
+    """Return the mean of the vector from A to B."""
     d_0 = sub(vector(step.x_0[b]), vector(step.x_0[a]))
     return scaled(0.5, add(d_0, sub(vector(step.x_f[b]), vector(step.x_f[a]))))
 
@@ -102,7 +102,7 @@ def force_of_row(model, step, k, a, b):
 
 @inner
 def add_reaction(model, discrete, step, k, a, b, f):
-    """Add the loads of row k with multiplier f: their work is f times the change of the row."""
+    """Add the loads of row k with multiplier f, whose work is f times the change of the row."""
     kind = model.rows.kind[k]
     if model.rows.is_length[k]:
         F = scaled(f, force_of_row(model, step, k, a, b))
@@ -143,7 +143,7 @@ def product_change(model, discrete, step, a, e, b, y):
 
 @inner
 def row_change(model, discrete, step, k, a, b):
-    """Return the change of row k over the step, by the motion alone: the work of a unit multiplier."""
+    """Return the change of row k over the step due to the motion alone: the work of a unit multiplier."""
     kind = model.rows.kind[k]
     if kind == POINT or kind == DISTANCE:
         F = force_of_row(model, step, k, a, b)
@@ -166,7 +166,7 @@ def row_change(model, discrete, step, k, a, b):
 
 @inner
 def row_rate(model, step, k, a, b, t):
-    """Return the rate of row k at the beginning of a step while nothing moves: that of a prescribed motion."""
+    """Return the rate of row k at the beginning of a step without motion: that of its prescribed motion."""
     kind = model.rows.kind[k]
     if model.rows.motion[k] < 0:
         return 0.0
@@ -186,14 +186,14 @@ def row_rate(model, step, k, a, b, t):
 
 @inner
 def angle_of(model, A, k, a, b):
-    """Return the angle of row k: that of D from Z towards -E; A: axes of the markers."""
+    """Return the angle of row k: of D, from Z towards -E; A: axes of the markers."""
     D = turned(A[b], vector(model.rows.y[k]))
     return math.atan2(-dot(turned(A[a], vector(model.rows.x[k])), D), dot(turned(A[a], vector(model.rows.z[k])), D))
 
 
 @inner
 def end_angle(model, step, k, a, b):
-    """Return the angle of row k where forces end to act."""
+    """Return the angle of row k at the end of the force interval."""
     return angle_of(model, step.A_f, k, a, b)
 
 
@@ -214,7 +214,7 @@ def angle_parts(model, step, k, a, b):
 
 @inner
 def angle_loads(model, discrete, step, k, a, b, f):
-    """Add the loads of a torque f along the angle of row k: their work is f times its change."""
+    """Add the loads of a torque f along the angle of row k, whose work is f times its change."""
     E, Z, D, S, C, kappa = angle_parts(model, step, k, a, b)
     f *= kappa
     add_direction(model, discrete, step, a, vector(model.rows.x[k]), scaled(-f * C, D))
@@ -236,7 +236,7 @@ def angle_change(model, discrete, step, k, a, b):
 
 @inner
 def slip_change(model, discrete, step, x, a, b):
-    """Return the change of the distance along an axis x of A, the mean axis and the mean way from A to B."""
+    """Return the change of the distance along an axis x of A, the mean axis and the mean vector from A to B."""
     E, d = mean_direction(step, a, x), mean_distance(step, a, b)
     dE = change(model, discrete, step, a, x, E)
     return dot(dE, d) + dot(E, sub(vector(step.dx[b]), vector(step.dx[a]))), E, d

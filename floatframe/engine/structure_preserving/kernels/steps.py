@@ -52,12 +52,13 @@ __all__ = ["advance", "advance_discrete_steps"]
 # steps ----------------------------------------------------------------------------------------------------------------
 
 
-FADING = 0.9  # of the size of a multiplier that holds nothing, a step: one that passes zero keeps its size
+# fraction of the size of a multiplier without constraint that remains per step when it passes through zero
+FADING = 0.9
 
 
 @inner
 def guess(model, step):
-    """Write the increments and multipliers from which Newton's method sets out: those of steady accelerations."""
+    """Write the initial guess of increments and multipliers for Newton's method: constant accelerations."""
     h, n_u = step.h, step.load.shape[0]
     for k in range(n_u):
         step.z[k] = h * (step.w_0[k] + 0.5 * h * step.acceleration[k])
@@ -73,7 +74,7 @@ def guess(model, step):
 
 @inner
 def learn(model, discrete, step):
-    """Take the change of velocities over the step for the next guess, v in body axes, and sizes of multipliers."""
+    """Store the change of velocities over the step for the next guess, v in body axes, and sizes of multipliers."""
     for i in range(model.bodies.kind.shape[0]):
         u0, n, R = model.bodies.u0[i], model.bodies.n_q[i], matrix(step.R_0[i])
         dv = turned_back(R, sub(vector(step.w_1[u0:]), vector(step.w_0[u0:])))
@@ -89,7 +90,7 @@ def learn(model, discrete, step):
 
 @inner
 def work_of_dampers(model, discrete, step):
-    """Return the work that modal damping takes."""
+    """Return the work dissipated by modal damping."""
     total = 0.0
     for i in range(model.bodies.kind.shape[0]):
         t, n, q0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i]
@@ -102,7 +103,7 @@ def work_of_dampers(model, discrete, step):
 
 @inner
 def add_drives(model, discrete, step):
-    """Add to the work that is given that of prescribed motions: of their multipliers."""
+    """Add the work of prescribed motions, from their multipliers, to the supplied work."""
     for c in range(model.connections.size.shape[0]):
         for j in range(discrete.first[c], discrete.first[c + 1]):
             if discrete.is_driven[j]:
@@ -111,7 +112,7 @@ def add_drives(model, discrete, step):
 
 @inner
 def begin(model, discrete, step, memory):
-    """Write what is known where the step begins."""
+    """Write the known quantities at the start of the step."""
     recall(memory, step)
     expect_angles(memory, step)
     begin_bodies(model, discrete, step, memory)
@@ -121,7 +122,7 @@ def begin(model, discrete, step, memory):
 
 @inner
 def solve_both_ways(model, work, discrete, step, order, stage):
-    """Find the unknowns with the factors that are kept, or else with new ones in each iteration."""
+    """Find the unknowns with the stored factors, otherwise with new factors in each iteration."""
     guess(model, step)
     status = solve(model, work, discrete, step, order, stage, False)
     if status != CONVERGED:
@@ -245,14 +246,14 @@ def variational_step(model, work, discrete, step, memory, order):
 
 @inner
 def learn_multipliers(step):
-    """Keep the multipliers of positions, from which those of the next step set out."""
+    """Store the multipliers of positions as the initial guess of the next step."""
     for j in range(step.f.shape[0]):
         step.kept[j] = step.f[j]
 
 
 @inner
 def put_elastic(model, step, i):
-    """Keep the modal forces of the middle of the step."""
+    """Store the modal forces of the middle of the step."""
     u0, n = model.bodies.u0[i], model.bodies.n_q[i]
     for k in range(n):
         step.elastic[u0 + 6 + k] = step.force[k]
@@ -260,7 +261,7 @@ def put_elastic(model, step, i):
 
 @inner
 def is_too_long(model, work, discrete, step):
-    """Whether the step, whose unknowns are found, is too long for a contact; see `kernels.connections.gap`."""
+    """Whether the step, whose unknowns are known, is too long for a contact; see `kernels.connections.gap`."""
     if model.gaps.connection.shape[0] == 0:
         return False
     for g in range(model.gaps.connection.shape[0]):
@@ -273,7 +274,7 @@ def is_too_long(model, work, discrete, step):
 
 @inner
 def begin_iterate(model, work, step, memory):
-    """Take the state of the memory for the iterate, with the mean accelerations of the step before.
+    """Use the state in the memory as the iterate, with the mean accelerations of the previous step.
 
     Not those of the memory, which are those of the last output: outputs do not change a motion.
     """
@@ -289,7 +290,7 @@ def begin_iterate(model, work, step, memory):
 
 @inner
 def take_size(step, h):
-    """Take a size of the step."""
+    """Set the size of the step."""
     if step.h != h:
         step.h = h
         step.is_due[0], step.is_due[1] = 1, 1
@@ -297,7 +298,7 @@ def take_size(step, h):
 
 @inner
 def take_parts(model, work, discrete, step, memory, order, t_0, t_1):
-    """Advance the memory from t_0 to t_1 by one step, with contacts by parts that these want; return the status.
+    """Advance the memory from t_0 to t_1 by one step, divided if contacts require it; return the status.
 
     With h_min above 0 a part that fails is tried again, shorter, down to it.
     """
@@ -341,7 +342,7 @@ def take_parts(model, work, discrete, step, memory, order, t_0, t_1):
 
 @inner
 def advance(model, work, discrete, step, memory, rows, order):
-    """Advance by n_steps of size h, the first of them number `first` from t0; keep the state after every `every`-th.
+    """Advance by n_steps of size h, the first with the number `first` from t0; keep the state after every `every`-th.
 
     Return (status, good steps, rows written). A step is good where its output can be made: after NO_ACCELERATION the
     memory has gone one step further.
@@ -357,7 +358,7 @@ def advance(model, work, discrete, step, memory, rows, order):
         if (order.first + k + 1) % order.every == 0:
             if not observe(model, work, discrete, step, memory, t_1, rows):
                 return NO_ACCELERATION, k, work.counted.rows
-            if work.counted.stopped > 0:  # at the end of the step, whose row goes as the step does
+            if work.counted.stopped > 0:  # row at the end of the step, which belongs to the step
                 return STOPPED, k, work.counted.rows - 1
         keep_past(work.past, memory, step.f_kept, h, step.n_iterations)
     return CONVERGED, order.n_steps, work.counted.rows
@@ -365,7 +366,7 @@ def advance(model, work, discrete, step, memory, rows, order):
 
 @inner
 def count_angles(model, work, memory, h):
-    """Count turns of angles on."""
+    """Continue to count the turns of angles."""
     if memory.angle.shape[0] == 0:
         return
     load_state(work.state, memory)

@@ -1,1 +1,1 @@
-"""Kernels of relative coordinates: the absolute iterate follows from joint coordinates, and forces go back to them."""
+"""Kernels of relative coordinates: the absolute iterate from joint coordinates, and forces projected back."""

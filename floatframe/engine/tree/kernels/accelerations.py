@@ -21,7 +21,7 @@ __all__ = ["accelerate", "constrain"]
 
 @inner
 def constrain(model, work, tree, joints, tangent, is_group):
-    """Write what is held, its rates, and C by increments x (is_group: as they are, else by rates), where x leads."""
+    """Write constraints, their rates, and C for increments x (is_group: increments of the group, otherwise rates)."""
     move_joints(tree, joints)
     place_bodies(model, work, tree, joints)
     evaluate_tree(model, work, tree, joints, 1.0)
@@ -34,7 +34,7 @@ def constrain(model, work, tree, joints, tangent, is_group):
 
 @inner
 def kept_rates(model, work, tree):
-    """Write the rates of what is held and its second rates, with the accelerations of the iterate."""
+    """Write the rates and second rates of the constraints, with the accelerations of the iterate."""
     for m in range(model.markers.body.shape[0]):
         marker_acceleration(model, work, m, work.markers.bias[m])
     for e in range(tree.kept.shape[0]):
@@ -43,7 +43,7 @@ def kept_rates(model, work, tree):
 
 @inner
 def accelerate(model, work, tree, joints, tangent):
-    """Write accelerations of unknowns and bodies and all wrenches for positions and rates; whether there is one."""
+    """Write accelerations and all wrenches for positions and rates; return whether they exist."""
     for s in range(tree.slot.shape[0]):
         if tree.column[s] >= 0:
             joints.acceleration[tree.column[s]] = 0.0

@@ -21,12 +21,12 @@ __all__ = [
     "turning_bias_by_rate",
 ]
 
-SERIES_UP_TO = 4.0  #: t² at the switch: nearer to zero the closed forms lose digits
+SERIES_UP_TO = 4.0  #: value of t² at the switch to series; below it the closed forms lose digits
 
 
 @inner
 def deformation_accelerations(model, work, m, i):
-    """Return the second rates of place and elastic angle of marker m, which has modes, as its body i sees them."""
+    """Return the second rates of position and elastic angle of marker m, which has modes, relative to its body i."""
     n, o, u0 = model.bodies.n_q[i], model.markers.psi0[m], model.bodies.u0[i] + 6
     d, th = shape_sum(work.markers.psi[o : o + 6 * n], n, work.state.u_dot[u0 : u0 + n])
     b_t, b_r = bent_bias(model, work, m, i)
@@ -73,7 +73,7 @@ def quotient_ddb(x):
 
 @inner
 def turning_bias_by_angle(th, w, d):
-    """Return the change of c by a change d of th."""
+    """Return the change of c for a change d of th."""
     x = dot(th, th)
     p, m, b = dot(th, w), cross(th, w), quotient_b(x)
     y = cross(th, m)
@@ -88,7 +88,7 @@ def turning_bias_by_angle(th, w, d):
 
 @inner
 def turning_bias_by_rate(th, w, d):
-    """Return the change of c by a change d of w."""
+    """Return the change of c for a change d of w."""
     x = dot(th, th)
     p, m, b = dot(th, w), cross(th, w), quotient_b(x)
     da, db = quotient_da(x), quotient_db(x)

@@ -132,7 +132,7 @@ def call(
     rows: Rows = NO_ROWS,
     **order: float,
 ) -> Outcome:
-    """Run the entry with an order, what it does not name being zero; all arrays live until it returns."""
+    """Run the entry with a request; unnamed fields are zero, and all arrays live until it returns."""
     if not run.signatures:
         run.compile(SIGNATURE)
     ordered = filled(Order(), **(NOTHING._asdict() | order))
@@ -159,10 +159,10 @@ def moved(model: Model, work: Work, tree: Tree, joints: JointWork, x: Array) -> 
 
 @dataclass(frozen=True, eq=False)
 class Mover:
-    """What `moved` does by the increments in `joints.x`, for motions at many instants."""
+    """The same as `moved` for the increments in `joints.x`, for motions at many instants."""
 
-    records: tuple[NamedTuple, ...]  #: of the entry, kept alive
-    tables: tuple[IntArray, ...]  #: of them, found once, which takes longer than a motion
+    records: tuple[NamedTuple, ...]  #: arguments of the entry, kept alive
+    tables: tuple[IntArray, ...]  #: their addresses, found once, because finding them takes longer than a motion
 
     def __call__(self) -> None:
         """Write the absolute iterate."""
@@ -170,7 +170,7 @@ class Mover:
 
 
 def mover(model: Model, work: Work, tree: Tree, joints: JointWork) -> Mover:
-    """Return a function that does what `moved` does by the increments in `joints.x`."""
+    """Return a function that does the same as `moved` for the increments in `joints.x`."""
     if not run.signatures:
         run.compile(SIGNATURE)
     ordered = filled(Order(), **(NOTHING._asdict() | {"what": MOVE}))
@@ -185,7 +185,7 @@ def projected(model: Model, work: Work, tree: Tree, joints: JointWork, c_k: floa
 
 
 def newton_matrix(model: Model, work: Work, tree: Tree, joints: JointWork, c_m: float, c_d: float, c_k: float) -> Array:
-    """Return the Newton matrix at the iterate, unknowns and kept wrenches (times c_k), (n_s + n_rows,) squared."""
+    """Return the Newton matrix at the iterate, (n_s + n_rows)², for unknowns and kept wrenches (times c_k)."""
     tangent = new_tangent_work(model, tree, is_dense=True)
     call(model, work, tree, joints, tangent, what=TANGENT, c_m=c_m, c_d=c_d, c_k=c_k)
     return tangent.K
@@ -218,12 +218,14 @@ def newton_step(
 def constraints(
     model: Model, work: Work, tree: Tree, joints: JointWork, tangent: TangentWork, *, by_increments: bool
 ) -> None:
-    """Write what kept rows hold, its rates and C, by increments x or by rates, with joints moved by `joints.x`."""
+    """Write the values and rates of kept rows, and C, for increments x or rates, with joints moved by `joints.x`."""
     call(model, work, tree, joints, tangent, what=CONSTRAIN, n_steps=int(by_increments))
 
 
 def accelerations(model: Model, work: Work, tree: Tree, joints: JointWork, tangent: TangentWork) -> bool:
-    """Write accelerations of joints and bodies, and kept wrenches; whether positions and rates have them.
+    """Write accelerations of joints and bodies, and kept wrenches.
+
+    Return whether they exist for the positions and rates.
 
     Joints are moved by `joints.x`, which is zero after it.
     """
@@ -231,7 +233,7 @@ def accelerations(model: Model, work: Work, tree: Tree, joints: JointWork, tange
 
 
 def observe_tree(model: Model, work: Work, tree: Tree, joints: JointWork, memory: Memory, t: float) -> Rows:
-    """Return the results at the state in the memory; the power at it goes into the memory."""
+    """Return the results at the state in the memory, and store the power at this state in the memory."""
     rows = new_rows(model, 1)
     call(model, work, tree, joints, NO_TANGENT, memory, rows, what=OBSERVE, t0=t)
     return rows

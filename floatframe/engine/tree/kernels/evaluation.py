@@ -22,7 +22,7 @@ def evaluate_tree(model, work, tree, joints, c_k):
 
 @inner
 def evaluate_placed(model, work, tree, joints, c_k):
-    """Do the same right after `place_bodies`, which knows how the ends of the joints of the tree have moved."""
+    """Write the same directly after `place_bodies`, which has computed the motion of the ends of tree joints."""
     for m in range(model.markers.body.shape[0]):
         c, i = model.markers.connection[m], model.markers.body[m]
         if c < 0 or tree.is_kept[c] != 0 or i < 0:
@@ -33,7 +33,7 @@ def evaluate_placed(model, work, tree, joints, c_k):
 
 @inner
 def project_residuals(model, work, tree, joints, c_k):
-    """Write what `evaluate_tree` does with the motion of all markers in `work`."""
+    """Write the same as `evaluate_tree`, with the motion of all markers in `work`."""
     for c in range(model.connections.size.shape[0]):
         if tree.is_kept[c] != 0:
             connection_rows(model, work, c, c_k)

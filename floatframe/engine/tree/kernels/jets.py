@@ -60,7 +60,7 @@ def mode_screw(model, work, m, i, k):
 
 @inner
 def mode_rate(model, work, m, i, k):
-    """Return the screw of `mode_screw` and its rate as the body sees them.
+    """Return the screw of `mode_screw` and its rate relative to the body.
 
     `work.markers.bend_dot` has been written for the marker.
     """
@@ -145,7 +145,7 @@ def carrier(model, work, tangent, m, i):
 
 @inner
 def mode_screws(model, work, m, i, k, held):
-    """Return the screw of mode k at marker m and its rates as body i sees them, ground axes; held: its `carrier`."""
+    """Return the screw of mode k at marker m and its rates relative to body i, ground axes; held: its `carrier`."""
     R, p, _, _, rho_2, angle_2 = held
     s, s_1 = mode_rate(model, work, m, i, k)
     s_2 = mode_second_rate(model, work, m, i, k, s, s_1, rho_2, angle_2)
@@ -176,7 +176,7 @@ def column_jets(model, work, tree, joints, tangent, i, c_m, c_d, c_k, rate):
     p_a, p_b = sub(r_a, origin), sub(r_b, origin)
     V_a, V_a_dot = spatial_motion(p_a, v_a, omega_a, a_a, alpha_a)
     V_b, V_b_dot = spatial_motion(p_b, v_b, omega_b, a_b, alpha_b)
-    spin, spin_dot = zero, zero  # of the rotations fixed in B, axes of B
+    spin, spin_dot = zero, zero  # for rotations fixed in B, axes of B
     for k in range(tree.column0[i], tree.column0[i + 1]):
         if tree.side[k] != 0:
             alpha = vector(tree.alpha[k])

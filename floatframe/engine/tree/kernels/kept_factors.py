@@ -1,4 +1,4 @@
-"""Newton's correction over the tree with matrices of bodies that are kept over steps (docs/relative.md §6).
+"""Newton's correction over the tree with matrices of bodies that are reused in many steps (docs/relative.md §6).
 
 An approximation of `kernels.tree_factors`, six wide instead of eighteen and symmetric: a body turns and moves as a
 whole, so that its own matrix H, mass, damping and stiffness weighted, is constant in its axes but for its deformation;
@@ -46,7 +46,7 @@ __all__ = ["factorize_poses", "keep_bodies", "solve_kept"]
 
 @inner
 def keep_bodies(model, work, tree, c_m, c_d, c_k):
-    """Write the matrices of bodies that are kept; `evaluate_tree` has been called."""
+    """Write the reused matrices of bodies; `evaluate_tree` has been called."""
     for i in range(tree.parent.shape[0]):
         n = model.bodies.n_q[i]
         turning = work.bodies.T_right[i]
@@ -58,7 +58,7 @@ def keep_bodies(model, work, tree, c_m, c_d, c_k):
 
 @matrix_loops
 def symmetrise(H):
-    """Leave the symmetric part of a matrix."""
+    """Reduce a matrix to its symmetric part."""
     for r in range(H.shape[0]):
         for k in range(r):
             mean = 0.5 * (H[r, k] + H[k, r])
@@ -68,7 +68,7 @@ def symmetrise(H):
 
 @inner
 def factorize_poses(model, work, tree, joints, tangent, c_d, c_k):
-    """Factorise with the kept matrices at the poses of the iterate; whether all unknowns have their equation."""
+    """Factorise with the reused matrices at the poses of the iterate; return whether the matrix is regular."""
     for i in range(tree.parent.shape[0]):
         n, m = model.bodies.n_q[i], tree.far[i]
         H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((6 + n, 6 + n))
@@ -111,7 +111,7 @@ def front(tree, tangent, i):
 
 @loops
 def put_screws(model, work, m, n, S):
-    """Write the screws, as of `jets.mode_screw`, of all modes of its body at marker m, (6, n), body axes."""
+    """Write the screws, as in `jets.mode_screw`, of all modes of its body at marker m, (6, n), body axes."""
     if m < 0 or model.markers.psi0[m] < 0:
         for r in range(6):
             for k in range(n):
@@ -136,7 +136,7 @@ def take_away(T, S, n):
 
 @matrix_loops
 def write_front(H, S, Z, F, n, n_l):
-    """Write (1) into the front; columns are still to come."""
+    """Write (1) into the front; its columns follow."""
     for r in range(6):
         for e in range(6):
             F[n_l + r, n_l + e] = H[r, e]
@@ -159,7 +159,7 @@ def write_front(H, S, Z, F, n, n_l):
 
 @inner
 def pose_columns(work, tree, joints, tangent, i):
-    """Write by which screws the columns of the joint of body i move it, body axes about its origin."""
+    """Write the screws by which the columns of the joint of body i move it, body axes about its origin."""
     near, far = tree.near[i], tree.far[i]
     R, origin = work.state.R[i], vector(work.state.r[i])
     at_near, at_far = (0.0, 0.0, 0.0), origin
@@ -207,7 +207,7 @@ def add_columns(F, J, n):
 
 @matrix_loops
 def factorize_front(F, n_l):
-    """Eliminate the first n_l unknowns of a front; whether all their pivots are positive."""
+    """Eliminate the first n_l unknowns of a front; return whether all pivots are positive."""
     size = F.shape[0]
     for k in range(n_l):
         pivot = F[k, k]
@@ -243,7 +243,7 @@ def upper_part(F, row, column):
 
 @loops
 def move_inwards(F, turn, shift, P):
-    """Write Adᵀ P Ad of what is left of a front, in axes and about the origin of the parent."""
+    """Write Adᵀ P Ad of the remainder of a front, in axes and about the origin of the parent."""
     o, R, arm = F.shape[0] - 6, matrix(turn), tilde(vector(shift))
     back, minus = transposed(R), scaled_matrix(-1.0, arm)
     vv = product(product(R, upper_part(F, o, o)), back)
@@ -280,7 +280,7 @@ def add_child(P, T, Z, F, n):
 
 @loops
 def solve_kept(model, tree, joints, tangent, c_k):
-    """Write the corrections of the unknowns into tangent.step, those of bodies, axes of each, into tangent.X.
+    """Write the corrections of the unknowns into tangent.step, and those of bodies (own axes) into tangent.X.
 
     From the leaves inwards minus the force of a subtree at rest, `b`, and the right sides z = U⁻ᵀ (q, u); then outwards
     Y, q, u, and X.
@@ -295,7 +295,7 @@ def solve_kept(model, tree, joints, tangent, c_k):
         i = tree.order[place]
         n_l, n, parent = tree.s0[i + 1] - tree.s0[i], model.bodies.n_q[i], tree.parent[i]
         z = tangent.z[tree.s0[i] + 6 * i : tree.s0[i + 1] + 6 * i + 6]
-        for k in range(n):  # what children have left here is in x
+        for k in range(n):  # contributions of children are in x
             z[k] = x[tree.m0[i] + k] - c_k * joints.residual[tree.m0[i] + k]
         for s in range(tree.s0[i], tree.m0[i]):
             total = -c_k * joints.residual[s]
@@ -349,7 +349,7 @@ def add_force(T, b, x, f, m, n):
 
 @loops
 def hold(T, above, q, Y, n):
-    """Write the motion of what holds a body: that of its parent, with its modes."""
+    """Write the motion of the carrier of a body: that of its parent, with its modes."""
     for r in range(6):
         total = above[r]
         for k in range(n):
@@ -359,7 +359,7 @@ def hold(T, above, q, Y, n):
 
 @matrix_loops
 def reduce_right_side(F, z, n_l):
-    """Overwrite (q, u) of z by U⁻ᵀ of them, and take their part from the force at Y."""
+    """Overwrite (q, u) of z by U⁻ᵀ times them, and subtract their part from the force at Y."""
     for k in range(n_l):
         y = z[k] * F[k, k]
         z[k] = y
@@ -369,7 +369,7 @@ def reduce_right_side(F, z, n_l):
 
 @matrix_loops
 def finish_solution(F, z, n_l):
-    """Overwrite (q, u) of z by the solution, Y being there."""
+    """Overwrite (q, u) of z by the solution, with Y known."""
     for k in range(n_l - 1, -1, -1):
         total = z[k]
         for j in range(k + 1, z.shape[0]):

@@ -43,7 +43,7 @@ __all__ = ["end_acceleration", "end_motion", "joint_motion", "move_joints", "pla
 
 @loops
 def end_motion(model, work, m, i):
-    """Return r, A, v, omega of marker m, of the frame of body i for m = -1, of the ground for i = -1 too."""
+    """Return r, A, v, omega of marker m, of the frame of body i if m = -1, and of the ground if i = -1 too."""
     zero = (0.0, 0.0, 0.0)
     if m >= 0:
         marker_motion(model, work, m)
@@ -57,7 +57,7 @@ def end_motion(model, work, m, i):
 
 @loops
 def end_acceleration(model, work, m, i):
-    """Return acceleration and angular acceleration as `end_motion` does."""
+    """Return acceleration and angular acceleration with the conventions of `end_motion`."""
     zero = (0.0, 0.0, 0.0)
     if m >= 0:
         out = work.markers.bias[m]
@@ -110,7 +110,7 @@ def place_bodies(model, work, tree, joints):
 
 @loops
 def place_body(model, work, tree, joints, i):
-    """Write the motion of the frame of body i, that of its parent being known."""
+    """Write the motion of the frame of body i; that of its parent is known."""
     near, parent = tree.near[i], tree.parent[i]
     r, A, v, omega = end_motion(model, work, near, parent)
     a, alpha = end_acceleration(model, work, near, parent)
@@ -146,7 +146,7 @@ def place_body(model, work, tree, joints, i):
 
 @loops
 def put_body(model, work, tree, i, r, A, v, omega, a, alpha):
-    """Write the motion of body i whose far marker moves as given."""
+    """Write the motion of body i from that of its far marker."""
     state, u0, m = work.state, model.bodies.u0[i], tree.far[i]
     u, u_dot = state.u[u0 : u0 + 6], state.u_dot[u0 : u0 + 6]
     if m < 0:

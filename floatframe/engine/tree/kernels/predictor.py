@@ -1,4 +1,4 @@
-"""Where a step in relative coordinates begins: algorithmic accelerations of the last steps are continued.
+"""Initial guess of a step in relative coordinates, by extrapolating the algorithmic accelerations of the last steps.
 
 So long as steps of one size follow each other, by the constant, the line or the parabola through the last of them,
 whichever would have led nearest to those of the step before: smooth motions follow a parabola, modes that the step does
@@ -27,7 +27,7 @@ def predicted(tangent, s, degree):
 
 @inner
 def predict(model, work, tree, joints, tangent, memory, order, h):
-    """(1): a_new in every unknown; prescribed coordinates are where their functions lead."""
+    """(1): a_new of every unknown; prescribed coordinates follow their functions."""
     alpha_m, alpha_f, beta, gamma = order.alpha_m, order.alpha_f, order.beta, order.gamma
     begin_step(model, work, memory, h, alpha_f)
     state, degree = work.state, min(tangent.degree, tangent.n_known - 1)
@@ -62,7 +62,7 @@ def predict(model, work, tree, joints, tangent, memory, order, h):
 
 @inner
 def learn(tree, tangent, memory):
-    """Take note of the algorithmic accelerations after a step, and of the degree that would have led nearest."""
+    """Store the algorithmic accelerations after a step, and the degree that would have predicted them best."""
     miss, best = 0.0, 0
     for degree in range(tangent.n_known):
         total = 0.0
@@ -76,5 +76,5 @@ def learn(tree, tangent, memory):
         tangent.a_first[s] = tangent.a_before[s]
         tangent.a_before[s] = tangent.a_last[s]
         tangent.a_last[s] = memory.a[tree.slot[s]]
-    if tangent.V.shape[0] == 0:  # wrenches that are kept want the iterations that it saves
+    if tangent.V.shape[0] == 0:  # kept wrenches need the iterations that this would save
         tangent.n_known = min(tangent.n_known + 1, 3)

@@ -1,4 +1,4 @@
-"""Residuals of bodies go back over the tree: reactions of its joints, equations along coordinates and modes.
+"""Projection of residuals over the tree: reactions of its joints, equations of coordinates and modes.
 
 From the leaves inwards the wrench of a joint on its body is what the residual of the body, with what hangs at it, asks
 for; it acts on the parent with the opposite sign. Its part along a coordinate, less the force Q that acts there, is the
@@ -76,7 +76,7 @@ def force_slopes(model, work, tree, i, row):
 
 @inner
 def put_reactions(model, work, tree, joints):
-    """Write the wrenches of the joints of the tree into state.w, as their rows have them: F, M on A, N against B."""
+    """Write the wrenches of the joints of the tree into state.w as their rows have them: F, M on A, N reversed on B."""
     for i in range(tree.parent.shape[0]):
         c = tree.joint[i]
         if c < 0:

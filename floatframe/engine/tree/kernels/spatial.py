@@ -48,14 +48,14 @@ def put_pair_of(out, first, S):
 
 @inner
 def spatial_motion(p, v, omega, a, alpha):
-    """Return spatial velocity and its rate of a frame at p from the origin that moves as given."""
+    """Return spatial velocity and its rate of a frame at p from the origin, given its motion."""
     V = (sub(v, cross(omega, p)), omega)
     return V, (sub(sub(a, cross(alpha, p)), cross(omega, v)), alpha)
 
 
 @small
 def world_screw(R, p, S):
-    """Return a spatial vector of a frame with axes R at p from the origin, given about its own point and axes."""
+    """Return a spatial vector in the ground from one about the point p and in the axes R of a frame."""
     ang = turned(R, S[1])
     return add(turned(R, S[0]), cross(p, ang)), ang
 

@@ -1,4 +1,4 @@
-"""Spin of axisymmetric bodies that are free or on a ball joint, taken by itself (docs/relative.md §6).
+"""Spin of axisymmetric bodies that are free or on a ball joint, integrated separately (docs/relative.md §6).
 
 As in absolute coordinates (`kernels.generalized_alpha`), with the motion of the body against its parent, omega and
 alpha in axes of the body's end of the joint: these are z_dot and z_ddot of the three columns of rotation, the last of
@@ -53,7 +53,7 @@ def first_rotation(tree, i):
 
 @inner
 def of_body(tree, i, Q, x):
-    """Return three values of columns of rotation as those of body i against its parent, axes of its end."""
+    """Return three values of rotation columns as a vector of body i relative to its parent, axes of its end."""
     if tree.is_reversed[i] == 0:
         return vector(x)
     return scaled(-1.0, turned(Q, x))
@@ -61,7 +61,7 @@ def of_body(tree, i, Q, x):
 
 @inner
 def of_columns(tree, i, Q, x):
-    """Return a vector of body i against its parent as three values of columns of rotation."""
+    """Return a vector of body i relative to its parent as three values of rotation columns."""
     if tree.is_reversed[i] == 0:
         return x
     return scaled(-1.0, turned_back(Q, x))
@@ -80,7 +80,7 @@ def turn_spinning_joint(tree, joints, i):
 
 @inner
 def begin_spin(tree, joints, memory, i, alpha_f, h):
-    """Choose whether the step takes the spin of body i by itself; predict it so then, with a_new = a."""
+    """Choose whether the step integrates the spin of body i separately; if so, predict it with a_new = a."""
     e, k, Q = vector(tree.spin_axis[i]), first_rotation(tree, i), joints.Q_start[i]
     joints.spins[i] = 0
     if dot(e, e) == 0.0:
@@ -103,7 +103,7 @@ def begin_spin(tree, joints, memory, i, alpha_f, h):
 
 @inner
 def change_spin(tree, joints, step, i, by_theta, by_rate, by_acceleration):
-    """Add the correction of the columns of rotation of a body that spins, by_theta of it to theta, to the iterate."""
+    """Add the correction of the rotation columns of a spinning body to the iterate, by_theta of it to theta."""
     k, Q = first_rotation(tree, i), joints.Q[i]
     y = of_body(tree, i, Q, step[tree.unknown[k] :])
     omega, alpha = of_body(tree, i, Q, joints.rate[k:]), of_body(tree, i, Q, joints.acceleration[k:])
@@ -137,7 +137,7 @@ def spin_accelerations(tree, joints, memory, i, alpha_m, alpha_f):
 
 @inner
 def spin_jump(tree, joints, memory, i, alpha_m, alpha_f):
-    """Return by how much the algorithmic acceleration of a body that spins changes in a step, as values of columns."""
+    """Return the change of the algorithmic acceleration of a spinning body in a step, as values of columns."""
     e, along = vector(tree.spin_axis[i]), dot(vector(tree.spin_axis[i]), vector(joints.x[first_rotation(tree, i) :]))
     a, after = spin_accelerations(tree, joints, memory, i, alpha_m, alpha_f)
     return of_columns(tree, i, joints.Q[i], turned_about(e, -along, sub(after, a)))
@@ -155,7 +155,7 @@ def put_spin_acceleration(tree, joints, memory, i, alpha_m, alpha_f):
 
 @loops
 def turning_by_columns(tree, joints, i):
-    """Return the rotation of body i by changes of x of the columns of its joint that are fixed in B, axes of B."""
+    """Return the rotation of body i for changes of x of its joint columns that are fixed in B, axes of B."""
     if joints.spins[i] != 0:
         T = spin_jacobian(vector(tree.spin_axis[i]), vector(joints.x[first_rotation(tree, i) :]))
         if tree.is_reversed[i] == 0:
@@ -171,7 +171,7 @@ def turning_by_columns(tree, joints, i):
 
 @inner
 def spin_variations(tree, joints, i, y, theta, c_m, c_d, c_k):
-    """Return theta_dot and theta_ddot of `kernels.jets` by the change y of unknowns of a body that spins, axes of B.
+    """Return theta_dot and theta_ddot of `kernels.jets` for the change y of unknowns of a spinning body, axes of B.
 
     omega follows c_d y and alpha - w omega × e follows c_m y, both turned on by c_k (e · y) about -e.
     """
@@ -184,7 +184,7 @@ def spin_variations(tree, joints, i, y, theta, c_m, c_d, c_k):
     by_omega = sub(scaled(c_d, y), scaled(further, cross(e, omega)))
     by_alpha = sub(scaled(c_m, y), scaled(further, cross(e, rest)))
     by_alpha = add(by_alpha, add(scaled(dot(e, by_omega), cross(omega, e)), scaled(spin, cross(by_omega, e))))
-    if tree.is_reversed[i] != 0:  # omega as the parent sees it
+    if tree.is_reversed[i] != 0:  # omega relative to the parent
         return by_omega, add(by_alpha, cross(omega, by_omega))
     theta_1 = sub(by_omega, scaled(c_k, cross(omega, theta)))
     return theta_1, sub(sub(by_alpha, scaled(c_k, cross(alpha, theta))), cross(omega, theta_1))

@@ -59,16 +59,16 @@ from floatframe.engine.tree.kernels.weights import sizes_of_step, squared_size, 
 
 __all__ = ["SINGULAR", "advance_tree", "correct", "renew", "write_tree_row"]
 
-SINGULAR = 6  #: status: the Newton matrix is
-MANY = 4  # iterations of a step after which the next one starts with new factors
-EXACT_STEPS = 4  # steps that take exact matrices after those that are kept have failed
-FAR_SPIN = 0.2  # rad: of a body whose spin is taken by itself, above which steps take exact matrices
-MOST_PATIENCE = 31  # steps that make their own factors before older ones are tried again
+SINGULAR = 6  #: status: the Newton matrix is singular
+MANY = 4  # number of iterations of a step after which the next one starts with new factors
+EXACT_STEPS = 4  # number of steps with exact matrices after the reused ones have failed
+FAR_SPIN = 0.2  # rotation [rad] in a step of a body with separate spin, above which steps use exact matrices
+MOST_PATIENCE = 31  # number of steps with their own factors before older factors are tried again
 
 
 @inner
 def begin(model, work, tree, joints, memory):
-    """Take the iterate from the memory; write motion of the joints at the beginning of a step if it is not known."""
+    """Set the iterate from the memory; write the motion of the joints at the start of a step if unknown."""
     load_state(work.state, memory)
     if joints.is_known == 0:
         joint_motion(model, work, tree, joints)
@@ -81,7 +81,7 @@ def begin(model, work, tree, joints, memory):
 
 @inner
 def start_here(tree, joints):
-    """Take the motion of the joints for that at the beginning of a step."""
+    """Use the motion of the joints as that at the beginning of a step."""
     for i in range(tree.parent.shape[0]):
         for a in range(3):
             joints.d_start[i, a] = joints.d[i, a]
@@ -94,7 +94,7 @@ def start_here(tree, joints):
 
 @inner
 def resize(model, work, tree, joints, tangent, memory, t, h):
-    """Turn the algorithmic accelerations into those of a step of size h to t; iterate and joints are of the memory."""
+    """Convert the algorithmic accelerations to steps of size h to t; iterate and joints are those of the memory."""
     ratio = ratio_of_steps(model, memory, h)
     if ratio == 0.0:
         begin_anew(model, work, tree, joints, tangent, memory, t - h)
@@ -108,7 +108,7 @@ def resize(model, work, tree, joints, tangent, memory, t, h):
 
 @inner
 def begin_anew(model, work, tree, joints, tangent, memory, t):
-    """Take the accelerations of the equations of motion at the state in the memory, where there are some."""
+    """Use the accelerations of the equations of motion at the state in the memory, if they exist."""
     work.state.time = t
     hold_states(model, work, memory)
     if accelerate(model, work, tree, joints, tangent):
@@ -119,7 +119,7 @@ def begin_anew(model, work, tree, joints, tangent, memory, t):
 
 @inner
 def renew(model, work, tree, joints, tangent, c_m, c_d, c_k):
-    """Make the factors of the Newton matrix anew; whether all unknowns have their equation.
+    """Renew the factors of the Newton matrix, and return whether it is regular.
 
     Exact ones where wrenches are kept or `tangent.exactly` asks for them, else those of `kernels.kept_factors`.
     """
@@ -151,7 +151,7 @@ def correct(model, work, tree, joints, tangent, c_k):
 
 @inner
 def spins_far(tree, joints):
-    """Whether a body spins too far in the step for factors that leave gyroscopic terms out."""
+    """Whether a body spins too fast in the step for factors without gyroscopic terms."""
     for i in range(joints.spins.shape[0]):
         if joints.spins[i] != 0:
             if abs(dot(vector(tree.spin_axis[i]), vector(joints.x[first_rotation(tree, i) :]))) > FAR_SPIN:
@@ -161,7 +161,7 @@ def spins_far(tree, joints):
 
 @inner
 def turns_too_far(work, tree, joints, length):
-    """Return the first body of a loop that its joint would turn by more than `MOST_TURN` in the step, or -1.
+    """Return the first body of a loop that its joint would rotate by more than `MOST_TURN` in the step, or -1.
 
     Where the loop leaves it on the axis of this turn, any turn is followed, and so are those that are prescribed.
     """
@@ -183,7 +183,7 @@ def turns_too_far(work, tree, joints, length):
 
 @inner
 def hold_velocities(model, work, tree, joints, tangent, by_rate, by_acceleration, c_k):
-    """Add the correction of rates that held positions ask for to the iterate; return its squared norm.
+    """Add the correction of rates required by position constraints to the iterate; return its squared norm.
 
     As `kernels.generalized_alpha.hold_velocities`, of unknowns s_dot by what joints and couplers that are kept hold.
     """
@@ -212,7 +212,7 @@ def hold_velocities(model, work, tree, joints, tangent, by_rate, by_acceleration
 
 @inner
 def turn_at_once(tree, joints, step):
-    """Turn changes of x of columns that are fixed in B into what they turn B by, as changes of rates do."""
+    """Convert changes of x of columns fixed in B to the rotation of B, as changes of rates do."""
     for i in range(tree.parent.shape[0]):
         change, is_turned = (0.0, 0.0, 0.0), False
         for k in range(tree.column0[i], tree.column0[i + 1]):
@@ -262,7 +262,7 @@ def update(model, work, tree, joints, tangent, by_rate, by_acceleration, c_k):
 
 @inner
 def local_error(model, work, tree, joints, tangent, memory, order, h):
-    """Return the estimated error of the increment of a step that has converged, as the absolute method does.
+    """Return the estimated error of the increment of a converged step, as in the absolute method.
 
     Accelerations of bodies are affine in those of the unknowns, so that the change of these in a step, added to them,
     gives that of the bodies; then they are as before.
@@ -347,14 +347,15 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
     is_last_try = False
     predict(model, work, tree, joints, tangent, memory, order, h)
     holds = order.stabilized != 0 and tree.held.shape[0] > 0
-    if holds:  # by which velocities differ from the rates of positions, follows the factors
+    if holds:  # difference between velocities and the rates of positions, with the factors
         work.solver.is_due = 1
     if spins_far(tree, joints):
         tangent.exactly = max(tangent.exactly, 1)
         work.solver.is_due = 1
-    is_old, made, begun = work.solver.is_due == 0, -1, 0  # iterations at which factors were made, the step begun anew
+    # iterations at which factors were renewed, or the step was restarted
+    is_old, made, begun = work.solver.is_due == 0, -1, 0
     factorisations = work.counted.factorisations
-    is_open = tangent.V.shape[0] == 0  # wrenches that are kept are not in the norm
+    is_open = tangent.V.shape[0] == 0  # kept wrenches are not in the norm
     has_states = model.states.row.shape[0] + model.laws.equation.shape[0] > 0
     while iteration < order.max_iterations:
         evaluate_placed(model, work, tree, joints, c_k)
@@ -433,7 +434,7 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
             work.solver.is_due = 1
             if tangent.is_exact == 0:
                 tangent.is_kept = 0
-                if begun < made < iteration:  # those of an iterate near to the solution are not good enough either
+                if begun < made < iteration:  # factors of an iterate near the solution are not good enough either
                     tangent.exactly = EXACT_STEPS
         if of_states > max(1.0, SLOW * last_of_states) or iteration >= MANY:
             work.solver.is_due = 1
@@ -472,7 +473,7 @@ def accept(model, work, memory, tree, joints, h, alpha_m, alpha_f):
 
 @inner
 def put_euler_parameters(R, p):
-    """Write the Euler parameters of a rotation matrix, of the two signs that nearer to those that are there.
+    """Write the Euler parameters of a rotation matrix, with the sign nearer to the existing ones.
 
     The largest of w², x², y², z² by the diagonal; the others from sums and differences across it.
     """
@@ -494,7 +495,7 @@ def put_euler_parameters(R, p):
 
 @inner
 def write_tree_row(model, work, memory, tree, joints, t, rows):
-    """Write the next row of the results, with the reactions of the tree at the very state in the memory."""
+    """Write the next row of the results, with the reactions of the tree exactly at the state in the memory."""
     work.state.time = t
     begin(model, work, tree, joints, memory)
     evaluate_tree(model, work, tree, joints, 1.0)
@@ -520,13 +521,16 @@ def try_tree_step(model, work, memory, others, order, t, h):
 
 @inner
 def write_next_row(model, work, memory, others, t, rows):
-    """Write the next row of the results; gaps of loops are known to rounding, as those of all joints in bodies' own."""
+    """Write the next row of the results.
+
+    Gaps of loops have rounding errors, like those of all joints in absolute ones.
+    """
     tree, joints, tangent = others
     write_tree_row(model, work, memory, tree, joints, t, rows)
     if tree.kept.shape[0] > 0:
         settle_row(model, work, memory, rows)
     if work.solver.is_due == 1:
-        tangent.is_kept = 0  # its factors of the bodies are overwritten
+        tangent.is_kept = 0  # this overwrites its factors of the bodies
 
 
 advance_tree = time_loop(try_tree_step, write_next_row)

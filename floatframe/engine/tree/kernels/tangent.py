@@ -162,7 +162,7 @@ def of_body(model, work, joints, tangent, i, c_m, c_d, c_k):
 
 @small
 def unit_of(e, first):
-    """Return the part from `first` on of the unit vector e of a jet."""
+    """Return the part of the unit vector e of a jet from index `first` on."""
     return 1.0 if e == first else 0.0, 1.0 if e == first + 1 else 0.0, 1.0 if e == first + 2 else 0.0
 
 
@@ -184,7 +184,7 @@ def inner_product(x, y):
 
 @inner
 def assemble(model, work, tree, tangent, c_d, c_k):
-    """Write the matrix K of the unknowns and of the wrenches that are kept; sums over subtrees overwrite D and F."""
+    """Write the matrix K of the unknowns and kept wrenches; sums over subtrees overwrite D and F."""
     K = tangent.K
     for r in range(K.shape[0]):
         for s in range(K.shape[0]):
@@ -213,7 +213,7 @@ def assemble(model, work, tree, tangent, c_d, c_k):
 
 @inner
 def of_modes(model, work, tree, tangent, i):
-    """Add rows and columns of the modes of body i, its frame and that of the bodies on it held or moved by jets."""
+    """Add rows and columns of the modes of body i, its frame and those of its children being fixed or moved by jets."""
     n, q0, m0, K = model.bodies.n_q[i], model.bodies.q0[i], tree.m0[i], tangent.K
     if n == 0:
         return
@@ -238,7 +238,7 @@ def of_modes(model, work, tree, tangent, i):
 
 @inner
 def of_subtree(tree, tangent, i):
-    """Add J · D jet of all pairs of which one belongs to the joint of body i, the other to it or one before."""
+    """Add J · D jet of all pairs with one in the joint of body i and the other in it or before it."""
     K, f, D = tangent.K, tangent.f, tangent.D[i]
     b = i
     while b >= 0:
@@ -257,7 +257,7 @@ def of_subtree(tree, tangent, i):
 
 @inner
 def turning_columns(model, tree, tangent, i):
-    """Add (xi × J) · F of the columns of the joint of body i, xi that of the frame in which J is fixed."""
+    """Add (xi × J) · F of the columns of the joint of body i, with xi of the frame in which J is fixed."""
     K, F = tangent.K, tangent.F[i]
     for j in range(tree.jet0[i], tree.jet0[i + 1]):
         if tree.jet_kind[j] != COLUMN:
@@ -275,7 +275,7 @@ def turning_columns(model, tree, tangent, i):
 
 @inner
 def turning_modes(model, work, tree, tangent, i, c_k):
-    """Add what the screws of modes at both ends of the joint of body i change by, times the force of the subtree."""
+    """Add the changes of the screws of modes at both ends of the joint of body i, times the force of the subtree."""
     K, F = tangent.K, tangent.F[i]
     for j in range(tree.jet0[i], tree.jet0[i + 1]):
         if tree.jet_kind[j] == COLUMN:
@@ -294,7 +294,7 @@ def turning_modes(model, work, tree, tangent, i, c_k):
 
 @inner
 def add_second_order(model, work, tangent, i, m, k, factor, F, row):
-    """Add the change of the screw of mode k at marker m of body i by all its modes, as the body sees it, times F.
+    """Add the change of the screw of mode k at marker m of body i due to all its modes, relative to the body, times F.
 
     With b = T' Psi_r,k, its derivative slope, and f, m' the force and its moment about the marker, body axes:
     Psi_t,l · (b × f) + Psi_r,l · (slopeᵀ m') - K_t,kl · f - K_r,kl · (T'ᵀ m').
@@ -328,7 +328,7 @@ def loaded_columns(model, work, tree, tangent, i, c_d, c_k):
 
 @inner
 def kept_marker(model, work, tree, tangent, m, first, rate):
-    """Add rows and columns of the connection of marker m, whose rows begin at `first`, by what moves the marker."""
+    """Add rows and columns of the connection of marker m, whose rows begin at `first`, for motions of the marker."""
     i, c = model.markers.body[m], model.markers.connection[m]
     p = sub(vector(work.markers.r[m]), vector(tangent.origin))
     v, omega = vector(work.markers.v[m]), vector(work.markers.omega[m])
@@ -382,7 +382,7 @@ def kept_pair(model, work, tangent, m, c, first, s, xi, xi_dot, unit, p, v, omeg
 
 @inner
 def accelerated_marker(model, work, tree, tangent, m, first, c_m, c_d, c_k):
-    """Add to the rows of the connection of marker m, from `first` on, what they change by its acceleration."""
+    """Add the effect of the acceleration of marker m on the rows of its connection, from `first` on."""
     i = model.markers.body[m]
     b = i
     while b >= 0:
@@ -402,8 +402,8 @@ def accelerated_marker(model, work, tree, tangent, m, first, c_m, c_d, c_k):
 def accelerated_pair(model, work, tangent, m, first, s, jet):
     """Add P_a times the change of the acceleration of marker m by the jet (xi, xi_dot, xi_ddot) of unknown s.
 
-        da = xi_ddot_v + xi_ddot_w × p + 2 xi_dot_w × v + xi_w × a
-        dalpha = xi_ddot_w + xi_dot_w × omega + xi_w × alpha
+    da = xi_ddot_v + xi_ddot_w × p + 2 xi_dot_w × v + xi_w × a
+    dalpha = xi_ddot_w + xi_dot_w × omega + xi_w × alpha
     """
     accelerated = model.markers.accelerated[m]
     P_a, now = work.connections.P_a[accelerated], work.markers.acceleration[accelerated]

@@ -1,4 +1,4 @@
-"""The tree of bodies as a record, and what the recursions write.
+"""The tree of bodies as a record, and the results of the recursions.
 
 A joint of the tree has marker A and marker B, of which one is on the body (far), the other on its parent (near). Its
 columns, one for each coordinate rate z_dot_k, say how B moves as seen from A (docs/relative.md §2):
@@ -30,7 +30,7 @@ n_k, n_s, n_kept, n_j, n_rows, n_l = (
 
 
 class Tree(NamedTuple):
-    """Bodies and the joints between them that are coordinates."""
+    """Bodies, and the joints between them whose coordinates are unknowns."""
 
     order: IntArray = integer(n_b)  #: bodies, depth first, each after its parent
     parent: IntArray = integer(n_b)  #: of each body, -1 for the ground
@@ -42,34 +42,35 @@ class Tree(NamedTuple):
     s0: IntArray = integer(n_b + 1)  #: first unknown of each body
     m0: IntArray = integer(n_b)  #: first of its modes among the unknowns
     column: IntArray = integer(n_s)  #: of each unknown, -1 for a mode
-    mode: IntArray = integer(n_s)  #: place in q of each unknown, -1 for a coordinate
-    slot: IntArray = integer(n_s)  #: place of its algorithmic acceleration among those of the bodies, of a mode its own
+    mode: IntArray = integer(n_s)  #: index in q of each unknown, -1 for a coordinate
+    #: index of its algorithmic acceleration among those of the bodies; for a mode its own
+    slot: IntArray = integer(n_s)
     tau: Array = real(n_k, 3, unit="1 or m/rad")  #: translation, axes of A
     alpha: Array = real(n_k, 3)  #: rotation, axes of the side
     side: IntArray = integer(n_k)  #: 0: fixed in A, 1: fixed in B
     unknown: IntArray = integer(n_k)  #: number among the unknowns, -1 for a prescribed coordinate
     motion: IntArray = integer(n_k)  #: function of time of a prescribed coordinate, -1 for none
-    factor: Array = real(n_k)  #: of the coordinate by what the function prescribes
-    row: IntArray = integer(n_k)  #: row of the joint that belongs to it, -1 for none
-    kept: IntArray = integer(n_kept)  #: connections that are no joints of the tree
-    is_kept: IntArray = integer(n_c)  #: whether a connection is among them
-    kept_row: IntArray = integer(n_w)  #: number of a row among those of connections that are kept, -1 for others
-    held: IntArray = integer(Size("held"))  #: joints and couplers among those that are kept
+    factor: Array = real(n_k)  #: factor from the prescribed function to the coordinate
+    row: IntArray = integer(n_k)  #: row of the joint for this coordinate, -1 for none
+    kept: IntArray = integer(n_kept)  #: connections that are not joints of the tree
+    is_kept: IntArray = integer(n_c)  #: whether a connection is among the kept ones
+    kept_row: IntArray = integer(n_w)  #: number of a row among those of kept connections, -1 for others
+    held: IntArray = integer(Size("held"))  #: kept joints and couplers
     #: axis of symmetry of a body that is free or on a ball joint, axes of its end of the joint; zero for others
     spin_axis: Array = real(n_b, 3)
-    #: of the spin, the most angular velocity across the axis with which it is taken by itself
+    #: largest ratio of transverse angular velocity to spin for which the spin is integrated separately
     most_across: Array = real(n_b)
-    loop_body: IntArray = integer(n_l)  #: a body that a loop goes through,
-    loop_marker: IntArray = integer(n_l)  #: and the marker by which the loop leaves it outwards
-    #: first of what moves a body with its subtree against its parent: columns that are unknown, modes of the parent at
+    loop_body: IntArray = integer(n_l)  #: a body of a loop
+    loop_marker: IntArray = integer(n_l)  #: marker at which the loop leaves it outwards
+    #: first of the motions of a body and its subtree relative to its parent: unknown columns, modes of the parent at
     #: the near marker, modes of the body at the far marker
     jet0: IntArray = integer(n_b + 1)
     jet_kind: IntArray = integer(n_j)  #: COLUMN, NEAR_MODE or FAR_MODE
     jet_item: IntArray = integer(n_j)  #: number of the column, or of the mode in its body
     jet_s: IntArray = integer(n_j)  #: number among the unknowns
     own_jet: IntArray = integer(n_s)  #: jet of each unknown at the joint of its own body, -1 for none
-    l0: IntArray = integer(n_b + 1)  #: where the matrix of the unknowns of each body begins in a flat store
-    front0: IntArray = integer(n_b + 1)  #: where its front begins in one, see kernels/kept_factors.py
+    l0: IntArray = integer(n_b + 1)  #: index of the matrix of the unknowns of each body in a flat store
+    front0: IntArray = integer(n_b + 1)  #: index of its front in a flat store, see kernels/kept_factors.py
 
 
 class JointWork(NamedTuple):
@@ -79,13 +80,13 @@ class JointWork(NamedTuple):
     Q: Array = real(n_b, 3, 3)  #: A_Aᵀ A_B
     d_start: Array = real(n_b, 3, unit="m")  #: the same at the beginning of a step
     Q_start: Array = real(n_b, 3, 3)
-    x: Array = real(n_k, unit="m or rad")  #: increments of coordinates since then
+    x: Array = real(n_k, unit="m or rad")  #: increments of coordinates since the beginning of a step
     rate: Array = real(n_k, unit="m/s or rad/s")  #: z_dot
     acceleration: Array = real(n_k, unit="m/s² or rad/s²")  #: z_ddot
     rate_start: Array = real(n_k, unit="m/s or rad/s")  #: z_dot at the beginning of a step
     acceleration_start: Array = real(n_k, unit="m/s² or rad/s²")
-    spins: IntArray = integer(n_b)  #: whether the step takes the spin about the axis of symmetry by itself
-    is_known: IntArray = integer()  #: whether the beginning of a step is the motion in the memory
+    spins: IntArray = integer(n_b)  #: whether the step integrates the spin about the axis of symmetry separately
+    is_known: IntArray = integer()  #: whether the motion at the beginning of a step is that in the memory
     t: Array = real(n_k, 3)  #: A_A tau, ground axes
     a: Array = real(n_k, 3)  #: rotation, ground axes
     near: Array = real(n_b, 12, unit="m/s², rad/s², m/s, rad/s")  #: accelerations and velocities of the marker there
@@ -98,9 +99,9 @@ class TangentWork(NamedTuple):
     """The Newton matrix in relative coordinates, see kernels/tangent.py; spatial vectors about the point `origin`."""
 
     origin: Array = real(3, unit="m")
-    screw: Array = real(n_j, 6)  #: by which a jet moves bodies with unit rate
+    screw: Array = real(n_j, 6)  #: motion of bodies for a jet with unit rate
     jet: Array = real(n_j, 18)  #: variations xi, xi_dot, xi_ddot, weighted
-    reach: Array = real(n_j, 12)  #: xi, xi_dot by an increment of the step
+    reach: Array = real(n_j, 12)  #: xi, xi_dot for an increment of the step
     D: Array = real(n_b, 6, 18)  #: derivative of the force of a body, with its subtree, by jets
     F: Array = real(n_b, 6, unit="N, N m")  #: force of a body with its subtree
     modal: Array = real(Size("n_q"), 18)  #: derivative of the modal residual by jets
@@ -110,9 +111,9 @@ class TangentWork(NamedTuple):
     f: Array = real(6)
     motion: Array = real(12)
     own: Array = real(18)  #: jet of a mode at a marker of its body
-    C: Array = real(n_rows, n_s)  #: rows that are kept by unknowns
-    B: Array = real(n_rows, n_s)  #: equations of unknowns by wrenches that are kept, transposed; then K⁻¹ of them
-    V: Array = real(n_rows, n_rows)  #: rows that are kept by their wrenches; then the factors of V - C K⁻¹ B
+    C: Array = real(n_rows, n_s)  #: kept rows by unknowns
+    B: Array = real(n_rows, n_s)  #: equations of unknowns by kept wrenches, transposed; then K⁻¹ times them
+    V: Array = real(n_rows, n_rows)  #: kept rows by their wrenches; then the factors of V - C K⁻¹ B
     V_pivot: IntArray = integer(n_rows)
     by_mode: Array = real(Size("n_q"), 6)  #: force of a body, with its subtree, by its own modes
     L: Array = real(Size("numbers of L"))  #: equations by unknowns of each body, then their factors, flat
@@ -120,36 +121,38 @@ class TangentWork(NamedTuple):
     G: Array = real(n_s, 18)  #: unknowns of a body by the jet of its near marker
     W: Array = real(n_s, 6)  #: force of a subtree by the unknowns of its first body
     b: Array = real(n_b, 6, unit="N, N m")  #: force of subtrees in a solution
-    #: of kernels/kept_factors.py, in axes of each body about its origin
+    #: for kernels/kept_factors.py, in axes of each body about its origin
     front: Array = real(Size("numbers of fronts"))  #: matrices of modes, columns and motion, then their factors, flat
     S: Array = real(n_b, 6, Size("n_most"))  #: screws of the modes at the far marker
-    T: Array = real(n_b, 6, Size("n_most"))  #: those of the parent's modes at the near, less those at its far marker
+    #: screws of the parent's modes at the near marker, minus those at its far marker
+    T: Array = real(n_b, 6, Size("n_most"))
     Z: Array = real(6, Size("n_most"))
     J: Array = real(n_s, 6)  #: screws of columns
-    P: Array = real(6, 6)  #: force of a subtree by the motion of what holds it
+    P: Array = real(6, 6)  #: force of a subtree by the motion of its carrier
     z: Array = real(
         Size("unknowns and motions")
-    )  #: modes, columns and motion of what holds a body, one body after the other
+    )  #: modes, columns and motion of the carrier of a body, one body after the other
     turn: Array = real(n_b, 3, 3)  #: axes of a body in those of its parent
     shift: Array = real(n_b, 3, unit="m")  #: its origin
     is_exact: IntArray = integer()  #: whether the factors are those of the exact matrix
-    is_kept: IntArray = integer()  #: whether the matrices of bodies are there
-    exactly: IntArray = integer()  #: steps still to be made with exact matrices
-    #: algorithmic accelerations of the unknowns after the last steps, of one size each after the other
+    is_kept: IntArray = integer()  #: whether the matrices of bodies exist
+    exactly: IntArray = integer()  #: number of remaining steps with exact matrices
+    #: algorithmic accelerations of the unknowns after the last steps of equal size
     a_last: Array = real(n_s)
     a_before: Array = real(n_s)
     a_first: Array = real(n_s)
-    n_known: IntArray = integer()  #: how many of the three are there
-    degree: IntArray = integer()  #: of the polynomial through them that would have led nearest to the last
-    X: Array = real(n_b, 18)  #: jets of bodies in a solution; of kept factors their motion, axes of each
+    n_known: IntArray = integer()  #: number of valid ones among the three
+    degree: IntArray = integer()  #: degree of the polynomial through them that would have predicted the last one best
+    X: Array = real(n_b, 18)  #: jets of bodies in a solution; with reused factors their motion, axes of each
     Y: Array = real(n_b, 18)  #: of what holds them
-    patience: IntArray = integer()  #: steps that make their own factors after the next that finds old ones too old
+    #: number of steps with their own factors after the next step that finds old factors too old
+    patience: IntArray = integer()
     left: IntArray = integer()  #: of them, still to come
     mass: Array = real(n_b, 6, 6, unit="kg, kg m, kg m²")  #: of subtrees
     weight: Array = real(n_s, unit="kg, kg m²")  #: of the norm of corrections
     step: Array = real(n_s)  #: right side, then the correction of the unknowns
-    mu: Array = real(n_rows)  #: that of the wrenches that are kept, times c_k
-    K: Array = real(Size("n_dense"), Size("n_dense"))  #: [unknowns, wrenches that are kept], where it is asked for
+    mu: Array = real(n_rows)  #: correction of the kept wrenches, times c_k
+    K: Array = real(Size("n_dense"), Size("n_dense"))  #: [unknowns, kept wrenches], if requested
 
 
 def new_joint_work(model: Model, tree: Tree) -> JointWork:
@@ -167,7 +170,7 @@ def new_joint_work(model: Model, tree: Tree) -> JointWork:
 
 
 def new_tangent_work(model: Model, tree: Tree, *, is_dense: bool = False) -> TangentWork:
-    """Return working arrays for the Newton matrix of a tree; is_dense: with room for all of it as one matrix."""
+    """Return working arrays for the Newton matrix of a tree; is_dense: with space for the complete matrix."""
     n_s, n_rows = int(tree.s0[-1]), int((tree.kept_row >= 0).sum())
     sizes = {
         "n_b": len(tree.parent),

@@ -25,8 +25,8 @@ __all__ = ["factorize_tree", "solve_bordered", "solve_newton", "solve_wrenches"]
 
 @inner
 def factorize_tree(model, work, tree, tangent, c_d, c_k):
-    """Factorise the Newton matrix whose parts `write_tangent` has written; whether all unknowns have their equation."""
-    for place in range(tree.order.shape[0] - 1, -1, -1):  # forces of subtrees, before the matrices need them
+    """Factorise the Newton matrix from the parts of `write_tangent`; return whether it is regular."""
+    for place in range(tree.order.shape[0] - 1, -1, -1):  # forces of subtrees, which the matrices need
         i = tree.order[place]
         if tree.parent[i] >= 0:
             for r in range(6):
@@ -69,7 +69,7 @@ def add_turning(row, screw, F):
 
 @inner
 def factorize_joint(model, work, tree, tangent, i, c_d, c_k):
-    """Eliminate the unknowns of body i; add what is left to its parent. Whether its matrix could be factorised."""
+    """Eliminate the unknowns of body i, and add the remainder to its parent. Return whether its matrix is regular."""
     s0, n_l, m0, q0 = tree.s0[i], tree.s0[i + 1] - tree.s0[i], tree.m0[i], model.bodies.q0[i]
     n = model.bodies.n_q[i]
     A, F = tangent.D[i], tangent.F[i]
@@ -138,7 +138,7 @@ def factorize_joint(model, work, tree, tangent, i, c_d, c_k):
 
 @inner
 def turning_far(tree, tangent, i, j, k, L, F):
-    """Add (xi × J) · F by the columns of the joint where J is fixed in the marker on the body."""
+    """Add (xi × J) · F of the columns of the joint if J is fixed in the marker on the body."""
     if tree.side[tree.jet_item[j]] == tree.is_reversed[i]:
         return
     for o in range(tree.jet0[i], tree.jet0[i + 1]):
@@ -148,7 +148,7 @@ def turning_far(tree, tangent, i, j, k, L, F):
 
 @inner
 def add_to_parent(model, work, tree, tangent, i, c_k):
-    """Add P of the joint of body i to its parent: to the force of it, and to that and the equations of its modes."""
+    """Add P of the joint of body i to its parent: to its force, and to the force and equations of its modes."""
     parent, P, F = tree.parent[i], tangent.D[i], tangent.F[i]
     n, q0 = model.bodies.n_q[parent], model.bodies.q0[parent]
     H = work.solver.H[model.bodies.h0[parent] : model.bodies.h0[parent + 1]].reshape((6 + n, 6 + n))
@@ -221,7 +221,7 @@ def solve_tree(tree, tangent, x):
 
 @inner
 def solve_newton(work, tree, joints, tangent, c_k):
-    """Write the corrections of unknowns and of kept wrenches, these times c_k, into tangent.step and tangent.mu."""
+    """Write the corrections of unknowns into tangent.step, and those of kept wrenches times c_k into tangent.mu."""
     for s in range(tree.slot.shape[0]):
         tangent.step[s] = -c_k * joints.residual[s]
     for k in range(tree.kept_row.shape[0]):
@@ -232,7 +232,7 @@ def solve_newton(work, tree, joints, tangent, c_k):
 
 @inner
 def solve_bordered(tree, tangent):
-    """Overwrite tangent.step and tangent.mu, right sides of unknowns and of rows that are kept, by the solution."""
+    """Overwrite tangent.step and tangent.mu, right sides of unknowns and of kept rows, by the solution."""
     step, mu = tangent.step, tangent.mu
     solve_tree(tree, tangent, step)
     for r in range(mu.shape[0]):
@@ -243,7 +243,7 @@ def solve_bordered(tree, tangent):
 
 @inner
 def solve_wrenches(tangent):
-    """Overwrite tangent.mu, right sides of rows, by the wrenches that are kept; add what they move to tangent.step."""
+    """Overwrite tangent.mu, right sides of rows, by the kept wrenches; add the motion due to them to tangent.step."""
     step, mu = tangent.step, tangent.mu
     if mu.shape[0] == 0:
         return

@@ -1,4 +1,4 @@
-"""Norms in relative coordinates: of corrections that of the bodies, and of unknowns by the mass that a unit moves.
+"""Norms in relative coordinates: of corrections by the motion of bodies, of unknowns by the mass that a unit moves.
 
 Corrections are measured as in absolute coordinates, by how bodies and modes move, so that a tolerance means the same: a
 turn of a joint near the root that those behind it take back is no large one.
@@ -29,7 +29,7 @@ __all__ = ["sizes_of_step", "squared_size", "weigh"]
 
 @inner
 def weigh(model, work, tree, joints, tangent):
-    """Write the weights of the norm of unknowns: what of the mass a unit of a coordinate moves, M + c_k K of a mode.
+    """Write the weights of the norm of unknowns: the mass moved by a unit of a coordinate, M + c_k K of a mode.
 
     Mass m, first moment S and inertia J of subtrees about tangent.origin, ground axes: rows 0, 1 and 3 to 5 of mass.
     """
@@ -72,7 +72,7 @@ def weigh(model, work, tree, joints, tangent):
 
 @inner
 def squared_size(model, work, tree, tangent):
-    """Return the squared norm of the correction in tangent.step by what it moves, in the weights of `work.solver`."""
+    """Return the squared norm of the correction in tangent.step by the motion of bodies; weights of `work.solver`."""
     if tangent.is_exact != 0:
         move_by_screws(work, tree, tangent)
     total, weight, step = 0.0, work.solver.weight, tangent.step
@@ -88,7 +88,10 @@ def squared_size(model, work, tree, tangent):
 
 @inner
 def move_by_screws(work, tree, tangent):
-    """Write how bodies move by the correction, axes of each about its origin, into tangent.X; Y: about one point."""
+    """Write the motion of bodies for the correction, own axes about their origins, into tangent.X.
+
+    Y: about one point.
+    """
     for place in range(tree.order.shape[0]):
         i = tree.order[place]
         parent, Y = tree.parent[i], tangent.Y[i]
@@ -104,7 +107,7 @@ def move_by_screws(work, tree, tangent):
 
 @inner
 def sizes_of_step(model, work, memory, h):
-    """Return the squared size of the accelerations of the iterate, gravity included, and of the way of a step."""
+    """Return the squared size of the accelerations of the iterate, with gravity, and of the displacement in a step."""
     size, size_x, mass = 0.0, 0.0, 0.0
     for k in range(memory.u.shape[0]):
         size += work.solver.weight[k] * work.state.u_dot[k] ** 2

@@ -1,4 +1,4 @@
-"""Articulated bodies: M x = b of a tree in a time that grows with the number of bodies, factors kept.
+"""Articulated bodies: M x = b of a tree in time proportional to the number of bodies, with stored factors.
 
 In ground axes, each node about its own origin, S the motion by its rates, H = [[I, ..]] of a flexible body
 (composite.py) with articulated instead of composite bodies in it:
@@ -66,7 +66,7 @@ def inverse(A):
 
 @loops
 def one_rate(work, k, v, A, B, C):
-    """Eliminate the one rate of a joint; return the blocks left, and the inertia along it."""
+    """Eliminate the one rate of a joint; return the remaining blocks, and the inertia along it."""
     move, w = vector(work.S[v]), vector(work.S[v, 3:])
     f, t = add(turned(A, move), turned(B, w)), add(turned(transposed(B), move), turned(C, w))
     d = dot(move, f) + dot(w, t)
@@ -80,7 +80,7 @@ def one_rate(work, k, v, A, B, C):
 
 @loops
 def three_rates(work, k, v, A, B, C):
-    """Eliminate the three rates of a joint; return the blocks left, and the determinant of the inertia along them."""
+    """Eliminate the three rates of a joint; return the remaining blocks, and the determinant of their inertia."""
     L = transposed((vector(work.S[v]), vector(work.S[v + 1]), vector(work.S[v + 2])))
     W = transposed((vector(work.S[v, 3:]), vector(work.S[v + 1, 3:]), vector(work.S[v + 2, 3:])))
     F = matrix_sum(product(A, L), product(B, W))
@@ -97,7 +97,7 @@ def three_rates(work, k, v, A, B, C):
 
 @loops
 def flexible(nodes, work, k):
-    """Eliminate rates and modes of a flexible body; return the blocks left, and whether it could be done."""
+    """Eliminate rates and modes of a flexible body; return the remaining blocks, and whether the matrix is regular."""
     n, v0, size = nodes.n_q[k], nodes.v0[k], nodes.n_z[k] + nodes.n_q[k]
     H = work.H[nodes.h0[k] : nodes.h0[k + 1]].reshape((6 + n, 6 + n))
     G = work.G[nodes.g0[k] : nodes.g0[k + 1]].reshape((size, size))
@@ -105,7 +105,7 @@ def flexible(nodes, work, k):
         flexible_column(nodes, work, H, k, j)
         for i in range(size):
             G[i, j] = along_rate(nodes, work, k, i)
-    pivot = work.pivot[v0 : v0 + size]  # rates of joint and modes stand one after the other
+    pivot = work.pivot[v0 : v0 + size]  # the rates of the joint are followed by the modes
     fine = lu_factor(G, pivot)
     X = work.V[v0 : v0 + size]
     for i in range(size):

@@ -1,4 +1,4 @@
-"""How the frames of nodes move with the rates, ground axes, each at its own origin (docs/recursive.md §3).
+"""Motion of the frames of nodes for unit rates, ground axes, each at its own origin (docs/recursive.md §3).
 
     V_k = shift(V_parent) + above q_dot of a flexible parent + S z_dot of the joint + S q_dot of its own modes
 

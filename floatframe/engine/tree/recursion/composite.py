@@ -1,4 +1,4 @@
-"""Composite bodies: the mass matrix of a tree, and the matrices of flexible bodies with what they carry.
+"""Composite bodies: the mass matrix of a tree, and the matrices of flexible bodies including their subtrees.
 
 In ground axes, of each node k about its own origin, p from the origin of the parent:
 
@@ -53,7 +53,7 @@ def congruent(R, J):
 
 @loops
 def moments_in_ground(nodes, work, model, marker_work, k):
-    """Write mass, s, J of the body of node k alone, and H of a flexible one; its forces have been evaluated."""
+    """Write mass, s, J of the body of node k alone, and H if it is flexible; its forces have been evaluated."""
     R = matrix(work.R_G[k])
     if nodes.n_q[k] > 0:
         i = nodes.body[k]
@@ -103,7 +103,7 @@ def flexible_mass(nodes, work, model, marker_work, k):
 
 @small
 def times_inertia(m, s, J, v, w):
-    """Return force and moment by the acceleration v, w of composite m, s, J."""
+    """Return force and moment for the acceleration v, w of a composite with m, s, J."""
     return add(scaled(m, v), cross(w, s)), add(cross(s, v), turned(J, w))
 
 

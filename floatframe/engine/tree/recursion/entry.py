@@ -51,7 +51,7 @@ __all__ = [
 ]
 
 
-# where nodes are: pose of each in its parent, and in the ground (docs/recursive.md §1) --------------------------------
+# poses of nodes in their parents and in the ground (docs/recursive.md §1) --------------------------------
 # The frame of a node in that of its parent is R, p: of a rigid body, joined to a rigid one,
 #
 #     R = A E,  p = r + A d        with A, r of the joint in the parent and E, d of the joint alone
@@ -62,7 +62,7 @@ __all__ = [
 
 @inner
 def set_modes(nodes, work, state):
-    """Take modal coordinates and rates out of positions and rates."""
+    """Extract modal coordinates and rates from positions and rates."""
     for k in range(nodes.parent.shape[0]):
         for j in range(nodes.n_q[k]):
             state.q[nodes.q0[k] + j] = work.x[nodes.xq[k] + j]
@@ -72,7 +72,7 @@ def set_modes(nodes, work, state):
 
 @inner
 def own_marker(model, marker_work, m):
-    """Write how a marker moves in its flexible body; return its axes but for those of the undeformed marker."""
+    """Write the motion of a marker in its flexible body; return its axes without those of the undeformed marker."""
     work = marker_work.markers
     put(work.rho[m], 0, vector(model.markers.position[m]))
     if model.markers.psi0[m] < 0:
@@ -157,10 +157,10 @@ PLACE, INVERSE, MASS, FORWARD, SOLVE, TANGENTS = range(6)  #: values of `Task.wh
 
 
 class Task(NamedTuple):
-    """What the entry is asked for."""
+    """A request to the entry."""
 
     what: IntArray = integer()
-    times: IntArray = integer()  #: how often, for measurements
+    times: IntArray = integer()  #: number of repetitions, for measurements
 
 
 as_nodes, as_node_work, as_model = converter(Nodes()), converter(NodeWork()), converter(Model())
@@ -219,7 +219,7 @@ run = make_entry(source_digest(__name__, "lean" if is_lean else "plain"))
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """The records of a tree with their tables, which take longer to make than a short chain to evaluate."""
+    """The records of a tree with their tables, whose construction takes longer than the evaluation of a short chain."""
 
     records: tuple[Nodes, NodeWork, Model, Work]  #: kept alive
     tables: tuple[IntArray, ...]
@@ -227,7 +227,7 @@ class Prepared:
     task_table: IntArray
 
     def run(self, what: int, dense_table: IntArray, times: int = 1) -> int:
-        """Do what is asked for with the numbers in the records; return -1, or the node whose matrix is singular."""
+        """Execute a request with the numbers in the records; return -1, or the node whose matrix is singular."""
         self.task.what[...] = what
         self.task.times[...] = times
         nodes, work, model, marker_work = self.tables

@@ -51,7 +51,7 @@ class Elementary:
 
 @dataclass(frozen=True, eq=False)
 class Expansion:
-    """The nodes of a system and how their numbers belong to its bodies."""
+    """The nodes of a system, and the relation of their numbers to its bodies."""
 
     nodes: Nodes
     node_of: tuple[int, ...]  #: node that carries each body
@@ -215,7 +215,7 @@ def starts_of(chain: Sequence[Elementary], x: int, z: int) -> dict[int, tuple[in
 
 
 def positions_and_rates(found: SystemTree, model: Model) -> tuple[tuple[slice, ...], ...]:
-    """Return the positions and rates of joints, and of modes among both, of each body."""
+    """Return the positions and rates of joints, and those of modes, of each body."""
     tree = found.tree
     x, v = 0, 0
     parts: tuple[list[slice], ...] = ([], [], [], [])
@@ -244,7 +244,7 @@ def marker_place(model: Model, m: int) -> tuple[Array, Array]:
 
 
 def placed_axes(compiled: CompiledSystem, m: int, body: int) -> Array:
-    """Return the axes of a marker, of a body without one, in ground axes as placed; deformation counts."""
+    """Return the assembled axes of a marker, or of a body without a marker, in ground axes, including deformation."""
     placed, bodies = compiled.placed, compiled.model.bodies
     i = body if m < 0 else int(compiled.model.markers.body[m])
     R = np.eye(3) if i < 0 else rotation_matrix(placed.p[i])
@@ -275,7 +275,7 @@ def zero_rotation_of(system: System, compiled: CompiledSystem, tree: Tree, i: in
 
 
 def carried(model: Model, i: int, F: Array, origin: Array) -> dict:
-    """Return what a node holds of the body that it carries: moments of a rigid one in its own frame."""
+    """Return the data of a node for the body that it carries: moments of a rigid one in its own frame."""
     bodies, types = model.bodies, model.body_types
     numbers = {"body": i, "q0": int(bodies.q0[i]), "u0": int(bodies.u0[i])}
     if is_flexible(model, i):

@@ -92,7 +92,7 @@ def elastic_carrier(model, marker_work, m, omega, alpha, a):
 
 @loops
 def elastic_body_in_joint(model, marker_work, m, omega, alpha, a):
-    """Return omega, alpha, a of a flexible body whose marker m moves so; all in body axes."""
+    """Return omega, alpha, a of a flexible body from the motion of its marker m; all in body axes."""
     markers = marker_work.markers
     rho_ddot, nu_dot = marker_acceleration(model, marker_work, m)
     nu = vector(markers.spin[m])
@@ -112,7 +112,7 @@ def outer_axes(nodes, work, k):
 
 @small
 def joint_motion(nodes, work, k, omega, alpha, a):
-    """Return omega, alpha, a with what the joint of node k adds, outer frame of the joint."""
+    """Return omega, alpha, a including the motion of the joint of node k, outer frame of the joint."""
     kind, v0 = nodes.kind[k], nodes.v0[k]
     if kind == SCREW:
         turn, slide = nodes.turn[k], nodes.slide[k]
@@ -188,7 +188,7 @@ def forward(nodes, work, model, marker_work):
 
 @loops
 def backward(nodes, work, model, marker_work):
-    """Take wrenches back to the base (3)."""
+    """Transfer wrenches back to the base (3)."""
     residual = marker_work.bodies.residual
     for k in range(nodes.parent.shape[0] - 1, -1, -1):
         f, t = vector(work.f[k]), vector(work.t[k])
@@ -229,6 +229,6 @@ def backward(nodes, work, model, marker_work):
 
 @loops
 def newton_euler(nodes, work, model, marker_work):
-    """Write the generalised forces of the motion in `work`, with reactions at all joints; nodes are placed."""
+    """Write the generalised forces of the motion in `work`, with reactions at all joints; nodes are already placed."""
     forward(nodes, work, model, marker_work)
     backward(nodes, work, model, marker_work)

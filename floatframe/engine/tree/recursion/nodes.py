@@ -1,4 +1,4 @@
-"""The tree of bodies with its joints taken apart into elementary ones, as records, and what the recursions write.
+"""The tree of bodies with its joints divided into elementary ones, as records, and the results of the recursions.
 
 A node carries one elementary joint: none (0 rates), a screw about the third axis of its frames (1), a translation (3)
 or a rotation (3). A cylindrical, universal or planar joint and the free motion of a body are chains of nodes, of which
@@ -42,7 +42,7 @@ class Nodes(NamedTuple):
 
     parent: IntArray = integer(n_n)  #: -1 for the ground
     kind: IntArray = integer(n_n)  #: FIXED, SCREW, TRANSLATION or ROTATION
-    is_near: IntArray = integer(n_n)  #: of a rotation: whether its rates are those in axes of the parent, taken back
+    is_near: IntArray = integer(n_n)  #: for a rotation: whether its rates are in axes of the parent, backwards
     n_z: IntArray = integer(n_n)  #: rates of the joint
     x0: IntArray = integer(n_n)  #: its first position
     v0: IntArray = integer(n_n)  #: its first rate
@@ -50,7 +50,7 @@ class Nodes(NamedTuple):
     turn: Array = real(n_n)  #: rotation about the axis by the rate
     A: Array = real(n_n, 3, 3)  #: inner frame of the joint in the frame of the parent, undeformed
     r: Array = real(n_n, 3, unit="m")  #: its origin
-    body: IntArray = integer(n_n)  #: that it carries, -1 for none
+    body: IntArray = integer(n_n)  #: body that it carries, -1 for none
     n_q: IntArray = integer(n_n)  #: modes of the body
     q0: IntArray = integer(n_n)  #: its first mode in `state.q`
     u0: IntArray = integer(n_n)  #: its first velocity in `state.u`
@@ -68,20 +68,20 @@ class Nodes(NamedTuple):
 
 
 class NodeWork(NamedTuple):
-    """What the recursions write; frame of the node where nothing else is said."""
+    """The results of the recursions, in the frame of the node unless stated otherwise."""
 
     x: Array = real(n_x)  #: positions
     v: Array = real(n_v)  #: rates
     a: Array = real(n_v)  #: their rates
     force: Array = real(n_v)  #: generalised forces
-    force_given: Array = real(n_v)  #: applied along the rates
+    force_given: Array = real(n_v)  #: force applied along the rates
     gravity: Array = real(3, unit="m/s²")  #: ground axes
     R: Array = real(n_n, 3, 3)  #: axes in those of the parent
     p: Array = real(n_n, 3, unit="m")  #: origin from that of the parent, its axes
     omega: Array = real(n_n, 3, unit="rad/s")
     alpha: Array = real(n_n, 3, unit="rad/s²")
     acc: Array = real(n_n, 3, unit="m/s²")  #: acceleration of the origin minus gravity
-    f: Array = real(n_n, 3, unit="N")  #: force that the subtree needs
+    f: Array = real(n_n, 3, unit="N")  #: force required by the subtree
     t: Array = real(n_n, 3, unit="N m")  #: moment about the origin
     reaction: Array = real(n_n, 6, unit="N, N m")  #: wrench of the joint on its outer frame, axes and point of that
     R_G: Array = real(n_n, 3, 3)  #: axes in those of the ground
@@ -89,11 +89,13 @@ class NodeWork(NamedTuple):
     rho: Array = real(n_n, 3, unit="m")  #: marker above, in the body of the parent
     A: Array = real(n_n, 3, 3)  #: inner frame of the joint in the frame of the parent
     R_own: Array = real(n_n, 3, 3)  #: outer frame of the joint in the frame of the flexible body
-    #: ground axes, from here on; motion (translation, rotation) of the frame of a node, at its origin, by a rate of its
+    #: from here on in ground axes; motion (translation, rotation) of the frame of a node, at its origin, for its unit
+    #: rate
     S: Array = real(n_v, 6, unit="m or 1, rad")
-    above: Array = real(n_above, 6, unit="m, rad")  #: the same by a mode of the flexible parent, that one held
-    H: Array = real(Size("numbers of H"), unit="kg, kg m, kg m²")  #: of flexible bodies with all they carry, flat
-    mass: Array = real(n_n, unit="kg")  #: of the subtree, its joints and modes held
+    #: the same for a mode of the flexible parent, with the parent's frame fixed
+    above: Array = real(n_above, 6, unit="m, rad")
+    H: Array = real(Size("numbers of H"), unit="kg, kg m, kg m²")  #: of flexible bodies including their subtrees, flat
+    mass: Array = real(n_n, unit="kg")  #: mass of the subtree, with its joints and modes fixed
     s: Array = real(n_n, 3, unit="kg m")  #: first moment about the origin of the node
     J: Array = real(n_n, 3, 3, unit="kg m²")
     I_ff: Array = real(n_n, 3, 3, unit="kg")  #: articulated inertia: force by acceleration
@@ -111,7 +113,7 @@ class NodeWork(NamedTuple):
 
 
 class Dense(NamedTuple):
-    """What grows with the square of the rates, and what derivatives need; without entries where it is not asked for.
+    """Arrays whose size grows with the square of the rates, and those for derivatives; empty if not requested.
 
     Ground axes, motions and wrenches about the origin of the ground.
     """
@@ -120,23 +122,23 @@ class Dense(NamedTuple):
     columns: Array = real(Size("right sides"), n_d)  #: right sides, then solutions
     by_z: Array = real(n_d, n_d)  #: forces by positions
     by_rate: Array = real(n_d, n_d)  #: forces by rates
-    S: Array = real(n_d, 6, unit="m, rad")  #: motion of what hangs at a rate
-    change: Array = real(n_d, 18)  #: Y and X by its position, X by its rate, see recursion/tangents.py
+    S: Array = real(n_d, 6, unit="m, rad")  #: motion of the subtree of a rate
+    change: Array = real(n_d, 18)  #: Y and X for its position, X for its rate, see recursion/tangents.py
     above: Array = real(n_above, 6)  #: the same by a mode of a flexible parent
     above_change: Array = real(n_above, 18)
     momentum: Array = real(n_dn, 3, unit="kg m/s")  #: of a subtree
-    Q: Array = real(n_dn, 3, 3, unit="kg m²/s")  #: moment by the common change of its angular velocities
+    Q: Array = real(n_dn, 3, 3, unit="kg m²/s")  #: moment for a common change of its angular velocities
     s: Array = real(n_dn, 3, unit="kg m")  #: first moment of a subtree
     J: Array = real(n_dn, 3, 3, unit="kg m²")
     wrench: Array = real(n_dn, 6, unit="N, N m")  #: that a subtree needs
-    row_a: Array = real(n_d, 6)  #: force along a rate by X of all it hangs at
+    row_a: Array = real(n_d, 6)  #: force along a rate for X of its complete subtree
     row_b: Array = real(n_d, 3)  #: by the rotation of Y
-    by_mode: Array = real(n_d, 12)  #: wrench by a mode of a body and by its rate
+    by_mode: Array = real(n_d, 12)  #: wrench for a mode of a body and for its rate
     scratch: Array = real(2, Size("most six"))
 
 
 def new_dense(nodes: Nodes, n_v: int, n_right: int, *, is_whole: bool) -> Dense:
-    """Return arrays for matrices; whole: for the mass matrix and derivatives, else for nothing but right sides."""
+    """Return arrays for matrices; whole: for the mass matrix and derivatives, otherwise only for right sides."""
     sizes = {
         "rates of matrices": n_v,
         "right sides": n_right,

@@ -12,7 +12,7 @@ __all__ = ["positions_of_state"]
 
 
 def positions_of_state(expansion: Expansion, state: State) -> Array:
-    """Return the positions, (n_x,), of a state of the engine; what joints hold is taken as held."""
+    """Return the positions, (n_x,), of a state of the engine; joints are assumed closed."""
     compiled, tree = expansion.compiled, expansion.tree.tree
     bodies = compiled.model.bodies
     x = np.zeros(expansion.n_x)
@@ -36,12 +36,12 @@ def joint_positions(expansion: Expansion, i: int, d: Array, Q: Array) -> Array:
     Q0 = zero_rotation_of(expansion.system, expansion.compiled, tree, i)
     chain = chain_of(tree, i, Q0)
     turning = [each for each in chain if each.turn != 0.0 and each.kind not in (TRANSLATION, ROTATION)]
-    M = Q @ Q0.T  # of rotations about axes of A at zero coordinates, one after the other
+    M = Q @ Q0.T  # for rotations about axes of A at zero coordinates, one after the other
     angles = {}
     if len(turning) == 1:
         x, y, _ = turning[0].axes.T
         angles[turning[0].first] = np.arctan2(y @ M @ x - x @ M @ y, x @ M @ x + y @ M @ y) / turning[0].turn
-    elif len(turning) == 2:  # at right angles: M e_2 turns with the first, Mᵀ e_1 against the second
+    elif len(turning) == 2:  # at right angles: M e_2 rotates with the first, Mᵀ e_1 against the second
         first, second = turning
         e_1, e_2 = first.axes[:, 2], second.axes[:, 2]
         angles[first.first] = turn_between(e_1, e_2, M @ e_2) / first.turn

@@ -188,13 +188,13 @@ def by_turning(p, Q, v, w):
 
 @small
 def force_cross(v, w, f, t):
-    """Return (v, w) ×* (f, t): the change of a wrench that moves along."""
+    """Return (v, w) ×* (f, t): the change of a wrench that moves with it."""
     return cross(w, f), add(cross(w, t), cross(v, f))
 
 
 @loops
 def mode_rows(nodes, work, dense, model, marker_work, k):
-    """Write the rows of the modes of flexible node k by what moves its body alone (2)."""
+    """Write the rows of the modes of flexible node k for motions of its body alone (2)."""
     i, n, vq, q0 = nodes.body[k], nodes.n_q[k], nodes.vq[k], nodes.q0[k]
     types, t, bodies = model.body_types, model.bodies.kind[i], marker_work.bodies
     R, r = work.R_G[k], vector(work.r_G[k])
@@ -222,7 +222,7 @@ def row_times(dense, i, change, first, turning):
 
 @small
 def put_rows(dense, k, v, m, s, J):
-    """Add the row of what moves node k along S_v (2)."""
+    """Add the row of a motion of node k along S_v (2)."""
     S, w = vector(dense.S[v]), vector(dense.S[v, 3:])
     put_sum(dense.row_a[v], 0, add(scaled(m, S), cross(w, s)))
     put_sum(dense.row_a[v], 3, add(cross(s, S), turned(J, w)))
@@ -231,7 +231,7 @@ def put_rows(dense, k, v, m, s, J):
 
 @loops
 def change_of_wrench(dense, k, S, change, m, s, J):
-    """Return the wrench of subtree k by S and its Y, X: seen from the ground, by position; by rate (3)."""
+    """Return the wrench of subtree k for S with its Y, X: relative to the ground, for position; for rate (3)."""
     p, Q, f, t = vector(dense.momentum[k]), dense.Q[k], vector(dense.wrench[k]), vector(dense.wrench[k, 3:])
     v, w = vector(S), vector(S[3:])
     f_z, t_z = wrench_of(m, s, J, p, Q, vector(change[6:]), vector(change[9:]), vector(change[3:]))
@@ -351,7 +351,7 @@ def joint_tangents(nodes, work, dense, k):
 
 @loops
 def give_to_flexible_parent(nodes, work, dense, model, marker_work, k):
-    """Add what subtree k says to rows, columns and block of the modes of its parent (2), (4)."""
+    """Add the contribution of subtree k to rows, columns and block of the modes of its parent (2), (4)."""
     above, marker, c0 = nodes.parent[k], nodes.above[k], nodes.c0[k]
     n, vq, R = nodes.n_q[above], nodes.vq[above], work.R_G[above]
     m, s, J = work.mass[k], vector(dense.s[k]), matrix(dense.J[k])
@@ -378,7 +378,7 @@ def give_to_flexible_parent(nodes, work, dense, model, marker_work, k):
 
 @loops
 def force_tangents(nodes, work, dense, model, marker_work):
-    """Write the derivatives of the forces by positions and rates; inverse dynamics and the mass matrix are there."""
+    """Write the derivatives of the forces by positions and rates; inverse dynamics and mass matrix are known."""
     n_n = nodes.parent.shape[0]
     dense.by_z[:, :] = 0.0
     dense.by_rate[:, :] = 0.0

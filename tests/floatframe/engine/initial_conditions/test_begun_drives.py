@@ -31,7 +31,7 @@ def test_a_run_that_a_drive_begins_with_a_blow_tells_so_with_its_rate_and_what_t
     system = misaligned_four_bar(segments(5), turn=AT_ONCE)
     told = (
         r"the drive of 'angle' of joint 'A' begins at t = 0 with 0\.6 rad/s, 0\.6 rad/s from what its bodies as given "
-        r"have: .* begin it softly \(cycloidal_spin_up\)"
+        r"have: .* begin it gradually \(cycloidal_spin_up\)"
     )
     with pytest.raises(ConvergenceError, match=told) as error:
         integrate(system, GeneralizedAlpha(0.3, max_iterations=2), 0.2, H)

@@ -182,7 +182,7 @@ def test_impossible_connections_are_refused_before_anything_is_written(two_masse
         (lambda: Coupling(scheme="implicit"), "scheme: expected one of explicit, iterated, got 'implicit'"),
         (lambda: Coupling(max_iterations=1), "max_iterations: expected at least 2"),
         (lambda: Coupling(step=-1.0), "Coupling: step"),
-        (lambda: ForeignUnit("idle", "idle.fmu"), "it would act on nothing"),
+        (lambda: ForeignUnit("idle", "idle.fmu"), "it would have no effect"),
     ],
 )
 def test_bad_couplings_are_refused(make, words):

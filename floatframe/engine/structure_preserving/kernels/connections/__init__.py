@@ -1,1 +1,1 @@
-"""What one connection of a kind does in a step, compiled: bushings, contacts, couplers, rolling, user forces."""
+"""Compiled functions of one connection of each kind over a step: bushings, contacts, couplers, rolling, user forces."""

@@ -11,7 +11,7 @@ from floatframe.engine.structure_preserving.kernels.rows import mean_direction, 
 
 __all__ = ["contact_load", "gap_at", "speed_of_approach"]
 
-ALIKE = 0.02  # difference of depths over their sum below which the quotient is a mean of forces
+ALIKE = 0.02  # difference of depths relative to their sum, below which the quotient is the mean force
 POINT = math.sqrt(0.6)  # of Gauss, exact to degree five
 
 
@@ -27,7 +27,7 @@ def gap_at(model, x, A, c):
 
 @inner
 def mean_force(k, n, x_0, x_1):
-    """Return the change of k x^(n+1)/(n+1) over that of the depth, of gaps with these depths."""
+    """Return the change of k x^(n+1)/(n+1) divided by that of the depth, for gaps with these depths."""
     middle, half = 0.5 * (x_0 + x_1), 0.5 * (x_1 - x_0)
     if abs(half) <= ALIKE * middle:
         ends = (middle - POINT * half) ** n + (middle + POINT * half) ** n
@@ -56,7 +56,7 @@ def known_speed(model, step, c):
 
 @inner
 def contact_load(model, discrete, step, c):
-    """Add the loads of contact c; return the work that restitution and friction take."""
+    """Add the loads of contact c, and return the work that restitution and friction dissipate."""
     a, b, i, own = model.connections.a[c], model.connections.b[c], model.connections.item[c], model.contacts
     gap_0, gap_1 = gap_at(model, step.x_0, step.A_0, c), gap_at(model, step.x_f, step.A_f, c)
     f_s = spring_force(own.stiffness[i], own.exponent[i], gap_0, gap_1)
@@ -95,7 +95,7 @@ def contact_load(model, discrete, step, c):
 
 @inner
 def speed_of_approach(model, step, c):
-    """Return what the next step knows of v_0: in contact v_0, else minus the speed at which the gap closes."""
+    """Return v_0 for the next step: in contact v_0, otherwise minus the speed at which the gap closes."""
     begin, end = gap_at(model, step.x_0, step.A_0, c), gap_at(model, step.x_1, step.A_1, c)
     if end >= 0.0:
         return min((end - begin) / step.h, -model.contacts.slow[model.connections.item[c]])

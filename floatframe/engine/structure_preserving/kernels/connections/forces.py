@@ -73,7 +73,7 @@ def mean_axes(step, m):
 
 @inner
 def bushing_load(model, discrete, step, c):
-    """Add the loads of bushing c; return the work that its tables give, and that its damping takes."""
+    """Add the loads of bushing c, and return the work supplied by its tables and dissipated by its damping."""
     a, b, i = model.connections.a[c], model.connections.b[c], model.connections.item[c]
     A, B, d = mean_axes(step, a), mean_axes(step, b), mean_distance(step, a, b)
     s_0 = turned_back(step.A_0[a], sub(vector(step.x_0[b]), vector(step.x_0[a])))
@@ -90,7 +90,7 @@ def bushing_load(model, discrete, step, c):
     Q_0, Q_1 = exp_matrix(part_0), exp_matrix(part_1)
     Q = scaled_matrix(0.5, matrix_sum(Q_0, Q_1))
     arm = turned(Q, scaled(0.5, add(s_0, s_1)))
-    # the change of the deformations by the motion over the step
+    # change of the deformations due to the motion over the step
     dA, dB = axes_change(model, discrete, step, a, A), axes_change(model, discrete, step, b, B)
     turning = matrix_sum(product(transposed(dA), B), product(transposed(A), dB))
     dtheta = solved(Gamma, axial(product(turning, transposed(P))))
@@ -136,7 +136,7 @@ def put_states(model, work, step, c, first, part):
 
 @inner
 def user_force_load(model, work, discrete, step, c):
-    """Add the loads of user force c; return the work they give."""
+    """Add the loads of user force c, and return their work."""
     i = element_of(model, c)
     first, last = model.elements.coordinate0[i], model.elements.coordinate0[i + 1]
     n, inputs = last - first, work.users.inputs

@@ -29,16 +29,16 @@ from floatframe.model.joints.rows.kinds import POSITION, VELOCITY
 
 __all__ = ["element_gap", "element_load", "element_residual", "first_row_of_multipliers"]
 
-WAY = 1.0 / 64.0  # of the step, on which the gradient of the potential is taken
-FIRST = (-1 / 60, 9 / 60, -45 / 60, 0.0, 45 / 60, -9 / 60, 1 / 60)  # of differences of sixth order at -3 to 3
-LEAST = 1e-6  # of the length of the law: motions below it are none
-BALANCED = 1e-9  # sum of wrenches over that of their sizes
+WAY = 1.0 / 64.0  # fraction of the step over which the gradient of the potential is taken
+FIRST = (-1 / 60, 9 / 60, -45 / 60, 0.0, 45 / 60, -9 / 60, 1 / 60)  # coefficients of sixth-order differences at -3 to 3
+LEAST = 1e-6  # motion relative to the length of the law, below which it counts as zero
+BALANCED = 1e-9  # sum of wrenches relative to the sum of their norms, below which they balance
 ALONG, BEGIN, END = range(3)
 
 
 @inner
 def begin_motion(model, discrete, step, c):
-    """Write places, axes and rotations of the markers of element c in the middle of the step, or where it is still."""
+    """Write positions, axes and rotations of the markers of element c in the middle of the step, or at its start."""
     a = model.connections.a[c]
     for m in range(a, a + model.laws.head[model.connections.item[c], 0]):
         put(step.d_law[m], 0, vector(step.dx[m]))
@@ -65,7 +65,7 @@ def way_turned(Q):
 
 @inner
 def put_inputs(model, work, discrete, step, c, t, where, s, part):
-    """Write what the law of element c is asked with: markers at a part s ALONG the step, or at its BEGIN or END.
+    """Write the inputs of the law of element c: markers at a fraction s ALONG the step, or at its BEGIN or END.
 
     part: of the changes of its states.
     """
@@ -110,13 +110,13 @@ def element_gap(model, work, discrete, step, g):
 
 @inner
 def first_row_of_multipliers(model, c):
-    """Return the first row of the multipliers of element c, the last of its rows."""
+    """Return the first multiplier row of element c; these are its last rows."""
     return model.connections.w0[c + 1] - model.laws.head[model.connections.item[c], 3]
 
 
 @inner
 def potential(model, discrete, step, c, outputs):
-    """Return the energy that outputs of element c name less the reactions times what they hold of positions."""
+    """Return the declared energy of element c minus its reactions times the held positions."""
     i, total = model.connections.item[c], 0.0
     held = 6 * model.laws.head[i, 0] + model.laws.head[i, 2]
     if model.laws.energy[i] >= 0:
@@ -130,7 +130,7 @@ def potential(model, discrete, step, c, outputs):
 
 @inner
 def has_potential(model, c):
-    """Whether element c names an energy or holds positions."""
+    """Whether element c declares an energy or holds positions."""
     for row in range(first_row_of_multipliers(model, c), model.connections.w0[c + 1]):
         if model.rows.holds[row] == POSITION:
             return True
@@ -139,7 +139,7 @@ def has_potential(model, c):
 
 @inner
 def is_balanced(n, width, x, outputs):
-    """Whether the wrenches of n markers, asked with x, balance."""
+    """Whether the wrenches of n markers balance for the inputs x."""
     force, moment, of_forces, of_moments = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, 0.0
     r_0 = vector(x[1:])
     for m in range(n):
@@ -153,7 +153,7 @@ def is_balanced(n, width, x, outputs):
 
 @inner
 def potential_at(model, work, discrete, step, c, where, s):
-    """Return the potential of element c at a place on the way, and whether its wrenches balance there."""
+    """Return the potential of element c at a point of the path, and whether its wrenches balance there."""
     i = model.connections.item[c]
     put_inputs(model, work, discrete, step, c, step.t_force, where, s, 0.5)
     law_call(model, work, i, work.laws.trial)
@@ -163,7 +163,7 @@ def potential_at(model, work, discrete, step, c, where, s):
 
 @inner
 def marker_of_whole(model, c):
-    """Return the first marker of element c on which it acts by all that it acts by, -1 for none or one on the ground.
+    """Return the first marker of element c with all kinds of loads of the element; -1 for none or one on the ground.
 
     Also whether it acts by moments.
     """
@@ -185,7 +185,7 @@ def marker_of_whole(model, c):
 
 @inner
 def put_ways(model, step, c, balances):
-    """Write the forces and moments that are as large as the motion of the markers of element c."""
+    """Write forces and moments with the sizes of the motions of the markers of element c."""
     i, a = model.connections.item[c], model.connections.a[c]
     last, square = a + model.laws.head[i, 0], model.laws.length[i] ** 2
     for m in range(a, last):
@@ -203,7 +203,7 @@ def put_ways(model, step, c, balances):
         for m in range(a, last):
             for k in range(a, m):
                 d = sub(vector(step.r_law[m]), vector(step.r_law[k]))
-                is_apart = dot(d, d) > LEAST**2 * square  # two points in one place have no line
+                is_apart = dot(d, d) > LEAST**2 * square  # two coincident points have no line
                 if is_apart and model.markers.force[m] >= 0 and model.markers.force[k] >= 0:
                     change = dot(d, sub(vector(step.dx[m]), vector(step.dx[k]))) / dot(d, d)
                     put_sum(step.way[k], 0, scaled(-change, d))
@@ -233,7 +233,7 @@ def work_along(step, wrench, m):
 
 @inner
 def correct_wrenches(model, work, discrete, step, c):
-    """Add what the potential of element c lacks over the step to its wrenches."""
+    """Add the correction of the work of element c over the step to its wrenches."""
     i, a = model.connections.item[c], model.connections.a[c]
     slope = 0.0
     for p in range(7):
@@ -255,7 +255,7 @@ def correct_wrenches(model, work, discrete, step, c):
 
 @inner
 def add_axes_moment(model, discrete, step, m, M):
-    """Add a moment on a marker whose work is that of the rotation of the marker."""
+    """Add a moment on a marker, conjugate to the rotation of the marker."""
     i = model.markers.body[m]
     if i < 0 or step.is_still or not discrete.turns[m]:
         add_moment(model, step, m, M)
@@ -278,7 +278,7 @@ def add_axes_moment(model, discrete, step, m, M):
 
 @inner
 def note(model, work, c):
-    """Write down an output that ends the run, and what is no number for a motion that is one."""
+    """Record an output that ends the run, and results that are not finite for a finite motion."""
     i, laws, out = model.connections.item[c], model.laws, work.laws.outputs
     n_out = 6 * laws.head[i, 0] + laws.head[i, 2] + laws.head[i, 3]
     for k in range(laws.stop0[i], laws.stop0[i + 1]):
@@ -293,7 +293,7 @@ def note(model, work, c):
 
 @inner
 def element_load(model, work, discrete, step, c):
-    """Add the loads of element c; return the work that it gives and takes."""
+    """Add the loads of element c, and return the work that it supplies and dissipates."""
     i, a = model.connections.item[c], model.connections.a[c]
     head, laws, out = model.laws.head[i], model.laws, work.laws.outputs
     begin_motion(model, discrete, step, c)
@@ -327,7 +327,7 @@ def element_load(model, work, discrete, step, c):
 
 @inner
 def element_residual(model, work, discrete, step, c):
-    """Write the equations of the states of element c, and what its multipliers hold; while velocities are closed none.
+    """Write the equations of states and multipliers of element c; none while velocities are closed.
 
     Positions are held at the end of the step, all else in its middle.
     """
