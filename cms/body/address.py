@@ -50,7 +50,7 @@ class Address:
     """
 
     node: int | str | None = None  #: the user's number; "INSTANCE.number" if several instances have it
-    element: int | str | None = None  #: likewise; selects the kept nodes of the element's surface
+    element: int | str | None = None  #: the same for an element: selects the kept nodes of its surface
     set: str | None = None  #: name of a set; selects its kept nodes, or the kept nodes of its elements
     position: Any = None  #: in mesh axes, (3,) [m]; selects the nearest kept node
     tolerance: float = TOLERANCE  #: largest distance of that node from the position, relative to the size of the body
@@ -157,7 +157,7 @@ class Address:
 
 
 def own_rows(reduced: ReducedBody, rows: IntArray) -> IntArray:
-    """Return the node itself, as the copy with rotations if there is one; if only its skin is kept, the skin points."""
+    """Return the node itself, or its copy with rotations if there is one; if only its skin is kept, the skin points."""
     flags = reduced.numbering.on_skin
     own = rows[flags[rows] == 0] if flags.size else rows
     if not len(own):

@@ -141,7 +141,7 @@ class Moments:
 
     @property
     def left_out(self) -> "Moments":
-        """The moments for a motion without the missing terms, that is with constant inertia where nothing is known.
+        """The moments for a motion without the missing terms, with constant inertia in their place.
 
         Missing terms are zero, including the trace of a missing 5C. M* then only comes from `ReducedBody.M`.
         """
@@ -172,14 +172,17 @@ class Moments:
 
 
 def known_P(P: Array, missing: Iterable[str]) -> Array:
-    """Return P, (3, 3, n_q), with missing terms set to zero; its antisymmetric part, which is 2C, always stays."""
+    """Return P, (3, 3, n_q), with missing terms set to zero; its antisymmetric part, which is 2C, is always known."""
     if "3C" not in missing:
         return P
     return np.asarray((P - P.swapaxes(0, 1)) / 2)
 
 
 def known_S_kl(S_kl: Array, missing: Iterable[str]) -> Array:
-    """Return S_kl, (3, 3, n_q, n_q), with missing terms set to zero; its trace over a, b, which is M*, always stays."""
+    """Return S_kl, (3, 3, n_q, n_q), with missing terms set to zero.
+
+    Its trace over a, b, which is M*, is always known.
+    """
     if "5C" not in missing:  # 4C is then known too
         return S_kl
     M = np.einsum("aakl->kl", S_kl) / 3

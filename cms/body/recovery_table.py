@@ -43,7 +43,7 @@ class RecoveryTable:
     name: str
     labels: tuple[str, ...]  #: label of each row, unique, such as "node 17 acceleration ux"
     quantities: tuple[str, ...]  #: quantity of each row, such as "acceleration" or "beam force"
-    entities: tuple[str, ...]  #: what the row belongs to: "node", "element", "interface", "point" or "body"
+    entities: tuple[str, ...]  #: kind of object of the row: "node", "element", "interface", "point" or "body"
     numbers: IntArray  #: number of the node or element, (n_rows,); -1 if it only has a name
     components: tuple[str, ...]  #: component of each row, such as "ux", "xx" or "end A My"
     dimensions: Array  #: exponents of mass, length and time of each row, (n_rows, 3)

@@ -72,7 +72,7 @@ def frame_command(
     ] = True,
     output: Output = None,
 ) -> None:
-    """Convert a modal file to another body frame, from the file alone; its modes are diagonalised anew.
+    """Convert a modal file to another body frame, from the file alone, and diagonalise its modes again.
 
     Without -o the new file is written beside the old one: rod.h5 gives rod_tisserand.h5.
 
@@ -174,7 +174,7 @@ def export_command(
     ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write.")] = None,
 ) -> None:
-    """Write a modal file in the format of another program, and report what that format cannot hold.
+    """Write a modal file in the format of another program, and report data that the format cannot hold.
 
     Example: cms export rod.h5 --to exudyn --units m-kg-s -o rod_exudyn.npz
 

@@ -166,7 +166,7 @@ def kernels_compiled_beside() -> Iterator[Callable[[], None]]:
 
 
 def put_inputs(folder: Path) -> None:
-    """Copy the mesh and the job files into the folder; raise `JobError` for a changed job, which is left as it is."""
+    """Copy the mesh and the job files into the folder; raise `JobError` for a changed job, which is not overwritten."""
     from fe_models.foundation.paths import replace_file
     from fe_models.parts import shipped_mesh
 

@@ -59,7 +59,7 @@ def list_formats(*, as_json: bool, as_markdown: bool) -> None:
 
 
 def markdown_tables() -> str:
-    """Return both tables as they stand in docs/formats.md."""
+    """Return both tables in the form of docs/formats.md."""
     parts = (("What comes in", IN, rows_in()), ("What goes out", OUT, rows_out()))
     return "\n\n".join(f"**{title}**\n\n{markdown(head, rows)}" for title, head, rows in parts)
 
@@ -102,7 +102,7 @@ class ExportRequest:
 
 
 def run_export(request: ExportRequest) -> None:
-    """Write the files, and report what the format does not hold.
+    """Write the files, and report data that the format does not hold.
 
     Raises
     ------

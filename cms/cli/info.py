@@ -45,7 +45,7 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
         ("units", f"{body.units.name} (force {body.units.force_symbol}, stress {body.units.stress_symbol})"),
         *[("", text) for text in unit_texts(body)],
         ("frame B", frame["kind"] + (f" at {frame['at']}" if frame["at"] else "")),
-        *([("held", "to the ground, as it was said: no floating frame can take it")] if record["is_held"] else []),
+        *([("held", "to the ground, as declared: no floating frame can take it")] if record["is_held"] else []),
         ("origin of B", f"{vector_words(frame['origin'], size)} {length} (mesh coordinates)"),
         *[(f"{a} axis of B", f"{vector_words(axis, 1.0)} (mesh axes)") for a, axis in turned_axes(frame["axes"])],
         ("mass", f"{record['mass']:.6g} {mass}"),

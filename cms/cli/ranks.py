@@ -20,7 +20,7 @@ PARALLEL_SOLVERS = ("petsc", "petsc-disk", "slepc")  #: solvers that several ran
 
 
 def one_job_of_ranks(jobs: Sequence[Path], workers: str | None, solver: str | None) -> None:
-    """Raise `JobError` for what several ranks cannot do; a single process has no restrictions."""
+    """Raise `JobError` if several ranks cannot process the request; a single process has no restrictions."""
     n = started_ranks()
     if n == 1:
         return

@@ -122,7 +122,9 @@ class StiffnessDamping:
 
 
 def stiffness_damping(job: Job) -> StiffnessDamping | None:
-    """Return D = beta K with the damping ratio of the first elastic mode of the whole; None if the job has no ratios.
+    """Return D = beta K with the damping ratio of the first elastic mode of the whole body.
+
+    None if the job has no ratios.
 
     Ratios belong to the modes of one body. The modes of a part lie far above the first modes of the whole, so ratios of
     the parts would damp the latter far too little. D = beta K is the same for the parts and for the whole.
@@ -224,7 +226,7 @@ def edit_job(
     cuts: "list[Cut]",
     inside: list[str],
 ) -> None:
-    """Edit the job of the whole body to that of a part; comments and order of the file are kept."""
+    """Edit the job of the whole body to that of a part, with its comments and order."""
     import tomlkit
 
     body = document["body"]

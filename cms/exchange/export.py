@@ -82,10 +82,10 @@ NEEDS = {
 
 @dataclass(frozen=True)
 class Exported:
-    """The written files, and what the format could not hold."""
+    """The written files, and the data that the format could not hold."""
 
     files: tuple[Path, ...]
-    left_out: tuple[str, ...]  #: descriptions of what the body has but the files do not
+    left_out: tuple[str, ...]  #: descriptions of data of the body that the files do not have
     notes: tuple[str, ...]  #: positions of the interfaces, and other facts for the user of the other program
     units: Units  #: of the numbers in the files
 

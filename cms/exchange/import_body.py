@@ -88,19 +88,19 @@ FORMATS = (
 # import body ----------------------------------------------------------------------------------------------------------
 
 
-HEAD = 4096  #: bytes by which the format of a file is told
+HEAD = 4096  #: bytes that identify the format of a file
 Places = Mapping[int, Array]  #: number of a node -> its place
 ForeignFiles = str | Path | Iterable[str | Path] | Mapping[str, str | Path]  #: a file, several, or role -> file
 
 
 def never(path: Path, head: bytes) -> bool:
-    """Return that no content tells a format, which then has to be named."""
+    """Return that no content identifies the format, which must be named."""
     return False
 
 
 @dataclass(frozen=True)
 class BodyFormat:
-    """A format of reduced bodies: how its files are told, and what reads them."""
+    """A format of reduced bodies: recognition of its files, and its reader."""
 
     is_it: Callable[[Path, bytes], bool]  #: by path and head of 4096 bytes of one of the files
     read: Callable[[Sequence[Path], str, Places], Superelement | ModalBody]  #: files, name of the body, further places
@@ -132,7 +132,7 @@ def import_body(
     repair_mass: bool = False,
     accept: Sequence[str] = (),
 ) -> ReducedBody:
-    """Make a reduced body of what another program has reduced.
+    """Make a reduced body from the files of another program.
 
     Superelements (matrices over boundary dofs and modal coordinates, rigid motion inside) and bodies of floating frames
     (modes without rigid motion, with their mass integrals) become bodies like our own. What the files do not say is
@@ -199,7 +199,7 @@ def import_body(
         raise
     except MemoryError as error:
         raise ForeignBodyError(f"{paths[0]}: not enough memory to read it") from error
-    except Exception as error:  # whatever a damaged file does to a parser, the user gets one message
+    except Exception as error:  # one message for any error that a damaged file causes in a parser
         raise ForeignBodyError(f"{paths[0]}: could not be read as {key}: {damage(error)}") from error
     if isinstance(body, Superelement):
         return body_of_superelement(body, options)
@@ -222,7 +222,7 @@ def paths_of(files: ForeignFiles) -> list[Path]:
 
 
 def format_of(paths: Sequence[Path]) -> str:
-    """Return the key of the first format that knows one of the files; "matrices" if none does."""
+    """Return the key of the first format that recognises one of the files; "matrices" if none does."""
     heads = []
     for path in paths:
         with path.open("rb") as file:
@@ -249,18 +249,18 @@ def of_matrices(foreign: ForeignMatrices, name: str, places: Places, boundary: S
         own = np.stack([np.repeat(np.asarray(boundary), 6), np.tile(np.arange(6), len(boundary))], axis=1)
         n_modes = n - len(own)
         modal = np.stack([1 + np.arange(n_modes), np.full(n_modes, SCALAR)], axis=1)
-        note = f"the first {len(own)} rows are six dofs of each of nodes {list(map(int, boundary))}, as it was said"
+        note = f"the first {len(own)} rows are six dofs of each of nodes {list(map(int, boundary))}, as given"
         foreign = replace(foreign, dofs=np.concatenate([own, modal]), notes=(*foreign.notes, note))
     return superelement_of_matrices(foreign, name, places)
 
 
 def with_names(options: ImportOptions, foreign: ForeignMatrices) -> ImportOptions:
-    """Return the options with the interfaces that the files name, where the user names none."""
+    """Return the options with the interfaces named in the files, if the user names none."""
     return options if options.interfaces is not None else replace(options, interfaces=named_interfaces(foreign))
 
 
 def named_interfaces(foreign: ForeignMatrices) -> dict[str, list[int]] | None:
-    """Return the interfaces whose names stand beside the places of the nodes, as our own .mat files have them."""
+    """Return the interfaces named with the positions of the nodes, as in our own .mat files."""
     names = np.asarray(foreign.others.get("interfaces", ()))
     if foreign.node_numbers is None or names.dtype.kind != "U" or names.shape != (len(foreign.node_numbers),):
         return None

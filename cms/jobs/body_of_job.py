@@ -34,7 +34,7 @@ __all__ = [
 ]
 
 
-# bodies whose elements stay in another program: matrices, their geometry, and interfaces on it ------------------------
+# bodies whose elements are in another program: matrices, their geometry, and interfaces on it -------------------------
 
 
 def body_of_matrices(job: Job, stages: Stages, on_report: Callable[[Any], None] | None = None) -> FEBody:
@@ -239,7 +239,7 @@ def job_body(
 
 
 def coupled_body(job: Job, body: FEBody) -> FEBody:
-    """Couple the interfaces of the body of a job, and make it planar if the job says so."""
+    """Couple the interfaces of the body of a job, and make it planar if requested."""
     from cms.jobs.beam_tables import PLANES
     from cms.modes.centrifugal import CENTRIFUGAL, centrifugal_loads
     from fe_models.body.couplings.couplings import couple

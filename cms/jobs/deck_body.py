@@ -139,7 +139,7 @@ def _solids(
 
 
 def _solid_mass(job: Job, of_table: str) -> str:
-    """Return the mass of a table [solids.NAME]; [body] mass may ask for lumped mass, or for none."""
+    """Return the mass of a table [solids.NAME]; [body] mass may request lumped mass, or none."""
     if job.body.mass == "lumped":
         return "lumped"
     return "consistent" if job.body.mass == "consistent" and of_table == "lumped" else of_table

@@ -180,14 +180,15 @@ class BodySection(Table):
         "(as the deck), others consistent",
     )
     program: choice("program", lambda: DECK_PROGRAMS) | None = Field(  # type: ignore[valid-type]
-        None, description="for a deck (.inp): calculix (default) or abaqus, by which elements have lumped mass"
+        None,
+        description="for a deck (.inp): calculix (default) or abaqus, which determines the elements with lumped mass",
     )
     part: PartSection | None = Field(None, description="a table {number, of or at, axis}: one part of the mesh alone")
     units: choice("unit system", lambda: tuple(UNIT_SYSTEMS)) = Field(  # type: ignore[valid-type]
         description=f"the unit system of the numbers, one of {', '.join(UNIT_SYSTEMS)}"
     )
     held: bool | None = Field(
-        None, description="true or false, for matrices: whether the body is meant to be held to the ground"
+        None, description="true or false, for matrices: whether the body is intentionally held to the ground"
     )
     repair_mass: bool | None = Field(
         None, description="true or false, for matrices: whether slightly negative masses are set to zero"
@@ -291,7 +292,7 @@ class InterfaceSection(Table):
     reference: Vector3 | None = Field(None, description="the reference point, [x, y, z]")
     triad: Matrix3 | None = Field(None, description="the axes of the interface, [x axis, y axis, z axis]")
     on: choice("part", lambda: ("solid", "lines")) | None = Field(  # type: ignore[valid-type]
-        None, description="solid or lines: what it is on, where a body has both"
+        None, description="solid or lines: the part on which it is, if a body has both"
     )
 
     @property

@@ -286,7 +286,8 @@ class ReductionSection(Table):
     )
     interfaces_together: bool | None = Field(None, description="true or false: one problem for all all-node interfaces")
     solver: choice("solver", lambda: tuple(SOLVERS)) | None = Field(  # type: ignore[valid-type]
-        None, description=f"what factorises, one of {', '.join(SOLVERS)}; default: the fastest that is installed"
+        None,
+        description=f"solver of the factorisation, one of {', '.join(SOLVERS)}; default: the fastest that is installed",
     )
     memory: Memory | None = Field(None, description='the most memory the process may take, such as "8GB"')
     frame: choice("frame", lambda: FRAMES) = Field(  # type: ignore[valid-type]

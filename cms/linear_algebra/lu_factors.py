@@ -9,7 +9,7 @@ __all__ = ["solve_factored"]
 
 
 def solve_factored(factors: tuple[Array, IntArray], right: Array, *, is_transposed: bool = False) -> Array:
-    """Return x of A x = right, or of Aᵀ x = right, and leave the factors as they are.
+    """Return x of A x = right, or of Aᵀ x = right, without changing the factors.
 
     SciPy adds 1 to the pivots in place for LAPACK, which counts from 1, and subtracts it again after the solution.
     LAPACK runs without the interpreter's lock, so another thread may meet shifted pivots: each solution has its own

@@ -1,1 +1,1 @@
-"""Modes: the families of static and vibration modes, and the mode sets that are made of them."""
+"""Modes: the families of static and vibration modes, and the mode sets made from them."""

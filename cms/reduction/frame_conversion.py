@@ -77,7 +77,7 @@ def converted(reduced: ReducedBody, frame: Frame, *, damping: Damping | None = N
     if reduced.is_held or isinstance(frame, HeldFrame):
         raise BodyError(
             f"reduced body {reduced.name!r}: a body that is held to the ground has the frame of the ground, and a "
-            "free one any other; reduce it anew with or without its supports"
+            "free one any other; reduce it again with or without its supports"
         )
     C, target = condition_of(reduced, frame)  # (1)
     require_convertible(reduced, target)

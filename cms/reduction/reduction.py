@@ -227,7 +227,7 @@ def require_states_of(body: FEBody, frame: BodyFrame, states: UnitStates) -> Non
     if states.body is not body or not is_same:
         raise ModeSetError(
             f"reduce: the unit states are those of body {states.body.name!r} in a {other.kind} frame, expected "
-            f"{body.name!r} in a {frame.kind} frame with the same origin and axes; make them for this very frame"
+            f"{body.name!r} in a {frame.kind} frame with the same origin and axes; make them for this frame"
         )
 
 
@@ -327,7 +327,7 @@ def reduced_damping(body: FEBody, finished: FinishedBasis, damping: Damping | No
 def reduction_provenance(
     body: FEBody, modes: ModeSet, finished: FinishedBasis, damping: Damping | None
 ) -> Mapping[str, str]:
-    """Return from what the reduced body was made, and by which versions."""
+    """Return the sources of the reduced body, and the versions of the programs."""
     versions = {f"version {name}": metadata.version(name) for name in ("numpy", "scipy")}
     try:
         versions["version floatframe"] = metadata.version("floatframe")

@@ -109,7 +109,7 @@ def weighted_motion(
     is_known = values > UNDETERMINED * values[-1]
     if (np.abs(rows[:, ~is_known]) > PART * scale[list(components), None]).any():
         raise BodyError(
-            f"weighted motion: {len(points)} points with these weights cannot say the components "
+            f"weighted motion: {len(points)} points with these weights do not determine the components "
             f"{', '.join(str(c + 1) for c in components)} of the reference point: they lie on a line or at one point; "
             "take more points, weights of their rotations, or fewer components"
         )
@@ -194,8 +194,8 @@ def eliminated(
         if slave in by:
             node, component = (int(i[0]) for i in np.nonzero(dof_of == slave))
             raise BodyError(
-                f"constraints: component {component + 1} of node {node} follows two of them, {by[slave]} and {name}; "
-                "take it out of one"
+                f"constraints: component {component + 1} of node {node} is defined by two of them, {by[slave]} "
+                "and {name}; remove it from one"
             )
         by[slave] = name
     for _ in range(len(rows) + 1):  # (2)

@@ -285,7 +285,7 @@ def recovered_dofs(body: FEBody) -> IntArray:
 
 
 def _without_idle_dofs(body: FEBody, n_of_parts: int, references: IntArray, normal: int | None) -> FEBody:
-    """Step (4). A rotation with mass but without stiffness stays, and appears as a motion of zero frequency.
+    """Step (4). A rotation with mass but without stiffness remains, and appears as a motion of zero frequency.
 
     The reference of a mean motion that follows in some components only has no other motion, so its other translations
     are idle too. If a recovery row beyond those of the parts belongs to an idle dof, it does not give the motion of its

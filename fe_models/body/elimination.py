@@ -66,7 +66,7 @@ def eliminate_dofs(body: FEBody, slaves: IntArray, T_s: sp.sparray) -> FEBody:
 
 
 def _congruent(D: sp.csc_array, T: sp.csr_array) -> sp.csc_array:
-    """Return Tᵀ D T without entries that are rounding of larger terms: a damper between linked dofs leaves nothing."""
+    """Return Tᵀ D T without entries that are rounding of larger terms: a damper between linked dofs has no effect."""
     made = sp.csc_array(T.T @ D @ T)
     terms = sp.csc_array(abs(T).T @ abs(D) @ abs(T))
     made = sp.csc_array(made.multiply(abs(made) > ROUNDING * terms))

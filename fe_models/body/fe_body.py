@@ -226,13 +226,13 @@ class Tie:
 
     interface: Interface  #: the interface; its `dofs` are None
     motion: sp.csr_array  #: motion of its reference node as rows over the dofs, (6, n_dof)
-    multipliers: IntArray  #: dofs of the multipliers, (n,); n is 6, or less where some have been eliminated
+    multipliers: IntArray  #: dofs of the multipliers, (n,); n is 6, or less if some have been eliminated
     S: Array  #: scale of the rows of the multipliers, (n, 6)
     #: the interface whose members the reference node follows rigidly; None: it follows nodes of the body
     leader: Interface | None = None
 
     def changed(self, T: sp.sparray, new_index: IntArray) -> "Tie":
-        """Return the tie after a substitution u = T u_new, (n_dof, n_new); new_index is -1 for dofs that leave."""
+        """Return the tie after a substitution u = T u_new, (n_dof, n_new); new_index is -1 for eliminated dofs."""
         stays = new_index[self.multipliers] >= 0
         return replace(
             self, motion=sp.csr_array(self.motion @ T), multipliers=new_index[self.multipliers[stays]], S=self.S[stays]

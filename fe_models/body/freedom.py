@@ -1,4 +1,4 @@
-"""Forces with which the stiffness of a body resists rigid-body motion; a free body resists none."""
+"""Forces of the stiffness of a body in rigid-body motion, which are zero for a free body."""
 
 from dataclasses import dataclass
 

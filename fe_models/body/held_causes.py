@@ -38,7 +38,7 @@ def mistake_description(
     with_rows: bool,
     called: Called = str,
 ) -> str | None:
-    """Describe what is wrong with matrices that are not free; None if a support explains them.
+    """Describe the fault of matrices that are not free; None if a support explains them.
 
     (1) a penalty on the diagonal
     (2) the same matrices are free if their rows are reordered, or if the nodes are in another unit
@@ -62,8 +62,8 @@ def mistake_description(
         k = int(np.argmax(np.where(is_penalty, diagonal, 0.0)))
         return (
             f"K has {diagonal[k]:.3g} on the diagonal of row {k} (node {called(dofs[k, 0])}, component {dofs[k, 1]}), "
-            f"the median is {median:.3g}: a support by penalty ({int(is_penalty.sum())} such rows), which costs the "
-            "digits of everything beside it; give the matrices without it"
+            f"the median is {median:.3g}: a support by penalty ({int(is_penalty.sum())} such rows), which destroys "
+            "the digits of all other terms; give the matrices without it"
         )
     if order := fitting_order(K, M, nodes, dofs):  # (2)
         return f"the rows are in {order} order and dofs list another; list the dofs in the order of the rows"
@@ -79,13 +79,13 @@ def mistake_description(
         node, component = missing[0]
         return (
             f"{len(missing)} rows that other nodes have are missing, such as component {component} of node "
-            f"{called(node)}: rows taken out hold the body to the ground; give all rows, or say that the body is held"
+            f"{called(node)}: removed rows hold the body to the ground; give all rows, or declare the body as held"
         )
     return None
 
 
 def fitting_order(K: sp.csc_array, M: sp.csc_array, nodes: Array, dofs: IntArray) -> str:
-    """Return the order of rows in which these matrices are free; "" if no usual order makes them free."""
+    """Return the order of rows for which these matrices are free; "" if no usual order makes them free."""
     node, component = dofs.T
     orders = {"component-major": np.lexsort((node, component)), "node-major": np.lexsort((component, node))}
     for name, order in orders.items():

@@ -316,7 +316,7 @@ def assign_materials(
 
 
 def groups_of(mesh: Mesh, missing: Mapping[str, IntArray]) -> str:
-    """Say to which groups the cells without a material belong."""
+    """Name the groups of the cells without a material."""
     groups = [
         group
         for group, by_type in mesh.cell_sets.items()

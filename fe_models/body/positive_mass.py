@@ -90,7 +90,7 @@ def positive_mass(body: FEBody) -> FEBody:
     if values[0] < -REPAIR_LIMIT:
         raise BodyError(
             f"{where}: M has an eigenvalue of {values[0]:.1e} of its largest; expected at least -{REPAIR_LIMIT:.0e}, "
-            "which could be repaired: is this the mass matrix, with its rows in the order of dofs?"
+            "which could be repaired; check that this is the mass matrix, with its rows in the order of dofs"
         )
     local = np.where(np.abs(vectors) > ROUNDING_OF_VECTORS * np.abs(vectors).max(axis=0), vectors, 0.0)
     V = sp.csc_array(local * np.sqrt(np.abs(values)))

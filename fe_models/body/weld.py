@@ -286,7 +286,7 @@ def _moved(body: FEBody, interface: Interface, is_ambiguous: bool, first_dof: in
 def _ties(
     bodies: tuple[FEBody, ...], joined: set[Place], n_dof: int, start: dict[str, tuple[int, int]]
 ) -> Iterator[Tie]:
-    """Yield the ties of the parts, and those of their distributing interfaces that are joined, over all dofs."""
+    """Yield the ties of the parts, and those of their joined distributing interfaces, over all dofs."""
     for body in bodies:
         first_dof, first_node = start[body.name]
         T = sp.csr_array(
@@ -381,7 +381,7 @@ def _followers(
 
 
 def _has_only_multipliers(body: FEBody, dofs: IntArray) -> bool:
-    """Whether multipliers alone hold the node of these dofs, as they do that of a distributing interface."""
+    """Whether only multipliers hold the node of these dofs, as in a distributing interface."""
     rows, _ = body.K[:, dofs].nonzero()
     return bool((body.dofs[rows, 1] == MULTIPLIER).all())
 

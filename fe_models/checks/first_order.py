@@ -47,7 +47,7 @@ class FirstOrderError:
 
     error: float  #: largest f / f_second - 1 of the lowest elastic modes; a lower bound
     n_cells: int  #: number of cells of the piece
-    is_whole: bool  #: whether the piece is the whole mesh
+    is_whole: bool  #: whether the piece is the complete mesh
     kinds: tuple[str, ...]  #: types of the cells
 
     @property
@@ -61,7 +61,7 @@ class FirstOrderError:
         return {PROVENANCE: f"{self.error:.3g} {self.finding}"}
 
     def description(self) -> str:
-        """Describe the result, and what to do."""
+        """Describe the result and the remedy."""
         cures = {
             "tetra": "mesh with ten-node tetrahedra (tetra10)",
             "hexahedron": "give bricks incompatible modes, or mesh with 20 or 27 nodes",

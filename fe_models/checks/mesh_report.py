@@ -367,7 +367,7 @@ def _link_findings(links: Connectivity, coincident: IntArray, mesh: Mesh) -> lis
                 False,
                 f"{coincident.size} nodes coincide with another (first: node "
                 f"{coincident[0]} at {_vector(mesh.nodes[coincident[0]])}): the "
-                f"mesh is cut open there unless that is meant; merge them",
+                f"mesh has a gap there, unless it is intended; merge them",
             )
         )
     if links.n_facet_parts > len(links.part_cells):
@@ -375,8 +375,8 @@ def _link_findings(links: Connectivity, coincident: IntArray, mesh: Mesh) -> lis
             Finding(
                 "hinge",
                 False,
-                f"{links.n_facet_parts} pieces share no facet with the rest and hang "
-                f"together in single nodes or edges, which may act as hinges",
+                f"{links.n_facet_parts} pieces share no facet with the rest and are "
+                f"connected by single nodes or edges, which may act as hinges",
             )
         )
     if links.n_overlapping:
@@ -393,8 +393,8 @@ def _link_findings(links: Connectivity, coincident: IntArray, mesh: Mesh) -> lis
                 "transition",
                 True,
                 f"{links.n_mismatched} facets join cells with different middle "
-                f"nodes (linear beside quadratic): their middle nodes hang free; "
-                f"use one order",
+                f"nodes (linear next to quadratic): their middle nodes are "
+                f"unconnected; use one order",
             )
         )
     if links.n_transitions:

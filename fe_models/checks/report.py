@@ -15,7 +15,7 @@ class Finding:
 
     kind: str  #: "inverted", "degenerate", "parts", "overlap", "transition", "units"; others only warn
     is_error: bool
-    text: str  #: what is wrong, where, and what to do
+    text: str  #: fault, place, and remedy
 
 
 class Report(ABC):

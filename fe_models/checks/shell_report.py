@@ -105,7 +105,7 @@ def report_shell(
                 "coincident",
                 False,
                 f"{len(close)} pairs of nodes lie at one place, first {' and '.join(_names(mesh, pair))}; merge them "
-                "unless a slit is meant",
+                "unless a slit is intended",
             )
         )
     flips = (edges.nodes[edges.first] == edges.nodes[edges.second]).all(axis=1)
@@ -116,8 +116,8 @@ def report_shell(
                 "normals",
                 False,
                 f"the normal changes sides at {int(flips.sum())} edges, first between nodes {' and '.join(nodes)}: "
-                "top, bottom, offset and pressure change sides there; give the cells one sense (orient_normals), or "
-                "leave it where walls are meant so",
+                "top, bottom, offset and pressure change sides there; give the cells one sense (orient_normals), "
+                "unless the walls are intended like this",
             )
         )
     findings += [Finding("units", is_error, text) for is_error, text in implausible_units(units, size, materials)]

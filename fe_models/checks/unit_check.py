@@ -11,7 +11,8 @@ from fe_models.foundation.units import UNIT_SYSTEMS, Units
 __all__ = ["hull_volume", "implausible_matrices", "implausible_motion", "implausible_units"]
 
 SIZE = (1e-4, 1e3)  #: diagonal of the bounding box of a body [m]
-USUAL_SIZE = (1e-4, 50.0)  #: the same, outside of which it is told: a mesh in mm read in metres is large and slow [m]
+#: plausible range, outside of which a warning follows: a mesh in mm read in metres is large and slow [m]
+USUAL_SIZE = (1e-4, 50.0)
 DENSITY = (10.0, 25_000.0)  #: from rigid foam to osmium [kg/m³]
 MODULUS = (1e3, 2e12)  #: from soft gel to above diamond [Pa]
 WAVE_SPEED = (10.0, 30_000.0)  #: sqrt(E / rho): from soft rubber to above diamond [m/s]
@@ -108,7 +109,8 @@ def implausible_matrices(units: Units, nodes: Array, mass: float, speeds: Array)
     if not texts:
         return []
     moved = [
-        f"the nodes seem to be in {words} beside matrices in {units.name}: times {factor:g} all numbers would fit"
+        f"the nodes seem to be in {words}, but the matrices in {units.name}: multiplied by {factor:g}, all numbers "
+        "would be consistent"
         for factor, words in LENGTHS.items()
         if not _matrix_findings(units, factor * np.asarray(nodes), mass, factor * np.asarray(speeds))
     ]

@@ -1,4 +1,4 @@
-"""Meshes from files: one function, which reads truthfully or says why it cannot."""
+"""Meshes from files: one function, which reads exactly or explains why it cannot."""
 
 from fe_models.files.read_mesh import MESH_FORMATS, read_mesh
 

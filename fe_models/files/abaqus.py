@@ -105,7 +105,7 @@ class _Content:
     coordinates: list[Array] = field(default_factory=list)
     elements: list[tuple[str, str, IntArray]] = field(default_factory=list)  #: type, kind, rows of number and nodes
     ignored: dict[str, int] = field(default_factory=dict)  #: element type -> how many
-    orienting: dict[int, int] = field(default_factory=dict)  #: number of a line -> a node behind those of its ends
+    orienting: dict[int, int] = field(default_factory=dict)  #: number of a line -> a node besides those of its ends
     notes: list[str] = field(default_factory=list)
 
 
@@ -117,17 +117,17 @@ class DeckMesh:
     node_numbers: IntArray  #: (n_nodes,)
     coordinates: Array  #: (n_nodes, 3)
     elements: tuple[tuple[str, str, IntArray], ...]  #: type in the deck, kind, rows of number and nodes
-    node_sets: dict[str, IntArray]  #: numbers, ascending, of nodes that are there
+    node_sets: dict[str, IntArray]  #: numbers, ascending, of existing nodes
     element_sets: dict[str, IntArray]  #: numbers, ascending
     spelling: dict[str, str]  #: of sets, as they first appear: by "NSET name" and "ELSET name"
     ignored: dict[str, int]  #: element type -> how many
     notes: tuple[str, ...] = ()
-    orienting: Mapping[int, int] = field(default_factory=dict)  #: number of a line -> a node behind those of its ends
+    orienting: Mapping[int, int] = field(default_factory=dict)  #: number of a line -> a node besides those of its ends
     instances: tuple[str, ...] = ()  #: whose numbers were moved, the k-th by k `instance_step`
     instance_step: int = 0
 
     def rows_of(self, numbers: IntArray) -> IntArray:
-        """Return the rows of node numbers, -1 where there is none."""
+        """Return the rows of node numbers, -1 if there is none."""
         order = np.argsort(self.node_numbers, kind="stable")
         return _rows(self.node_numbers, order, numbers)
 
@@ -159,7 +159,7 @@ def read_abaqus(path: Path, data: bytes) -> RawMesh:
 
 
 def naming_note(mesh: DeckMesh) -> list[str]:
-    """Return a line about the elements of lines and faces beside solids: in a mesh they only name edges and faces."""
+    """Return a line about line and face elements next to solids: in a mesh they only name edges and faces."""
     counts: dict[str, int] = {}
     if any(kind in SOLID_TYPES for _, kind, _ in mesh.elements):
         for name, kind, table in mesh.elements:
@@ -232,7 +232,7 @@ def deck_mesh(where: str, blocks: list[DeckBlock]) -> DeckMesh:
 
 
 def raw_mesh_of(mesh: DeckMesh, notes: list[str]) -> RawMesh:
-    """Return the mesh of a deck as it is judged, sets under the names they have in it."""
+    """Return the mesh of a deck after its checks, with the names of sets as in the deck."""
     groups = {mesh.spelling[f"ELSET {name}"]: members for name, members in mesh.element_sets.items()}
     order = np.argsort(mesh.node_numbers, kind="stable")
     raw_blocks = []
@@ -245,7 +245,9 @@ def raw_mesh_of(mesh: DeckMesh, notes: list[str]) -> RawMesh:
         for name, members in mesh.node_sets.items()
     }
     notes = [*notes, *mesh.notes]
-    notes += [f"{count} {name} elements were left out: no part of the solid" for name, count in mesh.ignored.items()]
+    notes += [
+        f"{count} {name} elements were omitted: they are no part of the solid" for name, count in mesh.ignored.items()
+    ]
     return RawMesh(
         mesh.coordinates,
         tuple(raw_blocks),
@@ -277,7 +279,7 @@ def _take(here: str, block: DeckBlock, content: _Content, node_sets: _Sets, elem
             return
         orienting = content.orienting if kind in ("line", "line3") else {}
         table = _elements(here, block, kind, n_nodes, content.notes, orienting)
-        if kind == "line3":  # the middle node stands between the ends, here as in meshio it comes last
+        if kind == "line3":  # the middle node is between the ends; here, as in meshio, it comes last
             table = table[:, [0, 1, 3, 2]]
         content.elements.append((name, kind, table))
         element_sets.add(block.parameters.get("ELSET"), table[:, 0])
@@ -300,7 +302,7 @@ def _nodes(here: str, block: DeckBlock) -> tuple[IntArray, Array]:
         width = max(len(row) for row in rows)
         if width == min(len(row) for row in rows) and width >= 4:
             table = np.array([row[:4] for row in rows], dtype=float)
-        else:  # coordinates left out are zero
+        else:  # omitted coordinates are zero
             table = np.array([[float(word or 0) for word in (*row, "0", "0", "0")[:4]] for row in rows])
     except ValueError as error:
         raise MeshError(f"{here}: expected number, x, y, z on each line below; {error}") from error
@@ -308,7 +310,7 @@ def _nodes(here: str, block: DeckBlock) -> tuple[IntArray, Array]:
 
 
 def _element_type(name: str) -> tuple[str, int]:
-    """Return meshio name and nodes per element; ("ignored", 0) for what is no part of a solid."""
+    """Return meshio name and nodes per element; ("ignored", 0) for elements that are no part of a solid."""
     upper = name.upper()
     if match := _SOLID.match(upper):
         n_nodes = int(match[1])
@@ -385,7 +387,7 @@ def _require_unique(where: str, what: str, numbers: IntArray) -> None:
 
 
 def _rows(numbers: IntArray, order: IntArray, wanted: IntArray) -> IntArray:
-    """Return the rows of node numbers, -1 where there is none."""
+    """Return the rows of node numbers, -1 if there is none."""
     ordered = numbers[order]
     at = np.minimum(np.searchsorted(ordered, wanted), len(ordered) - 1)
     return np.where(ordered[at] == wanted, order[at], -1)

@@ -21,7 +21,7 @@ _REFUSED = {
     "ELCOPY": "write the copied elements out",
     "REFLECTION": "write the elements out",
     "MANIFEST": "write one input file without references to others",
-}  # keyword -> what to do; each makes or moves nodes or elements
+}  # keyword -> remedy; each creates or moves nodes or elements
 
 
 @dataclass(frozen=True)
@@ -32,11 +32,11 @@ class DeckBlock:
     parameters: dict[str, str]  #: upper-case names; "" for a parameter without value
     lines: list[str]
     line_number: int
-    file: str = ""  #: the included file it stands in; empty: the deck itself
+    file: str = ""  #: the included file in which it is; empty: the deck itself
 
     @property
     def place(self) -> str:
-        """Where it stands, for messages."""
+        """Its place, for messages."""
         return f"{self.file}, line {self.line_number}" if self.file else f"line {self.line_number}"
 
     @property
@@ -74,7 +74,7 @@ def deck_blocks(where: str, text: str, folder: Path, included: dict[str, str] | 
 def mesh_blocks(
     where: str, text: str, folder: Path, included: dict[str, str] | None = None
 ) -> tuple[list[DeckBlock], list[str]]:
-    """Return the blocks of a deck that concern its mesh, and in words what was left out.
+    """Return the blocks of a deck that define its mesh, and descriptions of the omitted ones.
 
     Raises
     ------
@@ -101,7 +101,7 @@ class _Files:
 
 
 def _lines(where: str, text: str, of: _Files, files: tuple[Path, ...]) -> Iterator[_Line]:
-    """Yield the lines of a deck that say something, those of included files in their place."""
+    """Yield the non-empty lines of a deck, with those of included files in their place."""
     name = files[-1].name if files else ""
     pending = ""
     for number, raw in enumerate(text.splitlines(), start=1):
@@ -110,7 +110,7 @@ def _lines(where: str, text: str, of: _Files, files: tuple[Path, ...]) -> Iterat
             continue
         if line.startswith("*") or pending:
             head = pending + line
-            if head.endswith(","):  # the keyword line goes on
+            if head.endswith(","):  # the keyword line continues
                 pending = head
                 continue
             pending = ""
@@ -200,7 +200,7 @@ def refuse_unread(where: str, blocks: list[DeckBlock]) -> None:
 
 
 def _one_part(where: str, blocks: list[DeckBlock]) -> tuple[list[DeckBlock], list[str]]:
-    """Return the blocks of a deck without parts, or of its only part, and what was left out."""
+    """Return the blocks of a deck without parts, or of its only part, and the omitted ones."""
     parts = [b for b in blocks if b.keyword == "PART"]
     instances = [b for b in blocks if b.keyword == "INSTANCE"]
     if not parts and not instances:
@@ -242,7 +242,7 @@ def _one_part(where: str, blocks: list[DeckBlock]) -> tuple[list[DeckBlock], lis
 
 
 def _left_out(blocks: list[DeckBlock]) -> list[str]:
-    """Name what has to do with the mesh but is not read."""
+    """Name the keywords that affect the mesh but are not read."""
     counts: dict[str, int] = {}
     for block in blocks:
         if block.keyword in ("SURFACE", "TIE", "MPC", "EQUATION", "COUPLING", "RIGID BODY", "TRANSFORM"):

@@ -178,7 +178,7 @@ def balance(placed: PlacedLaw, values: Array, where: str) -> list[str]:
         lost = [k for k in range(6) if k not in ACTS[acts] and wrench[m, k] != 0.0]
         if lost and marker.body >= 0:
             names = ", ".join(row_name(placed, 6 * m + k) for k in lost)
-            found.append(f"{where}: {names}: written, but acts = {acts!r} leaves it out, so that it does nothing")
+            found.append(f"{where}: {names}: written, but acts = {acts!r} excludes it, so that it has no effect")
     if law.is_opposite and not np.allclose(wrench[0, :3], -wrench[1, :3], rtol=ROUNDING, atol=0.0):
         forces = " and ".join(str(np.round(each, 6).tolist()) for each in wrench[:, :3])
         found.append(f"{where}: is_opposite says the forces on both markers are opposite, got {forces}")

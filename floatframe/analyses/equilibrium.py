@@ -162,7 +162,7 @@ class StatesAtRest:
 
 @dataclass(eq=False)
 class Progress:
-    """The least values of the decreasing quantities on the way to an equilibrium, and when they last fell to half."""
+    """Minima of the decreasing quantities on the way to an equilibrium, and when they last halved."""
 
     #: least forces, constraint errors and changes of states
     least: Array = field(default_factory=lambda: np.full(3, np.inf))
@@ -373,13 +373,13 @@ def steady_rotation(
         return found
     lost = indefinite_masses(system, found.state)
     why = (
-        f"loads at or above buckling bend it too far, or it lies far away; {indefinite_mass_words(lost)}"
+        f"loads at or above buckling deform it too far, or the equilibrium is far away; {indefinite_mass_words(lost)}"
         if lost
-        else f"forces are out of balance by {found.error:.2g} of those at work, most at body "
+        else f"forces are out of balance by {found.error:.2g} of the acting forces, most at body "
         f"{worst_body(compiled, found.W, found.forces)!r}{states.words(tolerance)}; hold what can fall or drift, start "
         "nearer (from the state under a part of the loads), or add damping and integrate until it rests"
     )
-    stood = f", the last {PATIENCE} of which led no nearer" if found.has_stood else ""
+    stood = f", without progress in the last {PATIENCE}" if found.has_stood else ""
     words = f"no equilibrium found in {found.iteration} steps{stood}{tried}: {why}"
     raise ConvergenceError(words, t=0.0, h=0.0, residual=found.error)
 
@@ -417,8 +417,8 @@ def words_of(led: LoadPathEnd, is_stable: bool) -> str:
     if led.n_solves == 0:
         return ""
     if led.p == 1.0 and not is_stable:
-        return f", and by loads that grow ({led.n_solves} solves) only one that the least push makes it leave"
-    return f", nor by loads that grow ({led.n_solves} solves, to {100 * led.p:.3g} % of them)"
+        return f", and increasing loads ({led.n_solves} solves) lead only to an unstable one"
+    return f", nor by increasing loads ({led.n_solves} solves, up to {100 * led.p:.3g} % of them)"
 
 
 def led_by_loads(

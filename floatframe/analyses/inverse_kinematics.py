@@ -280,7 +280,7 @@ class Search:
 
 
 def least_within(A: Array, e: Array, mu: float, X: Array, lower: Array, upper: Array) -> Array:
-    """Return a with least |A a - e|² + mu |a|² and lower <= X a <= upper, (n,), by Lawson and Hanson's least distance.
+    """Return the a that minimises |A a - e|² + mu |a|² with lower <= X a <= upper, (n,), by Lawson and Hanson's method.
 
     With H = AᵀA + mu 1 = L Lᵀ and z = Lᵀ a - L⁻¹ Aᵀ e, it is the shortest z with C z >= d, found by nonnegative least
     squares. Bounds that a = 0 violates only by rounding are taken as satisfied.

@@ -108,7 +108,7 @@ class Tangents:
         Z /= np.linalg.norm(Z, axis=0)
         JZ = self.J.T @ Z
         size = np.linalg.norm(JZ, axis=0)
-        if (size <= RANK * size.max()).any():  # a multiplier that moves nothing
+        if (size <= RANK * size.max()).any():  # a multiplier without effect
             size = np.maximum(size, RANK * size.max())
         left, values, right = la.svd(JZ / size, full_matrices=False)
         known = values > RANK * values[0]

@@ -64,8 +64,9 @@ class ValidityNote:
         """Return the problem as text."""
         if self.kind == "steps":
             return (
-                f"the steps put it off by about {100 * self.largest:.2g} % of the motion (limit {100 * self.limit:g} "
-                "%), as some of them taken again in halves tell"
+                f"the error of the steps is about {100 * self.largest:.2g} % of the motion (limit {100 * self.limit:g} "
+                "%), "
+                "estimated by repeating some of them as half steps"
             )
         if self.kind == "energy":
             return (
@@ -79,12 +80,13 @@ class ValidityNote:
             )
         if self.kind == "angles":
             return (
-                f"it turns about several axes so far that its angles, the components of the rotation vector, are "
+                f"it rotates so far about several axes that its angles, the components of the rotation vector, are "
                 f"{100 * self.largest:.2g} % off Cardan angles (limit {100 * self.limit:g} %)"
             )
         if self.kind == "tilt":
             return (
-                f"its shaft tilts so far that the sine, by which its moment goes, is {100 * self.largest:.2g} % below "
+                f"its shaft tilts so far that its sine, on which the moment depends, is {100 * self.largest:.2g} % "
+                "below "
                 f"the angle (limit {100 * self.limit:g} %)"
             )
         if self.kind == "rotation":
@@ -92,13 +94,13 @@ class ValidityNote:
         if self.kind == "inertia":
             return (
                 f"it turns with {self.largest:.3g} of its lowest frequency as held (limit {self.limit:g}), while "
-                f"inertia terms are left out: by the order of {self.largest**2:.1g} of its size its "
-                "deformation is not known"
+                f"inertia terms are omitted: the relative error of its deformation is of the order of "
+                f"{self.largest**2:.1g}"
             )
         if self.kind == "speed":
             return f"it turns with {self.largest:.3g} of its lowest frequency as held (limit {self.limit:g})"
         if self.is_stiffened:
-            return f"its loads reach {self.largest:.3g} of those that buckle it (limit {self.limit:g})"
+            return f"its loads reach {self.largest:.3g} of its buckling loads (limit {self.limit:g})"
         change = f"{100 * self.largest:.3g} % (limit {100 * self.limit:g} %)"
         if self.has_matrices:
             return f"its loads change its stiffness by {change}"
@@ -110,7 +112,7 @@ class ValidityNote:
         if not self.is_of_a_frame:
             return self.advice
         if self.kind == "inertia":
-            return "import it with its full mass matrix, nodal masses, or mesh and density beside (cms import)"
+            return "import it with its full mass matrix, nodal masses, or mesh and density (cms import)"
         if self.kind == "rotation" and 0 <= self.in_mean_axes < self.largest:
             frame = 'take mean axes (cms frame --to tisserand, [body] frame = "tisserand")'
             if self.in_mean_axes <= self.limit:

@@ -253,7 +253,7 @@ class ResultsWriter:
         try:
             action()
         except OSError as error:
-            kept = f"; closed segments stay in {str(self.folder)!r}" if self.n_segments else ""
+            kept = f"; closed segments remain in {str(self.folder)!r}" if self.n_segments else ""
             raise ResultsError(f"results file {str(self.path)!r}: cannot be written: {reason(error)}{kept}") from error
 
     def write_file(self, path: Path, fill: Callable[[h5py.File], None]) -> None:

@@ -74,7 +74,7 @@ def test_a_held_body_passes_the_checks_and_is_not_asked_to_be_free(held, reduced
     records = {record.name: record for record in check_reduction(held, modes, reduced)}
     assert [name for name, record in records.items() if record.verdict == "fail"] == []
     assert records["grounding"].verdict == "info"
-    assert "held to the ground, as it was said" in records["grounding"].reason
+    assert "held to the ground, as declared" in records["grounding"].reason
     assert records["same-body"].verdict == records["free-frequencies"].verdict == "pass"
 
 
@@ -112,17 +112,17 @@ def read_version(path):
 
 
 def test_a_floating_frame_refuses_it(reduced):
-    with pytest.raises(ModelError, match=r"'cantilever' is held to the ground, and a floating frame carries"):
+    with pytest.raises(ModelError, match=r"'cantilever' is held to the ground, but a floating frame needs"):
         ff.FlexibleBody("part", reduced)
 
 
 def test_frames_of_free_and_held_bodies_are_not_exchanged(held, reduced):
-    with pytest.raises(BodyError, match=r"its frame is the ground: leave the frame out"):
+    with pytest.raises(BodyError, match=r"its frame is the ground: omit the frame"):
         cms.reduce(held, cms.guyan(held), frame=TisserandFrame())
     body = cms.couple(bar(nx=3, kind="hexahedron"))
-    with pytest.raises(BodyError, match=r"is free; a HeldFrame is that of a body which is held"):
+    with pytest.raises(BodyError, match=r"is free; a HeldFrame is for a body that is held"):
         cms.reduce(body, cms.guyan(body), frame=HeldFrame())
-    with pytest.raises(BodyError, match=r"reduce it anew with or without its supports"):
+    with pytest.raises(BodyError, match=r"reduce it again with or without its supports"):
         cms.convert_frame(reduced, TisserandFrame())
 
 

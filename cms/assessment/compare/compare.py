@@ -141,7 +141,7 @@ def compare(
 
 
 def check_request(options: Mapping[str, Any], counts: Sequence[int]) -> None:
-    """Refuse what cannot be compared, before any work."""
+    """Raise an error before any work if a comparison is impossible."""
     if not options:
         raise CompareError(f"sets: expected at least one mode set; choices: {', '.join(sorted(MODE_SETS))}")
     for name in options:
@@ -152,7 +152,7 @@ def check_request(options: Mapping[str, Any], counts: Sequence[int]) -> None:
 
 
 def progress_of(advance: Any) -> Callable[[int, int], None] | None:
-    """Return what shows the progress of a stage that takes the finished fraction, if it takes one."""
+    """Return the progress display of a stage that reports its finished fraction, if there is one."""
     return (lambda done, all_: advance(done / all_)) if callable(advance) else None
 
 
@@ -167,7 +167,7 @@ def provenance(body: FEBody) -> dict[str, str]:
 
 
 class _Clock:
-    """Seconds of the stages, beside what the caller shows of them."""
+    """Times of the stages, with the progress display of the caller."""
 
     def __init__(self, stage: Stage | None) -> None:
         self.seconds: dict[str, float] = {}
@@ -190,7 +190,7 @@ class _Timed:
         self._clock.seconds[self._name] = time.perf_counter() - self._began
 
 
-# the surface of a body and its free modes, thinned out to what a screen shows -----------------------------------------
+# surface of a body and its free modes, thinned to the resolution of a screen ------------------------------------------
 
 
 MOST_TRIANGLES = 16_000  #: of a surface on the screen
@@ -252,8 +252,8 @@ def stiffness_lines(body: FEBody) -> IntArray:
     return pairs[:MOST_LINES].astype(np.int64)
 
 
-# mode sets of a comparison as tasks: a worker makes the body and its families once, and judges many parts with them
-# What a part gives does not depend on those that its worker judged before.
+# mode sets of a comparison as tasks: a worker makes the body and its families once, and assesses many parts with them.
+# The result of a part does not depend on earlier parts of its worker.
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,7 +266,7 @@ class SetTask:
 
 
 class SetJudge:
-    """The function that judges a task; the body and all that follows from it stay in the worker for the next one.
+    """The function that assesses a task; the body and all derived data remain in the worker for the next task.
 
     Parameters
     ----------

@@ -15,9 +15,9 @@ __all__ = ["Comparison", "Drawing", "FullResults", "Point", "SetResult"]
 class Point:
     """A mode set with one number of vibration modes."""
 
-    n_modes: int  #: vibration modes asked for
+    n_modes: int  #: number of requested vibration modes
     n_columns: int  #: columns of the set
-    n_q: int  #: independent elastic shapes that are left: generalised coordinates of the reduced body
+    n_q: int  #: number of remaining independent elastic shapes: generalised coordinates of the reduced body
     dropped: tuple[str, ...]  #: labels of redundant columns
     records: tuple[QualityRecord, ...]
     is_good: bool  #: whether every deciding record passes
@@ -37,7 +37,7 @@ class SetResult:
     name: str  #: key in the registry
     words: str  #: what its columns are
     points: tuple[Point, ...]  #: by ascending number of modes; empty where the set could not be made
-    shown: int | None  #: index of the point that details are given for; None where there is none
+    shown: int | None  #: index of the point with details; None if there is none
     verdict: Literal["pass", "warn", "fail", "error"]  #: the worst that decides, at the shown point; "error": not made
     sentence: str  #: why, in words
     columns: Mapping[str, int] = field(default_factory=dict)  #: family -> number of columns of the shown point
@@ -54,7 +54,7 @@ class FullResults:
     """What the full model answers, as far as reports show it."""
 
     frequencies_hz: Array  #: elastic free modes that were found, (n_modes,)
-    n_band: int  #: how many of them are in the band
+    n_band: int  #: number of them in the band
     band_hz: float  #: highest frequency of the comparison
     response_hz: Array  #: frequencies of the response, (n_f,)
     response: Array  #: magnitude of the entry that is drawn, (n_f,) [length / force]
@@ -65,14 +65,14 @@ class FullResults:
     force: Array | None  #: of the pulse, its peak 1, (n_t,); None for a given motion
     motion_words: str
     mass: Array  #: of the body in x, y, z and about those axes through the centre of mass, (6,)
-    held_mass: Array  #: of it, what moves while the interfaces are held, (6,)
+    held_mass: Array  #: part of it that moves while the interfaces are held, (6,)
     was_cached: bool  #: whether it came from the file of an earlier comparison
     digest: str  #: of what it depends on
 
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """A surface, or lines where there is none, and the free modes of the full model on it."""
+    """A surface, or lines if there is none, and the free modes of the full model on it."""
 
     nodes: Array  #: (n, 3) [length unit]
     triangles: IntArray  #: (n_tri, 3)

@@ -1,4 +1,4 @@
-"""Small coordinates in which many subsets of one mode set are judged without touching the mesh again.
+"""Coordinates in a small basis, in which many subsets of one mode set are assessed without the mesh.
 
 All that a comparison looks at (rigid-body and free modes, static responses, the columns of a mode set) is written in
 one basis Q, orthonormal in W = K + omega_1² M. Then K, M and every displacement are small dense arrays, the W-norm is
@@ -18,7 +18,7 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["Coordinates", "ReferenceBasis"]
 
-NOISE = 1e-11  #: W-length of what is left of a unit column, below which it is rounding
+NOISE = 1e-11  #: W-length of the remainder of a unit column, below which it is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ class ReferenceBasis:
         self._nodal = self._translations(self._Q.X)
 
     def coordinates(self, columns: Array) -> Coordinates:
-        """Return the coordinates of a mode set's columns, (n_dof, n_columns), beside the reference.
+        """Return the coordinates of a mode set's columns relative to the reference, (n_dof, n_columns).
 
         (1) unit columns in the W-norm; what lies in the span of the reference taken off, twice
         (2) W-orthonormal basis Q_V of what is left
@@ -100,14 +100,14 @@ class ReferenceBasis:
         )
 
     def _translations(self, X: Array) -> Array:
-        """Return the translations of all nodes, those of rigid interfaces among them, (3 n_nodes, k)."""
+        """Return the translations of all nodes, including those of rigid interfaces, (3 n_nodes, k)."""
         return self.body.translations(X).reshape(3 * len(self.body.nodes), X.shape[1])
 
     def _inner(self, Q: Columns, V: Columns) -> Array:
         return inner(Q.KX, V.X) + self.omega2 * inner(Q.MX, V.X)
 
     def _remainder(self, V: Columns) -> Array:
-        """Return unit columns without their part in the reference, those of which more than rounding is left."""
+        """Return unit columns without their part in the reference, if the remainder exceeds rounding."""
         length = np.sqrt(np.maximum(self._length2(V), 0.0))
         rest = V.X / np.where(length > 0, length, 1.0)
         subtract(rest, self._Q.X, self._inner(self._Q, V) / np.where(length > 0, length, 1.0))

@@ -68,7 +68,7 @@ def judged_subset(c: Coordinates, T: Array, labels: tuple[str, ...], rigid: Arra
         If nothing elastic is left.
     """
     U, redundant, condition = independent_subset(T)  # (1)
-    motions = rigid / np.sqrt(omega2_1)  # of unit length: the norm of the coordinates is that of K + omega_1² M
+    motions = rigid / np.sqrt(omega2_1)  # for unit columns: the norm of the coordinates is that of K + omega_1² M
     in_span = U.T @ motions
     rest = motions - U @ in_span
     U = U @ elastic_directions(in_span, rest.T @ rest)  # (2)

@@ -29,8 +29,8 @@ __all__ = ["FullModel", "read_full_model", "reference_digest", "solve_full_model
 
 log = logging.getLogger(__name__)
 
-VERSION = "2"  #: of what is computed; a file of another version is made anew
-MODES_BEYOND = 2.0  #: multiple of the band up to which free modes follow a motion dynamically
+VERSION = "2"  #: version of the computation; a file of another version is computed again
+MODES_BEYOND = 2.0  #: frequency relative to the band up to which free modes respond dynamically
 FIRST_SEARCH = 3  #: free modes found at first for each one in the band; mostly enough for twice its frequency
 MASS_TOLERANCE = 1e-10  #: relative residual of the solutions with M_II
 
@@ -58,8 +58,8 @@ class FullModel:
     port_rigid: Array  #: rigid-body modes at the ports, (6 n_ports, n_r)
     port_error: float  #: estimated error of that response at the top of the band, over its size
     directions: Array  #: geometric rigid-body modes about the centre of mass, (n_dof, 6)
-    held_mass: Array  #: of those directions, what moves while the interfaces are held, (6,) [kg, kg m²]
-    mass: Array  #: of those directions, of the whole body, (6,) [kg, kg m²]
+    held_mass: Array  #: for these directions, the inertia that moves while the interfaces are held, (6,) [kg, kg m²]
+    mass: Array  #: for these directions, the inertia of the whole body, (6,) [kg, kg m²]
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -78,7 +78,7 @@ class FullModel:
 
     @property
     def parts(self) -> dict[str, slice]:
-        """Where the families stand in `columns`."""
+        """Indices of the families in `columns`."""
         slices, at = {}, 0
         for name in ("rigid", "Phi", "Psi_A", "Psi_H", "Psi_L", "moved", "directions"):
             width = getattr(self, name).shape[1]
@@ -91,7 +91,7 @@ class FullModel:
         return np.hstack([getattr(self, name) for name in self.parts])
 
     def ports(self, names: tuple[str, ...]) -> PortModel:
-        """Return the body as it is seen at its interfaces of those names."""
+        """Return the body with ports at the interfaces of those names."""
         return PortModel(names, self.port_omega2, self.port_is_massive > 0.5, self.port_modes, self.port_rigid)
 
 
@@ -220,7 +220,7 @@ def held_mass(families: Families, directions: Array) -> Array:
 
 
 def reference_digest(body: FEBody, *asked: object) -> str:
-    """Return a digest of all that the reference solution depends on: matrices, dofs, interfaces, what was asked for."""
+    """Return a digest of everything that determines the reference solution: matrices, dofs, interfaces, request."""
     digest = hashlib.sha256(repr((VERSION, body.units.name, asked)).encode())
     for matrix in (whole_matrix(body.K), whole_matrix(body.M)):
         for array in (matrix.data, matrix.indices, matrix.indptr):
@@ -246,7 +246,7 @@ def write_full_model(path: Path, full: FullModel, digest: str) -> None:
 
 
 def read_full_model(path: Path, digest: str) -> FullModel | None:
-    """Return the reference solution of that digest, or None if the file holds another one, or none that is whole."""
+    """Return the reference solution with that digest, or None if the file has another one or an incomplete one."""
     if not path.is_file():
         return None
     try:
@@ -255,5 +255,5 @@ def read_full_model(path: Path, digest: str) -> FullModel | None:
                 return None
             return FullModel(**{field.name: file[field.name] for field in fields(FullModel)})
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        log.warning("%s: not a whole reference solution (%s); it is computed anew", path, error)
+        log.warning("%s: not a complete reference solution (%s); it is computed anew", path, error)
         return None

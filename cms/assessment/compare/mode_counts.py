@@ -1,4 +1,4 @@
-"""Numbers of vibration modes in words: "0:30", "0:30:5", "0,2,5,10"."""
+"""Numbers of vibration modes as text: "0:30", "0:30:5", "0,2,5,10"."""
 
 import re
 

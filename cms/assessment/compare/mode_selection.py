@@ -34,12 +34,12 @@ MOST = 300  #: modes at which the search gives up, by default
 
 @dataclass(frozen=True)
 class Trial:
-    """One number of modes and what came of it."""
+    """One number of modes and its result."""
 
     n_modes: int
-    n_columns: int  #: of the mode set, static ones included
+    n_columns: int  #: of the mode set, including static ones
     error: float  #: by the measure; inf where the set lacks a mode of the band, or could not be made
-    where: str  #: of the largest error, in words
+    where: str  #: place of the largest error, for messages
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,7 +234,7 @@ def _by_subspaces(make: _Maker, judge: _Judge, reference: FullReference, error: 
 
 
 def _by_bisection(make: _Maker, judge: _Judge, reference: FullReference, error: float) -> Iterator[Trial]:
-    """Judge sets that are made anew for each number of modes, by doubling and bisection: (3)."""
+    """Assess sets that are recomputed for each number of modes, by doubling and bisection: (3)."""
     basis, n_r = _reference_basis(make, reference)
 
     def tried(n: int) -> Trial:
@@ -263,7 +263,7 @@ def _by_bisection(make: _Maker, judge: _Judge, reference: FullReference, error: 
 
 
 def _reference_basis(make: _Maker, reference: FullReference) -> tuple[ReferenceBasis, int]:
-    """Small coordinates of rigid-body and free modes, and the number of the rigid-body ones."""
+    """Coordinates of rigid-body and free modes in the small basis, and the number of rigid-body modes."""
     N = make.families.free.N
     columns, n_r = np.hstack([N, reference.modes.Phi]), N.shape[1]
     return ReferenceBasis(make.families, reference.ports, columns, n_r, float(reference.modes.omega2[0])), n_r

@@ -1,4 +1,4 @@
-"""What a comparison asks of the full model, its answer, and where that answer is kept."""
+"""A request of a comparison to the full model, its result, and the file of this result."""
 
 import hashlib
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ POINTS = 800  #: frequencies of the response: peaks are drawn round
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """What is asked of the full model."""
+    """The request to the full model."""
 
     pulse: Pulse  #: of the default motion
     damping: float  #: ratio of every mode in response and motion
@@ -48,7 +48,7 @@ class Question:
 
     @property
     def key(self) -> str:
-        """What tells this question from others."""
+        """Identification of this request."""
         motion = hashlib.sha256()
         if self.motion is not None:
             for part in (self.motion.columns, self.motion.amplitudes, self.motion.t):
@@ -90,7 +90,7 @@ def solution(families: Families, question: Question, *, n_expected: int = 0, cac
 
 
 def reference_of(families: Families, full: FullModel, damping: float) -> Reference:
-    """Return what every set is judged by."""
+    """Return the reference data of every set."""
     body = families.body
     time_ = body.units.time
     names = tuple(interface.name for interface in body.interfaces)
@@ -109,7 +109,7 @@ def reference_of(families: Families, full: FullModel, damping: float) -> Referen
 
 
 def full_results(reference: Reference, question: Question, solved: Solution) -> FullResults:
-    """Return what reports show of the full model."""
+    """Return the data of the full model for reports."""
     full, response, time_ = solved.full, reference.response, reference.time
     out, into = reference.drawn
     pulse, is_default = question.pulse, question.motion is None

@@ -43,7 +43,7 @@ def set_result(
     basis: ReferenceBasis,
     reference: Reference,
 ) -> SetResult:
-    """Return the result of one set; where it cannot be made, its sentence says why."""
+    """Return the result of one set; if it cannot be made, its sentence gives the reason."""
     return joined_parts(name, [set_part(name, options, counts, families, basis, reference)])
 
 
@@ -138,7 +138,7 @@ def judged_points(
 
 
 def refused_words(refused: Mapping[int, str]) -> str:
-    """Say which numbers of modes could not be had; the first reason stands for all."""
+    """Name the numbers of modes that were impossible, with the first reason."""
     if not refused:
         return ""
     numbers = ", ".join(str(n) for n in sorted(refused))
@@ -146,7 +146,7 @@ def refused_words(refused: Mapping[int, str]) -> str:
 
 
 def without_curves(point: Point) -> Point:
-    """Return the point with the values and sentences of its records; frequencies and effective masses stay."""
+    """Return the point with only values and sentences of its records, and frequencies and effective masses."""
     kept = ("frequency-error", "effective-mass")
     records = (record if record.name in kept else replace(record, data={}) for record in point.records)
     return replace(point, records=tuple(records))

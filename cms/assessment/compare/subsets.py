@@ -36,7 +36,7 @@ def column_subset(modes: ModeSet, at_b: Array, n_modes: int) -> tuple[Array, tup
 
 
 def residual_subset(modes: ModeSet, at_b: Array, n_modes: int) -> tuple[Array, tuple[str, ...]]:
-    """Take fewer free modes; what those that go carried statically returns to the residual attachment modes.
+    """Use fewer free modes; the static contribution of the removed modes is added to the residual attachment modes.
 
     residual_n = Psi_U - Phi_n Lambda_n⁻¹ Phi_n,Bᵀ = residual_N + sum over n < k <= N of phi_k omega_k⁻² phi_k,Bᵀ, for
     M-orthonormal phi_k; parameters and returns as `column_subset`.
@@ -66,8 +66,8 @@ def _kept(modes: ModeSet, n_modes: int) -> IntArray:
     return np.sort(np.concatenate([np.flatnonzero(modes.is_static), vibration])).astype(np.int64)
 
 
-#: sets that are made once, with the most modes; others are made anew for each number of modes ("multilevel", whose tree
-#: keeps what the highest frequency asks for)
+#: sets that are made once, with the largest number of modes; others are recomputed for each number ("multilevel", whose
+#: tree depends on the highest frequency)
 SUBSETS: dict[str, Subset] = {
     "guyan": whole_set,
     "craig-bampton": column_subset,

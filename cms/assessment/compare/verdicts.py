@@ -25,7 +25,7 @@ __all__ = [
 ]
 
 EXACT = 1e-8  #: value that reads as exact in a sentence
-#: records that decide whether a set is good enough, and what they are called in a sentence
+#: records that decide whether a set is good enough, and their names in a sentence
 DECIDING = {
     "frequency-error": "free frequencies",
     "mac": "mode shapes (1 - MAC)",
@@ -35,7 +35,7 @@ DECIDING = {
     "frequency-response": "frequency response",
     "deformation-error": "deformation in the motion",
 }
-#: records that are told beside them, and decide nothing
+#: further records that are reported and decide nothing
 DOUBTS = {
     "residual-bound": "residual bound",
     "effective-mass": "missing effective mass",
@@ -45,12 +45,12 @@ DOUBTS = {
 
 
 def is_good(records: Sequence[QualityRecord]) -> bool:
-    """Whether every deciding record passes; what does not apply ("info") does not decide."""
+    """Whether every deciding record passes; "info" (not applicable) does not decide."""
     return all(record.verdict in ("pass", "info") for record in records if record.name in DECIDING)
 
 
 def severity(points: Sequence[Point]) -> Literal["pass", "warn", "fail"]:
-    """Return the worst verdict of the deciding records at the shown point: what `cms check` says of that reduction."""
+    """Return the worst verdict of the deciding records at the displayed point, as in `cms check`."""
     shown = shown_point(points)
     if shown is None:
         return "fail"
@@ -77,7 +77,7 @@ def shown_point(points: Sequence[Point]) -> int | None:
 
 
 def set_sentence(points: Sequence[Point]) -> str:
-    """Say with how many modes a set is good enough and what fewer would miss, or what is missing with the most."""
+    """Say with how many modes a set is good enough and which limits fewer miss, or what the largest number misses."""
     shown = shown_point(points)
     if shown is None:
         return "it has no columns to judge"
@@ -121,7 +121,8 @@ def answer(sets: Sequence[SetResult], order: Sequence[str], band_hz: float) -> s
         if not tried:
             return "No mode set could be made; the reasons stand below."
         severe = ("pass", "warn", "fail", "error")
-        nearest_ = min(tried, key=lambda result: (severe.index(result.verdict), len(missed(result.detail))))  # type: ignore[arg-type]
+        # type: ignore[arg-type]
+        nearest_ = min(tried, key=lambda result: (severe.index(result.verdict), len(missed(result.detail))))
         assert nearest_.detail is not None
         what = ", ".join(DECIDING[record.name] for record in missed(nearest_.detail))
         return (
@@ -185,7 +186,7 @@ def modes_words(n_modes: int) -> str:
 
 
 def number_words(value: float | None) -> str:
-    """Return a number without unit as reports write it; words for what is missing."""
+    """Return a number without unit as in reports; words for missing ones."""
     if value is None:
         return "none"
     return share(value) if math.isfinite(value) else "with modes missing"

@@ -165,7 +165,7 @@ class Correlation:
     #: orthogonality of the paired measured shapes in the mass of the model, (n, n); None: unknown
     orthogonality: Array | None
     cross_orthogonality: Array | None  #: orthogonality of the paired measured shapes to their partners, (n, n)
-    why_not: str = ""  #: reason why there is no orthogonality
+    why_not: str = ""  #: reason if there is no orthogonality
 
     @property
     def errors(self) -> Array:

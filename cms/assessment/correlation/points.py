@@ -73,7 +73,7 @@ def pair_points(measured: MeasuredModes, model: ModelModes, placement: Placement
     if len(rest):
         if np.isnan(places[rest]).any():
             raise CorrelationError(
-                f'measured point {points[rest[0]]}: has no place; give match = "number", or its node by hand'
+                f'measured point {points[rest[0]]}: has no position; give match = "number", or its node by hand'
             )
         found[rest] = cKDTree(model.nodes).query(places[rest])[1]
     away = np.linalg.norm(places - model.nodes[found], axis=1)

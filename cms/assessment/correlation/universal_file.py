@@ -41,7 +41,7 @@ def read_universal(path: Path, length: float, *, given: float | None = None) -> 
         file = pyuff.UFF(str(path))
         kinds = [int(kind) for kind in file.get_set_types()]
         sets = [(kind, file.read_sets(k)) for k, kind in enumerate(kinds) if kind in (*NODES, SHAPES, UNITS)]
-    except Exception as error:  # whatever error the reader raises for a damaged file, the user gets one message
+    except Exception as error:  # one message for any error that the reader raises for a damaged file
         words = f"{type(error).__name__}: {error}"[:200]
         raise CorrelationError(f"{path}: could not be read as a universal file: {words}") from error
     metre = unit_of_length(path, [block for kind, block in sets if kind == UNITS], given)
@@ -70,7 +70,7 @@ def read_universal(path: Path, length: float, *, given: float | None = None) -> 
         np.array([mode["damping"] for mode in found]) if any(mode["damping"] for mode in found) else np.zeros(0),
         phase_collinearity(shapes) if is_complex else np.zeros(0),
         str(path),
-        ("complex shapes, each turned to its main phase",) if is_complex else (),
+        ("complex shapes, each rotated to its main phase",) if is_complex else (),
     )
 
 

@@ -1,4 +1,4 @@
-"""Everything a reduced body can be asked without its full model."""
+"""All checks of a reduced body without its full model."""
 
 from cms.assessment.quality.of_body.buckling import check_buckling
 from cms.assessment.quality.of_body.effective_mass import check_driven_mass
@@ -66,7 +66,7 @@ BODY_CHECKS = (
 
 
 def check_body(reduced: ReducedBody) -> tuple[QualityRecord, ...]:
-    """Check a reduced body by itself: whether it says one thing, and what it asks of its user.
+    """Check a reduced body on its own: whether its data are consistent, and what it requires of its user.
 
     Returns
     -------

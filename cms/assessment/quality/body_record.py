@@ -110,7 +110,7 @@ def body_record(body: ReducedBody) -> dict[str, Any]:
 
 
 def numbering_record(body: ReducedBody) -> dict[str, Any]:
-    """Return what the user's numbers cover, the sets, and the points with rotations, in plain types."""
+    """Return summaries of the user's numbers, of the sets, and of the points with rotations, as plain types."""
     numbering = body.numbering
     sources = () if body.kept is None else body.kept.source
     return {

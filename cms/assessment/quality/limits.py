@@ -9,15 +9,15 @@ __all__ = ["LIMITS", "Limit"]
 class Limit:
     """What a value without unit may be."""
 
-    title: str  #: of the record, in words
+    title: str  #: title of the record
     tolerance: float | None  #: largest value that passes; None: information only
     failing: float | None  #: above it fails, between both is a warning; None: never fails
-    action: str  #: what to do when it does not pass
+    action: str  #: remedy if it does not pass
 
 
 REDUCE_AGAIN = "reduce the body again; the file does not say one thing"
 LIMITS: dict[str, Limit] = {
-    # A reduced body alone: does it say one thing? ----------------------------------------------------------------
+    # A reduced body on its own: consistency of its data ----------------------------------------------------------
     "symmetry": Limit("symmetry of M, K, D and moments", 1e-9, 1e-6, REDUCE_AGAIN),
     "definiteness": Limit(
         "no negative mass, stiffness or damping", 1e-9, 1e-6,

@@ -6,7 +6,7 @@ __all__ = ["factor", "share", "superscript"]
 
 
 def share(value: float) -> str:
-    """Return a number without unit: percent where that reads well, powers of ten below, a dash for what is missing."""
+    """Return a number without unit: as percent if readable, as powers of ten below, a dash if missing."""
     if math.isnan(value):
         return "\u2013"
     if math.isinf(value):

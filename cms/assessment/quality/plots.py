@@ -1,4 +1,4 @@
-"""Plots of quality results; they draw what was computed and compute nothing."""
+"""Plots of quality results, which draw computed data and compute nothing."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING

@@ -28,10 +28,10 @@ class QualityRecord:
     name: str  #: key in `LIMITS`, such as "frequency-error"
     title: str  #: the same in words
     value: float  #: without unit; NaN where the question does not apply
-    tolerance: float | None  #: largest value that passes; None: nothing is judged
+    tolerance: float | None  #: largest value that passes; None: no verdict
     verdict: Verdict
-    reason: str  #: what was found, in one sentence with its numbers
-    action: str  #: what to do next; "" where nothing is to be done
+    reason: str  #: finding, in one sentence with its numbers
+    action: str  #: remedy; "" if none is needed
     data: Mapping[str, Any] = field(default_factory=dict)  #: arrays, numbers and words behind it, for tables and plots
 
     def __post_init__(self) -> None:
@@ -105,7 +105,7 @@ def has_failed(records: Iterable[QualityRecord]) -> bool:
 
 
 def plain(value: Any) -> Any:
-    """Return a value in the types of JSON: lists, numbers, text; what is not finite becomes None."""
+    """Return a value in the types of JSON: lists, numbers, text; non-finite numbers become None."""
     if isinstance(value, np.ndarray):
         if np.iscomplexobj(value):
             return {"real": plain(value.real), "imag": plain(value.imag)}

@@ -1,4 +1,4 @@
-"""Everything a mode set and its reduced body can be asked against the full model."""
+"""All checks of a mode set and its reduced body against the full model."""
 
 from dataclasses import replace
 
@@ -45,7 +45,7 @@ def check_reduction(
     own: tuple[QualityRecord, ...] | None = None,
     options: ReductionOptions | None = None,
 ) -> tuple[QualityRecord, ...]:
-    """Check a reduced body by itself and against its full model.
+    """Check a reduced body on its own and against its full model.
 
     Parameters
     ----------

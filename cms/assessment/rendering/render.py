@@ -128,7 +128,7 @@ def run_worker(scene: Scene, scene_path: Path, out: Path, options: tuple[str, ..
         try:
             is_silent = follow(worker, tell)
         finally:
-            worker.kill()  # does nothing if it has ended; an interrupted caller leaves no process
+            worker.kill()  # no effect if it has ended; an interrupted caller leaves no process
             code = worker.wait()
             if worker.stdout is not None:
                 worker.stdout.close()

@@ -29,7 +29,7 @@ __all__ = [
     "response_section",
 ]
 
-#: what the chart of each record shows
+#: descriptions of the charts of the records
 SEEN = {
     "frequency-error": "Largest error of the elastic free-free frequencies in the band. Reduced frequencies are bounds "
     "from above, so the lines can only fall; where a set has fewer modes than the band it has no point yet.",

@@ -24,7 +24,7 @@ MARKS = {
     "fail": "\u2715 not good enough",
     "error": "! could not be made",
 }
-#: short headings of the deciding records, and what their charts show
+#: short headings of the deciding records, and descriptions of their charts
 COLUMNS = {
     "frequency-error": "free frequencies",
     "mac": "shapes (1\u2009\u2212\u2009MAC)",

@@ -1,1 +1,1 @@
-"""Writers for the file formats of multibody programs; each reports what its format cannot hold."""
+"""Writers for the file formats of multibody programs; each reports data that its format cannot hold."""

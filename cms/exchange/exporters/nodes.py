@@ -26,7 +26,7 @@ class NodeList:
     words: tuple[str, ...] = ()  #: notes about the origin of the numbers
 
     def notes(self) -> tuple[str, ...]:
-        """Return 'interface left: node 17' for each interface, and what is unknown at other nodes."""
+        """Return 'interface left: node 17' for each interface, and the unknown data of other nodes."""
         at = (f"interface {name}: node {self.numbers[row]}" for name, row in self.of_interface.items())
         found = (*self.words, *at)
         unknown = int((~self.has_rotation).sum())

@@ -1,4 +1,4 @@
-"""Common parts of all writers of foreign formats: request, result, header, and what a format cannot hold."""
+"""Common parts of all writers of foreign formats: request, result, header, and lists of lost data."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -13,12 +13,12 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["CONTENT", "Request", "Writer", "WrittenFiles", "in_ascii", "left_out"]
 
-OWN_AXES = "axes of the interfaces that are turned against those of the file"
+OWN_AXES = "axes of the interfaces that are rotated relative to those of the file"
 TURNED = 1e-12  #: difference of a direction cosine that is more than rounding
 
 
 def is_turned(axes: Array) -> bool:
-    """Return whether the axes differ from those in which they are written."""
+    """Return whether the axes of an interface differ from those of the file."""
     return bool(np.abs(axes - np.eye(3)).max() > TURNED)
 
 
@@ -82,7 +82,7 @@ class WrittenFiles:
 
 @dataclass(frozen=True)
 class Writer:
-    """One format: its function, and what it can hold."""
+    """One format: its function, and the data that it can hold."""
 
     make: Callable[[Request], WrittenFiles]
     holds: frozenset[str] = field(default_factory=frozenset)  #: keys of `CONTENT`
@@ -93,7 +93,7 @@ class Writer:
 
 
 def left_out(body: ReducedBody, holds: Iterable[str]) -> tuple[str, ...]:
-    """Describe what a body has but a format with this content does not."""
+    """Describe the data of a body that a format with this content cannot hold."""
     held = set(holds)
     return tuple(words for key, (words, has) in CONTENT.items() if key not in held and has(body))
 

@@ -1,1 +1,1 @@
-"""Bodies that another program has reduced, as our reduced body; what they do not say stays missing and is said so."""
+"""Bodies reduced by another program, as our reduced bodies; data that they lack are marked as missing."""

@@ -1,4 +1,4 @@
-"""Rows of a superelement that another program calls forces and stresses of elements: what they are, in our words.
+"""Forces and stresses of elements in the rows of a superelement from another program, with our names.
 
 Nastran numbers the items of an element force or stress by its output record, in whose order they stand below. Types
 that are not here have a record of several places (beams with stations, shells with corners), or one item that is a
@@ -70,7 +70,7 @@ class ForeignRows:
 
     names: tuple[RowName, ...]
     matrix: Array  #: (n_rows, n_dof)
-    about: str = ""  #: what has to be known of them, in words
+    about: str = ""  #: data that must be known of them, for messages
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "matrix", frozen(self.matrix))
@@ -81,7 +81,7 @@ class ForeignRows:
 
 
 def force_rows(elements: IntArray, matrix: Array) -> tuple[ForeignRows, tuple[str, ...]]:
-    """Return the element forces of known types, and in words which were left out.
+    """Return the element forces of known types, and descriptions of the omitted ones.
 
     Parameters
     ----------

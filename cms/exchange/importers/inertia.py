@@ -1,4 +1,4 @@
-"""Inertia that a reduced mass matrix does not say, from what is given beside: full mass, nodal masses, a mesh."""
+"""Inertia that a reduced mass matrix lacks, from additional data: full mass, nodal masses, a mesh."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -24,7 +24,7 @@ __all__ = [
     "moments_of_masses",
 ]  # fmt: skip
 
-EXACT = 1e-6  #: difference of what both routes know, of its size, up to which both are one mass distribution
+EXACT = 1e-6  #: difference of the quantities that both routes give, relative to their size, up to which they agree
 #: the same, beyond which these are two bodies; lumping moves the second moment of a coarse mesh by some per cent
 OTHER_BODY = {"mass": 0.02, "first moment": 0.1, "second moment": 0.1}
 
@@ -79,7 +79,7 @@ def full_mass_of(foreign: ForeignMatrices) -> FullMass:
 def moments_of_masses(
     inertia: Inertia, shapes: Shapes, places: Mapping[int, Array], units: Units, frame: BodyFrame
 ) -> tuple[Moments, str]:
-    """Return all moments of the shapes by the masses that are given beside, and in words what they are.
+    """Return all moments of the shapes from the given masses, and a description of these.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def moments_in_frame(gram: Array, frame: BodyFrame, missing: tuple[str, ...] = (
 
 
 def completed(known: Moments, other: Moments, what: str) -> tuple[Moments, str]:
-    """Return moments whose missing parts are those of another route, and in words how both differ where both know.
+    """Return moments with the missing parts from another route, and a description of differences in known parts.
 
     What a reduced mass matrix says stays as it says it: m, S, R, 1C, 2C, M*.
 

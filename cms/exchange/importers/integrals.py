@@ -10,7 +10,7 @@ __all__ = ["moments_of_invariants"]
 
 EPSILON = np.cross(np.eye(3)[:, None], np.eye(3)[None])  #: (a × b)_c = EPSILON_abc a_a b_b, (3, 3, 3)
 CONSISTENT = 1e-6  #: difference of two statements of one invariant, of its size, that is digits of a file
-ROUGH = 0.1  #: the same, up to which the one that the mass matrix says is taken, with a note
+ROUGH = 0.1  #: the same difference, up to which the moment of the mass matrix is used, with a note
 
 
 def moments_of_invariants(
@@ -26,7 +26,7 @@ def moments_of_invariants(
     C4: Array | None = None,
     C5: Array | None = None,
 ) -> tuple[Moments, tuple[str, ...]]:
-    """Return the moments of what a file says, and notes on where it says two things.
+    """Return the moments in a file, and notes on data that it contains twice.
 
     (1) R = ½ tr(J0) 1 - J0
     (2) P_k = ½ tr(3C_k) 1 - 3C_kᵀ, its antisymmetric part by 2C

@@ -35,13 +35,13 @@ __all__ = ["ForeignInterface", "ModalBody", "body_of_modes"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ForeignInterface:
-    """A named place of a foreign body: its nodes, and its motion where the file says that itself."""
+    """A named place of a foreign body: its nodes, and its motion if the file has it."""
 
     name: str
     nodes: IntArray  #: numbers of its nodes, (n,)
     position: Array | None = None  #: in B, (3,)
     triad: Array = field(default_factory=lambda: np.eye(3))  #: columns: its axes in B, (3, 3)
-    Psi: Array | None = None  #: translation and rotation for each mode in B, (6, n_q); None: that of its nodes
+    Psi: Array | None = None  #: translation and rotation for each mode in B, (6, n_q); None: from its nodes
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "nodes", frozen_int(self.nodes))
@@ -66,10 +66,10 @@ class ModalBody:
     node_numbers: IntArray  #: (n_nodes,)
     nodes: Array  #: undeformed places in B, (n_nodes, 3)
     Phi: Array  #: translations of the nodes for each mode, (n_nodes, 3, n_q)
-    rotations: Array | None = None  #: of the nodes for each mode, (n_nodes, 3, n_q); None: not said
+    rotations: Array | None = None  #: of the nodes for each mode, (n_nodes, 3, n_q); None: unknown
     stress: Array | None = None  #: xx yy zz yz xz xy at the nodes for each mode, (n_nodes, 6, n_q)
     surface: IntArray = field(default_factory=lambda: np.zeros((0, 3), np.int64))  #: triangles of rows of `nodes`
-    interfaces: tuple[ForeignInterface, ...] = ()  #: those that the file names
+    interfaces: tuple[ForeignInterface, ...] = ()  #: those named in the file
     load_cases: tuple[ReducedLoadCase, ...] = ()
     geometric: GeometricStiffness | None = None  #: in mean axes; its interfaces are the nodes, in their order
     program: str = ""
@@ -130,8 +130,8 @@ class ModalBody:
 log = logging.getLogger(__name__)
 
 ONE_BODY = 1e-4  #: difference of M* of the integrals from the modal mass, of its largest entry, that is a wrong order
-MEAN_AXES = 1e-8  #: momentum of a mode, of what its mass could carry, that is none: digits of a file
-NO_ENERGY = 1e-13  #: squared frequency of a mode over the largest, up to which it is none
+MEAN_AXES = 1e-8  #: momentum of a mode, relative to the largest possible for its mass, that is rounding of the file
+NO_ENERGY = 1e-13  #: squared frequency of a mode relative to the largest, up to which it is zero
 FEW = 12  #: nodes with rotations that are interfaces each, where nobody names any
 
 
@@ -235,7 +235,7 @@ def require_plausible(where: str, reduced: ReducedBody, accept: tuple[str, ...])
 def geometric_at(
     where: str, body: ModalBody, interfaces: tuple[ReducedInterface, ...], Z: Array
 ) -> GeometricStiffness | None:
-    """Return the geometric stiffness over the new modes, of the nodes that are interfaces; None if one is none."""
+    """Return the geometric stiffness over the new modes, if all interfaces are single nodes; otherwise None."""
     if body.geometric is None:
         return None
     if any(len(interface.members) != 1 for interface in interfaces):
@@ -264,7 +264,7 @@ def free_frequencies(where: str, reduced: ReducedBody) -> Array:
 
 
 def require_one_body(where: str, body: ModalBody) -> None:
-    """Raise `ForeignBodyError` unless the modal mass is that of the integrals, and the mass positive."""
+    """Raise `ForeignBodyError` unless the modal mass agrees with the integrals, and the mass is positive."""
     if not body.moments.m > 0:
         raise ForeignBodyError(f"{where}: expected a mass above zero, got {body.moments.m:g}")
     defect, size = np.abs(body.moments.M - body.M).max(), np.abs(body.M).max()
@@ -276,7 +276,7 @@ def require_one_body(where: str, body: ModalBody) -> None:
 
 
 def momentum_of(moments: Moments) -> float:
-    """Return the largest momentum of a mode over what its mass could carry; modes have unit mass."""
+    """Return the largest momentum of a mode relative to the largest possible for its mass; modes have unit mass."""
     c = moments.center_of_mass
     inertia = np.trace(moments.J0) - 2 * moments.m * float(c @ c)
     angular = moments.C2 - np.cross(c, moments.C1, axis=0)
@@ -293,7 +293,7 @@ def changed(moments: Moments, Z: Array) -> Moments:
 
 
 def interfaces_of(where: str, body: ModalBody, options: ImportOptions) -> Sequence[ForeignInterface]:
-    """Return the interfaces: as asked for, as the file names them, or each of a few nodes with rotations."""
+    """Return the interfaces: as requested, as named in the file, or each of a few nodes with rotations."""
     if options.interfaces is not None:
         wanted: Mapping[str, Sequence[int]] = options.interfaces
         return [ForeignInterface(name, np.array(numbers, dtype=np.int64)) for name, numbers in wanted.items()]
@@ -308,7 +308,7 @@ def interfaces_of(where: str, body: ModalBody, options: ImportOptions) -> Sequen
 def reduced_interface(
     where: str, body: ModalBody, interface: ForeignInterface, Z: Array, places: Mapping[int, int]
 ) -> ReducedInterface:
-    """Return an interface: with the motion that the file says, of a single node that turns, or the mean of several."""
+    """Return an interface with the motion in the file, of a node with rotations, or the mean of several nodes."""
     unknown = [int(number) for number in interface.nodes if int(number) not in places]
     if unknown or (not len(interface.nodes) and interface.Psi is None):
         raise ForeignBodyError(
@@ -341,7 +341,7 @@ def reduced_interface(
 
 
 def label_of(names: tuple[str, ...], share: Array) -> str:
-    """Return the one or two modes of the file that carry most of a mode's energy, in words."""
+    """Describe the one or two modes of the file that contribute most of a mode's energy."""
     order = np.argsort(share)[::-1]
     parts = [order[0]] if share[order[0]] > 0.9 or len(order) < 2 else order[:2]
     return ", ".join(f"{names[k]} ({100 * share[k]:.0f} %)" for k in parts)

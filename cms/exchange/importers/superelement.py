@@ -56,7 +56,7 @@ class Superelement:
     tables: Mapping[str, ForeignRows] = field(default_factory=dict)  #: further rows by name: forces, stresses
     loads: Mapping[str, Array] = field(default_factory=dict)  #: name -> forces over the rows, (n_dof,)
     program: str = ""  #: that wrote the files
-    provenance: Mapping[str, str] = field(default_factory=dict)  #: files, digests, what was assumed
+    provenance: Mapping[str, str] = field(default_factory=dict)  #: files, digests, assumptions
 
     def __post_init__(self) -> None:
         where = f"superelement {self.name!r}"
@@ -132,13 +132,13 @@ def checked_matrix(where: str, matrix: Array, n: int) -> Array:
 
 
 def require_unique(where: str, keys: IntArray, text: str = "{0}: a number is there twice") -> None:
-    """Raise `ForeignBodyError` if a key is there twice."""
+    """Raise `ForeignBodyError` if a key is duplicated."""
     if len(np.unique(keys)) != len(keys):
         raise ForeignBodyError(text.format(where))
 
 
 def listed(numbers: IntArray, most: int = 6) -> str:
-    """Return numbers in words, the first of many."""
+    """Return the first numbers of a list as text."""
     rest = f" and {len(numbers) - most} more" if len(numbers) > most else ""
     return ", ".join(str(int(number)) for number in numbers[:most]) + rest
 
@@ -174,7 +174,8 @@ def superelement_of_matrices(
             f"{where}: {len(foreign.constrained)} rows are held by the other program; write the superelement without "
             "supports: a floating frame carries free bodies"
         )
-    known = {} if foreign.nodes is None else dict(zip(map(int, foreign.node_numbers), foreign.nodes, strict=True))  # type: ignore[arg-type]
+    # type: ignore[arg-type]
+    known = {} if foreign.nodes is None else dict(zip(map(int, foreign.node_numbers), foreign.nodes, strict=True))
     for number, place in (places or {}).items():
         known.setdefault(int(number), np.asarray(place, dtype=float))
     numbers = np.array(sorted(known), dtype=np.int64)

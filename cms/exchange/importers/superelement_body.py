@@ -42,13 +42,13 @@ COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz")
 
 @dataclass(frozen=True, eq=False)
 class ImportOptions:
-    """What the files of another program do not say, and what is wanted of the body."""
+    """Data that the files of another program lack, and the requested properties of the body."""
 
     units: Units  #: of all numbers of the files
     interfaces: Mapping[str, Sequence[int]] | None = None  #: name -> boundary nodes; None: each node with six dofs
-    inertia: Inertia | None = None  #: what the reduced mass does not say; None: it stays missing
+    inertia: Inertia | None = None  #: inertia that the reduced mass lacks; None: it remains missing
     frame: Frame | None = None  #: Tisserand by default
-    damping: Damping | None = None  #: beside that of the files
+    damping: Damping | None = None  #: in addition to that of the files
     repair_mass: bool = False  #: set slightly negative eigenvalues of the mass to zero
     accept: tuple[str, ...] = ()  #: findings that are accepted, such as "units"
 
@@ -105,7 +105,7 @@ def body_of_superelement(element: Superelement, options: ImportOptions) -> Reduc
 
 
 def tables_of(element: Superelement, body: FEBody, Phi: Array, reduced: ReducedBody) -> dict[str, RecoveryTable]:
-    """Return the further rows of a superelement over z = (d, theta, q): all is in its span, nothing is truncated.
+    """Return the further rows of a superelement over z = (d, theta, q); they are in its span, so nothing is truncated.
 
     The files say what x is there, x = T x' with x' the dofs of the body (`static_part`).
     """
@@ -198,7 +198,7 @@ def static_part(element: Superelement, where: str) -> Array:
 
 
 def further_rows(element: Superelement, where: str) -> RecoveryRows:
-    """Return the recovery rows of dofs that are not boundary dofs; those that are must be the boundary dof itself."""
+    """Return the recovery rows of dofs that are not boundary dofs; rows of boundary dofs must equal the dof itself."""
     recovery = element.recovery
     assert recovery is not None
     keys, own = pair_keys(recovery.dofs), pair_keys(element.dofs)

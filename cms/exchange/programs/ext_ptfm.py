@@ -153,7 +153,7 @@ def read_ext_ptfm(files: Sequence[Path], name: str, places: Mapping[int, Array])
 
 
 def matrix_after(path: Path, lines: list[str], word: str) -> Array | None:
-    """Return the matrix behind its heading, None where there is none."""
+    """Return the matrix below its heading, None if it does not exist."""
     starts = [k for k, line in enumerate(lines) if line.startswith(f"!{word} Matrix")]
     if not starts:
         return None

@@ -29,7 +29,7 @@ FILE_VERSION = 1  #: version of the archive, as exudyn 1.9 to 1.13 write it
 
 
 def make_exudyn(request: Request) -> WrittenFiles:
-    """Return the archive FILE.npz and the script FILE.py beside it."""
+    """Return the archive FILE.npz and the script FILE.py."""
     archive = request.path.with_suffix(".npz")
     script = request.path.with_suffix(".py")
     image = io.BytesIO()
@@ -106,7 +106,7 @@ def side_by_side(matrices: Array) -> Array:
 
 
 def members_words(interface: Any) -> str:
-    """Describe to what the script attaches a marker of an interface."""
+    """Describe the object to which the script attaches a marker of an interface."""
     return f"marker of {len(interface.members)} mesh nodes"
 
 

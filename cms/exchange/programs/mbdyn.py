@@ -256,7 +256,7 @@ def stress_stiffening(path: Path, words: list[str], n_nodes: int, n: int) -> Geo
 
 
 def groups_of(path: Path) -> dict[int, list[str]]:
-    """Return the words of each record group, comments left out."""
+    """Return the words of each record group, without comments."""
     groups: dict[int, list[str]] = {}
     words: list[str] | None = None
     for line in path.read_text(encoding="ascii", errors="replace").splitlines():

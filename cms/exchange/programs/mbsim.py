@@ -77,7 +77,7 @@ def datasets(body: ReducedBody) -> dict[str, Array]:
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 READ_STRESS_ORDER = [0, 1, 2, 4, 5, 3]  #: our xx yy zz yz xz xy, from xx yy zz xy yz zx
-DENSEST = 1100  #: bytes that a byte of a compressed file can stand for
+DENSEST = 1100  #: largest number of bytes that one byte of a compressed file can represent
 NEEDED = ("mass", "position integral", "position position integral", "shape function integral", "stiffness matrix")
 
 

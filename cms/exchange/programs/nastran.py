@@ -226,11 +226,11 @@ def real(value: float, letter: str = "E") -> str:
 # external superelements of Nastran: the record of their files as a superelement of ours -------------------------------
 
 
-COMPANIONS = (".pch", ".asm")  #: text files of an external superelement beside its .op4
+COMPANIONS = (".pch", ".asm")  #: text files of an external superelement with the same name as its .op4
 
 
 def is_nastran(path: Path, head: bytes) -> bool:
-    """Whether a file is one of an external superelement: cards of one, or matrices with such cards beside them."""
+    """Whether a file belongs to an external superelement: its cards, or matrices with such cards in the same folder."""
     suffix = path.suffix.lower()
     if suffix in COMPANIONS:
         return any(word in head.upper() for word in (b"EXT. SUPERELEMENT", b"EXTRN", b"SEBULK", b"BEGIN SUPER"))
@@ -248,7 +248,7 @@ def read_nastran(files: Iterable[Path], name: str, places: Mapping[int, Array] |
 def nastran_superelement(
     raw: NastranSuperelement, name: str, places: Mapping[int, Array] | None = None
 ) -> Superelement:
-    """Return a superelement of what the files say; grid points without place are left out of the recovery, and told."""
+    """Return a superelement from the files; grid points without position are omitted from the recovery, with a note."""
     positions = {**{int(k): np.asarray(x, dtype=float) for k, x in (places or {}).items()}, **raw.positions}
     notes = list(raw.notes)
     recovery = None

@@ -145,7 +145,7 @@ def as_column(term: Taylor) -> Taylor:
 
 
 def taylor_lines(indent: int, name: str, term: Taylor, n_q: int, order: Dialect) -> Iterator[str]:
-    """Yield one Taylor series; zero entries are left out, as is usual in the format."""
+    """Yield one Taylor series; zero entries are omitted, as is usual in the format."""
     n_row, n_col = term.m0.shape
     is_diagonal = not term.m1.size and n_row == n_col and not np.any(term.m0 - np.diag(np.diag(term.m0)))
     is_empty = not np.any(term.m0) and not np.any(term.m1)

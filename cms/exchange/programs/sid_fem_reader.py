@@ -25,7 +25,7 @@ DIAGONAL, SYMMETRIC, UNIT = 1, 2, 4  #: of `structure`
 
 @dataclass
 class Taylor:
-    """A series as it stands in the file: sizes and entries by their indices."""
+    """A series as in the file: sizes, and entries by their indices."""
 
     line: int
     sizes: dict[str, int] = field(default_factory=dict)  #: order, nrow, ncol, nq, nqn, structure
@@ -40,7 +40,7 @@ def is_sid_fem(path: Path, head: bytes) -> bool:
 
 
 def read_sid_fem(files: Sequence[Path], name: str, places: Mapping[int, Array]) -> ModalBody:
-    """Read standard input data in either index order, m1(row, q, column) or m1(row, column, q), told by the indices.
+    """Read standard input data in either index order, m1(row, q, column) or m1(row, column, q), found from the indices.
 
     Raises
     ------
@@ -153,7 +153,7 @@ def read_in_order(files: Sequence[Path], name: str, q_second: bool | None) -> Mo
 def stiffening_of(
     Ct1: Array | None, Cr1: Array | None, Oe1: Array | None, C5: Array, nodes: list[Array]
 ) -> GeometricStiffness | None:
-    """Return the geometric stiffness of the terms of first order; None where there is none.
+    """Return the geometric stiffness from first-order terms; None if there are none.
 
     Ct1_ka,l = K_t,a,kl; the part of Cr1_ka,l symmetric in k, l is K_r,a,kl;
     Oe1_k,ab,l = -(5C_lk,ab + 5C_lk,ba) + 2 K_ab,kl, on the diagonal half of it; phi1, psi1 of a node: -K_i.
@@ -268,14 +268,14 @@ def order_of(path: Path, terms: list[Taylor], n: int, first: str) -> bool | None
     if said:
         return said[1].startswith("q")
     if n == 1 or not any(term.m1 for term in terms):
-        return True  # one index is always 1: both orders say the same, or there is no first order at all
+        return True  # one index is always 1: both orders agree, or there is no first order
     return None
 
 
 def values_of(
     path: Path, key: str, terms: Mapping[str, Taylor], order: int, shape: tuple[int, ...], q_second: bool
 ) -> Array:
-    """Return m0, (nrow, ncol), or m1, (nrow, ncol, nq), of a series; zero where nothing stands."""
+    """Return m0, (nrow, ncol), or m1, (nrow, ncol, nq), of a series; missing entries are zero."""
     if key not in terms:
         raise ForeignBodyError(f"{path}: the series {key} is missing")
     term = terms[key]

@@ -1,1 +1,1 @@
-"""The document that a reduced body is accepted with: every check, its origin, and what it is good for."""
+"""The acceptance document of a reduced body: every check, its origin, and its range of use."""

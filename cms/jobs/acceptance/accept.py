@@ -1,4 +1,4 @@
-"""Make the acceptance of a body: judge it, compare it with its full model or its deck, and say what it is good for."""
+"""Make the acceptance of a body: check it, compare it with its full model or its deck, and state its range of use."""
 
 import os
 import tempfile
@@ -59,9 +59,9 @@ class FullModel:
     """The full model that a body is compared with: a job, or a deck of another program."""
 
     job: Path | str | None = None  #: job file; one of our own bodies is compared with its mode set too
-    deck: Path | str | None = None  #: whole deck, read as `cms job` does
+    deck: Path | str | None = None  #: complete deck, read as by `cms job`
     program: str | None = None  #: whose elements a deck (.inp) has: "calculix" or "abaqus"
-    densities: Mapping[str, float] = field(default_factory=dict)  #: of materials of the deck that have none
+    densities: Mapping[str, float] = field(default_factory=dict)  #: density of materials of the deck that have none
 
     def __post_init__(self) -> None:
         if self.job is not None and self.deck is not None:
@@ -166,12 +166,12 @@ def against_job(
 
 
 def is_of_one_model(body: "FEBody", reduced: ReducedBody) -> bool:
-    """Whether a reduced body says that it was made of a model of this size."""
+    """Whether a reduced body states that it was made from a model of this size."""
     return reduced.provenance.get("full dofs") == str(body.n_dof)
 
 
 def band_record(reduced: ReducedBody, records: tuple[QualityRecord, ...], band: float) -> QualityRecord:
-    """Return whether the body is good up to the frequency that was asked for [Hz]."""
+    """Return whether the body is valid up to the requested frequency [Hz]."""
     usable = range_of_use(reduced, records).band
     said = f"asked for {band:.6g} Hz; good for up to {usable.highest:.6g} Hz ({usable.words})"
     data = {"asked_hz": band, "usable_hz": usable.highest}
@@ -180,7 +180,7 @@ def band_record(reduced: ReducedBody, records: tuple[QualityRecord, ...], band: 
 
 
 def band_of(reduced: ReducedBody) -> float:
-    """Return the band of custom [Hz], a little more than the first free frequency at least."""
+    """Return the customary band [Hz], at least slightly above the first free frequency."""
     band = 1.001 * custom_band(reduced).highest
     if not band > 0:
         raise QualityError(f"body {reduced.name!r}: has no elastic frequency to compare; give the band yourself")
@@ -188,7 +188,7 @@ def band_of(reduced: ReducedBody) -> float:
 
 
 def job_of_deck(deck: "Deck", full: FullModel, reduced: ReducedBody, folder: Path) -> Job:
-    """Return the job of a deck in the units of the body; what cannot be taken over is left out, and told."""
+    """Return the job of a deck in the units of the body; unconverted data are omitted and listed."""
     if reduced.units.name not in UNIT_SYSTEMS:
         raise QualityError(
             f"body {reduced.name!r}: is in units {quoted(reduced.units.name)} of its own; convert it (cms frame "
@@ -211,7 +211,7 @@ def cards_left_out(deck: "Deck") -> tuple[LeftOut, ...]:
 
 
 def left_out_record(left_out: tuple[LeftOut, ...]) -> QualityRecord:
-    """Return the record of what was left out of a deck: how many kinds of cards carry mass or stiffness."""
+    """Return the record of the omitted cards of a deck: how many kinds carry mass or stiffness."""
     body = [each for each in left_out if each.is_body]
     words = "; ".join(f"{each.count} {each.name}: {each.consequence}" for each in body)
     said = words or f"everything that carries mass or stiffness is taken over; {len(left_out)} kinds of other cards not"
@@ -227,13 +227,13 @@ def effective_masses(reduced: ReducedBody) -> tuple[EffectiveMass, ...]:
         if reduced.is_held or can_be_held(reduced, interface.name):
             try:
                 found.append(effective_mass(reduced, interface.name))
-            except np.linalg.LinAlgError:  # the records say what is wrong
+            except np.linalg.LinAlgError:  # the records describe the fault
                 continue
     return tuple(found)
 
 
 def mesh_error(job: Job | None, most_dofs: int, stages: Stages) -> MeshError:
-    """Estimate what the mesh does to the lowest frequencies, as far as the job allows."""
+    """Estimate the effect of the mesh on the lowest frequencies, if the job allows it."""
     if job is None:
         return MeshError("not estimated: no full model was given that could be refined")
     if not most_dofs:
@@ -268,8 +268,8 @@ def mesh_error(job: Job | None, most_dofs: int, stages: Stages) -> MeshError:
 
 
 # A received body against a full model of the same part: mass, free frequencies, and shapes at nodes in common ---------
-# For bodies whose mode set is not at hand (another program has reduced them); one of our own is compared with the mode
-# set of its job, which tells more (`check_reduction`). Nodes are paired by their place in mesh coordinates.
+# For bodies with an unknown mode set (reduced by another program); one of our own is compared with the mode set of its
+# job, which is more informative (`check_reduction`). Nodes are paired by their positions in mesh coordinates.
 
 
 SAME_PLACE = 1e-5  #: of the size of the body, within which two nodes are the same

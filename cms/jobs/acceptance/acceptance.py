@@ -1,4 +1,4 @@
-"""The acceptance of a reduced body: everything that can be said of it before somebody signs."""
+"""The acceptance of a reduced body: all information that is needed before it is approved."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -45,19 +45,19 @@ class MeshError:
 
     @property
     def largest(self) -> float:
-        """Largest estimated relative error of the lowest frequencies; NaN where none was made."""
+        """Largest estimated relative error of the lowest frequencies; NaN if there is no estimate."""
         return float("nan") if self.estimate is None else float(np.abs(self.estimate.error).max())
 
 
 @dataclass(frozen=True, eq=False)
 class Acceptance:
-    """A body, its origin, every check, and what it is good for."""
+    """A body, its origin, every check, and its range of use."""
 
     body: ReducedBody
     records: tuple[QualityRecord, ...]  #: all checks
     range: RangeOfUse
     masses: tuple[EffectiveMass, ...]  #: for each interface that can be held
-    compared_with: str  #: what the full model was, in words; "": none was given
+    compared_with: str  #: description of the full model; "": none was given
     mesh_error: MeshError
     left_out: tuple[LeftOut, ...] | None  #: of the deck; None: there is no deck
     file: str = ""  #: the modal file
@@ -72,7 +72,7 @@ class Acceptance:
 
     @property
     def words(self) -> str:
-        """The verdict in words, with what it rests on."""
+        """The verdict as text, with its basis."""
         counts = {kind: sum(record.verdict == kind for record in self.records) for kind in ("pass", "warn", "fail")}
         said = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
         against = self.compared_with or "no full model: the file was judged by itself"

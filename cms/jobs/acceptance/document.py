@@ -35,7 +35,7 @@ class Paragraph:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of words; a heading that ends in '>' stands right; `verdict` is the column that is coloured by its word."""
+    """A table of text; a heading that ends in '>' is right-aligned; `verdict` is the column coloured by its text."""
 
     headings: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
@@ -192,12 +192,12 @@ def checks_part(a: Acceptance) -> Part:
 
 
 def reason_of(record: QualityRecord) -> str:
-    """Return what was found and what to do."""
+    """Return the finding and the remedy."""
     return record.reason + (f". To do: {record.action}" if record.action else "")
 
 
 def modes_part(a: Acceptance) -> Part:
-    """Modes of the file, and the free frequencies beside those of the full model."""
+    """Modes of the file, and the free frequencies compared with those of the full model."""
     modes = body_record(a.body)["modes"]
     rows = tuple(
         (
@@ -229,7 +229,7 @@ def modes_part(a: Acceptance) -> Part:
 
 
 def more_words(n: int) -> str:
-    """Say how many rows are left out."""
+    """State how many rows are omitted."""
     return "." if n <= MOST_MODES else f"; the first {MOST_MODES} of {n}, the JSON file has all."
 
 
@@ -316,7 +316,7 @@ def range_part(a: Acceptance) -> Part:
 
 
 def stiffened_words(r: RangeOfUse) -> str:
-    """Return the limits with geometric stiffness; nothing where the file has none."""
+    """Return the limits with geometric stiffness; nothing if the file has none."""
     limits = r.stiffened_limits
     if limits is None:
         return ""
@@ -324,7 +324,7 @@ def stiffened_words(r: RangeOfUse) -> str:
 
 
 def magnitude(value: float) -> str:
-    """Return a load; one that deforms nothing has no limit."""
+    """Return a load; a load that deforms nothing has no limit."""
     return f"{value:.3g}" if math.isfinite(value) else "any"
 
 
@@ -361,12 +361,15 @@ def mesh_part(a: Acceptance) -> Part:
 
 
 def number(value: float | None) -> str:
-    """Return a value with three digits; none where there is none."""
+    """Return a value with three digits; "none" if there is no value."""
     return "" if value is None or not math.isfinite(value) else f"{value:.3g}"
 
 
 def vector(values: Sequence[float] | Iterable[float], scale: float | None = None) -> str:
-    """Return numbers in one line; what is rounding beside the scale (default: the greatest) reads 0."""
+    """Return numbers in one line.
+
+    Rounding errors relative to the scale (default: the largest number) are printed as 0.
+    """
     given = [float(value) for value in values]
     least = 1e-12 * (max(map(abs, given), default=0.0) if scale is None else scale)
     return ", ".join(f"{value if abs(value) > least else 0:.6g}" for value in given)

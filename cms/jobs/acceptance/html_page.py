@@ -50,7 +50,7 @@ def body_of(part: Part) -> str:
 
 
 def table_of(block: Table) -> str:
-    """Return a table; second lines of cells stand smaller."""
+    """Return a table; second lines of cells are smaller."""
     is_number = [heading.endswith(">") for heading in block.headings]
     rows = []
     for row in block.rows:

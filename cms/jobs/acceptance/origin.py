@@ -1,4 +1,4 @@
-"""Where a body came from: what its provenance says, in groups, and whether its files still are the same."""
+"""Origin of a body: its provenance in groups, and whether its files are unchanged."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class SourceFile:
-    """A file that the body was made from, and what it is today."""
+    """A file from which the body was made, and its present state."""
 
     path: str
     digest: str  #: on record, sha256
@@ -26,7 +26,7 @@ class SourceFile:
 
 
 def origin_groups(provenance: Mapping[str, str]) -> dict[str, dict[str, str]]:
-    """Return title -> key -> words; digests of files stand with the files instead."""
+    """Return title -> key -> text; digests of files are in the list of files instead."""
     groups: dict[str, dict[str, str]] = {title: {} for title in GROUPS}
     for key, words in provenance.items():
         title = next(title for title, starts in GROUPS.items() if key.startswith(starts))
@@ -35,7 +35,7 @@ def origin_groups(provenance: Mapping[str, str]) -> dict[str, dict[str, str]]:
 
 
 def source_files(provenance: Mapping[str, str], folder: Path) -> tuple[SourceFile, ...]:
-    """Return the files with a digest on record, looked up where the record says, or in a folder.
+    """Return the files with a recorded digest, searched at the recorded path, or in a folder.
 
     A file is on record as "NAME" with "NAME sha256", or as "file PATH" with its digest.
     """

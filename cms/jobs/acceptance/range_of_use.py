@@ -34,7 +34,7 @@ class UsableBand:
 
 @dataclass(frozen=True)
 class LargestSpeed:
-    """The angular speed up to which the frame may turn."""
+    """The angular speed up to which the frame may rotate."""
 
     lowest_held: float  #: lowest frequency with one interface held [Hz]
     at: str  #: that interface
@@ -49,9 +49,9 @@ class LargestLoad:
     interface: str
     direction: str  #: "force x" to "moment z", axes of B
     unit: str
-    linear: float  #: without geometric stiffness; infinite: it deforms nothing
-    stiffened: float | None  #: with it; None: the file has none
-    governed_by: str  #: what ends the linear range: "rotation", "change of stiffness" or "nothing"
+    linear: float  #: without geometric stiffness; infinite: no deformation
+    stiffened: float | None  #: with geometric stiffness; None: the file has none
+    governed_by: str  #: limit that is reached first: "rotation", "change of stiffness" or "nothing"
     deflection: float  #: largest displacement in B at the load `linear` [length of the body]
 
 
@@ -62,11 +62,11 @@ class RangeOfUse:
     band: UsableBand
     speed: LargestSpeed | None  #: None: no interface can be held, or the body is held
     loads: tuple[LargestLoad, ...]  #: three forces and three moments for each interface
-    limits: Limits  #: those of a linear frame
+    limits: Limits  #: limits of a linear frame
     stiffened_limits: Limits | None  #: None: the file has no geometric stiffness
 
     def strictest(self) -> tuple[LargestLoad, ...]:
-        """Return, for each interface, the direction that bears least of the forces, and of the moments."""
+        """Return, for each interface, the directions with the smallest allowed force and moment."""
         found: dict[tuple[str, str], LargestLoad] = {}
         for load in self.loads:
             key = (load.interface, load.direction.split()[0])
@@ -76,7 +76,7 @@ class RangeOfUse:
 
 
 def range_of_use(reduced: ReducedBody, records: Sequence[QualityRecord] = ()) -> RangeOfUse:
-    """Return what a body is good for.
+    """Return the range of use of a body.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def range_of_use(reduced: ReducedBody, records: Sequence[QualityRecord] = ()) ->
 
 
 def usable_frequencies(reduced: ReducedBody, records: Sequence[QualityRecord]) -> UsableBand:
-    """Return the band, from the comparison with the full model where there is one."""
+    """Return the band, from the comparison with the full model if there is one."""
     by_name = {record.name: record for record in records}
     compared, shapes = by_name.get("frequency-error"), by_name.get("mac") or by_name.get("mac-nodal")
     if compared is not None and "full_hz" in compared.data:
@@ -112,7 +112,7 @@ def usable_frequencies(reduced: ReducedBody, records: Sequence[QualityRecord]) -
 
 
 def custom_band(reduced: ReducedBody) -> UsableBand:
-    """Return the band of custom from the file alone, never above that of the mode set.
+    """Return the customary band from the file alone, never above that of the mode set.
 
     With n vibration modes the n-th elastic free frequency over 1.5: that of the held body, from which custom takes it,
     lies higher (constraints raise every frequency).
@@ -131,7 +131,7 @@ def custom_band(reduced: ReducedBody) -> UsableBand:
 
 
 def largest_speed(reduced: ReducedBody) -> LargestSpeed | None:
-    """Return the angular speed up to which the frame may turn; None where nothing can be said."""
+    """Return the angular speed up to which the frame may rotate; None if it is unknown."""
     if reduced.is_held or not reduced.n_q or reduced.moments.missing:
         return None
     found = []
@@ -139,7 +139,7 @@ def largest_speed(reduced: ReducedBody) -> LargestSpeed | None:
         if can_be_held(reduced, interface.name):
             try:
                 frequencies = effective_mass(reduced, interface.name).frequencies
-            except np.linalg.LinAlgError:  # moments that no body has: the records say which
+            except np.linalg.LinAlgError:  # impossible moments, which the records report
                 continue
             if len(frequencies) and frequencies[0] > 0:
                 found.append((float(frequencies[0]), interface.name))

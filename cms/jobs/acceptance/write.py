@@ -173,7 +173,7 @@ def head(document: Document, width: float) -> list[Any]:
 
 
 def section(part: Part, k: int, width: float) -> list[Any]:
-    """Return the blocks of a part; its title stays with the first of them."""
+    """Return the blocks of a part; its title is kept together with the first of them."""
     from reportlab.platypus import CondPageBreak, Spacer
 
     flow: list[Any] = [CondPageBreak(110), Spacer(1, 14)]
@@ -200,7 +200,7 @@ def picture(block: Picture, width: float) -> list[Any]:
 
 
 def table(block: Table, width: float) -> list[Any]:
-    """Return a table whose headings stand on every page it takes."""
+    """Return a table whose headings are repeated on every page."""
     from reportlab.platypus import Spacer
     from reportlab.platypus import Table as Grid
 

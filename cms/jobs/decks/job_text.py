@@ -1,4 +1,4 @@
-"""A whole deck as a job file: every table written out, with a header that lists what was not converted."""
+"""A complete deck as a job file: every table written out, with a header that lists unconverted data."""
 
 import json
 import re
@@ -141,7 +141,7 @@ def _materials(deck: Deck, request: JobRequest) -> dict[str, Any]:
             raise JobError(f"deck {deck.path}: material {quoted(name)} has no elastic constants (linear)")
         if not density and deck.program in ("nastran", "ansys") and _has_mass(deck, used):
             density = 0.0
-            why = f"material {name} has none: massless, as {deck.program} takes it; --density {name}=... gives it one"
+            why = f"material {name} has none: massless, as in {deck.program}; --density {name}=... sets it"
             deck.ledger.note("density", why)
         if density is None:
             without.append(name)

@@ -37,7 +37,7 @@ def correlation_page(result: CorrelationResult) -> str:
 
 
 def facts(c: Correlation) -> str:
-    """Return a description of what was compared."""
+    """Return a description of the compared data."""
     away = c.points.distances[np.isfinite(c.points.distances)]
     placed = f", at most {away.max():.3g} from their nodes" if len(away) else ", placed by number"
     return (
@@ -166,8 +166,8 @@ def points_section(c: Correlation) -> Section:
     if not rows:
         return Section("points", "Points", "Points", '<p class="notice">No modes are paired.</p>')
     lead = (
-        "COMAC of each point over all pairs, the least of its directions, worst first: a sensor that is turned, "
-        "exchanged or out of scale, or a place where the model is wrong."
+        "COMAC of each point over all pairs, the least of its directions, worst first: a sensor that is rotated, "
+        "exchanged or wrongly scaled, or a place where the model is wrong."
     )
     return Section("points", "Points", "Points", table(["point>", "node>", "COMAC>"], rows), lead)
 
@@ -189,8 +189,8 @@ def update_section(update: Update) -> Section:
              for i in range(n) for j in range(i) if abs(update.correlation[i, j]) > 0.9]  # fmt: skip
     lead = (
         f"Least squares over the frequencies of the pairs, measured to {100 * update.frequency_spread:g} %; spreads "
-        "are standard deviations, shares of the start. A parameter that the test does not tell stays where it was, and "
-        "its number means nothing."
+        "are standard deviations, shares of the start. A parameter about which the test has no information keeps its "
+        "value, which is then meaningless."
     )
     if pairs:
         lead += f" The test hardly tells apart: {'; '.join(pairs)}."

@@ -1,4 +1,4 @@
-"""How far the free frequencies of a meshed CAD body are from those of the geometry: the same job at two mesh sizes.
+"""Difference of the free frequencies of a meshed CAD body from those of the geometry: the same job at two mesh sizes.
 
 (1) the job is meshed at its own size h and at a coarser one, curvature and least size in proportion;
 (2) both bodies are coupled as the job says, and their lowest elastic frequencies found;
@@ -35,7 +35,7 @@ LEAST_RATIO = 1.05  #: of the sizes that the meshes came out with
 class MeshConvergence:
     """Free frequencies at two mesh sizes, and the estimated error of the finer."""
 
-    sizes: tuple[float, float]  #: coarse and fine, the fine is that of the job [length]
+    sizes: tuple[float, float]  #: coarse and fine mesh; the fine one is that of the job [length]
     n_dof: tuple[int, int]  #: of the coupled bodies
     frequencies: Array  #: at the coarse and the fine size, (2, n) [Hz]
     first_order: float = 0.0  #: relative error that the report of the fine mesh finds for cells of first order
@@ -84,7 +84,7 @@ def mesh_convergence(
     if job.mesh_size is None:
         raise JobError(
             "converge: the body comes from a mesh or from matrices, which have one size; expected a CAD file with "
-            "[mesh_size]. Mesh it at two sizes and compare, or see what the mesh report says of cells of first order"
+            "[mesh_size]. Mesh it at two sizes and compare, or see the mesh report on first-order cells"
         )
     if not 1.1 <= ratio <= 4:
         raise JobError(f"converge: ratio: expected a number between 1.1 and 4, got {ratio:g}")

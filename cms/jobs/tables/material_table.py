@@ -82,7 +82,7 @@ class MaterialSection(Table):
         if self.elasticity is not None:
             for key in ("young", "poisson", "shear"):
                 if getattr(self, key) is not None:
-                    raise ValueError(f"{key}: elasticity says it already; remove it")
+                    raise ValueError(f"{key}: elasticity already defines it; remove it")
             return self
         for key, expected in (("young", YOUNG), ("poisson", POISSON)):
             if getattr(self, key) is None:

@@ -17,7 +17,7 @@ class MeshSizeSection(Table):
     """[mesh_size]: largest element size, and adaptation to the geometry."""
 
     size: Positive = Field(description="a number above 0, the largest edge of an element")
-    smallest: Positive | None = Field(None, description="a number above 0, the least edge that curvature asks for")
+    smallest: Positive | None = Field(None, description="a number above 0, the smallest edge for curved surfaces")
     curvature: Annotated[float, Field(ge=0, le=1000)] = Field(
         12.0, description="a number from 3 to 1000, elements around a circle, or 0: the size does not follow curvature"
     )

@@ -35,7 +35,7 @@ class RowsSection(Table):
     """An entry of `rows`."""
 
     quantity: choice("quantity", lambda: QUANTITIES) = Field(  # type: ignore[valid-type]
-        description=f"what the rows are, one of {', '.join(QUANTITIES)}"
+        description=f"kind of the rows, one of {', '.join(QUANTITIES)}"
     )
     at: Places = Field((), description="numbers or names of nodes, elements, sets, interfaces; default: all there are")
     components: Annotated[tuple[str, ...], BeforeValidator(words)] = Field(

@@ -111,8 +111,8 @@ def columns_within(budget: float, shape: ReductionShape) -> ReductionShape:
     if reduction_peak(shape) <= budget or reduction_peak(stored) >= reduction_peak(shape):
         return shape
     log.warning(
-        "memory: %d columns of %d dofs need %s, more than %s; they lie on disk: %s, and up to %s on disk in %s. Fewer "
-        "of them need neither: interface_modes = 20 in [reduction] for interfaces of many nodes",
+        "memory: %d columns of %d dofs need %s, more than %s; they are stored on disk: %s, and up to %s on disk in "
+        "%s. Fewer columns avoid this: interface_modes = 20 in [reduction] for interfaces of many nodes",
         shape.n_columns, shape.n_dof, gigabytes(reduction_peak(shape)), gigabytes(budget),
         gigabytes(reduction_peak(stored)), gigabytes(8.0 * ON_DISK * shape.n_dof * shape.n_columns),
         tempfile.gettempdir(),
@@ -151,7 +151,7 @@ def solver_within(budget: float, shape: ReductionShape) -> Solver:
 
 
 def refusal(budget: float, inside: Peak, outside: Peak) -> str:
-    """Return the message that says what is missing and what would help."""
+    """Return the message on the missing memory or disk space, and on possible remedies."""
     stages = {
         "the factorisation": (outside.factorisation, "fewer dofs (a coarser mesh), or cms split"),
         "the modes": (outside.modes, "fewer modes, or fewer columns (interface_modes for interfaces of many nodes)"),

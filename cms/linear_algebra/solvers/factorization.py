@@ -69,7 +69,7 @@ class EmptyFactor:
         return np.zeros((0, b.shape[1]), order="F")
 
     def close(self) -> None:
-        """Do nothing: there is nothing to free."""
+        """No effect: there is nothing to free."""
         self.is_open = False
 
 

@@ -248,7 +248,7 @@ class KrylovSearch:
             tolerance = max(0.1 * tolerance, FLOOR)  # the residual from the recurrence was smaller than the true one
         raise EigenError(
             f"eigenmodes: residuals stay at {residual:.1e}, expected {operator.tolerance:.1e}; "
-            "K is too ill-conditioned for this tolerance: allow a larger one, or mend units and stiffness contrasts"
+            "K is too ill-conditioned for this tolerance: allow a larger one, or correct units and stiffness contrasts"
         )
 
     def _converge(self, wanted: ModeRequest, at_least: int, tolerance: float) -> tuple[RitzPairs, int]:
@@ -393,5 +393,5 @@ def refuse_negative(theta: Array) -> None:
             "eigenmodes: an eigenvalue omega² lies below the shift; expected a stiffness and a mass without negative "
             "energy, and a shift below the lowest mode. A mass that is slightly indefinite, as some programs write "
             "it, is "
-            "mended by repair_mass = true in the [body] of a job, repair_mass=True of body_from_matrices"
+            "repaired by repair_mass = true in the [body] of a job, repair_mass=True of body_from_matrices"
         )

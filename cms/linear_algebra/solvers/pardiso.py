@@ -57,7 +57,7 @@ def mkl_runtime() -> ctypes.CDLL | None:
 
 
 def missing_pardiso() -> str:
-    """Describe what PARDISO lacks here; "" if it can be used."""
+    """Describe the missing parts of PARDISO here; "" if it can be used."""
     return "" if mkl_runtime() is not None else "needs MKL, which is not installed; pip install pypardiso (x86-64 only)"
 
 

@@ -60,7 +60,7 @@ def pardiso_or_cholesky(lower: sp.csc_array, *, definite: bool) -> Factor:
 
 
 def missing_default() -> str:
-    """Describe what PARDISO lacks here."""
+    """Describe the missing parts of PARDISO here."""
     return SOLVERS["pardiso"].missing()
 
 

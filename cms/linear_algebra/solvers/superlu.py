@@ -92,7 +92,7 @@ def announce(fronts: Fronts, *, definite: bool) -> None:
     if definite:
         better += ' or solver = "cholesky" (everywhere)'
     else:
-        better += ', or rigid interfaces in the place of distributing ones, which solver = "cholesky" factorises'
+        better += ', or rigid interfaces instead of distributing ones, which solver = "cholesky" factorises'
     log.warning(
         "SuperLU: %d rows: about %.2g minutes of one processor and %.2g GB for the factorisation; %s takes a fraction "
         "of both", len(fronts.order), seconds / 60, BYTES * fronts.n_entries / 1e9, better,

@@ -93,7 +93,7 @@ class Blocks:
         return np.arange(len(self))
 
     def turns(self, *, on_disk: bool) -> IntArray:
-        """Return the priorities for the factorisation: fastest, or with least memory."""
+        """Return the priorities for the factorisation: for the shortest time, or for the smallest memory."""
         return self.by_depth if on_disk else self.by_distance
 
     def n_working(self, n_threads: int, *, on_disk: bool = False) -> int:

@@ -62,7 +62,7 @@ class Columns:
         return b.shuffle_vector(one, ir.Constant(vector, ir.Undefined), zeros)
 
     def fetch(self, tile: Any, j: Any) -> None:
-        """Prefetch what is read slightly later; processors do so by themselves, but too late."""
+        """Prefetch data that is read slightly later; processors do so automatically, but too late."""
         b = self.builder
         at = b.add(b.mul(number(j), number(ROWS)), number(AHEAD * ROWS))
         byte, word = ir.IntType(8).as_pointer(), ir.IntType(32)

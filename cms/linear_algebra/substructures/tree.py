@@ -231,7 +231,7 @@ class _Body:
         self.n_threads = n_threads()
 
     def runs(self) -> tuple[list[range], Array]:
-        """Return the subtrees that become tasks, and which substructures are above all of them."""
+        """Return the subtrees that become tasks, and the substructures above all of them."""
         starts, parents = self.dissection.starts, self.dissection.parents
         first = self.dissection.first_of_subtrees()
         limit = starts[-1] // (PARTS * self.n_threads)

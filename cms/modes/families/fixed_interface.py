@@ -102,7 +102,7 @@ def _mechanism_message(body: FEBody, i: IntArray, K_ii: sp.csc_array, M_ii: sp.c
     if not is_free.any():
         return f"{start}; its smallest energy is {(energy / terms).min():.1e} of the sum of its terms"
     return (
-        f"{start}: {int(is_free.sum())}{'+' if is_free.all() else ''} motions without energy, largest at "
-        f"{moving_nodes(body, i, modes.Phi[:, is_free])}; hold these nodes by an interface, join the parts, or "
-        "mend the mesh"
+        f"{start}: {int(is_free.sum())}{'+' if is_free.all() else ''} motions without energy, largest "
+        f"at {moving_nodes(body, i, modes.Phi[:, is_free])}; hold these nodes by an interface, join the parts, or "
+        "repair the mesh"
     )

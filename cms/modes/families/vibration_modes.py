@@ -47,9 +47,9 @@ def elastic_modes(flexibility: Flexibility, wanted: ModeCount) -> EigenResult:
         largest = float(np.abs(K.diagonal()).max())
         softest = "" if load is None else f", those of its neighbours {np.abs(np.diag(load)).max():.1e} at most"
         raise EigenError(
-            f"body {body.name!r}: its slowest modes are lost in rounding: some motion besides the rigid ones is held "
-            f"by almost nothing beside the largest stiffness, {largest:.1e}{softest}; rounding is some "
-            f"{np.finfo(float).eps * largest:.1e}: hold that motion by more, or take away what holds it"
+            f"body {body.name!r}: its slowest modes are lost in rounding: some motion besides the rigid ones has "
+            f"almost no stiffness compared with the largest stiffness, {largest:.1e}{softest}; rounding is some "
+            f"{np.finfo(float).eps * largest:.1e}: increase the stiffness of this motion, or remove it"
         ) from error
     if wanted.verify:
         modes = _proven(flexibility, modes, wanted)
@@ -65,7 +65,7 @@ def _proven(flexibility: Flexibility, modes: EigenResult, asked: ModeCount) -> E
     k = len(modes.omega2)
     wanted = ModeRequest(k, None) if asked.cutoff is None else ModeRequest.of(asked)
     last, sigma = counting_shift(modes.omega2, k, wanted, 0.0)
-    for n_extra in (4, 12, 36):  # a gap in which to count lies beyond the requested modes
+    for n_extra in (4, 12, 36):  # a gap for counting lies beyond the requested modes
         try:
             more = eigenmodes(
                 flexibility.K, flexibility.M, k + n_extra, factorization=flexibility, numbering=flexibility.numbering

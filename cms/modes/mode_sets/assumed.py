@@ -155,7 +155,7 @@ def section_axes(
         if moments[1] - moments[0] <= SLENDER_RATIO * moments[2]:
             raise ModeSetError(
                 f"assumed_modes: body {body.name!r}: its least principal moments of inertia {moments[0]:.4g} and "
-                f"{moments[1]:.4g} tell no axis; give axis = [x, y, z]"
+                f"{moments[1]:.4g} determine no axis; give axis = [x, y, z]"
             )
         t = directions[:, 0]
         t = t * np.sign(t[np.argmax(np.abs(t))])

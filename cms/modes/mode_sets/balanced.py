@@ -83,7 +83,7 @@ def balance(omega2: Array, D: Array, B: Array, C: Array | None = None) -> Balanc
     decay = -la.eigvals(A).real
     if decay.min() <= 1e-10 * omega.min():
         raise ModeSetError(
-            f"balance: a mode decays at {decay.min():.1e} per time unit beside its frequency of at least "
+            f"balance: a mode decays at {decay.min():.1e} per time unit, with a frequency of at least "
             f"{omega.min() / (2 * np.pi):.6g}; expected damping of every mode; give damping_ratio above 0"
         )
     E = np.block([[D / np.outer(omega, omega), np.diag(1 / omega)], [np.diag(1 / omega), np.zeros((n, n))]])

@@ -69,9 +69,10 @@ def coupled_columns(where: str, body: FEBody, V: Array, over: str | None) -> tup
         own, else_ = (float(np.sqrt(np.median(rayleigh(body, read[name])))) for name in (over, other))
         if own**2 > DEARER * else_**2:
             raise ModeSetError(
-                f'{where}: columns_over = "{over}": read so, the columns vibrate at {own / (2 * np.pi):.4g} per time '
-                f"unit (median of sqrt(uᵀKu / uᵀMu) / 2 pi), as {WORDS[other]} at {else_ / (2 * np.pi):.4g}; say "
-                f'columns_over = "{other}", or mend the order of the rows'
+                f'{where}: columns_over = "{over}": in this order, the columns vibrate at {own / (2 * np.pi):.4g} per '
+                "time "
+                f"unit (median of sqrt(uᵀKu / uᵀMu) / 2 pi), as {WORDS[other]} at {else_ / (2 * np.pi):.4g}; give "
+                f'columns_over = "{other}", or correct the order of the rows'
             )
     return columns, options
 
@@ -90,8 +91,8 @@ def stated_or_counted(where: str, body: FEBody, V: Array, over: str | None) -> s
         raise ModeSetError(f"{where}: columns: expected {expected}, got {V.shape}")
     if len(fitting) > 1:
         raise ModeSetError(
-            f"{where}: columns: {len(V)} rows may be the dofs of the coupled body or those of its mesh, which stand in "
-            'another order; say which: columns_over = "coupled" or columns_over = "mesh"'
+            f"{where}: columns: {len(V)} rows may be the dofs of the coupled body or those of its mesh, which have "
+            'another order; give columns_over = "coupled" or columns_over = "mesh"'
         )
     return fitting[0]
 
@@ -138,6 +139,7 @@ def log_frequencies(where: str, body: FEBody, X: Array, frequencies: Array) -> N
     if np.median(apart) > np.log(APART):
         k = np.flatnonzero(is_known)[int(np.argmax(apart))]
         log.warning(
-            "%s: column %d is said to vibrate at %.5g, its energy gives %.5g (per time unit); are rows, units and "
-            "frequencies those of this body?", where, np.flatnonzero(is_stated)[k] + 1, stated[k], own[k],
+            "%s: column %d has the stated frequency %.5g, but its energy gives %.5g (per time unit); check that "
+            "rows, units and frequencies belong to this body",
+            where, np.flatnonzero(is_stated)[k] + 1, stated[k], own[k],
         )  # fmt: skip

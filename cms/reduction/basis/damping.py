@@ -85,7 +85,7 @@ Damping = ModalDamping | PerModeDamping | RampDamping | RayleighDamping
 
 
 def damping_of_words(words: str) -> Damping | None:
-    """Return the damping that prints as these words, as provenance has it; None for "none" and for other words."""
+    """Return the damping that prints as this text, as in the provenance; None for "none" and for other texts."""
     known = {kind.__name__: kind for kind in (ModalDamping, PerModeDamping, RampDamping, RayleighDamping)}
     try:
         call = ast.parse(words, mode="eval").body

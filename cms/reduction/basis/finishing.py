@@ -37,7 +37,7 @@ TRUSTED_ROUNDING = 1e-11
 ORTHONORMAL_DEFECT = 1e-9  #: largest accepted entry of Phi.T M Phi - 1, unless M is known less well
 LOST_MASS = 1e-6  #: largest rounding of M in the mass of a shape, relative
 LOST_STIFFNESS = 1e-2  #: the same of K in its stiffness; its frequency is then known to half of that
-MARGIN = 10.0  #: factor on the rounding of the masses of shapes, for that of products
+MARGIN = 10.0  #: factor from the rounding of the masses of shapes to that of their products
 
 
 @dataclass(frozen=True, eq=False)

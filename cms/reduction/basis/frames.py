@@ -107,9 +107,9 @@ def frame_condition(body: FEBody, frame: Frame | HeldFrame) -> FrameCondition:
     """
     if isinstance(frame, HeldFrame) != body.is_held:
         raise BodyError(
-            f"body {body.name!r}: is held to the ground, as it was said; its frame is the ground: leave the frame out"
+            f"body {body.name!r}: is declared as held to the ground; its frame is the ground: omit the frame"
             if body.is_held
-            else f"body {body.name!r}: is free; a HeldFrame is that of a body which is held to the ground"
+            else f"body {body.name!r}: is free; a HeldFrame is for a body that is held to the ground"
         )
     if isinstance(frame, HeldFrame):
         none = np.zeros((body.n_dof, 0))

@@ -49,8 +49,8 @@ def left_out_words(body: FEBody, n_modes: int) -> str:
         return ""
     return (
         f"geometric stiffness left out: {n_loads(body)} unit loads over {n_modes} modes would be {size / 1e9:.2g} GB. "
-        f"{remedies(body, n_modes)}; geometric_stiffness = true makes it all the same, false leaves it out without "
-        "this note"
+        f"{remedies(body, n_modes)}; geometric_stiffness = true computes it anyway, false omits it "
+        "without this note"
     )
 
 

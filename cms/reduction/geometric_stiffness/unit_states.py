@@ -36,7 +36,7 @@ class UnitStates:
     on_dofs: Array  #: loads on the dofs of the body, (n_dof, k) [N, N m]
     loaded: IntArray  #: indices of the loads that are not zero, (n_loaded,)
     u: Array  #: responses to the loaded ones, up to a rigid motion, (n_dof, n_loaded)
-    spread: Array | None = None  #: the last six loads before balancing, (n_dof, 6); None: left out
+    spread: Array | None = None  #: the last six loads before balancing, (n_dof, 6); None: not needed
     is_loaded: tuple[bool, ...] = ()  #: for each interface, whether its loads are included; empty: all are
 
     @property

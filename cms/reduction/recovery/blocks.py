@@ -10,7 +10,7 @@ from fe_models.foundation.units import Dimensions
 
 __all__ = ["Block", "RowName"]
 
-FORCES_OF_PLACES = ("interface force", "net force")  #: quantities whose name includes what they belong to
+FORCES_OF_PLACES = ("interface force", "net force")  #: quantities whose name includes the kind of object
 
 
 @dataclass(frozen=True)

@@ -53,7 +53,7 @@ class RecoveryFiles:
     """The written files."""
 
     files: tuple[Path, ...]
-    notes: tuple[str, ...]  #: where the names and units are, and what was left out
+    notes: tuple[str, ...]  #: description of the names and units, and of omitted data
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,7 +39,7 @@ class PartOfTable:
     static: Array  #: (n_rows, n_loads)
 
     def over(self, Z: Array | None) -> "PartOfTable":
-        """Return the rows over combinations of the modes, the columns of Z, (n_q, k); None: as they are."""
+        """Return the rows over combinations of the modes, the columns of Z, (n_q, k); None: unchanged."""
         if Z is None:
             return self
         dynamic = np.concatenate([self.dynamic[..., :N_RIGID], self.dynamic[..., N_RIGID:] @ Z], axis=2)

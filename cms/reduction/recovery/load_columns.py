@@ -147,7 +147,7 @@ def spin_forces(body: ReducedBody) -> Array:
 
 
 def on_q_alone(forces: Array, *, held: bool) -> Array:
-    """Return forces on z; for a held body, those on the rigid motions, which it does not have, are set to zero."""
+    """Return forces on z; for a held body, those on the rigid motions, which it does not have, are zero."""
     forces = np.array(forces)
     if held:
         forces[:N_RIGID] = 0.0

@@ -33,8 +33,8 @@ from fe_models.foundation.arrays import Array
 __all__ = ["recovery_matrices", "recovery_of_model"]
 
 OF_MODEL = (
-    "modes that were left out answer inertia and loads at once, without vibrating; no Coriolis and no geometric "
-    "stiffening; the static part knows the loads of its columns only; velocities and accelerations have none"
+    "omitted modes respond to inertia and loads statically; no Coriolis forces and no geometric "
+    "stiffening; the static part has only the loads of its columns; velocities and accelerations have none"
 )
 OF_BODY = (
     "mode displacement alone: the static part of displacements and stresses that the modes lack needs the model; make "

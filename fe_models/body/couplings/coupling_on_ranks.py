@@ -66,7 +66,7 @@ def extended_here(ranks: Ranks, rows: Rows, more: sp.csr_array) -> OwnRows:
 
 
 def spread_body(body: FEBody, ranks: Ranks) -> FEBody:
-    """Return a body whose K and M are distributed by rows over all ranks, in place of the whole matrices of rank 0.
+    """Return a body whose K and M are distributed by rows over all ranks, instead of complete matrices on rank 0.
 
     The rows are ordered so that neighbours are near, and are cut into parts with about as many entries of K each. With
     one rank, or if the body is distributed already (as bodies of solid meshes are), the body itself is returned.
@@ -75,8 +75,7 @@ def spread_body(body: FEBody, ranks: Ranks) -> FEBody:
         return body
     order = nearby_order(body.K, body.dofs, np.arange(body.n_dof))
     rows = even_rows(np.concatenate([[0], np.cumsum(np.diff(body.K.indptr)[order])]), ranks.size)
-    # Without a recovery that says on which ranks the rows of the mesh lie, element models would take the columns of
-    # rank 0.
+    # Without a recovery that knows the ranks of the rows of the mesh, element models would use the columns of rank 0.
     recovery = body.recovery or Recovery(sp.eye_array(body.n_dof, format="csr"), body.dofs)
     return replace(
         body,

@@ -137,7 +137,7 @@ class Tube:
     def __post_init__(self) -> None:
         require_lengths(self)
         if self.thickness >= self.radius:
-            raise SectionError(f"section Tube: thickness {self.thickness:g} leaves no hole in radius {self.radius:g}")
+            raise SectionError(f"section Tube: thickness {self.thickness:g} leaves no hole with radius {self.radius:g}")
 
     def properties(self, nu: float) -> SectionProperties:
         """Return the properties; kappa = 6 (1+nu) (1+m²)² / ((7+6nu) (1+m²)² + (20+12nu) m²), m inner/outer radius."""

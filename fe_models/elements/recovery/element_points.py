@@ -273,7 +273,10 @@ def solid_nodes(body: FEBody, group: ElementGroup, model: SolidModel, rows: IntA
 
 
 def material_borders(body: FEBody, group: ElementGroup) -> list[MaterialBorders]:
-    """Return the borders of the solid model of a group, once for its groups of all cell types; none without any."""
+    """Return the borders of the solid model of a group, once for all cell types of the group.
+
+    None if there are none.
+    """
     model = group.source
     if not isinstance(model, SolidModel) or group.kind != next(iter(model.mesh.cells)):
         return []

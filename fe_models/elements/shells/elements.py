@@ -295,7 +295,7 @@ def shell_cells(
     lost = np.flatnonzero((lengths > 0) & (across < np.sin(np.deg2rad(LEAST_ANGLE)) * lengths))
     if lost.size:
         raise ShellError(
-            f"laminate: {lost.size} {kind} cells stand across direction {tuple(along[lost[0]].tolist())}, first cell "
+            f"laminate: {lost.size} {kind} cells are normal to direction {tuple(along[lost[0]].tolist())}, first cell "
             f"{lost[0]}: within {LEAST_ANGLE:g} degrees of their normal it gives no axis on them; give these cells a "
             "laminate with another direction"
         )

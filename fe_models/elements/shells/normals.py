@@ -50,4 +50,4 @@ def orient_normals(mesh: ShellMesh) -> ShellMesh:
         mine = turned[begin:end]
         rows[mine] = rows[mine][:, [0, *range(rows.shape[1] - 1, 0, -1)]]
         cells[kind] = rows
-    return replace(mesh, cells=cells, notes=(*mesh.notes, f"the nodes of {int(turned.sum())} cells were turned round"))
+    return replace(mesh, cells=cells, notes=(*mesh.notes, f"the nodes of {int(turned.sum())} cells were reversed"))

@@ -113,8 +113,8 @@ class LaminateProperty:
         _require_ratios("laminate", self)
         if self.bending_ratio != 1 and len(self.layers) > 1:
             raise ShellError(
-                f"laminate: bending_ratio: expected 1 with several layers, got {self.bending_ratio}; it does not say "
-                "how they couple membrane and bending"
+                f"laminate: bending_ratio: expected 1 with several layers, got {self.bending_ratio}; it does not "
+                "determine their coupling of membrane and bending"
             )
         if self.added_mass < 0:
             raise ShellError(f"laminate: added_mass: expected zero or more, got {self.added_mass}")

@@ -83,7 +83,7 @@ def assemble_on_ranks(
     ranks.store[KEY] = [mesh_part(mesh, lists, of_cell, order, rows, rank) for rank in range(ranks.size)]  # (2)
     try:
         asked(ranks, assemble_here, properties, dict(options))  # (3)
-    # the message refers to a part of the mesh; a single process finds the same fault in the whole mesh
+    # the message refers to a part of the mesh; a single process finds the same fault in the complete mesh
     except MeshError:
         asked(ranks, forget_here)  # drop the rows of the ranks that found no fault
         assemble(mesh, properties, of_cell, **options)

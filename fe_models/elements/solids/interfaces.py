@@ -91,7 +91,9 @@ def distributing_interface(
     nodes = np.unique(np.concatenate([rows.ravel() for rows in facets.values()]))
     area = weights[nodes].sum()
     if (weights[nodes] < -1e-3 * area).any():
-        raise InterfaceError(f"interface {name!r}: the facets are so curved that nodes weigh less than nothing; refine")
+        raise InterfaceError(
+            f"interface {name!r}: the facets are so curved that nodes have negative weights; refine the mesh"
+        )
     member_weights = np.maximum(weights[nodes], 0.0)
     _require_spread(name, "distributing", mesh.nodes[nodes], member_weights)
     return _interface(mesh, name, "distributing", nodes, selection, reference, triad, member_weights)

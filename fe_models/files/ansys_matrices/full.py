@@ -20,7 +20,7 @@ STIFFNESS, MASS, DAMPING, DOFS, SCALES = (18, 19), (26, 27), (28, 29), (35, 36),
 
 @dataclass(frozen=True, eq=False)
 class AnsysMatrices:
-    """What a .full file says; rows that ANSYS holds are taken out, their stiffness is not in the file."""
+    """The contents of a .full file; rows that ANSYS holds are removed, because the file lacks their stiffness."""
 
     where: str
     K: sp.csc_array  #: stiffness, (n_dof, n_dof), both triangles, in the nodal systems
@@ -55,8 +55,8 @@ def read_full(path: str | Path) -> AnsysMatrices:
         raise MatrixError(f"{where}: the matrices are unsymmetric; a body needs symmetric ones")
     if header[N_EQUATIONS_CE]:
         raise MatrixError(
-            f"{where}: has {header[N_EQUATIONS_CE]} constraint equations (CE, CP, RBE3, contact), which stand beside "
-            "the matrices; expected a model without them: make couplings here, as interfaces"
+            f"{where}: has {header[N_EQUATIONS_CE]} constraint equations (CE, CP, RBE3, contact), which are separate "
+            "from the matrices; expected a model without them: define couplings here, as interfaces"
         )
     _, behind = file.record(103, "the header", INTEGERS)
     _, behind = file.record(behind, "labels of dofs", INTEGERS)
@@ -99,7 +99,7 @@ def _mass(file: AnsysFile, n: int) -> sp.csc_array | None:
 
 
 def _matrix(file: AnsysFile, what: str, pointer: tuple[int, int], n: int) -> sp.csc_array | None:
-    """Return a matrix from its upper triangle, None where there is none."""
+    """Return a matrix from its upper triangle, None if it does not exist."""
     at = file.pointer(*pointer)
     if not at:
         return None

@@ -181,7 +181,7 @@ def body_from_matrices(
     record["mass moments"] = "approximate: M is not M_s ⊗ 1" if M_s is None else "exact: M = M_s ⊗ 1"
     model = None if M_s is None else ScalarMassModel(name, M_s, body.nodes, body.dofs)
     if held:
-        record["held"] = "to the ground, as it was said"
+        record["held"] = "to the ground, as declared"
     return replace(body, element_model=model, provenance=record, is_held=held)
 
 

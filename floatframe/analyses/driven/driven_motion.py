@@ -78,7 +78,7 @@ def frozen_bodies(compiled: CompiledSystem, work: Work, state: State, t: float) 
     model, rigid = compiled.model, rigid_columns(compiled)
     work.state.time[...] = t
     state, equations, n = closed(compiled, work, state, rigid, t)
-    # velocities: the rate of the rows at rest is that of the drives
+    # the velocity of a row at rest is the rate of its drive
     state = State(state.r, state.p, state.q, np.zeros_like(state.u))
     set_iterate(work, state)
     rate, _ = rates_of_constraints(model, work)

@@ -96,7 +96,7 @@ def with_motors(system: System, drives: Mapping[str, CoordinateMotion]) -> Syste
 
 
 def released(joint: Any, drives: Mapping[str, CoordinateMotion]) -> Any:
-    """Return a joint without those of its prescribed motions that are among the drives."""
+    """Return a joint without the prescribed motions that are among the drives."""
     motions = getattr(joint, "motions", None)
     if not motions:
         return joint

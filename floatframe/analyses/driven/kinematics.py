@@ -132,8 +132,8 @@ class SingularityGuard:
         involved = [name for name in names if sum(s for s, o in zip(share, owner, strict=True) if o == name) > 0.02]
         raise ConvergenceError(
             f"a singular position {where}: the constraints of joints {', '.join(repr(name) for name in involved)} "
-            f"depend on each other there (smallest singular value {values[-1]:.2g}): the drives do not determine "
-            "which way the mechanism goes on; drive another coordinate, or keep away from this position",
+            f"depend on each other there (smallest singular value {values[-1]:.2g}): the drives do not "
+            "determine how the mechanism continues; drive another coordinate, or keep away from this position",
             t=now.t,
             h=0.0,
             residual=float(values[-1]),

@@ -247,8 +247,8 @@ def base_rows(small: SmallMotions, base: BaseColumn, channel: BaseMotion) -> tup
 
     if small.is_turning:
         raise ModelError(
-            f"input {channel.name!r}: a base moves under a system at rest; about a steady rotation take "
-            "drives and forces"
+            f"input {channel.name!r}: a base moves under a system at rest; about a steady rotation "
+            "use drives and forces"
         )
     model, work = small.compiled.model, small.work
     head = np.array(model.laws.head)

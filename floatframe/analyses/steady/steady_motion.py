@@ -169,7 +169,7 @@ class Equations:
         if len(trial.w) != int(compiled.model.connections.w0[-1]):
             raise ModelError("steady_motion: the function returns systems with different connections")
         require_off_stops(system, trial.w)
-        # open, joints would see by how much a wheel is turned
+        # otherwise joints would depend on the rotation of a wheel
         trial = replace(trial, state=assembled(compiled, work, trial.state, trial.w))
         return Place(system, compiled, work, trial, self.evaluated(compiled, work, trial))
 
@@ -357,7 +357,7 @@ def turned_forces(compiled: CompiledSystem, f: Array) -> Array:
 
 
 def smallest_inverse(A: Array, rows: Array, columns: Array, n_p: int) -> tuple[Array, Array]:
-    """Return the matrix from b to the smallest x with least |A x - b|, and the magnitudes of x.
+    """Return the matrix from b to the smallest x that minimises |A x - b|, and the magnitudes of x.
 
     Parameters
     ----------

@@ -77,7 +77,7 @@ class HostedUnit:
             if self.is_running and self.unit is not None:
                 self.unit.set(each.name, value)
             elif not self.is_running:
-                self.unit = None  # made anew with these values when it is asked for
+                self.unit = None  # recreated with these values when requested
 
     def begun(self) -> Unit:
         """Return the unit, at its beginning or later."""
@@ -132,7 +132,7 @@ class HostedUnit:
 
 
 def words_of(error: BaseException) -> str:
-    """Return an error in one line: its own words where it is meant for users, else with its kind."""
+    """Return an error in one line: its message if it is meant for users, otherwise with its kind."""
     return str(error) if isinstance(error, FloatframeError) else f"{type(error).__name__}: {error}"
 
 
@@ -200,7 +200,7 @@ def write_fmu(
     package = extra_module(PACKAGES[fmi], extra="fmi", purpose=f"an FMU of version {fmi}")
     content = content_of(system)
     told = content.get("fmu")
-    named = told if isinstance(told, dict) else {}  # else refused when the file is read
+    named = told if isinstance(told, dict) else {}  # otherwise refused when the file is read
     unit, run = read_unit(
         system,
         inputs=named.get("inputs") if inputs is None else inputs,
@@ -241,7 +241,7 @@ def write_fmu(
 
 
 def resource_files(system: Path, content: Mapping[str, Any]) -> dict[str, bytes]:
-    """Return the system file, with modal files and signals beside it, and these files, by name."""
+    """Return the system file, with paths to its modal files and signals, and these files, by name."""
     files: dict[str, bytes] = {}
     changed = json.loads(json.dumps(content))
     taken: dict[Path, str] = {}
@@ -276,7 +276,7 @@ def binaries_of(package: Path, identifier: str) -> dict[str, bytes]:
         if each.suffix in (".so", ".dll", ".dylib")
     }
     if not found:
-        raise ModelError(f"write_fmu: the installed {package.name} has no binaries in {folder}; install it anew")
+        raise ModelError(f"write_fmu: the installed {package.name} has no binaries in {folder}; install it again")
     return found
 
 
@@ -295,11 +295,12 @@ def licences(package: str) -> dict[str, bytes]:
     except PackageNotFoundError:
         return {}
     texts = [each for each in files if each.name.upper().startswith(("LICENSE", "LICENCE", "NOTICE"))]
-    return {f"documentation/licenses/{package}-{each.name}.txt": each.locate().read_bytes() for each in texts}  # type: ignore[attr-defined]
+    # type: ignore[attr-defined]
+    return {f"documentation/licenses/{package}-{each.name}.txt": each.locate().read_bytes() for each in texts}
 
 
 def documentation(about: Description, variables: Sequence[Variable], page: str) -> str:
-    """Return the page of documentation in an FMU; page: paragraphs of its own, HTML."""
+    """Return the page of documentation in an FMU; page: additional paragraphs, HTML."""
     rows = "\n".join(
         "<tr>" + "".join(f"<td>{html.escape(text)}</td>" for text in (v.name, v.causality, v.unit, v.words)) + "</tr>"
         for v in variables

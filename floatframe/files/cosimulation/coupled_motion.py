@@ -1,4 +1,4 @@
-"""A system and the units of other programs beside it: the master that leads them from macro-step to macro-step."""
+"""A system and units of other programs: the master that advances them by macro-steps."""
 
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -135,7 +135,7 @@ class Signals:
 
 
 class Master:
-    """The system as a unit, the units beside it, and how they are connected."""
+    """The system as a unit, the other units, and their connections."""
 
     def __init__(
         self, system: System, integrator: Integrator, h: float, slaves: Sequence[ForeignSlave], coupling: Coupling
@@ -193,14 +193,15 @@ class Master:
     def exchanged(self) -> Signals:
         """Return the signals at the time that all have reached: (1)."""
         found = self.exchanged_once()
-        if self.followers and self.coupling.scheme == "iterated":  # what follows forces at once sees those of this time
+        # outputs that depend directly on forces use those of this time
+        if self.followers and self.coupling.scheme == "iterated":
             for name, value in found.units.items():
                 self.unit.set(name, value)
             found = self.exchanged_once()
         return found
 
     def exchanged_once(self) -> Signals:
-        """Return the signals with the inputs of the system as they are set."""
+        """Return the signals with the current inputs of the system."""
         measured = self.unit.values()
         of_system = {source: measured[name] for source, name in self.columns.items()}
         of_units: dict[str, float] = {}
@@ -263,7 +264,7 @@ def mean(a: Signals, b: Signals) -> Signals:
 
 
 def largest_change(a: Signals, b: Signals) -> float:
-    """Return the largest change of a signal, relative to its size (or to 1e-12 where it is nothing)."""
+    """Return the largest change of a signal, relative to its size (or to 1e-12 if the signal is zero)."""
     changes = [abs(y[n] - x[n]) / max(abs(x[n]), abs(y[n]), 1e-12) for x, y in zip(a, b, strict=True) for n in x]
     return max(changes, default=0.0)
 

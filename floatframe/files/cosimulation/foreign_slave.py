@@ -1,4 +1,4 @@
-"""A unit of another program, run by FMPy: checked before the run, its errors in words."""
+"""A unit of another program, run by FMPy: checked before the run, with its errors as messages."""
 
 import math
 import shutil
@@ -21,7 +21,7 @@ REAL = ("Real", "Float64")
 VERSIONS = ("2.0", "3.0")
 DISCARD, ERROR, FATAL = 2, 3, 4  #: status of a call that failed
 
-words_of_call: list[str] = []  #: what units have logged since a function of one of them was called
+words_of_call: list[str] = []  #: log messages of units since the last call of one of their functions
 
 
 class ForeignSlave:
@@ -51,7 +51,7 @@ class ForeignSlave:
             raise ModelError(f"{self.where}: file: no such file: {path}")
         try:
             self.description = self.fmpy.read_model_description(str(path))
-        except Exception as error:  # whatever a damaged archive makes of zipfile, lxml or FMPy
+        except Exception as error:  # any error that a damaged archive causes in zipfile, lxml or FMPy
             raise ModelError(
                 f"{self.where}: {path}: expected an FMU of version 2.0 or 3.0; {one_line(error)}"
             ) from error
@@ -66,7 +66,7 @@ class ForeignSlave:
 
     @property
     def is_fmi_2(self) -> bool:
-        """Whether it is of version 2, else of version 3."""
+        """Whether its version is 2; otherwise it is 3."""
         return bool(self.description.fmiVersion == "2.0")
 
     def require_usable(self, path: Path) -> None:
@@ -82,7 +82,7 @@ class ForeignSlave:
             raise ModelError(f"{self.where}: {path}: no binary for {self.fmpy.platform}; it has those for {has}")
 
     def require_variable(self, part: str, name: str, causality: str) -> None:
-        """Raise `ModelError` unless a variable is there, real, and of the causality."""
+        """Raise `ModelError` unless a variable exists, is real, and has the causality."""
         choices = [v.name for v in self.description.modelVariables if v.causality == causality]
         found = self.references.get(name)
         if found is None:
@@ -99,7 +99,10 @@ class ForeignSlave:
         return bool(getattr(about, "canGetAndSetFMUstate", False) or getattr(about, "canGetAndSetFMUState", False))
 
     def feeds_through(self, output: str) -> list[str]:
-        """Return the connected inputs that an output follows at once; all of them where the FMU does not say."""
+        """Return the connected inputs on which an output depends directly.
+
+        All of them if the FMU does not declare it.
+        """
         for unknown in self.description.outputs:
             if unknown.variable.name == output and unknown.dependencies is not None:
                 return [v.name for v in unknown.dependencies if v.name in self.unit.inputs]
@@ -110,7 +113,7 @@ class ForeignSlave:
         words_of_call.clear()
         try:
             return function(*values, **named)
-        except Exception as error:  # FMICallException, or what a library that cannot be loaded raises
+        except Exception as error:  # FMICallException, or the error of a library that cannot be loaded
             self.worst = max(self.worst, getattr(error, "status", None) or ERROR)
             words = "; ".join([one_line(error), *words_of_call])
             raise CosimulationError(f"{self.where}: {what} failed: {words}") from error
@@ -172,10 +175,10 @@ class ForeignSlave:
             communicationStepSize=size * self.seconds,
         )  # fmt: skip
         if not self.is_fmi_2 and result is not None and bool(result[1]):
-            raise CosimulationError(f"{self.where}: it asked for the end of the run in its step from t = {t:.9g}")
+            raise CosimulationError(f"{self.where}: it requested the end of the run in its step from t = {t:.9g}")
 
     def state(self) -> Any:
-        """Return its state, to be given back to `free`."""
+        """Return its state, which `free` releases."""
         return self.call("keeping its state", self.instance.getFMUstate if self.is_fmi_2 else self.instance.getFMUState)
 
     def restore(self, state: Any) -> None:
@@ -189,21 +192,24 @@ class ForeignSlave:
         self.call("letting go of a state", function, state)
 
     def close(self) -> None:
-        """End it and remove what was extracted; after an error it is freed only, after a fatal one not called again."""
+        """Terminate it and remove extracted files.
+
+        After an error it is only freed, after a fatal error it is not called.
+        """
         if self.instance is not None:
             ways = [self.instance.terminate] if self.worst < DISCARD else []
             ways += [self.instance.freeInstance] if self.worst < FATAL else []
             for function in ways:
                 try:
                     function()
-                except Exception:  # the run has ended; what failed in it has been told
+                except Exception:  # the run has ended; failures in it have been reported
                     continue
         self.instance = None
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
 def note(*values: Any) -> None:
-    """Keep what a unit logs."""
+    """Store the log messages of a unit."""
     text = values[-1]
     words_of_call.append(one_line(text.decode("utf-8", "replace") if isinstance(text, bytes) else text))
 
@@ -226,7 +232,7 @@ def callbacks() -> Any:
     made.logger = logger()
     made.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
     made.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
-    with suppress(OSError):  # no such library for this machine: texts stay as the unit wrote them
+    with suppress(OSError):  # no such library for this machine: texts remain as the unit wrote them
         extra_module("fmpy.logging", extra="fmi", purpose="units of other programs").addLoggerProxy(byref(made))
     return made
 

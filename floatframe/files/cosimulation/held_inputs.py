@@ -26,7 +26,7 @@ __all__ = ["HeldInput", "function_numbers", "input_choices", "with_held_inputs",
 
 @dataclass(frozen=True)
 class HeldInput:
-    """A number that acts on a system from outside: what it is called, where it enters, and its value at the start."""
+    """A number that acts on a system from outside: its name, its place, and its initial value."""
 
     name: str  #: such as forces.push.amplitude, joints.hub.angle, or the name of a table [inputs.NAME]
     unit: str  #: in the symbols of the system, "1" for a factor
@@ -44,7 +44,7 @@ class HeldInput:
 
 
 def force_channels(system: System) -> list[Channel | CoordinateChannel]:
-    """Return the inputs of a system that are forces; its drives are inputs by themselves, bases have none in time."""
+    """Return the inputs of a system that are forces; drives are separate inputs, and bases have none in time."""
     return [each for each in inputs_of(system.inputs) if isinstance(each, Channel | CoordinateChannel)]
 
 
@@ -161,7 +161,7 @@ def function_numbers(system: System, compiled: CompiledSystem, held: HeldInput) 
 
 
 def motors_of(system: System, compiled: CompiledSystem, names: set[str]) -> Iterator[int]:
-    """Yield the functions of motors by name of the force: forces of a row stand in the order of the system."""
+    """Yield the functions of motors by name of the force; forces of a row are in the order of the system."""
     model = compiled.model
     for k, (owner, coordinate) in enumerate(zip(compiled.owners, compiled.coordinates, strict=True)):
         forces = [
@@ -176,7 +176,7 @@ def motors_of(system: System, compiled: CompiledSystem, names: set[str]) -> Iter
 
 
 def write_function(compiled: CompiledSystem, number: int, begin: float, coefficients: Array) -> None:
-    """Write a function of one piece anew: Σ_k c_k (t - begin)^k, up to six coefficients."""
+    """Convert a function of one piece to Σ_k c_k (t - begin)^k, with up to six coefficients."""
     functions = compiled.model.functions
     piece = int(functions.piece0[number])
     row = np.zeros(functions.piece.shape[1])

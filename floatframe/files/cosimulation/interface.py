@@ -31,7 +31,7 @@ OF_THE_STATE = (
     AngleSensor, DisplacementSensor, ElongationSensor, ModeSensor, MomentumSensor, StrainGauge, StressSensor,
     VonMisesSensor,
 )  # fmt: skip
-COLUMNS_OF_THE_STATE = ("value", "rate")  #: of a joint coordinate, beside the force along it
+COLUMNS_OF_THE_STATE = ("value", "rate")  #: of a joint coordinate, in addition to the force along it
 TABLES_OF_NUMBERS = ("bodies", "forces", "couplers")  #: whose numbers are parameters without being named
 
 

@@ -62,7 +62,7 @@ def base_unit(units: Units, words: str) -> BaseUnit | None:
 # model description ----------------------------------------------------------------------------------------------------
 
 
-#: what an FMU needs where it runs
+#: requirements of an FMU where it runs
 NEEDS = (
     "Needs Python with floatframe where it runs: the program that loads it must be Python itself (FMPy), or find the "
     "library of a Python in which floatframe is installed (Linux: LD_PRELOAD=libpython3.x.so; Windows: python3x.dll on "
@@ -73,7 +73,7 @@ CATEGORIES = {"logAll": "all messages", "logStatusWarning": "warnings", "logStat
 
 @dataclass(frozen=True)
 class Description:
-    """What a model description says besides the variables."""
+    """Data of a model description besides the variables."""
 
     name: str  #: of the model
     identifier: str  #: of its binaries, a name in C
@@ -83,7 +83,7 @@ class Description:
     stop_time: float  #: [s]
     step: float  #: [s]
     words: str  #: what it is
-    is_hosted: bool = True  #: whether it needs a program of its own where it runs
+    is_hosted: bool = True  #: whether it needs another program where it runs
     has_derivatives: bool = False  #: whether it can be solved by others (model exchange)
     sources: tuple[str, ...] = ()  #: its files of C, which FMI 2.0 names here
 
@@ -120,7 +120,7 @@ def model_description(about: Description, variables: Sequence[Variable], fmi: in
 
 
 def add_interface(root: Element, kind: str, about: Description, fmi: int) -> None:
-    """Add what a unit can do in one kind of use."""
+    """Add the capabilities of a unit in one kind of use."""
     state = "FMUstate" if fmi == 2 else "FMUState"
     can = {"modelIdentifier": about.identifier}
     if about.is_hosted:

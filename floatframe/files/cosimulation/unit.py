@@ -31,13 +31,13 @@ from floatframe.simulation.validity_watch import ValidityWatch
 
 __all__ = ["Unit", "UnitState", "quintic", "sensor_names"]
 
-ROUNDING = 1e-9  #: of a step, by which times of another program may differ
+ROUNDING = 1e-9  #: fraction of a step by which times of another program may differ
 JUMP = 1e-9  #: of an input, as in `TimeFunction.jumps`: changes below it are roundings of another program
 
 
 @dataclass(frozen=True, eq=False)
 class UnitState:
-    """All a unit remembers: time, what the integrator carries, inputs, and the pieces of its drives."""
+    """The complete memory of a unit: time, carry of the integrator, inputs, and the pieces of its drives."""
 
     t: float
     carry: Carry
@@ -57,7 +57,7 @@ class UnitState:
 
     @staticmethod
     def from_bytes(content: bytes, system: System) -> "UnitState":
-        """Return what `to_bytes` wrote; `ResultsError` if it is of another system."""
+        """Return the object that `to_bytes` wrote; `ResultsError` if it belongs to another system."""
         try:
             with np.load(io.BytesIO(content), allow_pickle=False) as file:
                 record = dict(file)
@@ -94,7 +94,7 @@ def quintic(begin: Array, end: Array, duration: float) -> Array:
 
 
 def sensor_names(system: System, outputs: Sequence[str] | None) -> list[str]:
-    """Return the sensors whose columns are outputs: those named, else all of the system, else all joint coordinates."""
+    """Return the sensors for outputs: the named ones, else all of the system, else all joint coordinates."""
     if outputs is not None:
         return [sensor_of(system, name).name for name in outputs]
     named = [sensor.name for sensor in sensors_of(system)]
@@ -103,7 +103,7 @@ def sensor_names(system: System, outputs: Sequence[str] | None) -> list[str]:
 
 @dataclass
 class Unit:
-    """A motion that another program leads: it sets inputs, asks for a step, reads outputs, and may go back.
+    """A motion controlled by another program, which sets inputs, requests steps, reads outputs, and may go back.
 
     Force inputs keep their values over a communication step; where one changes, the motion begins anew from the state
     (as `integrate` does where a force jumps), so that no impulse is lost. A drive is led from where it is to the value,
@@ -115,18 +115,18 @@ class Unit:
     system: System
     integrator: Integrator
     h: float  #: longest step of the integrator [s]
-    names: Sequence[str] | None = None  #: of inputs; None: those that `with_held_inputs` takes
+    names: Sequence[str] | None = None  #: of inputs; None: those that `with_held_inputs` uses
     outputs: Sequence[str] | None = None  #: sensors or joint coordinates; None: those of `sensor_names`
     inputs: dict[str, float] = field(init=False)  #: values that were set
-    notes: list[str] = field(init=False, default_factory=list)  #: words on bodies that left their linear range
+    notes: list[str] = field(init=False, default_factory=list)  #: messages on bodies that left their linear range
     t: float = field(init=False, default=0.0)
     steps: list[Rows] = field(init=False, default_factory=list)  #: results of the steps of the last communication step
 
     def __post_init__(self) -> None:
         if self.system.fmus:
             raise ModelError(
-                f"system {self.system.name!r}: units of other programs act beside it (fmus), which cannot be a part of "
-                "a unit; take them out and let the master connect them"
+                f"system {self.system.name!r}: it has units of other programs (fmus), which cannot be part "
+                "of a unit; remove them and let the master connect them"
             )
         if events_of(self.system):
             raise ModelError(
@@ -199,7 +199,7 @@ class Unit:
             write_function(compiled_system(self.system), number, t, coefficients)
 
     def settle(self) -> None:
-        """Let the force inputs act that have changed: where one jumps, the motion goes on with it from the state."""
+        """Apply changed force inputs; if one jumps, the motion restarts with it from the state."""
         assert self.carry is not None
         jumps = False
         for each in self.held:
@@ -252,7 +252,7 @@ class Unit:
                 end = np.array([x + v * size + a * size**2 / 2, v + a * size, a])
                 self.write(each, t, quintic(self.drives[each.name], end, n * h))
                 drives[each.name] = end
-        self.work.solver.c_k[...] = 0.0  # factors are made anew: a step depends on the state alone
+        self.work.solver.c_k[...] = 0.0  # factors are renewed, so that a step depends only on the state
         jumps = jumps_of_steps(self.system, t, h, n)
         k, steps = 0, []
         while k < n:
@@ -279,7 +279,7 @@ class Unit:
         self.t, self.drives, self.steps = t + size, drives, steps
 
     def measured(self) -> list[Measurement]:
-        """Return what the sensors measure now, with the inputs that are set."""
+        """Return the current values of the sensors, with the current inputs."""
         if self.carry is None:
             raise ModelError(f"unit {self.system.name!r}: outputs before its beginning")
         self.settle()

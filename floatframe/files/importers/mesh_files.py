@@ -1,4 +1,4 @@
-"""Surfaces that a description of a robot names: where their files are, and what is in them.
+"""Surfaces that a description of a robot names: their files, and the contents of these.
 
 Names are `package://NAME/rest` (of ROS), `file:///path`, or a path relative to the description. A package is looked for
 where the caller says it is, then in the folders above the description (as NAME/rest, or as the folder NAME itself),
@@ -55,13 +55,13 @@ def mesh_path(name: str, source: str, packages: Mapping[str, str | os.PathLike[s
         raise UrdfError(
             f"{where}: mesh {quoted(name)}: not found; looked for {', '.join(str(path) for path in tried[:4])}"
             f"{' and others' if len(tried) > 4 else ''}; say where package {quoted(package)} is (packages, --package "
-            f"{package}=FOLDER), or leave pictures out"
+            f"{package}=FOLDER), or omit pictures"
         )
     raise UrdfError(f"{where}: mesh {quoted(name)}: no such file: {tried[0]}{near_file(tried[0])}")
 
 
 def candidates(name: str, source: str, packages: Mapping[str, str | os.PathLike[str]]) -> Iterator[Path]:
-    """Yield where a file may be, the first that is there counts."""
+    """Yield possible paths of a file; the first existing one is used."""
     folder = Path(source).resolve().parent if source else Path.cwd()
     if name.startswith("package://"):
         package, _, rest = name.removeprefix("package://").partition("/")
@@ -83,7 +83,7 @@ def candidates(name: str, source: str, packages: Mapping[str, str | os.PathLike[
 
 
 def mesh_of(mesh: MeshFile, path: Path) -> Mesh:
-    """Return the surface of a file in the units of the robot, mirrored where the scale says so.
+    """Return the surface of a file in the units of the robot, mirrored if the scale is negative.
 
     Raises
     ------

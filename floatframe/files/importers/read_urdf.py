@@ -36,7 +36,7 @@ __all__ = ["Element", "read_urdf", "read_xml"]
 
 
 # an XML file as a tree whose elements know their line, so that messages can name it -----------------------------------
-# The parser is Python's own (expat). A document type is refused before anything in it is looked at: descriptions of
+# The parser is Python's own (expat). A document type is refused before its content is parsed: descriptions of
 # robots have none, and it could name other files or entities that grow without end.
 
 
@@ -117,7 +117,7 @@ def parsed(path: Path, content: bytes) -> Element:
 
 Color = tuple[float, float, float, float]
 
-READ = {  #: elements that are read, by the one they stand in
+READ = {  #: elements that are read, by their parent element
     "robot": ("link", "joint", "material"),
     "link": ("inertial", "visual", "collision"),
     "joint": ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic"),
@@ -142,7 +142,7 @@ def read_urdf(path: str | os.PathLike[str]) -> Robot:
 
 
 class Reader:
-    """Reads one file; keeps its materials, and counts what is not read."""
+    """Reader of one file, which collects its materials and counts elements that are not read."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -288,7 +288,7 @@ class Reader:
         return Picture(self.geometry(shapes[0]), self.pose(element), color, element.attributes.get("name", ""))
 
     def geometry(self, element: Element) -> Box | Cylinder | Sphere | MeshFile:
-        """Return what is in a <geometry>."""
+        """Return the content of a <geometry>."""
         try:
             if element.tag == "box":
                 return Box(self.numbers(element, "size", 3))
@@ -324,8 +324,8 @@ class Reader:
         limit, dynamics, mimic = (self.one(element, tag) for tag in ("limit", "dynamics", "mimic"))
         if kind == "revolute" and limit is None:
             raise self.error(
-                element, 'a revolute joint has limits: expected <limit lower="..." upper="...">, got none; one without '
-                "limits is of the type continuous"
+                element, 'a revolute joint has limits: expected <limit lower="..." upper="...">, got none; a joint '
+                "without limits has the type continuous"
             )  # fmt: skip
         if kind == "continuous" and limit is not None and {"lower", "upper"} & set(limit.attributes):
             self.unread["limit lower/upper of a continuous joint"] += 1

@@ -1,4 +1,4 @@
-"""A robot as URDF describes it: links in a tree of joints. What the file says, checked, in its own terms.
+"""A robot as URDF describes it: links in a tree of joints, checked, in the terms of the file.
 
 A link has one frame; the frame of a joint stands at `pose` in that of its parent link, and is that of its child link
 where the joint is at zero. Lengths are in m, masses in kg, angles in rad.
@@ -49,7 +49,7 @@ class Pose:
 
     @cached_property
     def rotation(self) -> Array:
-        """R = R_z(yaw) R_y(pitch) R_x(roll), (3, 3): from the axes of the pose to those it is given in."""
+        """R = R_z(yaw) R_y(pitch) R_x(roll), (3, 3): from the axes of the pose to those of its reference."""
         (cr, cp, cy), (sr, sp, sy) = np.cos(self.rpy), np.sin(self.rpy)
         return np.array(
             [
@@ -81,7 +81,7 @@ class MeshFile:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """What a link looks like (visual), or what it touches with (collision)."""
+    """The look of a link (visual), or its shape for contact (collision)."""
 
     geometry: Box | Cylinder | Sphere | MeshFile
     pose: Pose = field(default_factory=Pose)
@@ -108,7 +108,7 @@ class Link:
 
 @dataclass(frozen=True)
 class JointLimits:
-    """Limits of a joint; what is None is not said."""
+    """Limits of a joint; None: not given."""
 
     lower: float | None = None  #: [rad or m]
     upper: float | None = None
@@ -118,7 +118,7 @@ class JointLimits:
 
 @dataclass(frozen=True)
 class Mimic:
-    """A joint follows another: value = multiplier × that of the other + offset."""
+    """A joint that follows another: value = multiplier × that of the other + offset."""
 
     joint: str
     multiplier: float = 1.0
@@ -151,7 +151,7 @@ class RobotJoint:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """A robot: links, and joints that make one tree of them.
+    """A robot: links, and joints that connect them to one tree.
 
     Raises
     ------
@@ -164,7 +164,7 @@ class Robot:
     links: Sequence[Link]
     joints: Sequence[RobotJoint] = ()
     source: str = ""  #: path of its file, "": made in Python
-    notes: Sequence[str] = ()  #: what the file holds that is not read
+    notes: Sequence[str] = ()  #: elements of the file that are not read
 
     def __post_init__(self) -> None:
         for name in ("links", "joints", "notes"):
@@ -273,7 +273,7 @@ class Robot:
 
     @cached_property
     def order(self) -> tuple[str, ...]:
-        """Names of the links, the root first, each after its parent and before the links beside it (depth first)."""
+        """Names of the links, the root first, each after its parent and before its siblings (depth first)."""
         children: dict[str, list[str]] = {}
         for joint in self.joints:
             children.setdefault(joint.parent, []).append(joint.child)

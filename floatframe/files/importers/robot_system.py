@@ -1,4 +1,4 @@
-"""A robot as a system: links as bodies, in the configuration that is asked for.
+"""A robot as a system: links as bodies, in the requested configuration.
 
 (1) links without mass, and links that are fixed to another, become places on the body that carries them; masses of
     fixed ones are added to it (`combined`), unless they are to stay bodies
@@ -194,7 +194,7 @@ def shifted(function: TimeFunction, by: float) -> TimeFunction:
 
 
 def values_of(robot: Robot, given: Mapping[str, float], what: str = "configuration") -> dict[str, float]:
-    """Return the values (or rates) of all joints that have one; those that follow others as they must."""
+    """Return the values (or rates) of all joints that have one; followers are computed from their leaders."""
     values = {}
     for name, value in given.items():
         joint = robot.joint(name)
@@ -276,13 +276,13 @@ class Builder:
     # Bodies ----------------------------------------------------------------------------------------------------------
 
     def carry(self, link: str) -> None:
-        """(1), (2), (3): place a link, and say which body carries it; its parent has one already."""
+        """(1), (2), (3): place a link, whose parent is already placed, and record the body that carries it."""
         joint = self.robot.parent_joint.get(link)
         if joint is None:
             self.placed[link] = self.base
             self.moving[link] = np.zeros(3), np.zeros(3)
             if link in self.flexible and not self.is_free:
-                raise self.error(link, "the root stands on the ground and cannot be flexible; let it be free (is_free)")
+                raise self.error(link, "the root is fixed to the ground and cannot be flexible; make it free (is_free)")
             if not self.is_free:
                 self.carriers[link] = GROUND.name, self.base
                 return
@@ -382,7 +382,7 @@ class Builder:
         )
 
     def shapes(self, name: str) -> tuple[Shape, ...]:
-        """Return what the links of a body look like."""
+        """Return the shapes of the links of a body."""
         if self.pictures == "none":
             return ()
         found = []
@@ -418,12 +418,12 @@ class Builder:
         return Marker(body, position=at.x, triad=at.R)
 
     def interface_marker(self, link: str, joint: RobotJoint, frame: Frame) -> Marker:
-        """Return the marker at the interface of a flexible link where a joint stands, with the axes of the joint."""
+        """Return the marker at the interface of a flexible link for a joint, with the axes of the joint."""
         given, reduced = self.flexible[link], self.reduced[link]
         names = [each.name for each in reduced.interfaces]
         if joint.name not in given.interfaces:
             raise self.error(
-                link, f"flexible: at which interface is joint {joint.name!r}? Say it in interfaces; choices: "
+                link, f"flexible: the interface of joint {joint.name!r} is unknown; give it in interfaces; choices: "
                 f"{', '.join(names) or 'none'}"
             )  # fmt: skip
         name = given.interfaces[joint.name]
@@ -446,7 +446,7 @@ class Builder:
         return Marker(link, name, triad=in_link.R.T @ frame.R)
 
     def joint(self, joint: RobotJoint) -> Joint | None:
-        """Return a joint of the system; None where nothing holds its bodies, or they are one."""
+        """Return a joint of the system; None if it holds nothing, or connects a body to itself."""
         if self.carriers[joint.parent][0] == self.carriers[joint.child][0] or joint.type == "floating":
             return None
         a = self.marker(joint.parent, joint, Frame(joint.pose.xyz, joint.pose.rotation))
@@ -472,7 +472,7 @@ class Builder:
         return JointForce(f"{joint.name} drag", joint.name, coordinate, damping=joint.damping, friction=joint.friction)
 
     def couplers(self, joint: RobotJoint) -> list[CoordinateCoupler]:
-        """(5): return what couples a joint to the one that it follows, or stops it at its limits."""
+        """(5): return the coupler of a joint to its leader, or its stops at the limits."""
         if not joint.has_value or joint.name in self.drives:
             return []
         own = JointCoordinate(joint.name, coordinate_of(self.robot, joint.name))
@@ -491,11 +491,11 @@ class Builder:
         if (lower is not None and value < lower) or (upper is not None and value > upper):
             bounds = f"{'-inf' if lower is None else f'{lower:g}'} to {'inf' if upper is None else f'{upper:g}'}"
             raise UrdfError(
-                f"{where}: stands at {value:g}, beyond its limits {bounds}; say where it begins (configuration, "
-                f"--at {joint.name}=VALUE), or let limits not act"
+                f"{where}: is at {value:g}, beyond its limits {bounds}; give its initial value "
+                f"(configuration, --at {joint.name}=VALUE), or disable limits"
             )
         if lower is not None and upper is not None and not lower < upper:
-            raise UrdfError(f"{where}: its limits leave it no way, {lower:g} to {upper:g}; make it fixed")
+            raise UrdfError(f"{where}: its limits {lower:g} to {upper:g} allow no motion; make it fixed")
         offset = offset_of(self.robot, self.values, joint.name)
         stop = Limits(None if lower is None else lower - offset, None if upper is None else upper - offset)
         return [CoordinateCoupler(f"{joint.name} stop", [(own, 1.0)], limits=stop)]
@@ -511,7 +511,7 @@ class Builder:
             if link in self.parts or link in self.flexible
         ]
         if not bodies:
-            raise UrdfError(f"{robot.where()}: nothing in it moves: all links are fixed to the ground; see is_free")
+            raise UrdfError(f"{robot.where()}: it cannot move: all links are fixed to the ground; see is_free")
         in_order = [robot.parent_joint[link] for link in robot.order[1:]]
         joints = [made for joint in in_order if (made := self.joint(joint)) is not None]
         forces: list[Force] = [Gravity(gravity)] if gravity.any() else []

@@ -1,4 +1,4 @@
-"""A system as a robot: a tree of rigid bodies as URDF can say it.
+"""A system as a robot: a tree of rigid bodies that URDF can represent.
 
 (1) the tree: from the ground (or the only free body) along the joints; a joint that closes a loop is refused
 (2) the frame of a link stands at the marker of the joint that carries it, since that of a joint and of its child link
@@ -56,7 +56,7 @@ class ExportedRobot:
 
     robot: Robot
     meshes: Mapping[str, bytes]  #: files of surfaces, by their path relative to the description
-    notes: tuple[str, ...]  #: what URDF cannot say, and is left out
+    notes: tuple[str, ...]  #: parts that URDF cannot represent, which are omitted
 
 
 def robot_of_system(
@@ -95,7 +95,7 @@ class Exporter:
         flexible = [body.name for body in system.bodies if not isinstance(body, RigidBody)]
         if flexible:
             raise UrdfError(
-                f"{self.where}: URDF has no flexible bodies; put rigid ones in the place of {', '.join(flexible)}"
+                f"{self.where}: URDF has no flexible bodies; replace by rigid bodies: {', '.join(flexible)}"
             )
         self.bodies = {body.name: body for body in system.bodies if isinstance(body, RigidBody)}
         known = {joint.name for joint in system.joints}
@@ -140,7 +140,7 @@ class Exporter:
         return ExportedRobot(Robot(self.system.name, links, self.made), self.meshes, tuple(self.notes))
 
     def root(self) -> str:
-        """(1): return the ground, or the first body where nothing touches the ground and all hang together."""
+        """(1): return the ground, or the first body if nothing is attached to the ground and all are connected."""
         if any(GROUND.name in (a[0], b[0]) for a, b in self.ends.values()):
             return GROUND.name
         reached, left = set(), [next(iter(self.bodies))]
@@ -152,7 +152,7 @@ class Exporter:
         return next(iter(self.bodies)) if reached == set(self.bodies) else GROUND.name
 
     def follow(self, start: str) -> None:
-        """(1): add the joints that hang on a link, outwards, in the order of the system."""
+        """(1): add the joints of a link, outwards, in the order of the system."""
         left, used = [start], {joint.name for joint in self.made}
         while left:
             parent = left.pop(0)
@@ -163,8 +163,8 @@ class Exporter:
                 child = b if a == parent else a
                 if child in self.frames:
                     raise UrdfError(
-                        f"{self.where}: joint {joint.name!r} closes a loop; URDF describes trees: leave it out, and "
-                        "close the loop where the description is read"
+                        f"{self.where}: joint {joint.name!r} closes a loop; URDF describes trees: remove it, "
+                        "and close the loop in the program that reads the description"
                     )
                 used.add(joint.name)
                 self.made.append(self.joint(joint, parent, child))
@@ -252,7 +252,7 @@ class Exporter:
         return sum(factor * (self.values.get(name, 0.0) - self.offset(name)) for name, factor in terms)
 
     def note_the_rest(self) -> None:
-        """(4): list what is left out."""
+        """(4): list the omitted parts."""
         for force in self.system.forces:
             if isinstance(force, Gravity):
                 self.notes.append("gravity")
@@ -278,12 +278,12 @@ class Exporter:
         is_same = not own.x.any() and (own.R == np.eye(3)).all()
         center = body.center_of_mass if is_same else own.x + own.R @ body.center_of_mass
         tensor = body.inertia if is_same else own.R @ body.inertia @ own.R.T
-        shapes = [each for each in body.shapes if isinstance(each, Shape)]  # all of them: bodies make them so
+        shapes = [each for each in body.shapes if isinstance(each, Shape)]  # all of them, because bodies make them so
         visuals = tuple(self.picture(body, k, shape, own) for k, shape in enumerate(shapes))
         return Link(body.name, Inertial(body.mass, Pose(center), tensor), visuals)
 
     def picture(self, body: RigidBody, k: int, shape: Shape, own: Frame) -> Picture:
-        """Return what a body looks like."""
+        """Return the shapes of a body."""
         geometry = shape.geometry
         at = own @ Frame(shape.position, rotation_exp(shape.rotation_vector))
         color = shape.color
@@ -303,7 +303,7 @@ class Exporter:
 
 
 def joint_terms(coupler: CoordinateCoupler) -> list[tuple[str, float]] | None:
-    """Return the joints of a coupler with their factors; None if it couples something else."""
+    """Return the joints of a coupler with their factors; None if it couples other quantities."""
     if not all(isinstance(coordinate, JointCoordinate) for coordinate, _ in coupler.terms):
         return None
     return [(coordinate.joint, factor) for coordinate, factor in coupler.terms]  # type: ignore[union-attr]

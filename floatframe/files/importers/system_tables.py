@@ -1,4 +1,4 @@
-"""A robot as a system file: a folder with the file, surfaces and modal files beside it, ready for `floatframe run`."""
+"""A robot as a system file: a folder with the file, surfaces and modal files, ready for `floatframe run`."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -86,7 +86,7 @@ class Writer:
         return own | ({"shapes": shapes} if shapes else {})
 
     def shape(self, body: RigidBody, k: int, shape: Shape) -> dict[str, Any]:
-        """Return the table of what a body looks like."""
+        """Return the table of the shapes of a body."""
         geometry = shape.geometry
         if isinstance(geometry, Box):
             table: dict[str, Any] = {"type": "box", "size": geometry.size.tolist()}

@@ -16,7 +16,7 @@ TENSOR = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1,
 
 
 def write_urdf(robot: Robot, path: str | os.PathLike[str]) -> None:
-    """Write a robot; a file that was there is replaced whole or not at all.
+    """Write a robot; an existing file is replaced completely or not at all.
 
     Raises
     ------
@@ -31,7 +31,7 @@ def write_urdf(robot: Robot, path: str | os.PathLike[str]) -> None:
 
 
 def urdf_text(robot: Robot) -> str:
-    """Return a robot as text; `UrdfError` if a limit that URDF asks for is not known."""
+    """Return a robot as text; `UrdfError` if a limit required by URDF is unknown."""
     lines = ['<?xml version="1.0" encoding="utf-8"?>', f"<robot name={quoteattr(robot.name)}>"]
     for link in robot.links:
         lines += link_lines(link)
@@ -85,7 +85,7 @@ def inertial_lines(inertial: Inertial) -> list[str]:
 
 
 def picture_lines(tag: str, picture: Picture, material: str) -> list[str]:
-    """Return the lines of a visual or a collision; `material`: a name of its own for its colour."""
+    """Return the lines of a visual or a collision; `material`: the name of its colour."""
     shape = picture.geometry
     if isinstance(shape, Box):
         inner = f"<box size={numbers(shape.size)}/>"
@@ -118,8 +118,8 @@ def joint_lines(robot: Robot, joint: RobotJoint) -> list[str]:
         missing = [name for name in ("lower", "upper", "effort", "velocity") if getattr(joint.limits, name) is None]
         if missing:
             raise UrdfError(
-                f"robot {robot.name!r}: joint {joint.name!r}: URDF asks for limits of a {joint.type} joint; "
-                f"{', '.join(missing)} not given"
+                f"robot {robot.name!r}: joint {joint.name!r}: URDF requires limits of a {joint.type} "
+                f"joint; {', '.join(missing)} not given"
             )
     if limits:
         inside.append(f"  <limit {' '.join(limits)}/>")

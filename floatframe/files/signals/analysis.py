@@ -63,7 +63,7 @@ def spectral_csv(spectra: Sequence[AnySpectrum]) -> str:
         elif isinstance(each, Spectrum):
             columns[f"{each.name} {each.kind} [{each.unit}]"] = each.values
     if len({len(values) for values in columns.values()}) != 1:
-        raise SignalError("spectra over different frequencies do not stand in one table; write them one by one")
+        raise SignalError("spectra over different frequencies do not fit into one table; write them separately")
     writer.writerow(columns)
     writer.writerows([repr(float(x)) for x in row] for row in zip(*columns.values(), strict=True))
     return text.getvalue()
@@ -211,7 +211,7 @@ SPECTRA: dict[str, Callable[[Signal, SpectrumRequest], Spectrum | SpectralMap | 
 
 
 def rotation_of(signal: Signal, rotation: Signal | None) -> tuple[Array, Array]:
-    """Return speed [rad/s] and angle [rad] of a rotation; its unit tells which of them is given."""
+    """Return speed [rad/s] and angle [rad] of a rotation, which is given by one of them, depending on its unit."""
     if rotation is None:
         raise SignalError("orders: expected the channel with the angle or the speed of the rotation (--rotation)")
     unit = signal_unit(rotation.unit, f"rotation {quoted(rotation.name)}")

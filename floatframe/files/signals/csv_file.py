@@ -115,7 +115,7 @@ def delimiter_of(path: Path, rows: list[tuple[int, str]], decimal: str | None) -
         same = len({len(fields) for fields in spaced}) == 1 and len(spaced[0]) > 1
         as_decimal = all(COMMA.fullmatch(field) for fields in spaced for field in fields)
         if same and as_decimal:
-            return " "  # 0,001 1,5: decimal commas; with commas between columns a blank would follow each of them
+            return " "  # 0,001 1,5: decimal commas; if commas separated columns, a blank would follow each of them
         has_point = any("." in line for line in lines)
         counts = {line.count(",") for line in lines}
         if decimal == "," or (not has_point and len(counts) == 1 and two_ways(lines)):
@@ -192,7 +192,7 @@ def numbers_of(path: Path, split: list[tuple[int, list[str]]], width: int, decim
     if decimal == ",":
         flat = [field.replace(",", ".") for field in flat]
     try:
-        values = np.array(flat, dtype=float)  # as it stands, where all are numbers
+        values = np.array(flat, dtype=float)  # unchanged, if all are numbers
     except ValueError:
         values = np.array([number_or_nan(path, field, split[k // width][0], k % width) for k, field in enumerate(flat)])
     return values.reshape(-1, width)

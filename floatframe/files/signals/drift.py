@@ -96,9 +96,7 @@ def without_drift(signal: Signal, drift: str, corner: float | None = None) -> Si
     values = DRIFTS[drift](signal, corner)
     peak = float(np.abs(signal.values).max())
     off = float(np.abs(signal.values - values).max())
-    note = (
-        f"drift {drift}: up to {off:.6g} {signal.unit} taken off, {100 * off / peak if peak else 0:.3g} % of the peak"
-    )
+    note = f"drift {drift}: up to {off:.6g} {signal.unit} removed, {100 * off / peak if peak else 0:.3g} % of the peak"
     return replace(signal, values=values, notes=(*signal.notes, *(() if drift == "none" else (note,))))
 
 

@@ -20,7 +20,7 @@ __all__ = ["read_mat", "sound_variables"]
 # mat elements ---------------------------------------------------------------------------------------------------------
 # The elements of a MATLAB file of version 5, walked through before a reader takes it: tags, sizes and dimensions fit.
 #
-# SciPy's reader trusts what a damaged file says, and can take the program along. A file is a head of 128 bytes and
+# SciPy's reader trusts the contents of a damaged file, and can crash the program. A file is a head of 128 bytes and
 # elements: a tag (type and size of 4 bytes each, or of 2 in a small element) and data, filled up to 8 bytes. An array
 # is an element of elements: flags with its class, dimensions, name, and numbers, or the arrays of its fields or cells.
 
@@ -191,7 +191,7 @@ def read_mat(path: Path, *, time: str | None = None, rate: float | None = None) 
     n = len(columns[leading][0]) if leading else max(set(lengths), key=lengths.count)
     kept = {name: column for name, column in columns.items() if len(column[0]) == n}
     left = [name for name in columns if name not in kept]
-    notes = [f"left out, of another length than {n}: {', '.join(left[:20])}"] if left else []
+    notes = [f"omitted, because their length is not {n}: {', '.join(left[:20])}"] if left else []
     return RawTable(
         np.column_stack([values for values, _ in kept.values()]),
         tuple(kept),

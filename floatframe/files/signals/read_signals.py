@@ -138,8 +138,8 @@ def is_time(name: str) -> bool:
 
 
 # gaps in measured histories: times that do not increase, changing steps, missing or invalid samples -------------------
-# Each is refused in one message with the place in the file; gaps up to a stated length are filled by interpolation, and
-# said.
+# Each is refused in one message with the place in the file; gaps up to a stated length are filled by interpolation,
+# which a note states.
 
 
 FEW = 20  #: number of samples below which unequal steps count as intended
@@ -251,7 +251,7 @@ def with_lost_samples(
         raise SignalError(
             f"{place(k + 1)}: samples are missing between t = {time[k]:.9g} and {time[k + 1]:.9g} s, at steps of "
             f"{step:.6g} s ({n_lost} samples in {len(wide)} gaps, the longest {length:.6g} s); gaps up to a length are "
-            f"filled by interpolation if asked for (fill = {length:.3g})"
+            f"filled by interpolation on request (fill = {length:.3g})"
         )
     row = np.concatenate([[0], np.cumsum(np.maximum(counts, 1))])
     whole = np.full((int(row[-1]) + 1, values.shape[1]), np.nan)
@@ -301,8 +301,8 @@ def with_numbers(
             if length > fill * (1 + 1e-9):
                 raise SignalError(
                     f"{where}: {end - first} samples are no numbers, from t = {time[first]:.9g} s on ({int(bad.sum())} "
-                    f"in the channel, in {len(begins)} gaps); gaps up to a length are filled by interpolation if asked "
-                    f"for (fill = {length:.3g})"
+                    f"in the channel, in {len(begins)} gaps); gaps up to a length are filled by interpolation "
+                    f"on request (fill = {length:.3g})"
                 )
         good = ~bad
         values[bad, column] = PchipInterpolator(time[good], values[good, column])(time[bad])

@@ -89,7 +89,7 @@ def read_rpc(path: str | os.PathLike[str]) -> Signals:
     units = tuple(head.get(f"UNITS.CHAN_{k}", "") for k in range(1, n_channels + 1))
     n_given = whole(path, head, "SAMPLES", 1, n_samples) if "SAMPLES" in head else n_samples
     if n_given == n_samples and (n_tail := constant_tail(values, per_frame)) > 0:
-        notes.append(f"the last {n_tail} samples of all channels are alike, which may fill up the last frame")
+        notes.append(f"the last {n_tail} samples of all channels are equal; they may be padding of the last frame")
     bad = np.argwhere(~np.isfinite(values[:n_given]))
     if len(bad):
         raise SignalError(

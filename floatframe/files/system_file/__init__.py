@@ -1,1 +1,1 @@
-"""Tables of the system file, and how they are turned into a system."""
+"""Tables of the system file, and their conversion into a system."""

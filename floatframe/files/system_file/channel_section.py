@@ -59,7 +59,7 @@ __all__ = [
 MESH = ("node", "element", "set")  #: keys that specify a place in the user's mesh
 AT = ("marker", *MESH, "tolerance")  #: keys of a place
 
-#: keys of the tables whose places are put together from several keys; those before "|" are required
+#: keys of the tables for positions, which are combined from several keys; those before "|" are required
 KEYS_OF_PLACES: dict[type[Sensor], tuple[str, ...]] = {
     PlaceSensor: ("body", "|", *AT, "relative_to", "relative_marker"),
     AngleSensor: ("body_a", "body_b", "|", "marker_a", "marker_b", "axis"),

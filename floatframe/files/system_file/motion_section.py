@@ -84,7 +84,7 @@ class MotionSection(Table):
     position: Number | None = Field(None, description="a number, the position at the first time; default 0")
     velocity: Number | None = Field(None, description="a number, the velocity at the first time; default 0")
     signal: Name | None = Field(None, description="the name of a table [signals.NAME]")
-    factor: Number | None = Field(None, description="a number, by which the signal is multiplied; default 1")
+    factor: Number | None = Field(None, description="a factor on the signal; default 1")
     pieces: list["MotionSection"] | None = Field(
         None, description="a list of tables, a function of the time since its beginning for each time of t"
     )

@@ -46,8 +46,8 @@ def recorded_system(trajectory: Trajectory, path: str | Path | None = None) -> S
     ):
         if found != expected:
             raise ResultsError(
-                f"{source}: {kind} are {', '.join(found) or 'none'}, but those of the motion "
-                f"{', '.join(expected) or 'none'}; give the system file of the run"
+                f"{source}: its {kind} are {', '.join(found) or 'none'}, but those of "
+                f"the motion are {', '.join(expected) or 'none'}; give the system file of the run"
             )
     if path is None and run.get("system_file_digest", "") not in ("", file_digest(source)):
         log.warning("%s has changed since the run; its present sensors are used", source)

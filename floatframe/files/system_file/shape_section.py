@@ -56,7 +56,7 @@ class ShapeSection(Table):
     rail_height: Positive | None = Field(None, description="a number above 0, the height of the rails")
     sleeper_distance: Positive | None = Field(None, description="a number above 0, from sleeper to sleeper")
     file: Path | None = Field(None, description="the path of a surface, relative to the system file")
-    scale: Positive | None = Field(None, description="a number above 0 by which the numbers of the file are multiplied")
+    scale: Positive | None = Field(None, description="a factor above 0 on the numbers of the file")
 
     @field_validator("file", mode="before")
     @classmethod

@@ -59,9 +59,9 @@ class FlexibleBody:
         where = f"flexible body {self.name!r}"
         if self.reduced.is_held:
             raise ModelError(
-                f"{where}: the reduced body {self.reduced.name!r} is held to the ground, and a floating frame "
-                "carries a "
-                "body that is free; reduce it anew without its supports, and hold it here by joints or bushings"
+                f"{where}: the reduced body {self.reduced.name!r} is held to the ground, but a "
+                "floating frame needs a free body; reduce it again without its supports, and hold it here by joints or "
+                "bushings"
             )
         put = object.__setattr__
         for name in ("position", "velocity", "omega_B"):
@@ -78,8 +78,8 @@ class FlexibleBody:
         if self.stiffening is True and self.reduced.geometric is None:
             raise ModelError(
                 f"{where}: stiffening is asked for, but the reduced body {self.reduced.name!r} holds no geometric "
-                "stiffness; reduce it anew with geometric stiffness from a body with an element model, or leave "
-                "stiffening out"
+                "stiffness; reduce it again with geometric stiffness from a body with an element model, or omit "
+                "stiffening"
             )
         missing = self.reduced.moments.missing
         if not isinstance(self.leave_out_missing, bool):
@@ -87,9 +87,9 @@ class FlexibleBody:
         if missing and self.reduced.n_q and not self.leave_out_missing:
             raise ModelError(
                 f"{where}: a motion needs the inertia terms {', '.join(missing)}, which the reduced body "
-                f"{self.reduced.name!r} does not hold: the program that reduced it did not say them. Import it again "
-                "with its full mass matrix, its nodal masses, or its mesh and density beside (cms import); or say "
-                f"leave_out_missing = true: {self.reduced.moments.trust}"
+                f"{self.reduced.name!r} does not hold: the program that reduced it did not write them. "
+                "Import it again with its full mass matrix, its nodal masses, or its mesh and density (cms import); or "
+                "give leave_out_missing = true: {self.reduced.moments.trust}"
             )
         if self.reduced.moments.m <= 0:
             raise ModelError(f"{where}: expected a mass above zero, got {self.reduced.moments.m:g}")

@@ -221,7 +221,9 @@ class Element:
         return ()
 
     def small_angles(self) -> Callable[[Array], Array] | None:
-        """Return how far its angles are beyond small ones, as a function of motion; by default none: any size is meant.
+        """Return the deviation of its angles from small angles, as a function of motion.
+
+        By default none: any size is allowed.
 
         The function takes the axes of the markers in ground axes, (n_t, n, 3, 3), and returns the relative difference
         between an angle and what the law takes for it, (n_t,).

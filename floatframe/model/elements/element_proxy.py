@@ -34,7 +34,7 @@ class ElementProxy(Element):
         return self.element.events()
 
     def small_angles(self) -> Callable[[Array], Array] | None:
-        """Return how far its angles are beyond small ones."""
+        """Return the deviation of its angles from small angles."""
         return self.element.small_angles()
 
     def drawn(self) -> Any:

@@ -88,8 +88,8 @@ def package_named(name: str, package: str) -> ModuleType:
         except Exception as error:
             raise ModelError(f"{where}: package {each} cannot be imported: {type(error).__name__}: {error}") from error
     raise ModelError(
-        f"{where}: there is no package {quoted(package)}, neither in {OWN} nor where Python finds packages; install "
-        "it, put it beside the system file, or name its folder in PYTHONPATH"
+        f"{where}: there is no package {quoted(package)}, neither in {OWN} nor on Python's path; install "
+        "it, put it next to the system file, or name its folder in PYTHONPATH"
     )
 
 

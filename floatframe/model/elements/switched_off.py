@@ -1,4 +1,4 @@
-"""An element that is switched off by an event; its rows remain, but it does nothing.
+"""An element that an event has switched off; its rows remain, but it has no effect.
 
 Its wrenches and state rates are zero, unless its law defines by `off` what it does then (a closed valve, a dragging
 clutch). Its constraints are released, and its multipliers are zero.
@@ -20,7 +20,7 @@ __all__ = ["SwitchedOff", "law_switched_off", "off_at_start", "times_off"]
 
 
 class SwitchedOff(ElementProxy):
-    """Replaces an element; it does nothing."""
+    """Replaces an element; it has no effect."""
 
     def law(self, placed: Placed) -> ElementLaw:
         """Return its law while it is off."""
@@ -58,7 +58,7 @@ def times_off(events: Sequence[Any], happened: Sequence[Mapping[str, Any]], t: A
 
 @njit
 def still(t, x, z, lam, data, wrench, z_dot, g, outputs):
-    """Write the outputs of an element that does nothing."""
+    """Write the outputs of an element without effect."""
     for k in range(lam.shape[0]):
         g[k] = lam[k]
 

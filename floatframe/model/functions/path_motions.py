@@ -50,7 +50,7 @@ def rest_to_rest_spline(t: Array, values: Array, degree: int = 3) -> TimeFunctio
     curve = PPoly.from_spline(spline)
     inside = np.diff(curve.x) > 0
     begins, c = curve.x[:-1][inside], curve.c[:, inside][::-1].T
-    c[0, : len(ENDS[degree]) + 1] = values[0], *[0.0] * len(ENDS[degree])  # rounding would be a jump from rest
+    c[0, : len(ENDS[degree]) + 1] = values[0], *[0.0] * len(ENDS[degree])  # rounding would be a jump at rest
     return between(np.append(begins, t[-1]), c, (values[0],), (values[-1],))
 
 

@@ -83,7 +83,10 @@ class CoordinateCoupler:
             if not isinstance(self.limits, Limits):
                 raise ModelError(f"{where}: limits: expected Limits(lower, upper, restitution), got {self.limits!r}")
             if self.constant is not None:
-                raise ModelError(f"{where}: with limits there is no constant: what it holds is the stop; leave it out")
+                raise ModelError(
+                    f"{where}: a coupler with limits has no constant, because the limits determine its value; remove "
+                    "the constant"
+                )
         if isinstance(self.constant, int | float):
             object.__setattr__(self, "constant", constant(number(f"{where}: constant", self.constant)))
         elif not isinstance(self.constant, TimeFunction | None):

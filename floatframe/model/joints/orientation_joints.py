@@ -173,7 +173,7 @@ class ConstantVelocityJoint:
         if cosine < -np.sqrt(0.5):
             raise ModelError(
                 f"joint {self.name!r}: expected shafts less than 135 degrees from one line as placed, got "
-                f"{np.degrees(np.arccos(max(cosine, -1.0))):.6g}; axis_b leads away from A"
+                f"{np.degrees(np.arccos(max(cosine, -1.0))):.6g}; axis_b must point away from A"
             )
         x, z = normals_of(self.axis)  # x × z is along the axis of A
         turn = np.cross(along, across)  # as assembled, B is A rotated about this axis from shaft to shaft

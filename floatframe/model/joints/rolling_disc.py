@@ -50,7 +50,7 @@ class RollingDisc:
             # a body without marker would be met at the position of the other marker: the centre would lie on the plane
             if not isinstance(given, Marker):
                 raise ModelError(
-                    f"joint {self.name!r}: {key}: expected a Marker, {what}, as Marker({body_name(given)!r}, "
+                    f"joint {self.name!r}: {key}: expected a Marker, {what}, such as Marker({body_name(given)!r}, "
                     f"position=(0, 0, 0)), in a system file {key} = [0, 0, 0]; got the body {body_name(given)!r} alone"
                 )
         checked_axes(self)

@@ -107,8 +107,8 @@ def line_triad(where: str, points: Array, normal: Array | None) -> tuple[Array, 
     beside = float(np.abs(points - points[0] - np.outer(s, x)).max())
     if beside > 1e-6 * length or not (np.diff(s) > 1e-6 * length).all():
         raise ModelError(
-            f"{where}: its interfaces: expected them one after another on a straight line, got places {s.round(9)} up "
-            f"to {beside:.3g} beside it"
+            f"{where}: its interfaces: expected them in order on a straight line, got positions {s.round(9)} at "
+            f"distances up to {beside:.3g} from it"
         )
     y = np.eye(3)[int(np.argmin(np.abs(x)))] if normal is None else normal
     y = y - (y @ x) * x

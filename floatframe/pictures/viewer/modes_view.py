@@ -111,7 +111,7 @@ def view_modes(
             "stable" if modes.is_stable else "unstable",
         ],
         "notes": [
-            f"A mode has no size of its own: the farthest point is drawn at {100 * SWING:.0f} % of the machine.",
+            f"The amplitude of a mode is arbitrary: the farthest point is drawn at {100 * SWING:.0f} % of the machine.",
             *surface_notes(rest.body_names, surfaces),
         ],
         "sources": source_record(rest),

@@ -69,7 +69,7 @@ log = logging.getLogger(__name__)
 
 
 MOST_ROWS = 4000  #: of a page
-FASTEST = 2.6  #: rad that a body may turn from row to row, so that it is seen to turn the right way
+FASTEST = 2.6  #: rotation of a body between rows [rad] up to which its direction of rotation is visible correctly
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +81,7 @@ class Timeline:
 
     @property
     def turns_too_far(self) -> bool:
-        """Whether a body would be seen to turn the wrong way."""
+        """Whether a body would appear to rotate in the wrong direction."""
         return self.largest_turn > FASTEST
 
 
@@ -327,7 +327,7 @@ def known_system(trajectory: Trajectory) -> System | None:
     try:
         return recorded_system(trajectory)
     except ResultsError as error:
-        log.warning("joints, shapes and sensors are left out: %s", error)
+        log.warning("joints, shapes and sensors are omitted: %s", error)
         return None
 
 
@@ -493,12 +493,16 @@ def surface_notes(names: Sequence[str], surfaces: Sequence[FlexibleSurface]) -> 
     for each in surfaces:
         shown, whole = len(each.surface.rows), each.surface.n_nodes
         words = f"{names[each.body]}: surface of {shown:,} nodes"
-        words += f", thinned from {whole:,}; none is moved, so that modes stay exact there" if shown < whole else ""
+        words += (
+            f", thinned from {whole:,}; the remaining nodes are unchanged, so that modes are exact there"
+            if shown < whole
+            else ""
+        )
         if len(each.shapes) < each.n_modes:
-            words += f"; {each.n_modes - len(each.shapes)} of {each.n_modes} modes stay too small to be seen"
+            words += f"; {each.n_modes - len(each.shapes)} of {each.n_modes} modes are too small to be visible"
         notes.append(f"{words}.")
     if any(len(each.surface.rows) < each.surface.n_nodes for each in surfaces):
-        notes.append("Largest values of colours are those of the nodes shown.")
+        notes.append("The colour scale ends at the largest value of the displayed nodes.")
     return notes
 
 

@@ -67,14 +67,14 @@ __all__ = [
 
 
 def elements_cast(cast: Cast) -> None:
-    """Add what the elements of a system show of themselves."""
+    """Add the drawn parts of the elements of a system."""
     system = cast.carriers.system
     for element in () if system is None else system.elements:
         element_cast(cast, element)
 
 
 def element_cast(cast: Cast, element: Element) -> None:
-    """Add what an element shows of itself."""
+    """Add the drawn parts of an element."""
     carriers, where = cast.carriers, f"element {element.name!r}"
     system = carriers.system
     shown = () if system is None else shown_of(system, element)
@@ -97,7 +97,7 @@ def element_cast(cast: Cast, element: Element) -> None:
 
 
 def drawn_cast(cast: Cast, drawn: MarkerShapes, carrier: int, metres: float) -> None:
-    """Add a shape on a carrier; one that stands on the ground once, though several elements show it."""
+    """Add a shape on a carrier; a shape on the ground that several elements share is added once."""
     found = cast.carriers.found[carrier]
     if found.body < 0 and isinstance(drawn.shape.geometry, Plane):
         cast.add_plane(drawn.shape.geometry, found.position + found.axes @ drawn.shape.position, found.axes)

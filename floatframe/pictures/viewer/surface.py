@@ -22,11 +22,11 @@ class ShownSurface:
     """A surface of selected nodes of a body."""
 
     rows: IntArray  #: of the shown nodes of the body, (n,)
-    corner: IntArray  #: for each corner point with a normal of its own the shown node it lies on, (n_corners,)
+    corner: IntArray  #: for each corner point with its own normal, the drawn node at its position, (n_corners,)
     triangles: IntArray  #: of corner points, (n_triangles, 3)
     edges: IntArray  #: sharp edges, of shown nodes, (n_edges, 2)
-    n_nodes: int  #: nodes of the whole surface
-    n_triangles: int  #: triangles of the whole surface
+    n_nodes: int  #: nodes of the complete surface
+    n_triangles: int  #: triangles of the complete surface
 
 
 def shown_surface(nodes: Array, triangles: IntArray, most: int) -> ShownSurface:
@@ -56,7 +56,7 @@ def shown_surface(nodes: Array, triangles: IntArray, most: int) -> ShownSurface:
 
 
 def thinned(nodes: Array, triangles: IntArray, most: int) -> tuple[IntArray, IntArray]:
-    """Return rows of nodes that are kept, and triangles of them: nodes are taken away where the surface is flattest.
+    """Return rows of retained nodes, and triangles of them; nodes are removed where the surface is flattest.
 
     Nodes are deleted and never moved (`vtkDecimatePro`).
     """

@@ -203,5 +203,5 @@ def test_a_full_file_of_ansys_with_its_deck_has_the_printed_frequency(tmp_path):
     assert body.is_held
     assert len(body.interfaces[0].nodes) == 21
     job.write_text(job.read_text().replace("held = true\n", ""))
-    with pytest.raises(FeModelsError, match="say that the body is held"):
+    with pytest.raises(FeModelsError, match="declare the body as held"):
         uncoupled_body(cms.jobs.job.read_job(job), Stages())

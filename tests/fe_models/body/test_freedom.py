@@ -82,7 +82,7 @@ def test_springs_to_the_ground_are_held_if_they_say_so_and_refused_if_not(free, 
         made(free, K=K)
     held = made(free, K=K, held=True)
     assert held.is_held
-    assert held.provenance["held"] == "to the ground, as it was said"
+    assert held.provenance["held"] == "to the ground, as declared"
 
 
 def test_rows_taken_out_are_named_and_a_support_where_it_is_said(free):

@@ -56,6 +56,6 @@ def test_where_loads_have_led_is_told():
         return words_of(LoadPathEnd(np.zeros(1), np.zeros(0), p, n_solves), is_stable)
 
     assert words(0.0, 0) == ""
-    assert words(0.37, 52) == ", nor by loads that grow (52 solves, to 37 % of them)"
-    assert words(1.0, 9) == ", and by loads that grow (9 solves) only one that the least push makes it leave"
-    assert words(1.0, 9, is_stable=True) == ", nor by loads that grow (9 solves, to 100 % of them)"
+    assert words(0.37, 52) == ", nor by increasing loads (52 solves, up to 37 % of them)"
+    assert words(1.0, 9) == ", and increasing loads (9 solves) lead only to an unstable one"
+    assert words(1.0, 9, is_stable=True) == ", nor by increasing loads (9 solves, up to 100 % of them)"

@@ -110,7 +110,7 @@ def test_coarse_steps_of_a_pendulum_are_told_with_time_body_and_remedy(caplog, t
     (note,) = motion.validity
     assert (note.kind, note.body, note.limit) == ("steps", "rod", 0.03)
     assert 0 < note.t_first <= note.t_largest <= 5.0
-    assert f"system 'system': body 'rod', t = {note.t_first:.6g}: the steps put it off by about" in caplog.text
+    assert f"system 'system': body 'rod', t = {note.t_first:.6g}: the error of the steps is about" in caplog.text
     assert "take a step of about 0.0" in note.words
     assert read_results(tmp_path / "swing.h5").validity == motion.validity
     assert notes_from_json(notes_to_json(motion.validity)) == motion.validity

@@ -189,5 +189,5 @@ def test_mistakes_with_couplers_in_events_are_answered():
         integrate(shafts(constant=5.0), METHOD, 1.0, 1e-2)
     with pytest.raises(ModelError, match="begins at -1, beyond its lower limit 0"):
         integrate(dropped(Limits(lower=0.0), height=-1.0), METHOD, 1.0, 1e-2)
-    with pytest.raises(ModelError, match="there is no constant"):
+    with pytest.raises(ModelError, match="has no constant"):
         shafts(limits=Limits(upper=1.0), constant=0.0)

@@ -1,1 +1,1 @@
-"""What a reduced body can be asked from its modal file alone."""
+"""Checks of a reduced body from its modal file alone."""

@@ -18,11 +18,11 @@ NEGLIGIBLE = 1e-10  #: eigenvalue over the largest of its load, below which a di
 
 @dataclass(frozen=True)
 class CriticalLoad:
-    """The amplitudes at which one load takes the stiffness of the body away; infinite: none does."""
+    """The amplitudes at which one load makes the stiffness of the body singular; infinite if none does."""
 
-    load: str  #: in words, such as "force x at big_end", along the axes of B
-    along: float  #: least positive amplitude, in `unit`
-    against: float  #: size of the least negative amplitude, in `unit`; infinite for angular velocities
+    load: str  #: name of the load, such as "force x at big_end", along the axes of B
+    along: float  #: smallest positive amplitude, in `unit`
+    against: float  #: size of the smallest negative amplitude, in `unit`; infinite for angular velocities
     unit: str
 
 
@@ -65,7 +65,7 @@ def critical_loads(reduced: ReducedBody) -> tuple[CriticalLoad, ...]:
 
 
 def critical_factors(reduced: ReducedBody, K_geo: Array) -> tuple[float, float]:
-    """Return the least factors f > 0 at which K + f K_geo, and at which K - f K_geo, is singular."""
+    """Return the smallest factors f > 0 for which K + f K_geo, and K - f K_geo, are singular."""
     size = 1 / np.sqrt(np.diag(reduced.K))
     values = la.eigvalsh(size[:, None] * K_geo * size)
     scale = np.abs(values).max(initial=0.0) * NEGLIGIBLE
@@ -95,7 +95,7 @@ def unit_factor(load: CriticalLoad, units: Units) -> float:
 
 
 def sentences(loads: tuple[CriticalLoad, ...]) -> list[str]:
-    """Return the least angular velocity, acceleration, force and moment in words, with the sign of the load."""
+    """Describe the smallest angular velocity, acceleration, force and moment, with the sign of the load."""
     words = []
     for kind in ("angular velocity", "acceleration", "angular acceleration", "force", "moment"):
         of_kind = [load for load in loads if load.load.split(" at ")[0][:-2] == kind]

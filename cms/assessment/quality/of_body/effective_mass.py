@@ -1,4 +1,4 @@
-"""Effective modal mass of a body driven at one interface, and what its modes leave out."""
+"""Effective modal mass of a body driven at one interface, and the part missing in its modes."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -44,7 +44,7 @@ class EffectiveMass:
 
     @property
     def remainder(self) -> Array:
-        """Share of the mass that no mode represents, by direction, (6,); 0 where there is nothing to move."""
+        """Share of the mass that no mode represents, by direction, (6,); 0 if nothing can move."""
         return np.where(self.total > 0, 1.0 - self.share.sum(axis=0), 0.0)
 
 
@@ -125,7 +125,7 @@ def check_driven_mass(reduced: ReducedBody) -> QualityRecord:
         return information("driven-mass", "the body has no interface that could be driven")
     try:
         found = [effective_mass(reduced, name) for name in held]
-    except np.linalg.LinAlgError as error:  # moments that no body has: other records say which
+    except np.linalg.LinAlgError as error:  # impossible moments: other records report them
         return information("driven-mass", f"the moments of the file give no modes with an interface held: {error}")
     largest = max(found, key=lambda one: one.remainder[:3].max())
     remainder = largest.remainder

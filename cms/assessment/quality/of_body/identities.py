@@ -32,7 +32,7 @@ def check_modal_mass(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_inertia_terms(reduced: ReducedBody) -> QualityRecord:
-    """Count the inertia terms that the program which reduced the body did not say, and say what a motion is worth."""
+    """Count the inertia terms that the reducing program did not provide, and state the validity of a motion."""
     missing = reduced.moments.missing
     what = f"{', '.join(missing)} missing" if missing else "none is missing"
     reason = f"{what}; to be trusted: {reduced.moments.trust}"
@@ -68,7 +68,7 @@ def check_frame_condition(reduced: ReducedBody) -> QualityRecord:
 
 
 def held_motion(reduced: ReducedBody) -> tuple[Array, str]:
-    """Motions with q that a nodal frame holds at zero, as far as the file has them, (n, n_q) [m], and what they are.
+    """Motions due to q that a nodal frame holds at zero, if the file has them, (n, n_q) [m], and their names.
 
     The six of an interface with a reference point, rotations times the body length, or held translations of kept nodes.
     """
@@ -139,7 +139,7 @@ def check_energy_shares(reduced: ReducedBody) -> QualityRecord:
 
 
 def momenta(reduced: ReducedBody) -> tuple[Array, Array]:
-    """Linear and angular momentum of each mode per what its modal mass could carry, (n_q,) each."""
+    """Linear and angular momentum of each mode, relative to the largest possible for its modal mass, (n_q,) each."""
     moments = reduced.moments
     mass = np.sqrt(np.where(np.diag(reduced.M) > 0, np.diag(reduced.M), 1.0))
     center = moments.center_of_mass
@@ -150,7 +150,7 @@ def momenta(reduced: ReducedBody) -> tuple[Array, Array]:
 
 
 def mode_size(reduced: ReducedBody) -> Array:
-    """Largest displacement of each mode that the file shows, at least that of a rigid body of its mass, (n_q,).
+    """Largest displacement of each mode in the file, at least that of a rigid body with its mass, (n_q,).
 
     A mode of unit modal mass moves by 1 / sqrt(m) in the mean, though it may leave all kept nodes at rest.
     """

@@ -9,7 +9,7 @@ __all__ = ["check_mesh_order"]
 
 
 def check_mesh_order(reduced: ReducedBody) -> QualityRecord:
-    """How much too high the lowest frequencies are for want of order, as the file's provenance tells."""
+    """Excess of the lowest frequencies due to first-order cells, from the provenance of the file."""
     counts = {kind: reduced.provenance.get(f"cells {kind}", "") for kind in FIRST_ORDER}
     cells = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
     told = reduced.provenance.get(PROVENANCE, "")

@@ -43,7 +43,7 @@ def check_gram(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_moments_of_shapes(reduced: ReducedBody) -> QualityRecord:
-    """Moments have the direction of those of masses at the kept nodes, with the shapes there.
+    """Moments are parallel to those of masses at the kept nodes, with the shapes there.
 
     (1) find the masses with the right sum and centre that are nearest to equal masses
     (2) compute P of each mode, and S_kl without its trace, of these masses
@@ -79,7 +79,7 @@ def check_moments_of_shapes(reduced: ReducedBody) -> QualityRecord:
 
 
 def masses_at_nodes(reduced: ReducedBody) -> Array | None:
-    """Return the masses nearest to equal ones that have the right sum and centre, (n,); None if one is negative."""
+    """Return the masses nearest to equal masses with the correct sum and centre, (n,); None if one is negative."""
     moments, L = reduced.moments, body_length(reduced)
     c = (np.asarray(reduced.nodes) - moments.center_of_mass) / L
     rows, equal = np.vstack([np.ones(len(c)), c.T]), np.full(len(c), 1 / len(c))

@@ -1,4 +1,4 @@
-"""Recovery rows of a reduced body in rigid motions, and compared with those that follow from the rest of the file."""
+"""Recovery rows of a reduced body in rigid motions, and compared with rows that follow from the rest of the file."""
 
 import numpy as np
 
@@ -58,7 +58,7 @@ def check_recovery_forces(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_recovery_motions(reduced: ReducedBody) -> QualityRecord:
-    """Rows of motions say what a rigid body says: unit translations along the mesh axes, rotations about a place.
+    """Rows of motions are correct for a rigid body: unit translations along the mesh axes, rotations about a point.
 
     The translations of a place are the axes of B and minus its skew matrix; of a kept node or an interface the place is
     its own.
@@ -77,7 +77,7 @@ def check_recovery_motions(reduced: ReducedBody) -> QualityRecord:
 
 
 def places_of(table: RecoveryTable) -> dict[str, dict[str, int]]:
-    """Return the rows of each place and quantity by component, where all three translations are there."""
+    """Return the rows of each place and quantity by component, if all three translations exist."""
     found: dict[str, dict[str, int]] = {}
     for k, (label, quantity, component) in enumerate(
         zip(table.labels, table.quantities, table.components, strict=True)
@@ -134,7 +134,7 @@ def check_recovery_shapes(reduced: ReducedBody) -> QualityRecord:
             if not len(own):
                 continue
             a, b = ((x[..., N_RIGID:] * by_energy) for x in (table.dynamic[:, own], made))
-            if quantity == "stress":  # what the modes lack of it is the model's alone
+            if quantity == "stress":  # the part missing in the modes is known to the model only
                 a, b = a[:1], b[:1]
             elif quantity in MOTIONS:
                 order = MOTIONS.index(quantity)
@@ -142,14 +142,14 @@ def check_recovery_shapes(reduced: ReducedBody) -> QualityRecord:
             if quantity in MOTIONS:  # rotations are multiplied by the size of the body
                 lengths = np.where(table.dimensions[own, 1] == 0, body_length(reduced), 1.0)
                 a, b = a * lengths[:, None], b * lengths[:, None]
-            # places that the frame holds do not move: their size is that of other places
+            # places held by the frame do not move, so the size of other places is used
             at_least = 1e-3 * float((mode_size(reduced) * by_energy).max()) if quantity in MOTIONS else 0.0
             size = np.maximum(np.abs(b).max(axis=(-2, -1), keepdims=True, initial=0.0), at_least)
             size = np.maximum(size, 1e-9 * size.max(initial=0.0))
             apart = np.abs(a - b)
             defects[f"{name}: {quantity}"] = float((apart / np.where(size > 0, size, 1.0)).max(initial=0.0))
     if not defects:
-        return information("recovery-shapes", "no rows of what the file holds itself")
+        return information("recovery-shapes", "no rows of quantities that the file contains")
     worst = max(defects, key=lambda key: defects[key])
     reason = f"largest difference from what modes and matrices of the file give is {defects[worst]:.1e}, of {worst}"
     return judge("recovery-shapes", defects[worst], reason, {"defects": defects})

@@ -59,7 +59,7 @@ def check_turned_loads(reduced: ReducedBody) -> QualityRecord:
 
 
 def turned_defects(reduced: ReducedBody, geometric: GeometricStiffness) -> Iterator[tuple[str, float]]:
-    """Yield the differences of the turned loads, each kind over the sum of both."""
+    """Yield the differences of the rotated loads, each kind divided by the sum of both."""
     turned = geometric.turned
     wanted = turned_loads(reduced, geometric)
     if turned is None or wanted is None:
@@ -73,7 +73,7 @@ def turned_defects(reduced: ReducedBody, geometric: GeometricStiffness) -> Itera
     parts = np.split(wanted, [3, 6, 12])
     for name, made in zip(UNIT_LOADS, parts, strict=True):
         own = np.asarray(getattr(turned, name)).reshape(-1, 3, n)
-        if name == "interfaces":  # a mean of nodes has a second order of its own
+        if name == "interfaces":  # a mean of nodes has its own second-order part
             is_point = [reduced.interfaces[k].kind != "nodes" for k in geometric.loaded]
             own, made = own[np.repeat(is_point, 6)], made[np.repeat(is_point, 6)]
         if not len(own):

@@ -1,4 +1,4 @@
-"""What a reduced body asks of an integrator: its highest frequency, damping, and the columns that were dropped."""
+"""Requirements of a reduced body on an integrator: its highest frequency, its damping, and its dropped columns."""
 
 import numpy as np
 
@@ -55,7 +55,7 @@ def check_damping(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_dropped_columns(reduced: ReducedBody) -> QualityRecord:
-    """Redundant columns that the finishing step dropped, by label, as the file's provenance tells."""
+    """Redundant columns dropped in the last step of the reduction, by label, from the provenance of the file."""
     told = reduced.provenance.get("mode set redundant")
     if told is None:
         return information("dropped-columns", "the file does not say which columns were dropped")

@@ -1,4 +1,4 @@
-"""Symmetry and definiteness of what a modal file holds."""
+"""Symmetry and definiteness of the matrices in a modal file."""
 
 import numpy as np
 import scipy.linalg as la
@@ -27,7 +27,7 @@ def check_symmetry(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_definiteness(reduced: ReducedBody) -> QualityRecord:
-    """M and D have no negative eigenvalue, K only positive ones: least eigenvalue over the largest, after scaling."""
+    """M and D have no negative eigenvalue, K only positive ones: smallest eigenvalue divided by the largest, scaled."""
     values = {name: negativity(getattr(reduced, name)) for name in ("M", "K", "D")}
     stiffness = np.diag(reduced.K)
     if reduced.n_q and (stiffness <= 0).any():
@@ -59,7 +59,10 @@ def asymmetry(A: Array) -> float:
 
 
 def negativity(A: Array) -> float:
-    """How far the least eigenvalue of A, scaled to a unit diagonal, is below zero, over the largest; rounding is 0."""
+    """Return the smallest eigenvalue of A, scaled to a unit diagonal, divided by the largest, if negative.
+
+    Rounding is 0.
+    """
     if not A.size or not A.any():
         return 0.0
     values = la.eigvalsh(scaled(A))

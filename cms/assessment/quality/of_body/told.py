@@ -1,4 +1,4 @@
-"""What a file says of itself in words: labels by its columns, damping by its provenance, and what it cannot show."""
+"""Descriptions in a file: labels from its columns, damping from its provenance, and data that it cannot verify."""
 
 import numpy as np
 import scipy.linalg as la
@@ -11,7 +11,7 @@ __all__ = ["check_damping_told", "check_labels", "check_scope"]
 
 
 def check_labels(reduced: ReducedBody) -> QualityRecord:
-    """Labels, sources and energy shares are those of the columns on record."""
+    """Labels, sources and energy shares agree with the recorded columns."""
     columns = reduced.columns
     if columns is None:
         return information("labels", "the file holds no columns of its mode set")
@@ -28,7 +28,7 @@ def check_labels(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_damping_told(reduced: ReducedBody) -> QualityRecord:
-    """D is at least the damping that the provenance names: dampers of the model add to it, nothing takes from it.
+    """D is at least the damping in the provenance; dampers of the model add to it, and nothing reduces it.
 
     The least eigenvalue of D less that damping, over modes of one frequency, over the largest entry of either.
     """
@@ -51,7 +51,7 @@ def check_damping_told(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_scope(reduced: ReducedBody) -> QualityRecord:
-    """List what the file holds and cannot be checked without its model."""
+    """List the data of the file that cannot be checked without its model."""
     unknown = {
         "modes and frequencies themselves": True,
         "3C to 5C beyond their sign": not reduced.moments.missing,

@@ -17,7 +17,7 @@ def unit_texts(reduced: ReducedBody) -> list[str]:
 
 
 def check_units(reduced: ReducedBody) -> QualityRecord:
-    """Count what is implausible: size of the kept nodes, mass over their hull, 2 f L of the first elastic frequency."""
+    """Count implausible values: size of the kept nodes, mass divided by their hull, 2 f L of the first frequency."""
     texts = unit_texts(reduced)
     reason = "; ".join(texts) or f"size, density and first frequency are plausible in {reduced.units.name}"
     return judge("units", float(len(texts)), reason)

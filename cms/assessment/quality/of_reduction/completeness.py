@@ -17,7 +17,7 @@ __all__ = [
 ]  # fmt: skip
 
 NO_LOAD = 1e-10  #: part of a load that is not in balance with rigid acceleration, below which it is rounding
-NO_ENERGY = 1e-24  #: strain energy of a response over the largest of its kind, below which there is none
+NO_ENERGY = 1e-24  #: strain energy of a response relative to the largest of its kind, below which it is zero
 ACCELERATIONS = ("ax", "ay", "az", "alpha x", "alpha y", "alpha z")
 
 

@@ -340,7 +340,7 @@ def compare_damping(case: Case) -> Iterator[Compared]:
 
 
 def wanted_damping(case: Case) -> tuple[Array | None, str]:
-    """Return the damping matrix that the file should have, and its origin in words; None if it is unknown."""
+    """Return the damping matrix that the file should have, and a description of its origin; None if it is unknown."""
     reduced, options = case.reduced, case.options
     told = reduced.provenance.get("damping", "none")
     damping, words = damping_of_words(told), f"provenance: {told}"
@@ -453,7 +453,7 @@ def compare_stress(case: Case) -> Iterator[Compared]:
 
 
 def compare_recovery(case: Case) -> Iterator[Compared]:
-    """Recovery tables: names, and numbers over those of their quantity."""
+    """Recovery tables: names, and numbers relative to those of their quantity."""
     if case.options is None:
         return
     file, requests = case.reduced, case.options.recovery
@@ -470,7 +470,7 @@ def compare_recovery(case: Case) -> Iterator[Compared]:
 
 
 def compare_table(case: Case, own: RecoveryTable, made: RecoveryTable) -> Iterator[Compared]:
-    """Rows of one table, those of a quantity and dimension together.
+    """Rows of one table with the same quantity and dimension.
 
     A file that was converted to another frame keeps the static part of its first frame, with the reaction there. Only
     its positions, velocities and accelerations are compared.

@@ -186,7 +186,7 @@ def relative(t: Array, error: Mapping[str, Array], size: Mapping[str, Array]) ->
 
 
 def deformation_record(deformation: DeformationError) -> QualityRecord:
-    """Record "deformation-error": the largest eps(t) of the energy norm, or of the norm there is."""
+    """Record "deformation-error": the largest eps(t) in the energy norm, or in the available norm."""
     norm = "K" if "K" in deformation.error else next(iter(deformation.error))
     k = int(np.argmax(deformation.error[norm]))
     parts = ", ".join(f"{name} {100 * deformation.largest(name):.3g} %" for name in deformation.error)

@@ -14,7 +14,8 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["FIELDS", "Compared", "apart", "leaves", "same"]
 
-#: field -> record that judges it. Records are made by `contents_records`, "same-body" and "mass-properties" beside it
+#: field -> record that assesses it. `contents_records` makes these records, in addition to "same-body" and
+#: "mass-properties"
 FIELDS: Mapping[str, str] = {
     "name": "origin",
     "units": "same-body",  # other units are refused before anything is compared
@@ -117,8 +118,8 @@ class Compared:
 
     field: str  #: as in `FIELDS`
     defect: float  #: largest difference relative to the size of the field; infinite for words and counts that differ
-    where: str = ""  #: place of the largest difference, in words
-    doubt: str = ""  #: the difference in words, if it is not one of numbers
+    where: str = ""  #: description of the place of the largest difference
+    doubt: str = ""  #: description of the difference, if it is not one of numbers
 
 
 def leaves(value: Any, path: str = "") -> dict[str, list[Any]]:

@@ -21,10 +21,11 @@ class FrequencyComparison:
 
     full: Array  #: (n_full,) [Hz]
     reduced: Array  #: all of the reduced body, ascending, (n_reduced,) [Hz]
-    error: Array  #: reduced over full frequency in their order - 1, (n_full,); NaN where the reduced body has none
+    #: reduced frequency divided by full frequency, in order, minus 1, (n_full,); NaN if the reduced body has none
+    error: Array
     mac: Array  #: mass-weighted, (n_full, n_reduced)
     mac_nodal: Array  #: of the translations of all nodes, (n_full, n_reduced)
-    partner: IntArray  #: reduced mode that goes with each full one, by the mass-weighted MAC; -1: none, (n_full,)
+    partner: IntArray  #: reduced mode that matches each full one, by the mass-weighted MAC; -1: none, (n_full,)
     partner_error: Array  #: its frequency over the full one - 1, (n_full,)
     recovered: Array  #: part of each full shape in the partners of its cluster, mass-weighted, 0 to 1, (n_full,)
     recovered_nodal: Array  #: the same, nodal; the MAC with the partner for a single mode, (n_full,)

@@ -26,7 +26,7 @@ DAMPING = 0.01  #: ratio of every mode in the full and the reduced response that
 MOST_POINTS = 1_000_000  #: frequencies of a response
 POINTS = 400
 AROUND = np.array([0.0, 0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0, 8.0, 12.0])  #: half widths from a resonance
-UNDAMPED = 1e-4  #: ratio by which points stand around a resonance without damping, whose peak has no height
+UNDAMPED = 1e-4  #: frequency ratio of points around a resonance without damping, whose peak is infinite
 LOWEST = 0.05  #: lower end of the band over the first elastic frequency: below it the body moves rigidly
 
 

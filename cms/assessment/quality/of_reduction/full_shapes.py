@@ -27,7 +27,7 @@ from fe_models.foundation.arrays import Array, frozen
 __all__ = ["FullShapes", "full_shapes", "same_body_record"]
 
 WELL_DETERMINED = 1e-7  #: smallest over largest singular value of the nodal rows, below which x is not determined
-ONE_FREQUENCY = 1e-6  #: relative difference of two stiffnesses, below which their modes may be turned into each other
+ONE_FREQUENCY = 1e-6  #: relative difference of two stiffnesses, below which their modes may be combined
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,7 @@ def kept_turns(body: FEBody, reduced: ReducedBody, X: Array) -> Array:
 
 
 def turned_onto(found: Array, wanted: Array, stiffness: Array) -> Array:
-    """Return the orthogonal matrix that turns modes of one stiffness nearest to those that are wanted, (n_q, n_q).
+    """Return the orthogonal matrix that rotates modes of equal stiffness closest to the wanted ones, (n_q, n_q).
 
     Modes that the rows do not show stay as they are.
     """

@@ -17,7 +17,7 @@ __all__ = ["HeldMass", "answered_statically", "held_mass", "held_mass_record"]
 DIRECTIONS = ("ux", "uy", "uz", "rx", "ry", "rz")
 HELD = 1e-8  #: singular value of the interface motions over the largest, below which a combination holds them
 MASS_TOLERANCE = 1e-10  #: relative residual of the solutions with M_II
-NO_MASS = 1e-9  #: held mass over the mass of the body, below which a direction has none
+NO_MASS = 1e-9  #: held mass relative to the mass of the body, below which a direction has none
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ def full_held_mass(reference: FullReference, b: Array) -> Array:
 
 
 def held_mass_record(held: HeldMass, *, is_static_complete: bool = False) -> QualityRecord:
-    """Record "effective-mass": the translation whose held mass the modes carry least.
+    """Record "effective-mass": the translation whose held mass is represented worst by the modes.
 
     Where the mode set answers rigid-body accelerations statically, what its modes leave out is not lost: nothing is
     judged.
@@ -115,7 +115,7 @@ def held_mass_record(held: HeldMass, *, is_static_complete: bool = False) -> Qua
 
 
 def answered_statically(record: QualityRecord) -> QualityRecord:
-    """Return the record of a mode set that answers rigid-body accelerations statically: what it lacks is not judged."""
+    """Return the record of a mode set with exact static response to rigid accelerations: its deficit is no fault."""
     if record.verdict == "pass":
         return record
     return replace(record, verdict="info", reason=f"{record.reason}; the rest answers statically", action="")

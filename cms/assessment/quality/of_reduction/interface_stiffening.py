@@ -25,7 +25,7 @@ class InterfaceStiffening:
     rigid: Array  #: elastic free-free frequencies with rigid interfaces, (n,) [Hz]
     distributing: Array  #: the same with distributing ones, (n,) [Hz]
     labels: tuple[str, ...]  #: of the motions of the interfaces: 'big_end ux'
-    compliance_rigid: Array  #: elastic motion per force along each of them, (6 n_ports,) [m/N, 1/(N m)]
+    compliance_rigid: Array  #: elastic displacement for a unit force along each of them, (6 n_ports,) [m/N, 1/(N m)]
     compliance_distributing: Array
 
     def __post_init__(self) -> None:
@@ -39,7 +39,10 @@ class InterfaceStiffening:
 
     @property
     def compliance_ratio(self) -> Array:
-        """Distributing over rigid compliance, (6 n_ports,); at least 1 but for rounding."""
+        """Compliance with distributing interfaces divided by that with rigid ones, (6 n_ports,).
+
+        At least 1 except for rounding.
+        """
         return self.compliance_distributing / np.where(self.compliance_rigid > 0, self.compliance_rigid, np.nan)
 
 

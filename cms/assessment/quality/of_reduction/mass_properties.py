@@ -73,7 +73,7 @@ def geometric_shift(center: Array) -> Array:
 def check_grounding(body: FEBody) -> QualityRecord:
     """K times rigid-body modes: the largest force over |K| |Psi_R|, largest entries, rotations over the body length.
 
-    A body that is held, as it was said, is not judged.
+    A body that is held, as declared, is not judged.
 
     Row by row would be sharper, but the rows of a rigid interface are sums that cancel, and keep their rounding.
     """
@@ -94,5 +94,5 @@ def check_grounding(body: FEBody) -> QualityRecord:
         reason += f"; the body would swing at {swing.max():.3g} Hz"
     data = {"largest": ratio, "swing_hz": swing}
     if body.is_held:
-        return information("grounding", f"the body is held to the ground, as it was said: {reason}", data)
+        return information("grounding", f"the body is held to the ground, as declared: {reason}", data)
     return judge("grounding", ratio[k], reason, data)

@@ -26,7 +26,7 @@ __all__ = ["ResidualBounds", "residual_bounds", "residual_record"]
 
 @dataclass(frozen=True, eq=False)
 class ResidualBounds:
-    """Bounds of the reduced free-free frequencies, without knowing the true ones."""
+    """Bounds of the errors of reduced free-free frequencies, without knowing the true ones."""
 
     frequencies: Array  #: reduced, (n,) [Hz]
     bound: Array  #: b of this module: |(f_reduced / f)² - 1| <= b for some true f, (n,)
@@ -38,7 +38,7 @@ class ResidualBounds:
 
     @property
     def frequency_distance(self) -> Array:
-        """Largest f_reduced / f - 1 that the bound leaves, (n,); a Ritz frequency lies above."""
+        """Largest f_reduced / f - 1 allowed by the bound, (n,); a Ritz frequency lies above."""
         return np.sqrt(1 + self.bound) - 1
 
 

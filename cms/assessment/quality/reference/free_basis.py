@@ -26,7 +26,7 @@ class FreeBasis:
     """The span of [Psi_R, mode set] with M- and K-orthogonal columns: rigid motions N and elastic shapes Phi."""
 
     Phi: Array  #: elastic shapes, (n_dof, n), ascending omega2, massless ones last; Nᵀ M Phi = 0
-    omega2: Array  #: Phiᵀ K Phi, (n,): squared frequencies where there is mass [1/s²]
+    omega2: Array  #: Phiᵀ K Phi, (n,): squared frequencies for shapes with mass [1/s²]
     is_massive: np.ndarray  #: Phiᵀ M Phi = 1 there, 0 elsewhere, (n,) bool
     N: Array  #: M-orthonormal rigid-body motions, (n_dof, n_r)
     dropped: tuple[str, ...] = ()  #: labels of redundant columns

@@ -14,7 +14,8 @@ __all__ = [
     "whole_port_rows",
 ]  # fmt: skip
 
-NO_INERTIA = 1e-12  #: least eigenvalue of the scaled rigid mass matrix, below which there is no inertia about an axis
+#: smallest eigenvalue of the scaled rigid mass matrix, below which there is no inertia about an axis
+NO_INERTIA = 1e-12
 KNOWN_RATIO = 1e9  #: ratio of squared frequencies, up to which rounding of the modal mass stays far below all limits
 
 
@@ -35,7 +36,7 @@ class FreePencil:
 
 
 def free_pencil(reduced: ReducedBody) -> FreePencil:
-    """Return the pencil of a body without joints; of a held body that of its modes alone."""
+    """Return the pencil of a free body; for a held body that of its modes alone."""
     return FreePencil(reduced.M, reduced.K, reduced.D) if reduced.is_held else whole_pencil(reduced)
 
 
@@ -89,7 +90,7 @@ def free_elastic_modes(reduced: ReducedBody) -> tuple[Array, Array, np.ndarray]:
 
 
 def frequency_distance(own: Array, stored: Array) -> Array:
-    """Return relative differences of frequencies from stored ones, as far as these are known; both ascending.
+    """Return relative differences of frequencies from stored ones, if known; both ascending.
 
     The mass of a mode is omega_1² / omega² of its energy in units of the first mode, and rounding leaves it an error of
     eps: a frequency is known to eps omega² / omega_1². Light frames with point masses have modes of 1e6 times the first
@@ -117,7 +118,7 @@ def has_inertia(reduced: ReducedBody) -> bool:
 
 
 def stiffness_scale(reduced: ReducedBody) -> float:
-    """Smallest positive K_kk / M_kk of the modes [1/s²]; 1 where there is none."""
+    """Smallest positive K_kk / M_kk of the modes [1/s²]; 1 if there is none."""
     mass, stiffness = np.diag(reduced.M), np.diag(reduced.K)
     has_both = (mass > 0) & (stiffness > 0)
     return float((stiffness[has_both] / mass[has_both]).min()) if has_both.any() else 1.0

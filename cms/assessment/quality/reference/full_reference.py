@@ -1,4 +1,4 @@
-"""The full model as the reference of the quality checks; what was computed once serves every mode set of the body."""
+"""The full model as the reference of the quality checks; results are shared by all mode sets of the body."""
 
 from contextlib import ExitStack
 from functools import cached_property

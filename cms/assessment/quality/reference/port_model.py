@@ -1,4 +1,4 @@
-"""A body as its modes are seen at ports, and its frequency response."""
+"""A body as the motion of its modes at ports, and its frequency response."""
 
 from dataclasses import dataclass
 

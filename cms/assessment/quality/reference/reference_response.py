@@ -31,7 +31,7 @@ MOST_ROUNDS = 5
 
 @dataclass(frozen=True, eq=False)
 class ReferenceResponse:
-    """The full model seen at its ports, and how well it is known."""
+    """The full model at its ports, and the accuracy of its response."""
 
     model: PortModel
     basis: FreeBasis

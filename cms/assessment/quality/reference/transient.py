@@ -164,7 +164,7 @@ def transient_in(basis: FreeBasis, load: LoadHistory, *, damping: float = 0.0, i
 
 
 def transient_basis(families: Families, F: Array, cutoff: float, held: Sequence[str]) -> FreeBasis:
-    """Return modes and static corrections of the body as it is held: steps (1) and (2); cut-off in body units."""
+    """Return modes and static corrections of the body as held: steps (1) and (2); cut-off in body units."""
     body = families.body
     flexibility: Flexibility
     if held:

@@ -11,7 +11,7 @@ HOW = "benchmarks/install_petsc.sh builds them beside Debian's PETSc (docs/clust
 
 
 def missing_petsc() -> str:
-    """Describe what is missing; "" if PETSc can be used."""
+    """Describe the missing parts; "" if PETSc can be used."""
     lacks = [name for name in ("petsc4py", "slepc4py", "mpi4py") if find_spec(name) is None]
     return f"needs {', '.join(lacks)}, which {'is' if len(lacks) == 1 else 'are'} not installed; {HOW}" if lacks else ""
 

@@ -109,7 +109,7 @@ class RowKind:
     """Meaning of a kind of row."""
 
     code: int  #: code in the kernels
-    name: str  #: description of what it does
+    name: str  #: description of its effect
     holds: int = NOTHING  #: NOTHING (the row defines the wrench), POSITION or VELOCITY
     #: whether the held quantity is a length (VELOCITY: length over time); otherwise it is an angle
     is_length: bool = False

@@ -188,7 +188,7 @@ def test_bad_options_are_refused(thin, options, text):
 
 
 def test_a_cube_has_no_axis_of_its_own():
-    with pytest.raises(ModeSetError, match="tell no axis"):
+    with pytest.raises(ModeSetError, match="determine no axis"):
         assumed_modes(couple(bar(nx=1, ny=1, nz=1, length=1.0, width=1.0, height=1.0)), n_modes=2)
 
 

@@ -240,7 +240,7 @@ def test_normals_are_turned_to_one_side():
         assert [f.kind for f in fm.report_shell(mixed, [STEEL], units=SI).findings] == ["normals"]
         oriented = fm.orient_normals(mixed)
         assert fm.report_shell(oriented, [STEEL], units=SI).findings == ()
-        assert oriented.notes == (f"the nodes of {len(some)} cells were turned round",)
+        assert oriented.notes == (f"the nodes of {len(some)} cells were reversed",)
         body = fm.shell_body(oriented, fm.ShellProperty(0.02, STEEL), name="L", units=SI)
         assert is_closed(body.surface)
     assert fm.orient_normals(mesh) is mesh

@@ -71,7 +71,7 @@ def test_matrices_are_those_of_our_elements_on_the_same_mesh(tmp_path):
 
 def test_a_body_whose_supports_were_taken_out_of_the_rows_is_held(tmp_path):
     paths = unpack("bar_held", tmp_path)
-    with pytest.raises(BodyError, match="say that the body is held"):
+    with pytest.raises(BodyError, match="declare the body as held"):
         body_of(paths, DATA / "bar_held.inp")
     with pytest.raises(MatrixError, match="still not free"):
         body_of(paths, DATA / "bar_held.inp", remove_supports=True)

@@ -370,7 +370,7 @@ def test_without_stiffening_the_motion_is_that_of_the_body_without_matrices():
 
 def test_stiffening_of_a_body_without_matrices_is_refused():
     body = reduced_body(random_point_masses(2, 3), stiffness(2))
-    with pytest.raises(ModelError, match="holds no geometric stiffness; reduce it anew"):
+    with pytest.raises(ModelError, match="holds no geometric stiffness; reduce it again"):
         FlexibleBody("body", body, stiffening=True)
     with pytest.raises(ModelError, match="expected true, false or 'auto', got 'yes'"):
         FlexibleBody("body", body, stiffening="yes")

@@ -121,7 +121,7 @@ def test_a_run_alone_refuses_units_of_other_programs(two_masses, tmp_path):
     system, run = read_system(two_masses)
     with pytest.raises(ModelError, match=r"act beside it \(fmus: second\): use floatframe run"):
         integrate(system, run.integrator, 0.1, run.h)
-    with pytest.raises(FloatframeError, match="which cannot be a part of a unit"):
+    with pytest.raises(FloatframeError, match="which cannot be part of a unit"):
         write_fmu(two_masses, tmp_path / "first.fmu")
     assert not (tmp_path / "first.fmu").exists()
 

@@ -298,11 +298,11 @@ def test_files_that_are_none_are_told(tmp_path):
 CHANGES = {
     "no mass": (('<mass value="0.2"/>', '<mass value="0"/>'), {}, "'thumb': has no mass, but moments of inertia"),
     "triangle": (('ixx="0.02"', 'ixx="0.5"'), {}, "link 'rail': inertia: no mass distribution has the principal"),
-    "limits": (("", ""), {"configuration": {"slide": 0.7}}, "stands at 0.7, beyond its limits -0.1 to 0.5"),
+    "limits": (("", ""), {"configuration": {"slide": 0.7}}, "is at 0.7, beyond its limits -0.1 to 0.5"),
     "fixed value": (("", ""), {"configuration": {"end": 0.7}}, "joint 'end' is fixed; it has no single value"),
     "follower": (("", ""), {"configuration": {"other": 0.7}}, "joint 'other' follows 'knuckle'; give that one"),
     "unknown": (("", ""), {"configuration": {"slid": 0.7}}, "there is no joint 'slid'; did you mean 'slide'"),
-    "no way": (('lower="-0.1" upper="0.5"', ""), {}, "its limits leave it no way, 0 to 0"),
+    "no way": (('lower="-0.1" upper="0.5"', ""), {}, "its limits 0 to 0 allow no motion"),
     "mesh": (("tip.stl", "top.stl"), {}, "mesh 'package://hand/meshes/top.stl': not found; looked for"),
     "scheme": (("package://hand", "https://hand"), {}, "expected package://NAME"),
     "pictures": (("", ""), {"pictures": "both"}, "expected visual, collision or none"),

@@ -141,7 +141,7 @@ def test_matlab_files_of_both_versions_hold_the_same(tmp_path):
         assert sorted(zip(signals.names, signals.units, strict=True)) == [("F 1", "kN"), ("F 2", "kN"), ("acc", "g")]
         assert_allclose(signals["acc"].values, acc, rtol=1e-15, atol=0)
         assert_allclose(signals["F 2"].values, table[:, 1], rtol=1e-15, atol=0)
-        assert any("left out, of another length than 50: short" in note for note in signals.notes)
+        assert any("omitted, because their length is not 50: short" in note for note in signals.notes)
         with pytest.raises(SignalError, match="no variable 'tt' with the time"):
             read_signals(tmp_path / name, time="tt")
     assert len(read_signals(tmp_path / "5.mat", rate=100.0).names) == 4

@@ -102,7 +102,7 @@ def test_a_filled_last_frame_is_said(tmp_path):
     path = tmp_path / "a.rsp"
     foreign_file(path, np.arange(1.0, 101.0)[:, None], "f4", 64, 64)
     assert read_signals(path).notes == (
-        "the last 28 samples of all channels are alike, which may fill up the last frame",
+        "the last 28 samples of all channels are equal; they may be padding of the last frame",
     )
 
 

@@ -286,7 +286,7 @@ def test_where_a_law_ends_beyond_its_stop_the_stop_is_told(method):
 def test_examples_on_open_equations_refuse_elements_that_may_end_a_run(method):
     eq = open_equations(rising(Law(watched, [Marker("b")], outputs=("high",), stops={"high": "it is high"})))
     x, v, _, _ = eq.start()
-    with pytest.raises(ModelError, match=f"{method.__name__}: element 'e': it is high: an output that may end a run"):
+    with pytest.raises(ModelError, match=f"{method.__name__}: element 'e': it is high: an output may end a run"):
         method(eq, x, v, np.linspace(0.0, 0.1, 11))
 
 

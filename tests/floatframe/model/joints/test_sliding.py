@@ -216,7 +216,7 @@ def test_aligned_body_turns_with_the_line():
     [
         ({"line": ()}, "one or more further interfaces"),
         ({"line": ("s0",)}, "each once"),
-        ({"line": ("s3", "s2")}, "one after another on a straight line"),
+        ({"line": ("s3", "s2")}, "in order on a straight line"),
         ({"line": ("s9",)}, "no interface 's9'"),
         ({"line": ("s4",), "normal": (1, 0, 0)}, "one along it"),
         ({"line": ("s4",), "motions": {"place": 0.1}}, "no coordinate 'place'"),

@@ -51,7 +51,7 @@ def test_a_system_file_gives_its_modes_or_its_equilibrium(folder):
         (["swing.npz"], "give the system file"),
         (["none.h5"], "none.h5"),
         (["pendulum.toml", "--sensor", "a"], "expected results (.h5)"),
-        (["pendulum.toml", "--magnification", "2"], "no size of its own"),
+        (["pendulum.toml", "--magnification", "2"], "amplitude of a mode is arbitrary"),
     ],
 )
 def test_messages_name_what_was_expected(folder, monkeypatch, arguments, words):
