@@ -140,7 +140,7 @@ def moving_frame_of(job: Job) -> "Frame":
 
 
 def reduction_options(job: Job, body: FEBody) -> "ReductionOptions":
-    """Return what the file of a job is meant to hold.
+    """Return the intended contents of the file of a job.
 
     Parameters
     ----------

@@ -224,7 +224,7 @@ def _read(path: str | Path, convert: Callable[[RawMesh, Path, str], M]) -> M:
         return convert(reader(path, data), path, sha256(data).hexdigest())
     except FeModelsError:
         raise
-    except (Exception, SystemExit) as error:  # whatever a damaged file does to a parser, the user gets one message
+    except (Exception, SystemExit) as error:  # one message for any error that a damaged file causes in a parser
         raise MeshError(f"{where}: could not be read as a {name} file: {damage(error)}") from error
 
 

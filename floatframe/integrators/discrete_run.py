@@ -70,7 +70,7 @@ class DiscreteScheme:
         raise NotImplementedError
 
     def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
-        """Return the memory at the beginning, from a state made consistent.
+        """Return the memory at the beginning, from a consistent state.
 
         `a` holds the multipliers: of joints zero, of equations of elements those that fulfil them there.
         """

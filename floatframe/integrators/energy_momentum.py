@@ -1,4 +1,4 @@
-"""Schemes that keep energy and momentum in steps of any size, or let energy fall alone.
+"""Schemes that conserve energy and momentum in steps of any size, or let energy only decrease.
 
 Evaluated in `floatframe.engine.structure_preserving.kernels.steps`.
 """
@@ -57,7 +57,7 @@ class EnergyMomentum(DiscreteScheme):
 
     @property
     def equations(self) -> int:
-        """Which equations: `CONSERVING`."""
+        """Kind of equations: `CONSERVING`."""
         return CONSERVING
 
     def one_step(self, ds: DiscreteSystem, placed: list[Placed], span: Span, f: Array) -> StepResult:
@@ -67,7 +67,7 @@ class EnergyMomentum(DiscreteScheme):
 
 @dataclass(frozen=True)
 class EnergyDecaying(DiscreteScheme):
-    """The scheme of `EnergyMomentum` with dissipation in the modes that h does not resolve: energy never rises.
+    """The scheme of `EnergyMomentum` with dissipation in unresolved modes: energy never increases.
 
     In place of (1) and (4), with the modes Phi of the pencil (K, M - Bᵀ J⁻¹ B at q = 0) and their frequencies omega,
 
@@ -96,7 +96,7 @@ class EnergyDecaying(DiscreteScheme):
 
     @property
     def equations(self) -> int:
-        """Which equations: `CONSERVING`."""
+        """Kind of equations: `CONSERVING`."""
         return CONSERVING
 
     @property

@@ -1,4 +1,4 @@
-"""SUNDIALS IDA on the index-reduced equations: another method of another kind, for cross-checks.
+"""SUNDIALS IDA on the index-reduced equations: a method of another kind, for cross-checks.
 
 Evaluated in `floatframe.engine.kernels.evaluation`.
 """
@@ -70,7 +70,7 @@ class Ida:
                 raise ModelError(f"Ida: {name}: expected a number between 0 and 1, got {getattr(self, name)}")
 
     def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
-        """Return the memory at the beginning, from a state made consistent."""
+        """Return the memory at the beginning, from a consistent state."""
         solver_class()
         compiled = compiled_system(system)
         for c, name in enumerate(compiled.connection_names):
@@ -96,7 +96,7 @@ class Ida:
         return one_step_of(self, system, t, h, carry)
 
     def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
-        """Return the results at the carried state; the carry learns the power at it."""
+        """Return the results at the carried state, and store the power there in the carry."""
         work.state.time[...] = t
         power, rows = observed(system, t, carry, work)
         return replace(carry, power=power), rows
@@ -115,7 +115,7 @@ class Ida:
         rows, n_good, failure, has_stopped = [new_rows(compiled.model, 0)], 0, None, False
         made.rotations = FollowedRotations(compiled.model, own, float(t[0]), carry)
         for k, (at, y) in enumerate(reached, start=first + 1):
-            if not np.isfinite(y).all() or abs(at - t[k - first]) > 1e-9 * h:  # it may end with where it failed
+            if not np.isfinite(y).all() or abs(at - t[k - first]) > 1e-9 * h:  # it may end before its failure
                 break
             own.state.time[...] = t[k - first]
             own.counted.no_number[...] = 0  # of a trial beyond
@@ -139,15 +139,16 @@ class Ida:
         return carry, joined_rows(rows), n_good, failure
 
     def solved(self, made: "Motion", t: Array, y_0: Array) -> tuple[list[tuple[float, Array]], str]:
-        """Return times and y at the times but the first, as far as the solver comes, and its message."""
+        """Return times and y at all times but the first, as far as the solver gets, and its message."""
         solver = self.solver(made)
-        asked = t if len(t) > 2 else np.array([t[0], 0.5 * (t[0] + t[1]), t[1]])  # two times ask for every step
+        # with two times, every step is returned
+        asked = t if len(t) > 2 else np.array([t[0], 0.5 * (t[0] + t[1]), t[1]])
         solution = solver.solve(asked, y_0, made.rates(float(t[0]), y_0))
         reached = zip(np.atleast_1d(solution.t), np.atleast_2d(solution.y), strict=True)
         return list(reached)[len(asked) - len(t) + 1 :], solution.message
 
     def solved_past_contacts(self, made: "Motion", t: Array, y_0: Array) -> tuple[list[tuple[float, Array]], str]:
-        """Return the same of a system with contacts, step by step, so that none of them is passed over."""
+        """Return the same for a system with contacts, step by step, so that none of them is missed."""
         compiled, work = made.compiled, new_work(made.compiled.model)
 
         def gaps(at: float, y: Array) -> Array:
@@ -165,7 +166,7 @@ class Ida:
                 if not result.success:
                     return reached, result.message
                 end = float(result.t)
-                if end <= begin:  # after outputs within a step its end is returned once more
+                if end <= begin:  # after outputs within a step, its end is returned once more
                     continue
                 both = np.array([y, result.y]), np.array([rates, result.yp])
                 found = stretches_of_passed_contact(gaps, begin, end, *both)
@@ -201,7 +202,7 @@ def flattened(state: State) -> Array:
 
 
 def state_of(compiled: CompiledSystem, y: Array) -> State:
-    """Return the state of a vector, its Euler parameters made of length one."""
+    """Return the state of a vector, with normalised Euler parameters."""
     n_b, n_q = len(compiled.model.bodies.kind), int(compiled.model.bodies.q0[-1])
     r, p, q, u = np.split(np.array(y), [3 * n_b, 7 * n_b, 7 * n_b + n_q])
     p = p.reshape(n_b, 4)
@@ -209,7 +210,7 @@ def state_of(compiled: CompiledSystem, y: Array) -> State:
 
 
 class Motion:
-    """The rates of a system, counted; what goes wrong is kept, since it cannot leave the solver."""
+    """The rates of a system, with a count; errors are stored, because they cannot pass through the solver."""
 
     rotations: FollowedRotations  #: of bushings
 
@@ -236,7 +237,7 @@ class Motion:
         return np.concatenate([*r_dot, *p_dot, *q_dot, u_dot])
 
     def residual(self, t: float, y: Array, y_dot: Array, result: Array) -> None:
-        """Write y' less the rates at y."""
+        """Write y' minus the rates at y."""
         try:
             result[:] = y_dot - self.rates(t, y)
         except (FloatframeError, RuntimeError, ValueError) as error:

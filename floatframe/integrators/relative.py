@@ -1,4 +1,4 @@
-"""The generalized-alpha method in relative coordinates: joints and modes, with constraints of closed loops alone.
+"""The generalized-alpha method in relative coordinates: joints and modes, with constraints only for closed loops.
 
 Evaluated in `floatframe.engine.tree.kernels.steps`.
 """
@@ -30,12 +30,12 @@ from floatframe.model.system import System
 
 __all__ = ["RelativeGeneralizedAlpha", "in_formulation"]
 
-NEAR_BY = 1e-3  #: of a step, of the difference that gives the rates of accelerations
+NEAR_BY = 1e-3  #: fraction of a step for the difference that gives the rates of accelerations
 
 
 @dataclass(frozen=True)
 class RelativeGeneralizedAlpha:
-    """Generalized-alpha in the coordinates of joints and modes (docs/relative.md §6), as `GeneralizedAlpha` otherwise.
+    """Generalized-alpha in the coordinates of joints and modes (docs/relative.md §6), otherwise as `GeneralizedAlpha`.
 
     (1) predict: a_new = a for every unknown s = (z, q)
     (2) Newton on  rho(s, s_dot, s_ddot, w) = 0, g = 0  over the increment x of the step, where rho is the residual
@@ -50,13 +50,14 @@ class RelativeGeneralizedAlpha:
     """
 
     rho_inf: float = 0.8  #: spectral radius at infinite frequency, 0 <= rho_inf <= 1
-    tolerance: float = 1e-8  #: largest last correction over the one that the accelerations of the step amount to
+    #: largest last correction relative to the displacement due to the accelerations of the step
+    tolerance: float = 1e-8
     max_iterations: int = 25
     error_tolerance: float | None = None  #: largest local error of a body in a step, as in `GeneralizedAlpha`
-    h_min: float | None = None  #: least step, to which one that fails is divided [s]; None as in `GeneralizedAlpha`
-    #: alpha_m, alpha_f, beta, gamma in place of those that follow from rho_inf
+    h_min: float | None = None  #: smallest size of a divided step after failure [s]; None as in `GeneralizedAlpha`
+    #: alpha_m, alpha_f, beta, gamma instead of those from rho_inf
     parameters: tuple[float, float, float, float] | None = None
-    stabilized: bool = True  #: hold velocities of joints that close loops as well as positions
+    stabilized: bool = True  #: enforce velocities of joints that close loops as well as positions
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parameters", self.absolute.parameters)
@@ -67,7 +68,7 @@ class RelativeGeneralizedAlpha:
         return GeneralizedAlpha(**asdict(self))
 
     def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
-        """Return the memory at the beginning: the state made consistent and its accelerations."""
+        """Return the memory at the beginning: the consistent state and its accelerations."""
         return self.absolute.start(system, t, state, before)
 
     def after_jump(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
@@ -88,7 +89,7 @@ class RelativeGeneralizedAlpha:
         return one_step_of(self, system, t, h, carry)
 
     def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
-        """Return the results at the carried state; the carry learns the power at it."""
+        """Return the results at the carried state, and store the power there in the carry."""
         from floatframe.engine.tree.kernels.entry import observe_tree
 
         model, tree = compiled_system(system).model, tree_of(system).tree
@@ -106,7 +107,7 @@ class RelativeGeneralizedAlpha:
         model, kept = compiled.model, kept_of(work, compiled.model, tree)
         begun = self.prepared(system, carry, h, t0 + first * h)
         goes_on = kept.after is carry and begun.u_dot is carry.u_dot  # longer steps begin with other accelerations
-        if not goes_on or work.solver.c_k == 0.0:  # a run that goes on from a file begins so too
+        if not goes_on or work.solver.c_k == 0.0:  # a run that is resumed from a file begins in the same way
             kept.joints.is_known[...] = 0
             kept.tangent.n_known[...] = 0
         carry = begun
@@ -152,7 +153,7 @@ class RelativeGeneralizedAlpha:
         return replace(carry, u_dot=u_dot, a=a, h=h, h_next=h)
 
     def explain(self, system: System, work: Work, outcome: tuple, h: float) -> Failure | None:
-        """Say why a step failed; None if none did."""
+        """Return the reason of a failed step; None if none failed."""
         from floatframe.engine.kernels.generalized_alpha import TURNED
         from floatframe.engine.tree.kernels.steps import SINGULAR
 
@@ -171,12 +172,12 @@ class RelativeGeneralizedAlpha:
                 "position, or redundant ones)"
             )
         else:
-            words += "a coordinate moves no mass; check masses, inertias and massless modes"
+            words += "a coordinate moves no mass: check masses, inertias and massless modes"
         return Failure(words, outcome[4])
 
 
 def in_formulation(integrator: Integrator, formulation: str | None) -> Integrator:
-    """Return the method in a formulation by its name, "absolute" or "relative"; None: as it is.
+    """Return the method in a formulation by its name, "absolute" or "relative"; None: unchanged.
 
     Raises
     ------
@@ -199,19 +200,19 @@ def in_formulation(integrator: Integrator, formulation: str | None) -> Integrato
 
 @dataclass(eq=False)
 class Kept:
-    """What goes with working arrays beside them, and the memory that it led to."""
+    """Data that belong to working arrays, and the memory at the end of their last steps."""
 
     joints: JointWork
     tangent: TangentWork
     after: Carry | None = None
 
 
-#: by the identity of an array of the working arrays; they live as long as it
+#: by the identity of an array of the working arrays, with whose lifetime they end
 KEPT: dict[int, Kept] = {}
 
 
 def kept_of(work: Work, model: Model, tree: Tree) -> Kept:
-    """Return what goes with working arrays: factors of the Newton matrix as `work.solver` has the absolute ones."""
+    """Return the data of working arrays: factors of the Newton matrix, as `work.solver` has the absolute ones."""
     key = id(work.solver.pivot)
     if key not in KEPT:
         KEPT[key] = Kept(new_joint_work(model, tree), new_tangent_work(model, tree))
@@ -231,7 +232,7 @@ def joint_iterate(compiled: CompiledSystem, tree: Tree, state: State, u_dot: Arr
 
 
 def in_slots(tree: Tree, joints: JointWork, of_bodies: Array, of_columns: Array) -> Array:
-    """Return values of all unknowns in their slots, (n_u,), zero elsewhere."""
+    """Return values of all unknowns at their indices, (n_u,), zero elsewhere."""
     result = np.zeros_like(of_bodies)
     is_mode = tree.mode >= 0
     result[tree.slot[is_mode]] = of_bodies[tree.slot[is_mode]]
@@ -240,14 +241,14 @@ def in_slots(tree: Tree, joints: JointWork, of_bodies: Array, of_columns: Array)
 
 
 def may_spin(tree: Tree) -> NDArray[np.bool_]:
-    """Return the bodies whose spin steps in joint coordinates may take by itself, (n_b,)."""
+    """Return the bodies whose spin may be integrated separately in joint coordinates, (n_b,)."""
     return np.any(tree.spin_axis != 0.0, axis=1)
 
 
 def joint_accelerations(
     compiled: CompiledSystem, tree: Tree, carry: Carry, begun: Beginning, h: float, spin: Spin | None
 ) -> tuple[Array, Array]:
-    """Return s_ddot and its rate in the slots of the unknowns, (n_u,), of a motion that begins so.
+    """Return the initial s_ddot and its rate at the indices of the unknowns, (n_u,).
 
     spin: bodies that spin by themselves, whose rates are those of s_ddot without the turn of their axes, in axes that
     do not spin.

@@ -83,7 +83,7 @@ class RelativeOde:
                 raise ModelError(f"RelativeOde: {name}: expected a number between 0 and 1, got {getattr(self, name)}")
 
     def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
-        """Return the memory at the beginning, from a state made consistent."""
+        """Return the memory at the beginning, from a consistent state."""
         compiled = compiled_system(system)
         for each in compiled.laws:
             if each.law.accelerations:

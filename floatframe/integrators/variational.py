@@ -58,7 +58,7 @@ class Variational(DiscreteScheme):
         check_options(self)
 
     def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
-        """Return the memory at the beginning, from a state made consistent."""
+        """Return the memory at the beginning, from a consistent state."""
         for force in system.forces:
             if getattr(force, "friction_coefficient", 0.0) > 0:
                 raise ModelError(

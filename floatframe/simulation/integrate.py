@@ -58,24 +58,24 @@ __all__ = ["Progress", "integrate", "resume"]
 log = logging.getLogger(__name__)
 
 BATCH_STEPS = 400  #: steps per call of the compiled loop
-FIRST_STEPS = 100  #: of a run, in which a failure may come from how its drives begin
-LOOK_ROWS, LOOK_SECONDS = 1000, 0.2  #: rows of results are looked at when they are so many, or so much time has gone
+FIRST_STEPS = 100  #: number of steps of a run in which a failure may be due to the start of its drives
+LOOK_ROWS, LOOK_SECONDS = 1000, 0.2  #: rows of results are checked after this number, or after this time
 SEGMENT_SECONDS = 2.0  #: a segment of the results is closed after this time
-TIMES = ("t_start", "t_end", "h", "output_every")  #: of the run, in the head
+TIMES = ("t_start", "t_end", "h", "output_every")  #: attributes of the run in the head
 MOST_STEPS = 1e12  #: of a run: months of computing
 
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a run is."""
+    """Progress of a run."""
 
     t: float  #: time reached [s]
     t_end: float
     n_steps: int  #: done
     n_total: int
     n_iterations: int  #: of Newton's method, so far
-    notes: tuple[ValidityNote, ...] = ()  #: of the run about itself, so far
-    n_rejected: int = 0  #: steps that were tried in vain, so far
+    notes: tuple[ValidityNote, ...] = ()  #: notes of the run so far
+    n_rejected: int = 0  #: number of rejected steps so far
 
 
 def integrate(
@@ -172,7 +172,7 @@ def integrate(
     events = EventWatch(system, head) if has_events(system) else None
     require_times_of_events(system, t_start)
     begun = system if events is None else events.system
-    with ExitStack() as held:  # the place of the results, from before the work until its end
+    with ExitStack() as held:  # location of the results, fixed from before the computation until its end
         place = None if output is None else held.enter_context(ResultsPlace(output, inputs=system.files))
         carry = integrator.start(begun, t_start, state)  # (1)
         run = Run(
@@ -192,7 +192,7 @@ def integrate(
 
 
 def require_no_units(system: System) -> None:
-    """Raise `ModelError` if units of other programs act beside a system, which a run alone would leave out."""
+    """Raise `ModelError` if a system has units of other programs, which a plain run would omit."""
     if system.fmus:
         names = ", ".join(unit.name for unit in system.fmus)
         raise ModelError(
@@ -225,7 +225,7 @@ def resume(
     *,
     progress: Callable[[Progress], None] | None = None,
 ) -> Trajectory:
-    """Go on with a run that was interrupted, to the motion it would have become, bit for bit.
+    """Resume an interrupted run, with the same motion bit for bit as without interruption.
 
     Parameters
     ----------
@@ -279,7 +279,7 @@ def resume(
 
 @dataclass
 class Run:
-    """One motion being computed, and where its results go."""
+    """One motion being computed, and the destination of its results."""
 
     system: System
     integrator: Integrator
@@ -290,12 +290,12 @@ class Run:
     n_total: int
     output_every: int
     writer: ResultsWriter | None
-    notes: tuple[ValidityNote, ...] = ()  #: known before, or of the part that is done
+    notes: tuple[ValidityNote, ...] = ()  #: notes known before, or of the completed part
     kept: list[Rows] = field(default_factory=list)
-    seconds_before: float = 0.0  #: that the run has taken before it was interrupted
+    seconds_before: float = 0.0  #: time that the run took before its interruption
     began: float = field(default_factory=time.perf_counter)
     events: EventWatch | None = None
-    words_of_start: Callable[[], str] = lambda: ""  #: what may be wrong where the first steps fail
+    words_of_start: Callable[[], str] = lambda: ""  #: possible cause if the first steps fail
     jumps: dict[int, list[float]] = field(init=False)  #: times of jumps by step, from `advance` on
     work: Work = field(init=False)  #: working arrays of the kernels, from `begin` on
 
@@ -305,18 +305,18 @@ class Run:
         return self.seconds_before + time.perf_counter() - self.began
 
     def record(self, carry: Carry, n_done: int) -> dict[str, np.ndarray]:
-        """Return what is needed to go on from here."""
+        """Return the data to resume from here."""
         self.report(*self.energy.flush(self.system))
         events = {} if self.events is None else self.events.record()
         watches = self.steps.record() | self.energy.record()
         return restart_record(carry, n_done) | {"seconds": np.array(self.seconds)} | events | watches
 
     def record_where_due(self, carry: Carry, n_done: int) -> dict[str, np.ndarray] | None:
-        """Return what is needed to go on from here, None where a run does not go on."""
+        """Return the data to resume from here, None if a run cannot be resumed here."""
         return self.record(carry, n_done) if self.writer is not None and n_done % RESTART_STEPS == 0 else None
 
     def summary(self, carry: Carry) -> dict[str, Any]:
-        """Return what the run took, and its events."""
+        """Return the counts and times of the run, and its events."""
         events = {} if self.events is None else {"events": self.events.happened}
         return events | {
             "n_steps": carry.n_steps,
@@ -331,7 +331,7 @@ class Run:
         is_on = self.watching != "off" and has_second_order(self.integrator)
         self.steps = StepWatch(self.integrator, self.n_total, is_on)
         self.energy = EnergyWatch(self.output_every, self.h)
-        self.closed = self.looked = time.monotonic()  # when the last segment was, and rows were looked at
+        self.closed = self.looked = time.monotonic()  # time of the last segment, and of the last check of rows
         self.waiting: list[Rows] = []
 
     def keep(self, rows: Rows) -> None:
@@ -342,7 +342,7 @@ class Run:
             self.look()
 
     def look(self) -> None:
-        """Hand on the rows that wait; tell when a body leaves the range of its linear frame."""
+        """Pass on the collected rows; report if a body leaves the range of its linear frame."""
         self.looked = time.monotonic()
         if self.writer is not None:
             self.writer.validity = notes_to_json(self.watch.notes)
@@ -359,7 +359,7 @@ class Run:
             self.writer.append(told)
 
     def report(self, *new: ValidityNote | None) -> None:
-        """Keep the notes of the watches of steps and energy; log those that are new."""
+        """Store the notes of the watches of steps and energy, and log new ones."""
         found = [] if self.steps.note is None else [self.steps.note]
         for each in (*found, *self.energy.notes.values()):
             self.watch.found[each.key] = each
@@ -367,7 +367,7 @@ class Run:
             log.warning("system %r: %s", self.system.name, note.words)
 
     def close_segment(self, record: dict[str, np.ndarray] | None = None) -> None:
-        """Close a segment of the results, if they go to a file, with a record to go on from."""
+        """Close a segment of the results, if they go to a file, with a record to resume from."""
         self.look()
         self.closed = time.monotonic()
         if self.writer is not None:
@@ -389,17 +389,17 @@ class Run:
         progress: Callable[[Progress], None] | None,
         raise_if_interrupted: Callable[[], None],
     ) -> Trajectory:
-        """Take the steps that are left, in batches that end where a run can go on; return the motion."""
+        """Take the remaining steps, in batches that end where a run can be resumed; return the motion."""
         self.jumps = self.steps.jumps = jumps_of_steps(self.system, self.t_start, self.h, self.n_total)
         laws = LawWatch(self.system, self.t_start, self.h, self.jumps, n_done)
         n_told = n_done  # steps at the last progress
         failure: Failure | None = None
-        safe = self.record_where_due(carry, n_done)  # while a block runs its events are ahead of its memory
+        safe = self.record_where_due(carry, n_done)  # while a block runs, its events are ahead of its memory
         try:
             while n_done < self.n_total:
                 raise_if_interrupted()
                 if n_done % RESTART_STEPS == 0:
-                    self.work.solver.c_k[...] = 0.0  # factors are made anew, as after a resumption
+                    self.work.solver.c_k[...] = 0.0  # factors are renewed, as after a resumption
                     if n_done and time.monotonic() - self.closed > SEGMENT_SECONDS:
                         self.close_segment(safe)
                 batch = self.step(carry, n_done, batch_steps - (n_done - n_told), batch_steps)  # (2)
@@ -485,21 +485,21 @@ class Run:
 
     @property
     def acting(self) -> System:
-        """The system as it is switched."""
+        """The system as currently switched."""
         return self.system if self.events is None else self.events.system
 
     @property
     def n_happened(self) -> int:
-        """How many events have happened."""
+        """Number of past events."""
         return 0 if self.events is None else len(self.events.happened)
 
     def close_segment_when_due(self) -> None:
-        """Close a segment of the results without a record to go on from, when the last one is old enough."""
+        """Close a segment of the results without a record to resume from, if the last one is old enough."""
         if time.monotonic() - self.closed > SEGMENT_SECONDS:
             self.close_segment()
 
     def finished(self, carry: Carry) -> Trajectory:
-        """Return the motion, all of whose steps have been kept."""
+        """Return the motion, whose steps have all been stored."""
         self.look()
         if self.writer is None:
             head = replace(self.head, summary=self.summary(carry))
@@ -530,7 +530,7 @@ class Batch:
 
 
 def in_order(parts: list[Rows]) -> Rows:
-    """Return rows of results in the order of time; of two at one time, that of an earlier part first."""
+    """Return rows of results in the order of time; of two at one time, that of the earlier part first."""
     if len(parts) == 1:
         return parts[0]
     rows = joined_rows(parts)
@@ -552,18 +552,18 @@ def stopped(run: Run, failure: Failure, t: float, state: State) -> ConvergenceEr
 
 
 def energetic(run: Run, t: float) -> ConvergenceError:
-    """Return the error of a run that ends because its energy comes from its steps, with the motion so far."""
+    """Return the error of a run that ends because its steps add energy, with the motion so far."""
     words = (
         f"system {run.system.name!r}: stopped at t = {t:.9g} with steps of {run.h:g}: "
         f"{run.energy.notes['energy'].words}; "
-        'watch = "tell" goes on in spite of it'
+        'watch = "tell" continues nevertheless'
     )
     trajectory, where = motion_so_far(run)
     return ConvergenceError(words + where, t=t, h=run.h, residual=float("inf"), trajectory=trajectory)
 
 
 def motion_so_far(run: Run) -> tuple[Trajectory, str]:
-    """Return the motion of a run that ends before its time, and where it is, in words; "" for one in memory."""
+    """Return the motion of a run that ends early, and its location for messages; "" if it is in memory."""
     if run.writer is None:
         arrays = MemorySource(joint_rows(run.system, run.kept))
         return Trajectory(run.head, arrays, is_complete=False, validity=run.watch.notes), ""

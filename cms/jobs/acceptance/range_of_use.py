@@ -39,7 +39,7 @@ class LargestSpeed:
     lowest_held: float  #: lowest frequency with one interface held [Hz]
     at: str  #: that interface
     linear: float  #: without geometric stiffness [rad/s]
-    stiffened: float | None  #: with it; None: the file has none
+    stiffened: float | None  #: with geometric stiffness; None: the file has none
 
 
 @dataclass(frozen=True)

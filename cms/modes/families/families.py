@@ -102,7 +102,7 @@ class Families:
         self._stack.close()
 
     def forget_vibration_modes(self) -> None:
-        """Compute vibration modes anew when they are next requested; the number requested before affects roundoff."""
+        """Recompute vibration modes at the next request; an earlier requested number affects roundoff."""
         self._modes.clear()
 
     # -- Partition -------------------------------------------------------------------------------------------------
@@ -148,7 +148,7 @@ class Families:
         return self._fixed
 
     def adopt(self, fixed: FixedInterfaceBody) -> None:
-        """Take over an existing interior factorisation, unless there is one here; it is freed with these families."""
+        """Use an existing interior factorisation, unless there is one here; it is freed with these families."""
         if self._fixed is None:
             self._fixed = self._stack.enter_context(fixed)
 
@@ -168,7 +168,7 @@ class Families:
 
     @cached_property
     def condensed(self) -> CondensedBody:
-        """The parts from which every flexibility is made."""
+        """Common parts of all flexibilities."""
         return CondensedBody(self.fixed, self.Psi_C, self.S, self.Psi_R)
 
     @cached_property

@@ -290,7 +290,7 @@ def read_part(path: Path, request: Request) -> ForeignMatrices:
     except MemoryError as error:
         size = os.path.getsize(path)
         raise MatrixError(f"{where}: not enough memory to read {size / 1e6:.0f} MB as {form.name}") from error
-    except (Exception, SystemExit) as error:  # whatever a damaged file does to a parser, the user gets one message
+    except (Exception, SystemExit) as error:  # one message for any error that a damaged file causes in a parser
         raise MatrixError(f"{where}: could not be read as {form.name}: {damage(error)}") from error
     return replace(part, files={**part.files, str(path): digest.result()})
 

@@ -1,4 +1,4 @@
-"""Markers found in their bodies, and where they are at the start."""
+"""Markers with their bodies, and their positions at the start."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -34,19 +34,20 @@ __all__ = [
 ]
 
 GROUND_INDEX = -1
-SAME_PLACE = 1e-9  #: distance of a node from a reference point, of the size of the body, that is none
+#: distance of a node from a reference point, relative to the size of the body, below which they coincide
+SAME_PLACE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class MarkerData:
-    """A marker found in its body."""
+    """A marker with its body."""
 
-    body: int  #: index, -1 for the ground
+    body: int  #: index of the body, -1 for the ground
     shape: MarkerShape
 
 
 def least_size(markers: Sequence[MarkerData], radii: Array) -> float:
-    """Return the size of the smallest of the bodies of markers: its radius of gyration, or the arm of a marker."""
+    """Return the smallest size of the bodies of markers: the radius of gyration, or the arm of a marker."""
     arms: dict[int, float] = {}
     for marker in markers:
         if marker.body >= 0:
@@ -76,7 +77,7 @@ def index_of_bodies(system: System) -> dict[str, int]:
 
 
 def find_marker(system: System, where: str, marker: Marker) -> MarkerData:
-    """Return a marker with its place in the body frame."""
+    """Return a marker with its position in the body frame."""
     if not isinstance(marker, Marker):
         raise ModelError(f"{where}: expected a Marker, got {marker!r}")
     index = find_body(system, where, body_name(marker.body))
@@ -90,7 +91,7 @@ def find_marker(system: System, where: str, marker: Marker) -> MarkerData:
             )
         if marker.address is not None and marker.position is None:
             raise ModelError(
-                f"{where}: body {body_name(marker.body)!r} is not flexible: it knows no {marker.address.kind} "
+                f"{where}: body {body_name(marker.body)!r} is not flexible: it has no {marker.address.kind} "
                 f"{getattr(marker, marker.address.kind)!r}; give a position"
             )
         position = np.zeros(3) if marker.position is None else marker.position
@@ -114,7 +115,7 @@ def find_marker(system: System, where: str, marker: Marker) -> MarkerData:
 
 
 def interface_at_node(body: FlexibleBody, where: str, node: int | str) -> str:
-    """Return the interface that is a node of the user's mesh: its only member, or a member at its reference point.
+    """Return the interface for a node of the user's mesh: with this only member, or with it at the reference point.
 
     Raises
     ------
@@ -144,7 +145,7 @@ def interface_at_node(body: FlexibleBody, where: str, node: int | str) -> str:
 
 
 def joint_markers(system: System, joint: Joint, placed: State) -> tuple[MarkerData, MarkerData]:
-    """Return both markers of a joint; a body in the place of a marker is met where the other marker is placed."""
+    """Return both markers of a joint; a body without a marker gets one at the position of the other marker."""
     where = f"joint {joint.name!r}"
     given_a, given_b = joint.marker_a, joint.marker_b
     if isinstance(given_a, Marker):
@@ -172,7 +173,7 @@ def marker_as_placed(system: System, where: str, name: str, other: MarkerData, p
 
 
 def marker_with_pose(system: System, where: str, name: str, pose: tuple[Array, Array], placed: State) -> MarkerData:
-    """Return the marker of a body at a position with axes, both in ground axes, as placed."""
+    """Return the marker of a body at an assembled position with axes, both in ground axes."""
     index = find_body(system, where, name)
     r_P, A_P = pose
     if index < 0:
@@ -199,7 +200,7 @@ def marker_pose(marker: MarkerData, state: State, n_q: IntArray) -> tuple[Array,
 
 
 def marker_shapes(markers: list[MarkerShape]) -> tuple[list[int], Array]:
-    """Return where the shapes of each marker begin (-1 for none), and the shapes, flat."""
+    """Return the index of the shapes of each marker (-1 for none), and the shapes, flat."""
     start: list[int] = []
     parts: list[Array] = []
     n = 0
@@ -212,7 +213,7 @@ def marker_shapes(markers: list[MarkerShape]) -> tuple[list[int], Array]:
 
 
 def marker_bending(markers: list[MarkerShape]) -> tuple[list[int], Array]:
-    """Return where K_P [l, 6, k] of each marker begins (-1 for none), and all of them, flat; one interface has one."""
+    """Return the index of K_P [l, 6, k] of each marker (-1 for none), and all of them, flat; one for each interface."""
     start: list[int] = []
     known: dict = {}
     parts: list[Array] = []

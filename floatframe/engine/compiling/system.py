@@ -59,7 +59,7 @@ from floatframe.model.system import System
 __all__ = ["CompiledSystem", "Lines", "add_sliding", "compiled_system", "gap_record", "require_inertia"]
 
 
-# sliding joints as the kernels see them: their lines, stations and sliding markers ------------------------------------
+# sliding joints in the arrays of the kernels: their lines, stations and sliding markers -------------------------------
 
 
 @dataclass
@@ -74,7 +74,7 @@ class Lines:
     station: list[int] = field(default_factory=list)
 
     def records(self) -> dict[str, Any]:
-        """Return the parts of the model."""
+        """Return the arrays of the model."""
         return {
             "lines": filled(
                 model.Lines(),
@@ -125,11 +125,11 @@ def add_sliding(system: System, made: ConnectionLists, lines: Lines, joint: Slid
 # Bodies are eliminated one by one, each by its own matrix, so that none may be without inertia, joints or not.
 
 
-NO_INERTIA = 1e-13  #: smallest principal moment by the largest one that is none
+NO_INERTIA = 1e-13  #: ratio of the smallest principal moment to the largest below which it counts as zero
 
 
 def require_inertia(bodies: Sequence[RigidBody | FlexibleBody]) -> None:
-    """Raise `ModelError` naming a body that some motion of its own would move without force.
+    """Raise `ModelError` with the name of a body that could move in some way without any force.
 
     That is a rigid body, or a beam without thickness, that has no moment of inertia about an axis, and a mode that
     has neither mass nor stiffness.
@@ -148,7 +148,7 @@ def require_inertia(bodies: Sequence[RigidBody | FlexibleBody]) -> None:
 
 
 def require_moments(where: str, inertia: Array) -> None:
-    """Raise `ModelError` with the axis about which an inertia tensor about the centre of mass has no moment."""
+    """Raise `ModelError` with the axis about which an inertia tensor about the centre of mass is zero."""
     moments, axes = np.linalg.eigh(0.5 * (inertia + inertia.T))
     if moments[0] > NO_INERTIA * moments[-1]:
         return
@@ -156,8 +156,8 @@ def require_moments(where: str, inertia: Array) -> None:
     direction = ", ".join(f"{value:.3g}" for value in axis + 0.0)
     raise ModelError(
         f"{where}: it has no inertia about its axis [{direction}]: expected a moment above zero, got {moments[0]:.3g} "
-        f"beside {moments[-1]:.3g}; nothing would resist its turning. Give the moment of its real thickness (m r²/2 "
-        "for a round rod of radius r), or leave a rod without mass out: a distance joint is one"
+        f"beside {moments[-1]:.3g}; nothing would resist its rotation. Give the moment of its real thickness (m r²/2 "
+        "for a round rod of radius r), or replace a massless rod by a distance joint"
     )
 
 
@@ -173,11 +173,11 @@ def require_modes(where: str, reduced: ReducedBody) -> None:
         )
 
 
-# gaps between bodies that meet, as the kernels see them ---------------------------------------------------------------
+# gaps between bodies that can touch, in the arrays of the kernels -----------------------------------------------------
 
 
 def gap_record(made: ConnectionLists, contacts: Contacts, laws: Sequence[PlacedLaw]) -> Gaps:
-    """Return the gaps of all contacts, then those that elements name."""
+    """Return the gaps of all contacts, followed by those that elements declare."""
     gaps = []
     for c in (c for c, law in enumerate(made.law) if law == CONTACT):
         i = made.item[c]
@@ -193,15 +193,15 @@ def gap_record(made: ConnectionLists, contacts: Contacts, laws: Sequence[PlacedL
 # from the description of a system to the records of the kernels -------------------------------------------------------
 
 
-
-SOFT = 1e-9  #: by which redundant constraints give way, relative to what the mass moves in a step
-ROUNDING = 1e3 * np.finfo(float).eps  #: of the mobility of bodies, with room for what elimination adds
-MOST_SOFT = 1e-5  #: as SOFT, for angles of bodies with hardly any moment about an axis
+SOFT = 1e-9  #: compliance of redundant constraints, relative to the displacement of the mass in a step
+#: compliance relative to the mobility of bodies, with a margin for rounding in the elimination
+ROUNDING = 1e3 * np.finfo(float).eps
+MOST_SOFT = 1e-5  #: like SOFT, for angles of bodies with hardly any moment of inertia about an axis
 
 
 @dataclass(frozen=True, eq=False)
 class CompiledSystem:
-    """A system as the kernels see it, with the names of its parts in their order."""
+    """A system in the arrays of the kernels, with the names of its parts in order."""
 
     model: Model
     body_names: tuple[str, ...]
@@ -209,18 +209,18 @@ class CompiledSystem:
     spring_names: tuple[str, ...]  #: of spring-dampers, then bushings and contacts
     element_names: tuple[str, ...]  #: of couplers, then user forces, then public elements
     laws: tuple[PlacedLaw, ...]  #: of public elements
-    callbacks: tuple[Callback, ...]  #: users' functions that the kernels call
+    callbacks: tuple[Callback, ...]  #: users' functions called by the kernels
     owners: tuple[str, ...]  #: name of the connection of each row, (n_w,)
-    placed: State  #: the state as given, before it is made consistent, in the frames of the engine
-    mean_axes: tuple[MeanAxes | None, ...]  #: of bodies that the engine moves in another frame than their file's
+    placed: State  #: the given state, before it is made consistent, in the frames of the engine
+    mean_axes: tuple[MeanAxes | None, ...]  #: of bodies whose frame in the engine differs from that of their file
     coordinates: tuple[str, ...]  #: name of the joint coordinate to which each row belongs, "" for none, (n_w,)
     length: float  #: size of the system as placed [m]; scales rotations against translations
-    angles: tuple[CountedAngle, ...]  #: between bodies whose turns are counted
+    angles: tuple[CountedAngle, ...]  #: angles between bodies whose turns are counted
     angle_motions: tuple[TimeFunction | None, ...]  #: that prescribe them
 
     @property
     def resting_model(self) -> Model:
-        """The model with what elements say of equilibrium in the place of their laws."""
+        """The model in which the laws of elements are replaced by their equations in equilibrium."""
         rest = [each.rest for each in self.laws]
         return self.model._replace(
             laws=self.model.laws._replace(
@@ -231,7 +231,7 @@ class CompiledSystem:
 
     @property
     def stop_words(self) -> tuple[str, ...]:
-        """What outputs of elements say that end a run, in the order of the model."""
+        """Messages of outputs of elements that end a run, in the order of the model."""
         return tuple(f"element {each.element.name!r}: {text}" for each in self.laws for text in each.law.stops.values())
 
     @property
@@ -241,7 +241,7 @@ class CompiledSystem:
 
 
 def compiled_system(system: System) -> CompiledSystem:
-    """Return the flat arrays of a system: made at the first call, and kept with the system.
+    """Return the flat arrays of a system, computed at the first call and stored in the system.
 
     Raises
     ------
@@ -252,7 +252,7 @@ def compiled_system(system: System) -> CompiledSystem:
 
 
 def compile_system(system: System) -> CompiledSystem:
-    """Return a system as the kernels see it.
+    """Return a system in the arrays of the kernels.
 
     Raises
     ------
@@ -395,7 +395,7 @@ def compile_system(system: System) -> CompiledSystem:
 def marker_record(
     made: ConnectionLists, ends_of: list[list[int]], lines: Lines, load_marker: list[int], is_follower: list[bool]
 ) -> Markers:
-    """Return the markers as the kernels see them; those of loads come last."""
+    """Return the markers in the arrays of the kernels; those of loads come last."""
     markers = made.markers
     shapes = [marker.shape for marker in markers]
     ends = [m for group in ends_of for m in group]
@@ -431,7 +431,7 @@ def marker_record(
 
 
 def row_softness(system: System, made: ConnectionLists, types: BodyTypes, kind_of_body: IntArray) -> Array:
-    """Return the compliance of held rows, relative to c_k, by which they share reactions; zero if none is asked for.
+    """Return the compliance of constraint rows, relative to c_k, by which they share reactions; zero if not requested.
 
     A joint shares by how its two bodies give way: SOFT times the sum of their 1/m for distances, of their 1/J for
     angles, J the mean of the principal moments of inertia about the centre of mass. A body with a small moment about an
@@ -464,7 +464,7 @@ def principal_moments(types: BodyTypes) -> Array:
 
 
 def place(system: System, mean_axes: tuple[MeanAxes | None, ...]) -> State:
-    """Return the state of the bodies as given, in the frames of the engine."""
+    """Return the given state of the bodies, in the frames of the engine."""
     r: list[Array] = []
     p: list[Array] = []
     q: list[Array] = []
@@ -495,7 +495,7 @@ def motion_at_start(body: FlexibleBody) -> FrameMotion:
 
 
 def body_sizes(made: ConnectionLists, places: list[Array], placed: State, radii: Array) -> Array:
-    """Return the size of all that hangs together with each body, the ground left out, (n_b,).
+    """Return the size of the group of bodies connected to each body, without the ground, (n_b,).
 
     The largest arm of a marker or radius of gyration (radii, (n_b,)), or the extent of their points and of those that
     hold them.
@@ -510,7 +510,7 @@ def body_sizes(made: ConnectionLists, places: list[Array], placed: State, radii:
         return i
 
     bodies = [marker.body for marker in made.markers]
-    first: dict[int, int] = {}  # a body of each connection
+    first: dict[int, int] = {}  # one body of each connection
     for c, i in zip(made.connection_of, bodies, strict=True):
         if c >= 0 and i >= 0:
             together[head(i)] = head(first.setdefault(c, i))
@@ -532,6 +532,6 @@ def body_sizes(made: ConnectionLists, places: list[Array], placed: State, radii:
 
 
 def system_length(sizes: Array, places: list[Array], placed: State) -> float:
-    """Return the largest size of what hangs together, or the extent of the whole system; 1 if all are 0."""
+    """Return the largest size of connected bodies, or the extent of the whole system; 1 if all are 0."""
     points = np.array([*places, *placed.r])
     return max(float(sizes.max()), float(np.linalg.norm(np.ptp(points, axis=0)))) or 1.0

@@ -26,13 +26,14 @@ from floatframe.model.system import System
 
 __all__ = ["CoordinateName", "SystemTree", "tree_of"]
 
-NEARLY_SYMMETRIC = 0.3  #: difference of two moments of inertia of a body whose spin may be taken by itself
-MOST_ACROSS = 0.5  #: of the spin: angular velocity across the axis of such a body, above which it is not
+#: relative difference of two moments of inertia below which the spin may be integrated separately
+NEARLY_SYMMETRIC = 0.3
+MOST_ACROSS = 0.5  #: ratio of transverse angular velocity to spin, above which it is not
 
 
 @dataclass(frozen=True)
 class CoordinateName:
-    """A column of the tree in words."""
+    """Names of a column of the tree."""
 
     joint: str  #: "" for a free body
     body: str  #: that it carries
@@ -48,17 +49,17 @@ class CoordinateName:
 
 @dataclass(frozen=True, eq=False)
 class SystemTree:
-    """A system as a tree, and what its coordinates are called."""
+    """A system as a tree, and the names of its coordinates."""
 
     tree: Tree
     columns: tuple[CoordinateName, ...]
-    motions: tuple[TimeFunction | None, ...]  #: that prescribe the columns
+    motions: tuple[TimeFunction | None, ...]  #: rows that prescribe the columns
     cut: tuple[str, ...]  #: joints that would have a chart, but close a loop
-    constrained: tuple[str, ...]  #: joints without a chart, or with a law that keeps them constraints
+    constrained: tuple[str, ...]  #: joints without a chart, or kept as constraints because of their law
 
     @property
     def is_tree(self) -> bool:
-        """Whether every joint is one of the tree, and no coupler or element is beside it: nothing closes a loop."""
+        """Whether every joint is in the tree and there are no couplers or elements, so that nothing closes a loop."""
         return not len(self.tree.kept)
 
     @property
@@ -78,7 +79,7 @@ class Branch:
 
 
 def tree_of(system: System) -> SystemTree:
-    """Return the tree of a system: made at the first call, and kept with the system."""
+    """Return the tree of a system, computed at the first call and stored in the system."""
     return system.derived(make_tree)
 
 
@@ -135,7 +136,7 @@ def charts_of(system: System, compiled: CompiledSystem) -> dict[int, tuple[Colum
 
 
 def spanning_tree(system: System, model: Model, charts: dict[int, tuple[Column, ...]]) -> list[Branch]:
-    """Return the branches of the tree of least freedoms, each after its parent."""
+    """Return the branches of the spanning tree with the fewest freedoms, each after its parent."""
     ends = {
         k: (int(model.markers.body[model.connections.a[k]]), int(model.markers.body[model.connections.b[k]]))
         for k in charts
@@ -148,7 +149,7 @@ def spanning_tree(system: System, model: Model, charts: dict[int, tuple[Column, 
     mass = model.body_types.mass[model.bodies.kind]
     depth = {-1: 0}
     branches: list[Branch] = []
-    heap: list[tuple[int, int, int, int]] = []  # freedoms, depth, joint, body from which it leads
+    heap: list[tuple[int, int, int, int]] = []  # freedoms, depth, joint, body at its inner end
 
     def reach(body: int) -> None:
         for k in at.get(body, []):
@@ -192,7 +193,7 @@ def driving_motion(system: System, compiled: CompiledSystem, each: Branch, colum
 
 
 def own_row(compiled: CompiledSystem, joint: int, column: Column) -> int:
-    """Return the row of a joint along whose coordinate forces act, -1 if none do."""
+    """Return the row of a joint with forces along its coordinate, -1 if there is none."""
     model = compiled.model
     for row in range(model.connections.w0[joint], model.connections.w0[joint + 1]):
         if model.rows.is_loaded[row] and compiled.coordinates[row] == column.name:
@@ -223,7 +224,7 @@ def jets_of(
     column0: list[int],
     m0: list[int],
 ) -> tuple[list[int], list[tuple[int, int, int]]]:
-    """Return where the jets of each body begin, and kind, item and unknown of each, see `Tree`."""
+    """Return the index of the jets of each body, and kind, item and unknown of each jet, see `Tree`."""
     jet0, jets = [0], []
     for i, each in enumerate(ordered):
         jets += [(COLUMN, k, unknown[k]) for k in range(column0[i], column0[i + 1]) if unknown[k] >= 0]
@@ -236,7 +237,7 @@ def jets_of(
 
 
 def spin_axes(compiled: CompiledSystem, ordered: list[Branch], far: list[int]) -> tuple[Array, Array]:
-    """Return the axis of symmetry of each body that spins by itself, axes of its end of the joint, and `most_across`.
+    """Return the symmetry axis of each body with separate spin, axes of its end of the joint, and `most_across`.
 
     These are bodies that are free or on a ball joint, rigid with all that is fixed to them; zero for others. Their
     inertia about the joint, or about the centre of mass, is symmetric, or nearly so if they turn mostly about the axis.
@@ -244,7 +245,7 @@ def spin_axes(compiled: CompiledSystem, ordered: list[Branch], far: list[int]) -
     added to, and stiff ones make steps unstable.
     """
     model, axes, most_across = compiled.model, np.zeros((len(ordered), 3)), np.full(len(ordered), np.inf)
-    fixed: list[list[int]] = [[i] for i in range(len(ordered))]  # to each body, itself included
+    fixed: list[list[int]] = [[i] for i in range(len(ordered))]  # bodies fixed to each body, including itself
     is_rigid = [model.bodies.n_q[i] == 0 for i in range(len(ordered))]
     for i in reversed(depth_first(ordered)):
         each = ordered[i]
@@ -262,7 +263,7 @@ def spin_axes(compiled: CompiledSystem, ordered: list[Branch], far: list[int]) -
 
 
 def common_inertia(compiled: CompiledSystem, bodies: list[int], marker: int) -> Array:
-    """Return the inertia of rigid bodies, as placed, about a marker of the first or their centre of mass (-1).
+    """Return the assembled inertia of rigid bodies about a marker of the first, or their centre of mass (-1).
 
     In axes of the first, (3, 3).
     """
@@ -281,7 +282,7 @@ def common_inertia(compiled: CompiledSystem, bodies: list[int], marker: int) -> 
 
 
 def loop_markers(model: Model, ordered: list[Branch], near: list[int], kept: list[int]) -> list[tuple[int, int]]:
-    """Return the bodies that loops go through, each with the marker by which a loop leaves it outwards."""
+    """Return the bodies in loops, each with the marker at which a loop leaves it outwards."""
     found: set[tuple[int, int]] = set()
     for c in kept:
         if model.connections.law[c] != JOINT:
@@ -299,7 +300,7 @@ def loop_markers(model: Model, ordered: list[Branch], near: list[int], kept: lis
 
 
 def tree_record(compiled: CompiledSystem, branches: list[Branch]) -> Tree:
-    """Return the tree as the kernels see it."""
+    """Return the tree in the arrays of the kernels."""
     model = compiled.model
     ordered = sorted(branches, key=lambda branch: branch.body)
     near, far, is_reversed = [], [], []

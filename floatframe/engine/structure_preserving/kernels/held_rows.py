@@ -103,7 +103,7 @@ def coupler_value(model, step, c):
 
 @inner
 def add_coupler_reaction(model, discrete, step, c, f):
-    """Add the loads of coupler c with multiplier f: their work is f times the change of its row."""
+    """Add the loads of coupler c with multiplier f, whose work is f times the change of its row."""
     i = model.connections.item[c]
     scale = model.rows.x[model.elements.core[i], 0]
     for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
@@ -113,7 +113,7 @@ def add_coupler_reaction(model, discrete, step, c, f):
 
 @inner
 def coupler_change(model, discrete, step, c):
-    """Return the change of the row of coupler c by the motion over the step."""
+    """Return the change of the row of coupler c due to the motion over the step."""
     i, total = model.connections.item[c], 0.0
     for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
         row, a, b = model.coordinates.row[p], model.coordinates.a[p], model.coordinates.b[p]
@@ -123,7 +123,7 @@ def coupler_change(model, discrete, step, c):
 
 @inner
 def coupler_rate(model, c, t):
-    """Return the rate of the row of coupler c while nothing moves."""
+    """Return the rate of the row of coupler c without motion."""
     k = model.elements.core[model.connections.item[c]]
     _, rate = held(model, k, t)
     return -model.rows.x[k, 0] * rate

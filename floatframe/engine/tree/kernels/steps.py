@@ -319,7 +319,7 @@ def accelerations(work, tree, joints, memory, s):
 
 @inner
 def one_step(model, work, memory, tree, joints, tangent, order, h):
-    """Advance the memory by one step, unless its error is above the one that is allowed.
+    """Advance the memory by one step, unless its error is above the allowed error.
 
     Return (status, body that turns too far, last correction by the allowed one, error; -1 if not estimated). Factors of
     an earlier step serve as long as corrections shrink fast with them; where they do not, the step is begun anew with

@@ -422,7 +422,7 @@ def force_tangents(nodes, work, dense, model, marker_work):
 
 @loops
 def put_marker_changes(model, marker_work, m, body, R, arm, sign, out, scratch):
-    """Write what the modes and their rates change at marker m, for all that hangs at it; ground axes, a point at arm.
+    """Write the effect of modes and their rates at marker m on everything attached to it; ground axes, a point at arm.
 
     body: v, omega, a, alpha of the marker and omega, alpha of its body, body axes. out, (n, 18): Y, X by q; X by q_dot
     (whose Y is the column of the mode itself).
@@ -486,7 +486,7 @@ def put_motion(row, first, sign, R, arm, v, w):
 
 @loops
 def carried_change(model, marker_work, m, f, t, i, j, n):
-    """Return the change by mode j of the modal force i of a wrench (f, t) on marker m that turns with it; body axes."""
+    """Return the change with mode j of the modal force i of a wrench (f, t) fixed in marker m; body axes."""
     o, first, markers = model.markers.psi0[m], model.markers.bend0[m], marker_work.markers
     psi, T = markers.psi[o : o + 6 * n], markers.T_left[m]
     d, r = shape(psi, n, i)
