@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 import cms
 from cms.errors import BodyError, ForeignBodyError
 from cms.exchange.export import export_body
+from cms.exchange.importers.modal_body import changed, momentum_of
 from tests.bodies import bar
 from tests.cms.exchange.exporters.small_bodies import soft_bar
 
@@ -269,3 +270,21 @@ def test_geometric_stiffness_comes_back(key, tmp_path):
         assert_allclose(getattr(body.geometric, name) * signs, expected, rtol=0, atol=1e-6 * size)
     together = cms.import_body(path, units=own.units, interfaces={"both": [1, 2]})
     assert together.geometric is None
+
+
+def test_the_momentum_of_modes_does_not_depend_on_where_the_origin_lies():
+    """Angular momentum about the centre of mass over the inertia there, of modes that turn more than they move."""
+    part = cms.couple(bar(nx=4, width=0.07, height=0.04))
+    modes = cms.craig_bampton(part, n_modes=2)
+    found = []
+    for origin in (None, (3.0, -2.0, 5.0), (30.0, 40.0, 0.0)):
+        moments = cms.reduce(part, modes, frame=cms.NodalFrame("left", origin), geometric=False).moments
+        c = moments.center_of_mass
+        angular = np.linalg.norm(moments.C2 - np.cross(c, moments.C1, axis=0), axis=0)
+        central = np.trace(moments.J0 + moments.m * (np.outer(c, c) - c @ c * np.eye(3))) / 2
+        turning = angular / np.sqrt(central) - np.linalg.norm(moments.C1, axis=0) / np.sqrt(moments.m)
+        k = int(np.argmax(turning))  # a mode that turns more than it moves
+        assert turning[k] > 0.05
+        found.append(momentum_of(changed(moments, np.diag(1.0 * (np.arange(moments.n_q) == k)))))
+        assert_allclose(found[-1], angular[k] / np.sqrt(central), rtol=1e-8)
+    assert_allclose(found, found[0], rtol=1e-6)
