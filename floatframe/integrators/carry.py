@@ -9,6 +9,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.file_frames import state_of_file
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.initial_conditions.initial import counted_angles_of
 from floatframe.engine.initial_conditions.newton_equations import displaced
 from floatframe.engine.kernels.memory import Memory, Rows, memory_at
 from floatframe.engine.kernels.model import Model
@@ -207,14 +208,20 @@ def carry_of_past(work: Work, end: Carry, k: int) -> Carry:
     )
 
 
-def with_angles(system: System, t: float, carry: Carry, before: Carry | None = None) -> Carry:
+def with_angles(
+    system: System, t: float, carry: Carry, before: Carry | None = None, state: State | None = None
+) -> Carry:
     """Return the memory at the start of a motion with its angles counted.
 
-    They go on from those of a memory before, else from the motions that prescribe them, or between -pi and pi.
+    They go on from those of a memory before, else from the motions that prescribe them, from the state that a motion
+    begins with, or between -pi and pi.
     """
     compiled = compiled_system(system)
     if before is None:
-        start = np.array([0.0 if motion is None else motion(t) for motion in compiled.angle_motions])
+        known = counted_angles_of(compiled, state)
+        known = np.zeros(len(compiled.angles)) if known is None else known
+        pairs = zip(known, compiled.angle_motions, strict=True)
+        start = np.array([angle if motion is None else motion(t) for angle, motion in pairs])
     else:
         start = before.angle
     return turned_on(system, replace(carry, angle=start, angle_rate=np.zeros_like(start)), 0.0)

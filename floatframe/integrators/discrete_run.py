@@ -80,7 +80,7 @@ class DiscreteScheme:
         is_of_law = np.isin(held, compiled_system(system).model.laws.equation)
         f = np.where(is_of_law, consistent.w[held], 0.0)
         carry = Carry(consistent.state, consistent.u_dot, f, 0.0, consistent.w, np.zeros(2), np.zeros(2))
-        return with_angles(system, t, carry, before)
+        return with_angles(system, t, carry, before, state)
 
     def after_jump(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
         """Return the memory after a jump of forces at t, and the results there."""

@@ -69,16 +69,19 @@ class EnergyMomentum(DiscreteScheme):
 class EnergyDecaying(DiscreteScheme):
     """The scheme of `EnergyMomentum` with dissipation in unresolved modes: energy never increases.
 
-    In place of (1) and (4), with the modes Phi of the pencil (K, M - Bᵀ J⁻¹ B at q = 0) and their frequencies omega,
+    In place of (1) and (4), with E = J⁻¹ B and M_e = M - Bᵀ E at q = 0, the modes Phi of (K, M_e), their frequencies
+    omega, and Z = Y - Eᵀ Pi, the momentum of vibrations, which is zero in all rigid motions whatever the frame,
 
-        q' - q = h (mean(q_dot) + Phi chi Phiᵀ (Y' - Y)),    K mean(q) becomes K (mean(q) + X (q' - q)),
-        X = Phi chi Phiᵀ (M - Bᵀ J⁻¹ B),   chi = chi_inf x²/(1 + x²),  x = omega h,  chi_inf = (1 - rho)/(1 + rho)/2
+        R' = R cay(h (mean(omega) - E y)),   q' - q = h (mean(q_dot) + y),   y = F (Z* - Z),
+        K mean(q) becomes K (mean(q) + X (q' - q)),   X = Phi chi Phiᵀ M_e,   F = Phi chi/(1 + 2 chi) Phiᵀ,
+        chi = chi_inf x²/(1 + x²),   x = omega h,   chi_inf = (1 - rho)/(1 + rho)/2
 
-    Energy falls in a step by (q' - q)ᵀ K X (q' - q) + (Y' - Y)ᵀ Phi chi Phiᵀ (Y' - Y), both matrices positive
-    semidefinite, whatever h; momenta stay exact. A mode alone has the spectral radius of the method with
-    theta = 1/2 + chi, rho_inf where h is long; for short h dissipation is of third order, the scheme of second. The
-    idea of dissipating stress and velocity together is that of Armero & Romero (2001) [1]_; the filter by
-    frequency, which makes it of second order, is possible because K is constant here.
+    Z* is Z' for the velocities that y = 0 would give, so that y = Phi chi Phiᵀ (Z' - Z) where deformations are small.
+    Energy falls in a step by (q' - q)ᵀ K X (q' - q) + yᵀ (Z' - Z), whatever h, since chi is at most 1/2; momenta stay
+    exact. A mode alone has the spectral radius of the method with theta = 1/2 + chi, rho_inf where h is long; for short
+    h dissipation is of third order, the scheme of second. The idea of dissipating stress and velocity together is that
+    of Armero & Romero (2001) [1]_; the filter by frequency, which makes it of second order, is possible because K is
+    constant here.
 
     References
     ----------
@@ -123,13 +126,10 @@ class ConservingScheme:
         q_dot: Array = 2 * dq / h - place.q_dot
         made = self.filters.get(id(body))
         if made is not None:
-            q = place.q + dq
-            _, Y_0 = body.momenta(place.q, place.omega, place.q_dot)
-            _, by_spin = body.momenta(q, omega, np.zeros_like(dq))
-            C = body.shapes(q)
-            matrix = 0.5 * np.eye(body.n) + made.G @ (body.M - body.m * np.swapaxes(C, -1, -2) @ C)
-            right = dq / h - 0.5 * place.q_dot - (by_spin - Y_0) @ made.G
-            q_dot = np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0])
+            Pi_0, Y_0 = body.momenta(place.q, place.omega, place.q_dot)
+            Pi_1, Y_1 = body.momenta(place.q + dq, omega, q_dot)
+            rate = ((Y_1 - Y_0) - (Pi_1 - Pi_0) @ made.E) @ made.F.T
+            omega, q_dot = omega + 2 * rate @ made.E.T, q_dot - 2 * rate
         return omega, q_dot
 
     def inertia(self, body: CentralBody, place: Placed, x: Array, h: float) -> Array:

@@ -142,7 +142,7 @@ class GeneralizedAlpha:
         """Return the memory at the beginning: the consistent state and its accelerations."""
         known, angle = (None, None) if before is None else (before.w, before.angle)
         consistent = consistent_motion(system, state, t=t, known=known, angle=angle)
-        return with_angles(system, t, begun_carry(consistent), before)
+        return with_angles(system, t, begun_carry(consistent), before, state)
 
     def after_jump(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
         """Return the memory after a jump of forces at t, and the results there.

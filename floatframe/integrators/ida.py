@@ -85,7 +85,7 @@ class Ida:
         require_no_remembered_contacts(compiled, "Ida")
         made = consistent_motion(system, state, t=t, angle=None if before is None else before.angle)
         carry = Carry(made.state, made.u_dot, np.zeros(0), 0.0, made.w, np.zeros(2), np.zeros(2))
-        return with_angles(system, t, carry, before)
+        return with_angles(system, t, carry, before, state)
 
     def after_jump(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
         """Return the memory after a jump of forces at t, and the results there."""

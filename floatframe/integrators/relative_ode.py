@@ -95,7 +95,7 @@ class RelativeOde:
         known, angle = (None, None) if before is None else (before.w, before.angle)
         made = consistent_motion(system, state, t=t, known=known, angle=angle)
         carry = Carry(made.state, made.u_dot, np.zeros(0), 0.0, made.w, np.zeros(2), np.zeros(2))
-        return with_angles(system, t, carry, before)
+        return with_angles(system, t, carry, before, state)
 
     def after_jump(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
         """Return the memory after a jump of forces at t, and the results there."""

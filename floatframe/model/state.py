@@ -25,9 +25,13 @@ class State:
     #: unknowns of the connections, (n_w,), such as those of an equilibrium; they include the states of elements and
     #: user forces; None: initial values
     w: Array | None = None
+    #: angles between bodies, counted through full turns, (n_angles,) [rad], such as those of a motion before; None, or
+    #: of another number: they begin between -pi and pi
+    angle: Array | None = None
 
     def __post_init__(self) -> None:
         for name in ("r", "p", "q", "u"):
             object.__setattr__(self, name, frozen(getattr(self, name).copy()))
-        if self.w is not None:
-            object.__setattr__(self, "w", frozen(np.array(self.w, dtype=float)))
+        for name in ("w", "angle"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, frozen(np.array(getattr(self, name), dtype=float)))

@@ -143,9 +143,12 @@ class Trajectory:
         )
 
     def state(self, i_time: int) -> State:
-        """Return the state at an output time (-1: the last), for example as initial state of another motion."""
-        arrays = [self.source.read(name)[i_time] for name in ("position", "euler_parameters", "q", "u")]
-        return State(*arrays)
+        """Return the state at an output time (-1: the last), for example as initial state of another motion.
+
+        States of elements and user forces, and counted angles, go on in that motion (`State.w`, `State.angle`).
+        """
+        arrays = [self.source.read(name)[i_time] for name in ("position", "euler_parameters", "q", "u", "w")]
+        return State(*arrays, None if self.head.angles is None else self.source.read("angle")[i_time])
 
     def reaction(self, name: str) -> Reaction:
         """Return force and moment that a joint or spring-damper exerts on its marker A."""

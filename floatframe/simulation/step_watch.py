@@ -13,9 +13,9 @@ It works for second-order methods, with fixed steps and with an error tolerance:
 (4) After that, windows of `WINDOW` steps are repeated with half steps. The distance between windows grows. The errors
     of all steps are summed; steps between two windows get the mean error of both.
 (5) Position errors are relative to the longest displacement of any body from its start. Rotation errors are relative to
-    the largest rotation, or to that displacement over the length of the system if it is larger. Windows also count the
-    errors of speeds, relative to twice the largest speed (a vibration moves by two amplitudes). Errors a of place and b
-    of speed combine to sqrt(a² + b²), since they turn into one another.
+    the largest rotation, or to `SMALL_TURN` where that is larger. Windows also count the errors of speeds, relative to
+    twice the largest speed (a vibration moves by two amplitudes). Errors a of place and b of speed combine to
+    sqrt(a² + b²), since they turn into one another.
 
 A companion restarts where a run can be resumed; its error up to there is added. The sum over windows does not know how
 the motion changes earlier errors: it may forget them (damping) or magnify them (chaos).
@@ -61,6 +61,7 @@ STEP_LIMIT = 0.03  #: relative error above which a run is reported
 SHORT_LIMIT = 0.01  #: the same for runs of less than `FIRST_VERDICT` steps, which may be pieces of a longer motion
 REST_LENGTH = 1e-7  #: displacement over the length of the system below which the system is at rest
 REST_ANGLE = 1e-6  #: rotation below which the system is at rest [rad]
+SMALL_TURN = 1e-3  #: rotation below which errors of rotation do not count in a motion as long as the system [rad]
 FULL_TURN = 3.0  #: rotation above which errors are relative to a whole turn [rad]
 SCREEN = 0.25  #: share of the limit above which half steps decide: double steps may be outside the asymptotic range
 AIM = 0.2  #: share of the limit that the recommended step would reach
@@ -264,9 +265,10 @@ class StepWatch:
             if other.ratio == DOUBLES and not is_small:
                 other = self.companion = self.with_half_steps(system, other)
                 is_good = other.follow(system, end, last, t0, h, self.jumps)
-            if not is_good:
-                self.companion, self.companions_done, self.next_window = None, True, last
-                return None
+            if not is_good:  # what it has found so far counts
+                self.close_companion(h)
+                self.companions_done, self.next_window = True, last
+                return self.new_note(system, t0 + last * h, h) if last >= FIRST_VERDICT else None
         is_due = last >= max(FIRST_VERDICT, min(self.n_total, COMPANION_STEPS) // 2)
         note = self.new_note(system, t0 + last * h, h) if is_due else None
         is_over = self.n_companion_steps + last - other.start >= COMPANION_STEPS or self.note is not None
@@ -361,7 +363,7 @@ class StepWatch:
         compiled = compiled_system(system)
         least = np.array([REST_LENGTH * compiled.length, REST_ANGLE])
         size = self.size.copy()
-        size[1] = np.maximum(size[1], size[0] / compiled.length)
+        size[1] = np.maximum(size[1], SMALL_TURN * np.minimum(size[0] / compiled.length, 1.0))
         moves = size[:, 0] > least
         total = self.total
         if companion is not None:

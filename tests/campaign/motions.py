@@ -2,7 +2,7 @@
 
 (1) the case is run as drawn (`random_motion`), in chunks where it says so
 (2) the reference is the same system in fine steps, absolute and relative, with steps halved until both agree
-(3) the error is that of positions over the way of the farthest body, or that of rotations over their way
+(3) the error is that of positions over the way of the farthest body in any fine step, or that of rotations over theirs
 (4) a note of the run about its steps or energy, or an error in words, is an answer; else the motion has to be right,
     unless it is chaotic: a fine run whose velocities begin 1e-6 away ends more than `CHAOS` times as far away
 """
@@ -62,13 +62,15 @@ def motion_verdict(case: MotionCase) -> Verdict:
 
 
 class Samples:
-    """Places and rotations of bodies at the times that are compared."""
+    """Places and rotations of bodies at the times that are compared; how far they go in between too."""
 
     def __init__(self, parts: list[ff.Trajectory], every: int) -> None:
         names = [body.name for body in parts[0].head.bodies]
-        self.r = np.stack([joined([p.body(n).r for p in parts])[::every] for n in names])  # (n_b, n_t, 3)
-        self.p = np.stack([joined([p.body(n).p for p in parts])[::every] for n in names])
-        self.omega = np.stack([joined([p.body(n).omega_B for p in parts])[::every] for n in names])
+        r = np.stack([joined([p.body(n).r for p in parts]) for n in names])  # (n_b, n_t, 3)
+        p = np.stack([joined([p.body(n).p for p in parts]) for n in names])
+        self.way = np.linalg.norm(r - r[:, :1], axis=2).max()
+        self.angle = 2 * np.arccos(np.clip(np.abs(np.einsum("itk,itk->it", p, p[:, :1])), 0, 1)).max()
+        self.r, self.p = r[:, ::every], p[:, ::every]
 
 
 def joined(parts: list[np.ndarray]) -> np.ndarray:
@@ -78,15 +80,15 @@ def joined(parts: list[np.ndarray]) -> np.ndarray:
 
 def run(case: MotionCase, finer_by: int, watch: str = "stop") -> tuple[Samples, tuple[ff.ValidityNote, ...]]:
     """Return the motion of a case with steps divided by a number, at the times that are compared, and its notes."""
-    every = max(1, case.n_steps // SAMPLES)
+    every = max(1, case.n_steps // SAMPLES) * finer_by
     h, n = case.h / finer_by, case.n_steps * finer_by
     chunk = case.chunk or n
     parts, state, notes = [], None, ()
     for first in range(0, n, chunk):
         last = min(first + chunk, n)
         part = ff.integrate(
-            case.system, case.method, last * h, h, t_start=first * h, state=state, output_every=finer_by,
-            formulation=case.formulation if isinstance(case.method, ff.GeneralizedAlpha) else None, watch=watch,
+            case.system, case.method, last * h, h, t_start=first * h, state=state, watch=watch,
+            formulation=case.formulation if isinstance(case.method, ff.GeneralizedAlpha) else None,
         )  # fmt: skip
         state = part.state(-1)
         parts.append(part)
@@ -115,11 +117,8 @@ def difference(motion: Samples, reference: Samples) -> float:
     The way of a rotation is its largest angle, or a quarter of the angle it has gone through where that is more.
     """
     n = min(motion.r.shape[1], reference.r.shape[1])
-    r, p = reference.r[:, :n], reference.p[:, :n]
-    way = np.linalg.norm(r - r[:, :1], axis=2).max()
+    r, p, way, angle = reference.r[:, :n], reference.p[:, :n], reference.way, reference.angle
     size = np.linalg.norm(motion.r[:, :n] - r, axis=2).max()
-    cosine = np.abs(np.einsum("itk,itk->it", p, p[:, :1]))
-    angle = 2 * np.arccos(np.clip(cosine, 0, 1)).max()
     apart = 2 * np.arccos(np.clip(np.abs(np.einsum("itk,itk->it", p, motion.p[:, :n])), 0, 1)).max()
     if not (np.isfinite(motion.r).all() and np.isfinite(motion.p).all()):
         return float("inf")

@@ -124,11 +124,12 @@ def consistent_motion(
 ) -> ConsistentState:
     """Return the same as `consistent_state`, in the frames of the engine; the given state is in those of the files.
 
-    angle: counted angles of a motion before, (n_angles,), whose turned bushings go on.
+    angle: counted angles of a motion before, (n_angles,), whose turned bushings go on; None: those of the state.
     """
     compiled = compiled_system(system)
     given = compiled.placed if state is None else checked(compiled, state)
     known = known_of(compiled, state) if known is None else known
+    angle = counted_angles_of(compiled, state) if angle is None else angle
     work = work_from(compiled.model, known)
     work.state.time[...] = t
     if angle is not None and len(angle):
@@ -142,22 +143,31 @@ def consistent_motion(
 
 
 def known_of(compiled: CompiledSystem, state: State | None) -> Array | None:
-    """Return the unknowns in a state if the system has states that continue; otherwise None.
+    """Return the unknowns in a state if the system has states or angles that continue; otherwise None.
 
     Raises
     ------
     ModelError
         If they are those of another system.
     """
-    if state is None or state.w is None or not len(compiled.model.states.row):
+    if state is None or state.w is None:
         return None
-    n_w = int(compiled.model.connections.w0[-1])
+    n_w, has_states = int(compiled.model.connections.w0[-1]), len(compiled.model.states.row) > 0
+    if state.w.shape != (n_w,) and not has_states:
+        return None
     if state.w.shape != (n_w,):
         raise ModelError(
             f"state: w: expected the {n_w} unknowns of this system's joints, forces and elements, got {len(state.w)} "
             "of another system; to use the initial values of their states, call dataclasses.replace(state, w=None)"
         )
     return state.w
+
+
+def counted_angles_of(compiled: CompiledSystem, state: State | None) -> Array | None:
+    """Return the counted angles that a state carries, if they are as many as those of the system; else None."""
+    if state is None or state.angle is None or state.angle.shape != (len(compiled.angles),):
+        return None
+    return state.angle
 
 
 def checked(compiled: CompiledSystem, state: State) -> State:

@@ -27,19 +27,21 @@ __all__ = ["Kept", "kept_of", "new_step_work"]
 class Filter:
     """Dissipation of the modes of one body."""
 
-    G: Array  #: Phi chi Phiᵀ, (n, n)
-    X: Array  #: (n, n)
+    F: Array  #: (1 + 2 Phi chi Phiᵀ M_e)⁻¹ Phi chi Phiᵀ, (n, n)
+    X: Array  #: Phi chi Phiᵀ M_e, (n, n)
+    E: Array  #: J⁻¹ B: how a free body turns against its vibrations, (3, n)
 
 
 def filter_of(body: CentralBody, h: float, rho_inf: float) -> Filter:
     """Return the dissipation of the modes of a body for steps of size h."""
     M = body.mass_matrix(np.zeros(body.n))
-    effective = M[3:, 3:] - M[3:, :3] @ np.linalg.solve(M[:3, :3], M[:3, 3:])
+    E = np.linalg.solve(M[:3, :3], M[:3, 3:])
+    effective = M[3:, 3:] - M[3:, :3] @ E
     squares, Phi = la.eigh(body.K, 0.5 * (effective + effective.T))
     x = h**2 * np.maximum(squares, 0.0)
     chi = 0.5 * (1 - rho_inf) / (1 + rho_inf) * x / (1 + x)
-    G = (Phi * chi) @ Phi.T
-    return Filter(G, G @ effective)
+    X = (Phi * chi) @ Phi.T @ effective
+    return Filter((Phi * (chi / (1 + 2 * chi))) @ Phi.T, X, E)
 
 
 def constants_of(ds: DiscreteSystem, h: float, rho_inf: float) -> tuple[Array, IntArray]:
@@ -53,8 +55,12 @@ def constants_of(ds: DiscreteSystem, h: float, rho_inf: float) -> tuple[Array, I
             continue
         done.add(t)
         bent = np.zeros((n, 3 * n)) if body.K_t is None else body.K_t
-        of_modes = filter_of(body, h, rho_inf) if rho_inf < 1.0 and n else Filter(np.zeros((n, n)), np.zeros((n, n)))
-        own = (body.C1, bent, body.C2, body.J_k, body.S_ab, body.S_ab_T, body.M, body.K, body.D, of_modes.G, of_modes.X)
+        none = Filter(np.zeros((n, n)), np.zeros((n, n)), np.zeros((3, n)))
+        of_modes = filter_of(body, h, rho_inf) if rho_inf < 1.0 and n else none
+        own = (
+            body.C1, bent, body.C2, body.J_k, body.S_ab, body.S_ab_T, body.M, body.K, body.D, of_modes.F, of_modes.X,
+            of_modes.E,
+        )  # fmt: skip
         for which, array in enumerate(own):
             block0[t, which] = place
             parts.append(np.ascontiguousarray(array).ravel())

@@ -44,7 +44,7 @@ from floatframe.model.rotations import (
 )
 from floatframe.results.validity import ValidityNote, notes_from_json, notes_to_json
 from floatframe.simulation.energy_watch import EnergyWatch
-from floatframe.simulation.step_watch import StepWatch
+from floatframe.simulation.step_watch import Companion, StepWatch
 
 GROUND = Marker("ground", position=np.zeros(3))
 
@@ -395,3 +395,37 @@ def test_notes_of_older_files_are_read():
     fields = json.loads(notes_to_json([note]))
     del fields[0]["advice"]
     assert notes_from_json(json.dumps(fields)) == (note,)
+
+
+def test_errors_of_rotation_are_told_beside_a_long_way():
+    """Exact: the sine of a disc on a spring, on a cart that goes far; six steps in a period."""
+    omega, v = 10.0, 20.0
+    h, place = 2 * np.pi / omega / 6, np.array([5.0, -3.0, 2.0])
+    cart = RigidBody("cart", 2.0, 0.1 * np.eye(3), position=place, velocity=(v, 0, 0))
+    disc = RigidBody("disc", 1.0, 0.2 * np.eye(3), position=place, velocity=(v, 0, 0), omega_B=(0, 0, 0.3 * omega))
+    rail = PrismaticJoint(
+        "rail", Marker("ground", position=place), Marker("cart", position=np.zeros(3)), axis=(1, 0, 0)
+    )
+    hinge = RevoluteJoint(
+        "hinge", Marker("cart", position=np.zeros(3)), Marker("disc", position=np.zeros(3)), axis=(0, 0, 1)
+    )
+    spring = JointForce("spring", "hinge", "angle", stiffness=0.2 * omega**2)
+    motion = integrate(System([cart, disc], [rail, hinge], [spring]), GeneralizedAlpha(0.8), 30 * h, h)
+    R = rotations_between(motion.body("disc").p, np.array([1.0, 0, 0, 0]))
+    assert np.abs(R[:, 2] - 0.3 * np.sin(omega * motion.t)).max() > 0.05 * 0.3
+    assert np.abs(motion.body("cart").r[-1, 0] - place[0]) > 30.0
+    assert "steps" in kinds(motion)
+
+
+def test_what_halves_have_found_counts_where_they_fail(monkeypatch):
+    """The pendulum is off by more than 5 % after 16 steps; its halves fail at the last one."""
+    follow = Companion.follow
+
+    def fails(companion, system, end, last, *others):
+        return last <= 16 and follow(companion, system, end, last, *others)
+
+    fine = integrate(pendulum(), GeneralizedAlpha(0.5), 1.7, 0.001, output_every=100)
+    monkeypatch.setattr(Companion, "follow", fails)
+    motion = integrate(pendulum(), GeneralizedAlpha(0.0), 1.7, 0.1)
+    assert np.abs(motion.body("rod").r - fine.body("rod").r)[:17].max() > 0.05 * 2
+    assert "steps" in kinds(motion)

@@ -2,7 +2,7 @@
 
 from floatframe.engine.kernels.body import block, column, column_sum
 from floatframe.engine.kernels.compiler.compilation import inner, loops
-from floatframe.engine.kernels.dense import add_products, lu_factor, lu_solve
+from floatframe.engine.kernels.dense import add_products
 from floatframe.engine.kernels.rotation import matrix_of_euler_parameters
 from floatframe.engine.kernels.vector import (
     add,
@@ -25,6 +25,7 @@ from floatframe.engine.structure_preserving.kernels.records import (
     C2,
     DAMPING,
     FILTER,
+    FREE_TURNING,
     INERTIA,
     MASS,
     PRODUCTS,
@@ -283,31 +284,19 @@ def end_rates(model, discrete, step, i):
         step.w_1[u0 + k] = 2.0 * step.z[u0 + k] / h - step.w_0[u0 + k]
     if n == 0 or not discrete.is_filtered:
         return
-    m, q = model.body_types.mass[t], step.q_1[q0 : q0 + n]
-    Y, x = step.vector[:n], step.w_1[u0 + 6 : u0 + 6 + n]
+    omega, x, Y = vector(step.w_1[u0 + 3 :]), step.w_1[u0 + 6 : u0 + 6 + n], step.vector[:n]
+    Pi = momenta(model, discrete, step, t, n, step.q_1[q0 : q0 + n], omega, x, Y)
+    turning = sub(Pi, vector(step.P_0[u0 + 3 :]))
+    F, E = block(discrete, t, FILTER, n * n), block(discrete, t, FREE_TURNING, 3 * n)
     for k in range(n):
-        x[k] = 0.0
-    momenta(model, discrete, step, t, n, q, vector(step.w_1[u0 + 3 :]), x, Y)
+        Y[k] -= step.P_0[u0 + 6 + k] + dot(column(E, n, k), turning)
     for k in range(n):
-        Y[k] -= step.P_0[u0 + 6 + k]
-    shapes(discrete, t, n, q, step.C)
-    G, M, A = block(discrete, t, FILTER, n * n), block(discrete, t, MASS, n * n), step.matrix
-    for i_ in range(n):
-        total = 0.0
+        rate = 0.0
         for j in range(n):
-            total += G[i_ * n + j] * Y[j]
-        x[i_] = step.dq[q0 + i_] / h - 0.5 * step.w_0[u0 + 6 + i_] - total
-    for i_ in range(n):
-        for j in range(n):
-            A[i_, j] = 0.5 if i_ == j else 0.0
-    for j in range(n):
-        c = column(step.C, n, j)
-        for l_ in range(n):
-            effective = M[l_ * n + j] - m * dot(column(step.C, n, l_), c)
-            for i_ in range(n):
-                A[i_, j] += G[i_ * n + l_] * effective
-    lu_factor(A[:n, :n], step.pivot[:n])
-    lu_solve(A[:n, :n], step.pivot[:n], x)
+            rate += F[k * n + j] * Y[j]
+        x[k] -= 2.0 * rate
+        omega = add(omega, scaled(2.0 * rate, column(E, n, k)))
+    put(step.w_1, u0 + 3, omega)
 
 
 @inner

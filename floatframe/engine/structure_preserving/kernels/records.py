@@ -13,14 +13,16 @@ from floatframe.engine.kernels.records import Size, integer, real
 from floatframe.engine.kernels.work import n_most, n_q, n_u
 
 __all__ = [
-    "BENT", "C1", "C2", "CONSERVING", "DAMPING", "FILTER", "INERTIA", "MASS", "N_BLOCKS", "PRODUCTS", "SMALL",
-    "STIFFNESS", "STIFFNESS_FILTER", "TURNED_PRODUCTS", "VARIATIONAL", "Discrete", "Pattern", "StepWork",
+    "BENT", "C1", "C2", "CONSERVING", "DAMPING", "FILTER", "FREE_TURNING", "INERTIA", "MASS", "N_BLOCKS", "PRODUCTS",
+    "SMALL", "STIFFNESS", "STIFFNESS_FILTER", "TURNED_PRODUCTS", "VARIATIONAL", "Discrete", "Pattern", "StepWork",
 ]  # fmt: skip
 
 CONSERVING, VARIATIONAL = range(2)
 #: columns of `Discrete.block0`: those of `discrete.bodies.CentralBody` by name, and the filters of dissipation
-C1, BENT, C2, INERTIA, PRODUCTS, TURNED_PRODUCTS, MASS, STIFFNESS, DAMPING, FILTER, STIFFNESS_FILTER = range(11)
-N_BLOCKS = 11
+(
+    C1, BENT, C2, INERTIA, PRODUCTS, TURNED_PRODUCTS, MASS, STIFFNESS, DAMPING, FILTER, STIFFNESS_FILTER, FREE_TURNING,
+) = range(12)  # fmt: skip
+N_BLOCKS = 12
 #: changes of unknowns for derivatives, relative to the size of the system, in rad, or relative to their own size
 SMALL = 1e-7
 
