@@ -1,6 +1,6 @@
 """Random legal .cdb files of ANSYS beside an assembler of this file.
 
-A block of curved bricks (SOLID186, reduced or full) or of tetrahedra (SOLID187, or SOLID186 with equal nodes), some of
+A block of straight cells of SOLID185 (bricks with incompatible modes, wedges, tetrahedra), or of curved bricks (SOLID186, reduced or full) or of tetrahedra (SOLID187, or SOLID186 with equal nodes), some of
 them left out, of isotropic and orthotropic materials by major or minor ratios, blank constants, tables over
 temperature, element types by number or name, gaps in numbers, several widths of fields, two EBLOCKs.
 """
@@ -92,6 +92,47 @@ def matrices(shapes, nodes, C, rho, stiff, massive):
     return K, M
 
 
+def linear_shapes(n: int):
+    """Return the functions of a brick (8 nodes), a wedge (6) or a tetrahedron (4) of first order."""
+
+    def shapes(x: np.ndarray) -> np.ndarray:
+        if n == 8:
+            return (1 + CORNERS * x).prod(axis=1) / 8
+        L = np.array([1 - x[0] - x[1], x[0], x[1]])
+        return np.array([*(L * (1 - x[2]) / 2), *(L * (1 + x[2]) / 2)]) if n == 6 else np.array([1 - x.sum(), *x])
+
+    return shapes
+
+
+def linear_rule(n: int) -> list[tuple[np.ndarray, float]]:
+    """Return a rule that is exact on straight cells with parallel faces."""
+    if n == 6:  # a collapsed square times a line
+        return [
+            (np.array([(1 + x[0]) / 2, (1 + x[1]) / 2 * (1 - x[0]) / 2, x[2]]), w / 4 * (1 - x[0]) / 2)
+            for x, w in gauss(3)
+        ]
+    return gauss(2) if n == 8 else tet_rule(3)
+
+
+def with_modes(nodes: np.ndarray, C: np.ndarray) -> np.ndarray:
+    """Return K of a brick with parallel faces and the modes 1 - x², 1 - y², 1 - z², condensed (Wilson)."""
+    J = nodes.T @ gradients(linear_shapes(8), np.zeros(3))
+    K = np.zeros((33, 33))
+    for x, w in gauss(2):
+        g = np.vstack([gradients(linear_shapes(8), x), -2 * np.diag(x)]) @ np.linalg.inv(J)
+        B = np.zeros((6, 33))
+        for k, (p, q) in enumerate(((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))):
+            B[k, p::3] += g[:, q]
+            if p != q:
+                B[k, q::3] += g[:, p]
+        K += w * np.linalg.det(J) * B.T @ C @ B
+    return K[:24, :24] - K[:24, 24:] @ np.linalg.solve(K[24:, 24:], K[24:, :24])
+
+
+#: SOLID185: nodes of a cell -> the cells that a brick is cut into, by its corners
+CUTS = {8: [tuple(range(8))], 6: [(0, 1, 2, 4, 5, 6), (0, 2, 3, 4, 6, 7)], 4: TETS}
+
+
 class AnsysDeck:
     """The text of a file, and K and M over three components of each node."""
 
@@ -101,22 +142,28 @@ class AnsysDeck:
         self.counts = rng.integers(1, 3, 3)
         self.is_full = bool(self.is_brick and rng.random() < 0.4)
         self.kind = 186 if self.is_brick or rng.random() < 0.5 else 187
+        self.corners = 0
+        if rng.random() < 0.35:
+            self.kind, self.corners, self.is_full = 185, int(rng.choice([8, 6, 4])), False
         self.nodes: list[np.ndarray] = []
         self.place: dict[tuple[float, ...], int] = {}
         self.elements: list[tuple[int, list[int]]] = []  #: material, nodes
         self.Q = Rotation.random(random_state=int(rng.integers(2**31))).as_matrix()
-        self.bend = rng.uniform(-0.08, 0.08, 3)
+        self.bend = np.zeros(3) if self.corners else rng.uniform(-0.08, 0.08, 3)
+        self.Q = self.Q @ (np.eye(3) + (self.corners > 0) * rng.uniform(-0.2, 0.2, (3, 3)))
         cells = list(product(*(range(n) for n in self.counts)))
         kept = [cell for cell in cells if rng.random() < 0.8] or cells[:1]
         for cell in kept:
             corners = (CORNERS + 1) / 2 + cell
             pieces = [corners] if self.is_brick else [corners[list(tet)] for tet in TETS]
             edges = EDGES if self.is_brick else TET_EDGES
+            if self.corners:
+                pieces, edges = [corners[list(cut)] for cut in CUTS[self.corners]], []
             for piece in pieces:
                 all_points = [*piece, *((piece[a] + piece[b]) / 2 for a, b in edges)]
                 self.elements.append((int(rng.integers(1, 3)), [self.node(x) for x in all_points]))
         self.X = np.array(self.nodes)
-        for _, nodes in [] if self.is_brick else self.elements:  # straight edges, where a rule of degree four is exact
+        for _, nodes in [] if self.is_brick or self.corners else self.elements:  # straight edges, where a rule of degree four is exact
             for (a, b), middle in zip(TET_EDGES, nodes[4:], strict=True):
                 self.X[middle] = (self.X[nodes[a]] + self.X[nodes[b]]) / 2
         self.numbers = np.sort(rng.choice(np.arange(1, 5 * len(self.X)), len(self.X), replace=False))
@@ -126,9 +173,12 @@ class AnsysDeck:
         shapes = brick_shapes if self.is_brick else tet_shapes
         stiff = gauss(3 if self.is_full else 2) if self.is_brick else FOUR
         massive = irons() if self.is_brick else tet_rule(4)
+        if self.corners:
+            shapes, stiff, massive = linear_shapes(self.corners), *2 * [linear_rule(self.corners)]
         for material, nodes in self.elements:
             _, C, rho = self.materials[material]
             K, M = matrices(shapes, self.X[nodes], C, rho, stiff, massive)
+            K = with_modes(self.X[nodes], C) if self.corners == 8 else K
             at = (3 * np.array(nodes)[:, None] + np.arange(3)).ravel()
             self.K[np.ix_(at, at)] += K
             self.M[np.ix_(at, at)] += M
@@ -210,7 +260,13 @@ class AnsysDeck:
             for material, nodes in part:
                 number += 3
                 named = self.numbers[nodes].tolist()
-                if not self.is_brick and self.kind == 186:  # a brick of which nodes are equal
+                if self.corners == 6:
+                    i, j, k, m, n, o = named
+                    named = [i, j, k, k, m, n, o, o]
+                elif self.corners == 4:
+                    i, j, k, m = named
+                    named = [i, j, k, k, m, m, m, m]
+                elif not self.is_brick and self.kind == 186:  # a brick of which nodes are equal
                     i, j, k, o, *m = named
                     ij, jk, ki, io, jo, ko = m
                     named = [i, j, k, k, o, o, o, o, ij, jk, k, ki, o, o, o, o, io, jo, ko, ko]
