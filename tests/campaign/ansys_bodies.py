@@ -1,8 +1,9 @@
 """Random legal .cdb files of ANSYS beside an assembler of this file.
 
-A block of straight cells of SOLID185 (bricks with incompatible modes, wedges, tetrahedra), or of curved bricks (SOLID186, reduced or full) or of tetrahedra (SOLID187, or SOLID186 with equal nodes), some of
-them left out, of isotropic and orthotropic materials by major or minor ratios, blank constants, tables over
-temperature, element types by number or name, gaps in numbers, several widths of fields, two EBLOCKs.
+A block of straight cells of SOLID185 (bricks with incompatible modes, wedges, tetrahedra), of curved bricks (SOLID186,
+reduced or full) or of tetrahedra (SOLID187, or SOLID186 with equal nodes), some of them left out, of isotropic and
+orthotropic materials by major or minor ratios, blank constants, tables over temperature, element types by number or
+name, gaps in numbers, several widths of fields, two EBLOCKs.
 """
 
 from itertools import product
@@ -163,7 +164,8 @@ class AnsysDeck:
                 all_points = [*piece, *((piece[a] + piece[b]) / 2 for a, b in edges)]
                 self.elements.append((int(rng.integers(1, 3)), [self.node(x) for x in all_points]))
         self.X = np.array(self.nodes)
-        for _, nodes in [] if self.is_brick or self.corners else self.elements:  # straight edges, where a rule of degree four is exact
+        # straight edges, where a rule of degree four is exact
+        for _, nodes in [] if self.is_brick or self.corners else self.elements:
             for (a, b), middle in zip(TET_EDGES, nodes[4:], strict=True):
                 self.X[middle] = (self.X[nodes[a]] + self.X[nodes[b]]) / 2
         self.numbers = np.sort(rng.choice(np.arange(1, 5 * len(self.X)), len(self.X), replace=False))

@@ -67,7 +67,8 @@ def read_parameters(model: NastranModel, above: Iterable[Card]) -> None:
     Parameters
     ----------
     above
-        Those of the case control. They override those of the bulk data.
+        Those of the case control. They override those of the bulk data, as users of MSC Nastran describe it
+        (eng-tips.com, thread 484390); we know no manual that says so.
 
     Raises
     ------

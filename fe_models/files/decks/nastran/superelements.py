@@ -23,7 +23,9 @@ from fe_models.meshes.cells.raw_mesh import RawBlock, RawMesh
 
 __all__ = ["MAIN_CARDS", "Superelement", "connect_superelements", "join_superelements", "place_superelements"]
 
-TOLERANCE = 1e-4  #: distance within which points are one where TOL of SEBULK is blank (10E-5 in the guide)
+#: distance within which points are one where TOL of SEBULK is blank: our choice of MSC's default, printed as 10E-5;
+#: OptiStruct's guide has 1e-5
+TOLERANCE = 1e-4
 SAME_SHAPE = 1e-4  #: difference of distances of the points of SELOC, relative to the largest
 KINDS = ("PRIMARY", "REPEAT", "MIRROR")
 MAIN_CARDS = ("SEBULK", "SELOC", "SEMPLN", "SECONCT", "SEEXCLD")  #: cards that only the main bulk data may hold
