@@ -221,7 +221,7 @@ class GeneralizedAlpha:
         )
         after = carry_of(memory, carry.n_iterations + int(work.counted.iterations) - iterations)
         rows = Rows(*(array[: outcome.n_rows] for array in rows))
-        failure = None if outcome.status == 0 else self.explain(system, work, outcome, self.least_step(h, compiled))
+        failure = None if outcome.status == 0 else self.explain(system, work, outcome, after.state.u, h)
         return after, rows, outcome.n_steps, failure
 
     def least_step(self, h: float, compiled: CompiledSystem) -> float:
@@ -293,8 +293,8 @@ class GeneralizedAlpha:
             state = replace(state, u=state.u + closing_velocities(z, after, carry.w, t, h, rows))
         return replace(carry, state=state, u_dot=u_dot, a=a, h=h, h_next=h)
 
-    def explain(self, system: System, work: Work, outcome: tuple, least: float) -> Failure:
-        """Return the reason of a failed step."""
+    def explain(self, system: System, work: Work, outcome: tuple, u: Array, h: float) -> Failure:
+        """Return the reason of a failed step of size h that began with velocities u, (n_u,)."""
         from floatframe.engine.kernels.generalized_alpha import (
             INACCURATE,
             SINGULAR_BODY,
@@ -305,6 +305,8 @@ class GeneralizedAlpha:
         )
 
         compiled = compiled_system(system)
+        least = self.least_step(h, compiled)
+        fast_turn = words_of_fast_turn(compiled, u, least or h)
         status, _, _, index, excess = outcome
         no_number = int(work.counted.no_number)
         if no_number:
@@ -316,6 +318,8 @@ class GeneralizedAlpha:
             return Failure(words, excess)
         if status == SINGULAR_BODY:
             name = compiled.body_names[index]
+            if fast_turn:
+                return Failure(f"Newton's method diverged: {fast_turn}; choose a smaller h", excess)
             words = f"the Newton matrix of body {name!r} is singular; check its mass, inertia and stiffness"
             return Failure(words, excess)
         if status == SINGULAR_CONNECTION:
@@ -324,7 +328,7 @@ class GeneralizedAlpha:
                 f"the constraints of joint {name!r} depend on others here (a singular position); choose a smaller h, "
                 "or check for a drive out of reach or an error in the system"
             )
-            return Failure(words, excess)
+            return Failure(f"{words}; {fast_turn}" if fast_turn else words, excess)
         if status == TURNED:
             words = words_of_turn(compiled, work, index)
             words += (
@@ -349,6 +353,8 @@ class GeneralizedAlpha:
             words += f"; {gaps}"
         if least > 0:
             words += f"; this was the smallest step, h_min = {least:.3g}"
+        if fast_turn:
+            words += f"; {fast_turn}"
         words += (
             "; choose a smaller h, or check for a singular position, a drive out of reach or an error in the system"
         )
@@ -421,6 +427,18 @@ def words_of_turn(compiled: CompiledSystem, work: Work, body: int) -> str:
         f"body {compiled.body_names[body]!r} turns by {turn:.3g} rad in a step, with a joint away from its axis of "
         f"turning: expected at most {MOST_TURN:g} rad, beyond which joints can give it energy; choose a smaller h"
     )
+
+
+def words_of_fast_turn(compiled: CompiledSystem, u: Array, h: float) -> str:
+    """Name the body that turns furthest in a step of size h with velocities u, if by more than `MOST_TURN`."""
+    from floatframe.engine.kernels.generalized_alpha import MOST_TURN
+
+    first = compiled.model.bodies.u0[:-1]
+    turns = h * np.linalg.norm(u[first[:, None] + np.arange(3, 6)], axis=1)
+    k = int(np.argmax(turns)) if len(turns) > 0 else -1
+    if k < 0 or not turns[k] > MOST_TURN:
+        return ""
+    return f"body {compiled.body_names[k]!r} turns by {turns[k]:.3g} rad in a step"
 
 
 def rows_closed_by_positions(model: Model, stabilized: bool) -> NDArray[np.bool_]:

@@ -125,7 +125,7 @@ class RelativeGeneralizedAlpha:
         after = carry_of(memory, carry.n_iterations + int(work.counted.iterations) - iterations)
         kept.after = after
         rows = Rows(*(array[: outcome.n_rows] for array in rows))
-        return after, rows, outcome.n_steps, self.explain(system, work, outcome, h)
+        return after, rows, outcome.n_steps, self.explain(system, work, outcome, after.state.u, h)
 
     def prepared(self, system: System, carry: Carry, h: float, t: float) -> Carry:
         """Return the memory with algorithmic accelerations of the unknowns for steps of size h from t.
@@ -152,8 +152,8 @@ class RelativeGeneralizedAlpha:
             carry = shifted(system, carry, way, h, method.coefficients, t, rows)
         return replace(carry, u_dot=u_dot, a=a, h=h, h_next=h)
 
-    def explain(self, system: System, work: Work, outcome: tuple, h: float) -> Failure | None:
-        """Return the reason of a failed step; None if none failed."""
+    def explain(self, system: System, work: Work, outcome: tuple, u: Array, h: float) -> Failure | None:
+        """Return the reason of a failed step of size h that began with velocities u, (n_u,); None if none failed."""
         from floatframe.engine.kernels.generalized_alpha import TURNED
         from floatframe.engine.tree.kernels.steps import SINGULAR
 
@@ -162,7 +162,7 @@ class RelativeGeneralizedAlpha:
         if outcome[0] == TURNED:
             return Failure(f"{words_of_turn(compiled_system(system), work, outcome[3])}, or EnergyMomentum", outcome[4])
         if outcome[0] != SINGULAR or int(work.counted.no_number):
-            return self.absolute.explain(system, work, outcome, self.absolute.least_step(h, compiled_system(system)))
+            return self.absolute.explain(system, work, outcome, u, h)
         parts = tree_of(system)
         held = [*parts.cut, *parts.constrained]
         words = "the Newton matrix in relative coordinates is singular here: "

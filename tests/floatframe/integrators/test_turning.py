@@ -158,6 +158,11 @@ def test_a_spinning_rotor_precesses_as_its_weight_asks(system, rho_inf, turn):
     assert height < 1e-4 * L
 
 
+def test_a_step_in_which_a_rotor_spins_too_far_is_refused_by_its_turn():
+    with pytest.raises(ConvergenceError, match=r"diverged: body 'rotor' turns by 10 rad in a step"):
+        integrate(gyroscope(100.0, M * G * L / (J * 100.0)), GeneralizedAlpha(0.8), 0.5, 0.1)
+
+
 @pytest.mark.parametrize("is_reversed", [False, True], ids=["rotor second", "rotor first"])
 @pytest.mark.parametrize("turn", [0.4, 5.0])
 def test_a_top_in_joint_coordinates_precesses_as_its_weight_asks(turn, is_reversed):
