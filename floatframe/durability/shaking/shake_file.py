@@ -508,8 +508,7 @@ def notches_of(data: ShakeFile) -> tuple[NotchRequest, ...]:
                 raise ModelError(f"notch.{name}: expected either C (a force limit) or level, table, rms")
             limit: Limit = ForceLimit(each.output, each.C, each.frequency, each.exponent, each.mass, name)
         else:
-            unit = OF_OUTPUT if not each.output.partition(" acceleration")[1] else ("g" if kind == "sine" else "g2/Hz")
-            table = None if each.table is None else level_of(each.table, unit, f"notch.{name}: table")
+            table = None if each.table is None else level_of(each.table, OF_OUTPUT, f"notch.{name}: table")
             limit = ResponseLimit(each.output, each.level, table, each.rms, name, each.factor)
         together.setdefault((each.of, each.deepest), []).append(limit)
     return tuple(

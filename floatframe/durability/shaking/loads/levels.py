@@ -30,7 +30,7 @@ ACCELERATIONS = {  # unit -> m/s² or rad/s²
 }
 STROKES = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254, "rad": 1.0}  # amplitude of a displacement or rotation
 DENSITIES = {"g2/Hz": "g", "(m/s2)2/Hz": "m/s2", "(mm/s2)2/Hz": "mm/s2", "(rad/s2)2/Hz": "rad/s2"}
-OF_OUTPUT = "output"  #: the unit of the output to which a table belongs
+OF_OUTPUT = "output"  #: unit in which the output of a limit is listed: g for accelerations, else that of the model
 FEWEST = 2  #: smallest number of rows
 
 

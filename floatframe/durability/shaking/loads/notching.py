@@ -23,7 +23,7 @@ from scipy.optimize import brentq
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
-from floatframe.durability.shaking.loads.levels import Level
+from floatframe.durability.shaking.loads.levels import OF_OUTPUT, Level, in_model
 from floatframe.durability.shaking.loads.random_vibration import RandomRun
 from floatframe.durability.shaking.loads.sine import SineRun
 from floatframe.durability.shaking.structure.model import Output, ShakenModel
@@ -33,6 +33,7 @@ __all__ = ["ForceLimit", "Notch", "NotchedRun", "ResponseLimit", "notched_random
 
 LOWEST = -60.0  #: logarithm of the smallest clipped density, relative to its largest value, 260 dB
 DEEPEST = 40.0  #: largest allowed depth of a notch [dB], by default
+ACCELERATION_KINDS = ("acceleration", "angular acceleration")  #: outputs with tables in units of acceleration
 JOINED = 0.01  #: smallest reported depth of a notch [dB]
 
 
@@ -42,7 +43,7 @@ class ResponseLimit:
 
     output: str  #: name of an output: "mirror acceleration x", "base force z", "root stress von Mises"
     level: float | None = None  #: constant level over frequency, in the unit of the table
-    table: Level | None = None  #: level over frequency, for accelerations or in the unit of the output
+    table: Level | None = None  #: level over frequency; the unit "output" is that of `level`
     rms: float | None = None  #: rms over the whole band, only for random tests
     name: str = ""
     factor: float = 1.0  #: factor on the response before the comparison
@@ -185,11 +186,8 @@ def notched_random(model: ShakenModel, run: RandomRun, limits: Sequence[Limit], 
         elif limit.rms is not None:
             wanted = in_output_units(model, run.outputs[column], limit.rms) / limit.factor
             value = np.full(len(f), clipped_at(run, own * level, wanted))
-        elif limit.table is not None and limit.table.is_density:
-            value = limit.table.in_si(f) * (model.gravity / 9.80665) ** 2 / limit.factor**2
-            value[value == 0] = np.inf
         else:
-            value = limit_over(model, run.outputs[column], limit, f, squared=True) / limit.factor**2
+            value = limit_over(model, run.outputs[column], limit, f, density=True) / limit.factor**2
         of[label(limit)] = value
         allowed[k] = np.divide(value, own, out=np.full_like(value, np.inf), where=own > 0)
     notched, which = lowered(level, allowed)
@@ -210,16 +208,31 @@ def label(limit: Limit) -> str:
     return f"force limit of {limit.output}" if isinstance(limit, ForceLimit) else f"limit of {limit.output}"
 
 
-def limit_over(model: ShakenModel, output: Output, limit: ResponseLimit, f: Array, *, squared: bool = False) -> Array:
-    """Return the limit at frequencies in units of the model, infinite outside its table; densities are unchanged."""
+def limit_over(model: ShakenModel, output: Output, limit: ResponseLimit, f: Array, *, density: bool = False) -> Array:
+    """Return the limit at frequencies in units of the model, squared per Hz for a density; infinite outside its table.
+
+    Raises
+    ------
+    ModelError
+        If its table is of another quantity than the output, or of amplitudes where densities are limited.
+    """
+    scale = in_output_units(model, output, 1.0) ** (2 if density else 1)
     if limit.level is not None:
-        value = in_output_units(model, output, limit.level)
-        return np.full(len(f), value * (model.gravity if squared and output.kind == "acceleration" else 1.0))
+        return np.full(len(f), limit.level * scale)
     table = limit.table
     assert table is not None
-    at = table.at(f)
-    scale = in_output_units(model, output, 1.0) if table.unit == "g" else 1.0
-    return np.asarray(np.where(at > 0, at * scale, np.inf))
+    if table.unit == OF_OUTPUT:
+        value = table.at(f) * scale
+    else:
+        if output.kind not in ACCELERATION_KINDS or table.is_density != density:
+            wanted = "a density" if density else "an amplitude"
+            raise ModelError(
+                f"notch {label(limit)!r}: table: unit {table.unit}, expected {wanted} of {output.name!r} "
+                f"[{output.unit}]; give the rows in the unit of the output, unit = {OF_OUTPUT!r}"
+            )
+        direction = "rx" if output.kind == "angular acceleration" else "x"
+        value = table.in_si(f) * in_model(table, direction, model.units)
+    return np.asarray(np.where(value > 0, value, np.inf))
 
 
 def force_limit(model: ShakenModel, limit: ForceLimit, direction: str, f: Array, density: Array) -> Array:

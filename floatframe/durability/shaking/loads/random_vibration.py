@@ -155,8 +155,7 @@ def random_run(
     crossings = np.sqrt(
         np.divide(band.integral(f[:, None] ** 2 * density), rms2, out=np.zeros_like(rms2), where=rms2 > 0)
     )
-    spread = uncertainty_of(uncertainty, f, G, density_in, len(columns))
-    wide = density if spread is G else densities(spread, groups)
+    wide = density if uncertainty.is_none else wide_densities(uncertainty, f, H, root, groups)
     of_places = {
         model.outputs[rows.start].group: random_von_mises(
             band.integral(np.einsum("fai,fbi->fab", G[:, rows], G[:, rows].conj()).real)
@@ -245,14 +244,17 @@ def densities(G: Array, groups: Sequence[slice]) -> Array:
     return np.concatenate([(np.abs(G) ** 2).sum(axis=2), *extra], axis=1)
 
 
-def uncertainty_of(uncertainty: Uncertainty, f: Array, G: Array, density_in: Array, n_act: int) -> Array:
-    """Return G with uncertain frequencies and factors; if one input acts alone, its transfer functions are widened."""
-    if uncertainty.is_none:
-        return G
-    if n_act > 1:  # the joint spectrum is widened
-        return uncertainty.widened(f, np.abs(G))
-    root = np.sqrt(density_in[:, :, 0].real)[:, :, None]
-    return np.asarray(uncertainty.widened(f, np.abs(np.divide(G, root, out=np.zeros_like(G), where=root > 0))) * root)
+def wide_densities(uncertainty: Uncertainty, f: Array, H: Array, root: Array, groups: Sequence[slice]) -> Array:
+    """Return the densities with uncertain frequencies and factors, (n_f, n_out).
+
+    That of an output at f is the largest of those by the transfer functions between f/(1 + delta) and f/(1 - delta),
+    under the spectral matrix L L^H of the inputs at f.
+    """
+    if root.shape[1] == 1:
+        return uncertainty.widened(f, np.sqrt(densities(H, groups))) ** 2 * np.abs(root[:, 0]) ** 2
+    factor, low, high = uncertainty.windows(f)
+    largest_of = [densities(H[a:b] @ L, groups).max(axis=0) for a, b, L in zip(low, high, root, strict=True)]
+    return np.asarray(np.array(largest_of) * factor[:, None] ** 2)
 
 
 def largest(rms: Array, crossings: Array, duration: float) -> Array:

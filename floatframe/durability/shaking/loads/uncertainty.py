@@ -11,10 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, IntArray
 from floatframe.errors import ModelError
 
 __all__ = ["Uncertainty"]
+
+SAME = 1e-9  #: relative distance of frequencies that differ by rounding alone
 
 
 @dataclass(frozen=True)
@@ -62,13 +64,18 @@ class Uncertainty:
             factor[inside], share[inside] = own, off
         return factor, share
 
-    def widened(self, frequencies: Array, sizes: Array) -> Array:
-        """Return transfer functions, (n_f, ...), times their factor, with the maximum over uncertain frequencies."""
+    def windows(self, frequencies: Array) -> tuple[Array, IntArray, IntArray]:
+        """Return the factor at each frequency, and which frequencies it may be: from low to below high, (n_f,) each."""
         f = np.asarray(frequencies)
         factor, share = self.of(f)
-        low = np.searchsorted(f, f / (1 + share), side="left")
-        high = np.searchsorted(f, f / (1 - share), side="right")
-        widest = np.stack([sizes[a : max(b, a + 1)].max(axis=0) for a, b in zip(low, high, strict=True)])
+        low = np.searchsorted(f, f / (1 + share) * (1 - SAME), side="left")
+        high = np.searchsorted(f, f / (1 - share) * (1 + SAME), side="right")
+        return factor, low, np.maximum(high, low + 1)
+
+    def widened(self, frequencies: Array, sizes: Array) -> Array:
+        """Return transfer functions, (n_f, ...), times their factor, with the maximum over uncertain frequencies."""
+        factor, low, high = self.windows(frequencies)
+        widest = np.stack([sizes[a:b].max(axis=0) for a, b in zip(low, high, strict=True)])
         return np.asarray(widest * factor.reshape(-1, *([1] * (sizes.ndim - 1))))
 
     @property

@@ -117,8 +117,25 @@ class ShakenModel:
         return names.index(name)
 
     def with_frequencies(self, factor: float) -> "ShakenModel":
-        """Return the model with all frequencies times a factor and the same damping ratios."""
-        return replace(self, omega=self.omega * factor, C=self.C * factor)
+        """Return the model with all frequencies times a factor and the same damping ratios: with another stiffness.
+
+        What acts through the stiffness or the damping goes by factor² or factor: forces and stresses of displacements
+        and velocities, and the part of the base that excites modes so. How forces are written, by displacements or by
+        accelerations, then makes no difference.
+        """
+        stiffer = factor ** np.array([2.0, 1.0, 0.0])[:, None, None]
+        by_output = np.where([follows_stiffness(each) for each in self.outputs], stiffer[:, :, 0], 1.0)[:, :, None]
+        by_input = np.where(self.rates > 0, stiffer[:, :, 0], 1.0)[:, None, :]
+        D = self.D * np.where(self.rates > 0, by_output, 1.0)
+        return replace(self, omega=self.omega * factor, C=self.C * factor, B=self.B * by_input,
+                       E=self.E * by_output, D=D)  # fmt: skip
+
+
+
+
+def follows_stiffness(output: Output) -> bool:
+    """Whether displacements act on an output through a stiffness: forces, stresses, accelerations made of forces."""
+    return any(word in output.kind for word in ("force", "moment", "stress", "acceleration"))
 
 
 def gravity_in(units: Units) -> float:

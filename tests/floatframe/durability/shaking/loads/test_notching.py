@@ -82,9 +82,31 @@ def test_a_density_limit_in_g_is_one_of_the_density():
     assert_allclose(same.notched[inside], found.notched[inside], rtol=1e-9)
 
 
+@pytest.mark.parametrize("units", ["mm-t-s", "mm-kg-ms", "in-slinch-s"])
+def test_a_table_of_accelerations_is_in_its_own_unit_and_a_load_in_that_of_the_output(units):
+    model = masses([20.0, 60.0], 0.02, [1.0, 0.5], units)
+    run = sine_run(model, SineTest("s", Level.of([(5, 1.0), (100, 1.0)]), ("z",)), "z")
+    rows = [(5, 5.0), (100, 5.0)]
+    in_g = notched_sine(model, run, [ResponseLimit("mass acceleration z", table=Level.of(rows, "g"))])
+    assert_allclose(in_g.sizes[:, ACCELERATION].max(), 5 * model.gravity, rtol=1e-12)
+    for unit, one_g in (("m/s2", G), ("in/s2", G / 0.0254), ("output", 1.0)):
+        table = Level.of([(f, one_g * value) for f, value in rows], unit)
+        found = notched_sine(model, run, [ResponseLimit("mass acceleration z", table=table)])
+        assert_allclose(found.notched, in_g.notched, rtol=1e-12)
+    load = Level.of([(5, 0.4 * run.peaks[FORCE]), (100, 0.4 * run.peaks[FORCE])], "output")
+    assert_allclose(notched_sine(model, run, [ResponseLimit("base force z", table=load)]).sizes[:, FORCE].max(),
+                    0.4 * run.peaks[FORCE], rtol=1e-12)  # fmt: skip
+
+
+DENSITY, IN_SI = Level.of([(5, 1.0), (100, 1.0)], "g2/Hz"), Level.of([(5, 1.0), (100, 1.0)], "m/s2")
+
+
 @pytest.mark.parametrize(
     ("make", "words"),
     [
+        (lambda: notched_sine(MODEL, SINE, [ResponseLimit("mass acceleration z", table=DENSITY)]), "an amplitude of"),
+        (lambda: notched_random(MODEL, RANDOM, [ResponseLimit("mass acceleration z", table=IN_SI)]), "a density of"),
+        (lambda: notched_sine(MODEL, SINE, [ResponseLimit("base force z", table=IN_SI)]), "in the unit of the output"),
         (
             lambda: notched_sine(MODEL, SINE, [ResponseLimit("mass acceleration z", 1e-3)]),
             r"asks for a notch of [\d.]+ dB",
