@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 
-from cms.jobs.fleets.fleet import reduce_fleet
+from cms.fleet import reduce_fleet
 from fe_models.foundation.threads import bounded_threads
 from floatframe.design.studies.study import StudyPoint, run_study
 from floatframe.design.studies.study_file import read_study

@@ -33,7 +33,7 @@ from .fe_names import ReducedLoadCase as ReducedLoadCase
 from .fe_names import Units as Units
 from .fe_names import couple as couple
 from .fe_names import unit_system as unit_system
-from .jobs.fleets.fleet import reduce_fleet as reduce_fleet
+from .fleet import reduce_fleet as reduce_fleet
 from .linear_algebra.solvers.mode_count import ModeCount as ModeCount
 from .modes.centrifugal import centrifugal_loads as centrifugal_loads
 from .modes.families.families import Families as Families

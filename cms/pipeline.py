@@ -130,7 +130,7 @@ def reduced(
         Static states of the unit loads; None: without geometric stiffness.
     """
     from cms.jobs.tables.recovery_section import requests_of
-    from cms.modes.families.sharing import body_of
+    from cms.modes.families.families import body_of
     from cms.reduction.reduction import reduce
 
     body = body_of(source)

@@ -137,7 +137,7 @@ from .files.importers.robot_system import FlexibleLink as FlexibleLink
 from .files.importers.robot_system import RobotSystem as RobotSystem
 from .files.importers.robot_system import robot_system as robot_system
 from .files.importers.system_robot import robot_of_system as robot_of_system
-from .files.importers.write_urdf import write_urdf as write_urdf
+from .files.importers.system_robot import write_urdf as write_urdf
 from .files.system_file.read_system import read_system as read_system
 from .integrators import EnergyDecaying as EnergyDecaying
 from .integrators import EnergyMomentum as EnergyMomentum

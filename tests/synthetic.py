@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from cms.body.invariants import moments_from_gram
-from cms.body.nodal_sums import NodalSums
+from cms.body.invariants import NodalSums, moments_from_gram
 from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.body.source_columns import source_columns
 from cms.body.stress import PointStress

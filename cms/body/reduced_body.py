@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cms.body.geometric_stiffness import GeometricStiffness
-from cms.body.invariants import Moments
+from cms.body.invariants import Moments, NodalSums
 from cms.body.kept_points import KeptPoints
-from cms.body.nodal_sums import NodalSums
 from cms.body.recovery_table import RecoveryTable
 from cms.body.source_columns import SourceColumns
 from cms.body.stress import PointStress

@@ -82,7 +82,7 @@ def reduce_and_write_fleet(fleet: Fleet) -> None:
         If a job failed.
     """
     from cms.errors import JobError
-    from cms.jobs.fleets.fleet import reduce_fleet
+    from cms.fleet import reduce_fleet
 
     made = [job.with_suffix(".h5") for job in fleet.jobs]
     if fleet.output is not None and fleet.output.is_dir():
@@ -142,7 +142,7 @@ def reduce_command(
     """
     from cms.cli.ranks import on_ranks, one_job_of_ranks
     from cms.errors import JobError
-    from cms.jobs.fleets.inputs import inputs_of
+    from cms.fleet import inputs_of
     from cms.jobs.job import read_job
     from fe_models.foundation.ranks.ranks import started_ranks
 

@@ -155,7 +155,7 @@ def stiffness_damping(job: Job) -> StiffnessDamping | None:
 def mesh_of(job: Job) -> Any:
     """Read the mesh of a job that can be cut: solid cells, shells or lines."""
     from cms.jobs.attachments_of_job import frame_mesh
-    from cms.jobs.mesh_of_job import solid_mesh_of
+    from cms.jobs.body_of_job import solid_mesh_of
     from cms.jobs.shell_body import shell_mesh
     from fe_models.meshes.unused_nodes import drop_unused_nodes
 

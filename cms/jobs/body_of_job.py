@@ -9,7 +9,6 @@ import numpy as np
 from cms.errors import JobError
 from cms.jobs.attachments_of_job import attachments_of, frame_interface, frame_mesh, one_node, properties_of
 from cms.jobs.job import Job
-from cms.jobs.mesh_of_job import is_cad, solid_mesh_of
 from cms.jobs.parts_of_job import interfaces_of, load_cases_of, materials_of, part_of_mesh, selection_of
 from fe_models.body.couplings.coupling_on_ranks import spread_body
 from fe_models.body.fe_body import FEBody, Interface
@@ -28,8 +27,10 @@ __all__ = [
     "body_of_mixed",
     "checked_mesh",
     "coupled_body",
+    "is_cad",
     "is_of_mesh",
     "job_body",
+    "solid_mesh_of",
     "uncoupled_body",
 ]
 
@@ -362,3 +363,27 @@ def body_of_mesh(
     if job.ties:
         body = body_of_mixed(job, stages, body, mesh, on_report)
     return body.with_load_cases(*load_cases_of(job, body, mesh))
+
+
+# the solid mesh of a job, read from a mesh file or made of a CAD file -------------------------------------------------
+
+
+def is_cad(job: Job) -> bool:
+    """Whether the body comes from a CAD file, which is meshed here."""
+    return job.mesh_size is not None
+
+
+def solid_mesh_of(job: Job) -> "Mesh":
+    """Return the complete solid mesh; faces that interfaces and loads select are groups."""
+    from fe_models.files import read_mesh
+
+    if job.body.mesh is None:
+        raise JobError("job: expected a mesh, got none")
+    if job.mesh_size is None:
+        return read_mesh(job.body.mesh)
+    from fe_models.files.cad.cad_mesh import MeshSize, mesh_cad
+
+    size = MeshSize(**job.mesh_size.model_dump())
+    chosen = [table.faces for table in job.interfaces.values()] + [table.faces for table in job.load_cases.values()]
+    faces = [text for texts in chosen for text in texts or ()]
+    return mesh_cad(job.body.mesh, size, units=job.body.units, faces=faces)

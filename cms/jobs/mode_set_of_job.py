@@ -8,9 +8,8 @@ import numpy as np
 from cms.jobs.job import Job
 from cms.jobs.reduction_table import AUTO, LoadSection, NeighbourSection, ReductionSection, mode_set_options
 from cms.linear_algebra.solvers.mode_count import ModeCount
-from cms.modes.families.families import Families
+from cms.modes.families.families import Families, families_of
 from cms.modes.families.interface_loads import InterfaceLoad, condensed_load
-from cms.modes.families.sharing import families_of
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets import MODE_SETS
 from cms.modes.mode_sets.characteristic_modes import with_characteristic_modes

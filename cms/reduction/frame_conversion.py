@@ -15,15 +15,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cms.body.invariants import INERTIA_TERMS, Moments, moments_from_gram
-from cms.body.nodal_sums import NodalSums
+from cms.body.invariants import INERTIA_TERMS, Moments, NodalSums, moments_from_gram
 from cms.body.recovery_table import RecoveryTable
 from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.body.source_columns import SourceColumns, share_words
 from cms.body.stress import PointStress
 from cms.errors import BodyError
 from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
-from cms.linear_algebra.solvers.orientation import orientation
+from cms.linear_algebra.solvers.eigen import orientation
 from cms.reduction.basis.damping import Damping, modal_damping
 from cms.reduction.basis.frames import (
     BuckensFrame,

@@ -9,22 +9,24 @@ from typing import Any
 
 import numpy as np
 
-from cms.body.invariants import Moments, moments_from_gram
-from cms.body.nodal_sums import NodalSums
+from cms.body.invariants import Moments, NodalSums, moments_from_gram
 from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.errors import BodyError, ModeSetError
 from cms.linear_algebra.solvers.tall import inner, rows_times
-from cms.modes.families.families import Families
+from cms.modes.families.families import Families, body_of
 from cms.modes.families.rigid_modes import geometric_rigid_modes
-from cms.modes.families.sharing import body_of
 from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.damping import Damping, modal_damping
 from cms.reduction.basis.finishing import FinishedBasis, finish
 from cms.reduction.basis.frames import Frame, FrameCondition, HeldFrame, TisserandFrame, frame_condition
-from cms.reduction.basis.kept_rotations import kept_points
 from cms.reduction.basis.matrix_moments import gram_from_matrices
-from cms.reduction.basis.node_motion import reference_motion, translation_rows
-from cms.reduction.basis.node_weights import node_weights, weighted_rigid_modes
+from cms.reduction.basis.node_motion import (
+    kept_points,
+    node_weights,
+    reference_motion,
+    translation_rows,
+    weighted_rigid_modes,
+)
 from cms.reduction.basis.stress_modes import nodal_stress_modes, point_stress_modes
 from cms.reduction.geometric_stiffness.geometric_reduction import stiffness_of_states
 from cms.reduction.geometric_stiffness.quadratic_modes import quadratic_modes

@@ -14,8 +14,7 @@ import numpy as np
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import IntArray
 from fe_models.meshes.cell_shapes import CELL_SHAPES
-from fe_models.meshes.cells.node_order import mirrored_cells, mirrored_order
-from fe_models.meshes.cells.raw_mesh import RawBlock, RawMesh
+from fe_models.meshes.cells.raw_mesh import RawBlock, RawMesh, mirrored_cells, mirrored_order
 
 __all__ = ["read_med"]
 

@@ -227,8 +227,7 @@ def urdf_command(
     from fe_models.foundation.paths import replace_files
     from floatframe.errors import UrdfError
     from floatframe.files.importers.robot import JointLimits
-    from floatframe.files.importers.system_robot import robot_of_system
-    from floatframe.files.importers.write_urdf import urdf_text
+    from floatframe.files.importers.system_robot import robot_of_system, urdf_text
     from floatframe.files.system_file.read_system import read_system
 
     model, _ = read_system(system)

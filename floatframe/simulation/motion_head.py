@@ -13,7 +13,7 @@ from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.forces import BodyLoad, PointForce
 from floatframe.model.system import System
 from floatframe.results.head import BodyEntry, Head
-from floatframe.results.sensors.sensor_points import sensor_points
+from floatframe.results.sensors import sensor_points
 from floatframe.results.writer import arrays_of
 from floatframe.simulation.restart import system_digest
 

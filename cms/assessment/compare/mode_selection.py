@@ -17,8 +17,7 @@ from cms.assessment.quality.reference.free_basis import FreeBasis
 from cms.assessment.quality.reference.full_reference import FullReference
 from cms.assessment.quality.reference.port_model import PortModel, modal_response
 from cms.errors import ModeSetError
-from cms.modes.families.families import Families
-from cms.modes.families.sharing import families_of
+from cms.modes.families.families import Families, families_of
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets import MODE_SETS
 from fe_models.body.fe_body import FEBody

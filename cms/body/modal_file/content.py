@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 
 from cms.body.geometric_stiffness import UNIT_LOADS, GeometricStiffness, RotatedLoads, SpreadLoads
-from cms.body.invariants import Moments
+from cms.body.invariants import Moments, NodalSums
 from cms.body.kept_points import KeptPoints
 from cms.body.modal_file.contents import Contents
 from cms.body.modal_file.entries import ENTRIES, entry_of, unit_of
 from cms.body.modal_file.recovery import recovery_attributes, recovery_of, recovery_values
-from cms.body.nodal_sums import NodalSums
 from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.body.source_columns import SourceColumns
 from cms.body.stress import PointStress

@@ -14,7 +14,7 @@ from cms.errors import ForeignBodyError
 from cms.exchange.importers.superelement import listed
 from cms.exchange.importers.superelement_body import ImportOptions
 from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
-from cms.linear_algebra.solvers.orientation import orientation
+from cms.linear_algebra.solvers.eigen import orientation
 from cms.reduction.basis.damping import modal_damping
 from cms.reduction.basis.frames import TisserandFrame
 from cms.reduction.basis.node_motion import are_spread, mean_translation

@@ -28,10 +28,9 @@ from cms.errors import CmsError
 from cms.jobs.acceptance.acceptance import Acceptance, LeftOut, MeshError, now
 from cms.jobs.acceptance.origin import source_files
 from cms.jobs.acceptance.range_of_use import custom_band, range_of_use
-from cms.jobs.body_of_job import coupled_body, uncoupled_body
+from cms.jobs.body_of_job import coupled_body, is_cad, solid_mesh_of, uncoupled_body
 from cms.jobs.decks.job_text import JobRequest, job_text
 from cms.jobs.job import Job, read_job
-from cms.jobs.mesh_of_job import is_cad, solid_mesh_of
 from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
 from cms.jobs.parts_of_job import materials_of, part_of_mesh, reduction_options
 from cms.jobs.studies.mesh_convergence import mesh_convergence

@@ -9,10 +9,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from cms.errors import EigenError, ModeSetError
-from cms.linear_algebra.solvers.eigen import EigenResult, counting_shift, eigenmodes
+from cms.linear_algebra.solvers.eigen import EigenResult, counting_shift, eigenmodes, orientation, turn
 from cms.linear_algebra.solvers.factorization import Factorization, factorize, require_regular
 from cms.linear_algebra.solvers.mode_count import ModeCount
-from cms.linear_algebra.solvers.orientation import orientation, turn
 from cms.linear_algebra.solvers.registry import solver_of
 from cms.linear_algebra.solvers.shift_inverted import ModeRequest
 from cms.linear_algebra.substructures.dissection import Dissection, dissect, node_graph

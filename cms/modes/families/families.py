@@ -1,8 +1,8 @@
 """All mode families of one body from one factorisation of its interior stiffness (docs/theory.md §2)."""
 
 import logging
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -37,7 +37,8 @@ from fe_models.foundation.ranks.spread_matrix import largest_entry
 from fe_models.foundation.solver import Solver
 from fe_models.foundation.tall.on_disk import of_this_process, release
 
-__all__ = ["Families"]
+__all__ = ["Families", "body_of", "families_of"]
+
 
 GROUNDED = 1e-6  #: |K Psi_R| / (|K| |Psi_R|) above which a body is not free
 
@@ -332,3 +333,21 @@ def _first(modes: EigenResult, k: int) -> EigenResult:
         Phi=modes.Phi[:, :k],
         residuals=modes.residuals[:k],
     )
+
+
+# A body, or in its place its `Families`, which several mode sets share to use one factorisation -----------------------
+
+
+@contextmanager
+def families_of(body: FEBody | Families) -> Iterator[Families]:
+    """Yield the shared families, or new families of the body that are closed at the end of the block."""
+    if isinstance(body, Families):
+        yield body
+        return
+    with Families(body) as own:
+        yield own
+
+
+def body_of(body: FEBody | Families) -> FEBody:
+    """Return the body, from the body itself or from its families."""
+    return body.body if isinstance(body, Families) else body

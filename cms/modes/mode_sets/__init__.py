@@ -14,9 +14,9 @@ from cms.modes.mode_sets.classical import (
     unrestrained_attachment,
 )
 from cms.modes.mode_sets.free_interface import craig_chang, dual_craig_bampton, herting, macneal, normal_modes, rubin
+from cms.modes.mode_sets.given_columns import user_basis
 from cms.modes.mode_sets.krylov import krylov
 from cms.modes.mode_sets.multilevel import multilevel
-from cms.modes.mode_sets.user_basis import user_basis
 
 __all__ = [
     "MODE_SETS",

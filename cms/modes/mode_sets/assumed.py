@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cms.errors import ModeSetError
+from cms.modes.families.families import body_of
 from cms.modes.families.rigid_modes import geometric_rigid_modes
-from cms.modes.families.sharing import body_of
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets.axis_functions import AXIS_FUNCTIONS, AxisFunctions, axis_functions
 from cms.modes.mode_sets.mesh_field import coupled_field

@@ -12,13 +12,11 @@ from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
 from cms.linear_algebra.independent import gram, independent_columns
 from cms.linear_algebra.solvers.eigen import EigenResult
 from cms.linear_algebra.solvers.tall import combine
-from cms.modes.families.families import Families
+from cms.modes.families.families import Families, body_of, families_of
 from cms.modes.families.receptance import boundary_scale
-from cms.modes.families.sharing import body_of, families_of
 from cms.modes.families.static_modes import boundary_labels
 from cms.modes.mode_set import ModeSet
-from cms.modes.mode_sets.blocks import mode_set, rigid_block, static_block
-from cms.modes.mode_sets.selection import require_interfaces
+from cms.modes.mode_sets.blocks import mode_set, require_interfaces, rigid_block, static_block
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.words import nearest

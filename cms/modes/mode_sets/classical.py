@@ -8,23 +8,23 @@ import scipy.linalg as la
 from cms.errors import BodyError, ModeSetError
 from cms.linear_algebra.solvers.eigen import EigenResult
 from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
-from cms.modes.families.families import Families
+from cms.modes.families.families import Families, families_of
 from cms.modes.families.flexibility import BoundaryConditions
 from cms.modes.families.interface_loads import InterfaceLoad, boundary_load
-from cms.modes.families.sharing import families_of
 from cms.modes.families.static_modes import boundary_groups, boundary_labels
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets.blocks import (
     Block,
     boundary_block,
+    checked_modes,
     constraint_block,
     inertia_relief_block,
     mode_set,
+    require_interfaces,
     rigid_block,
     static_block,
     vibration_block,
 )
-from cms.modes.mode_sets.selection import checked_modes, require_interfaces
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.components import MOTION_COMPONENTS

@@ -13,12 +13,10 @@ from cms.linear_algebra.independent import Columns, gram
 from cms.linear_algebra.solvers.factorization import factorize, shifted_matrix
 from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
 from cms.modes.centrifugal import CENTRIFUGAL
-from cms.modes.families.families import Families
+from cms.modes.families.families import Families, body_of, families_of
 from cms.modes.families.receptance import boundary_scale, largest_error, receptance_of_pencil
-from cms.modes.families.sharing import body_of, families_of
 from cms.modes.mode_set import ModeSet
-from cms.modes.mode_sets.blocks import mode_set, rigid_block, static_block
-from cms.modes.mode_sets.selection import require_interfaces
+from cms.modes.mode_sets.blocks import mode_set, require_interfaces, rigid_block, static_block
 from fe_models.body.couplings.submatrix import PrincipalBlock
 from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.foundation.arrays import Array

@@ -10,13 +10,18 @@ from cms.linear_algebra.solvers.eigen import EigenResult
 from cms.linear_algebra.solvers.factorization import Factorization
 from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
 from cms.linear_algebra.substructures.modes import Interior, MultilevelResult, multilevel_modes
-from cms.modes.families.families import Families
+from cms.modes.families.families import Families, families_of
 from cms.modes.families.fixed_interface import FixedInterfaceBody
-from cms.modes.families.sharing import families_of
 from cms.modes.families.vibration_modes import no_modes
 from cms.modes.mode_set import ModeSet
-from cms.modes.mode_sets.blocks import constraint_block, inertia_relief_block, mode_set, vibration_block
-from cms.modes.mode_sets.selection import checked_modes, require_interfaces
+from cms.modes.mode_sets.blocks import (
+    checked_modes,
+    constraint_block,
+    inertia_relief_block,
+    mode_set,
+    require_interfaces,
+    vibration_block,
+)
 from fe_models.body.couplings.submatrix import principal_block
 from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.foundation.tasks.workers import Workers, tasks_of

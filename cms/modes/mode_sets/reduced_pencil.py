@@ -8,8 +8,7 @@ import scipy.linalg as la
 from cms.errors import ModeSetError
 from cms.linear_algebra.independent import gram
 from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
-from cms.modes.families.families import Families
-from cms.modes.families.sharing import families_of
+from cms.modes.families.families import Families, families_of
 from cms.modes.families.static_modes import boundary_labels
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets.free_interface import rubin

@@ -14,7 +14,7 @@ from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.body.source_columns import source_columns
 from cms.errors import BodyError, ModeSetError
 from cms.linear_algebra.independent import RANK_TOLERANCE
-from cms.linear_algebra.solvers.orientation import orientation
+from cms.linear_algebra.solvers.eigen import orientation
 from cms.modes.mode_sets.axis_functions import AXIS_FUNCTIONS, CUBIC
 from cms.reduction.assumed_mode_beams.beam_fields import (
     BeamFields,

@@ -17,18 +17,18 @@ from cms.linear_algebra.independent import (
     orthonormal_basis,
     within,
 )
-from cms.linear_algebra.solvers.orientation import orientation
+from cms.linear_algebra.solvers.eigen import orientation
 from cms.linear_algebra.solvers.tall import combine, combined, inner, squares, subtract
 from cms.modes.families.mechanism import mechanism_words, rounding_of_energy, without_energy
 from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.frames import FrameCondition
-from cms.reduction.basis.rigid_content import elastic_directions, orthonormal_motions
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.ranks.spread_columns import SpreadColumns, on_rows
 from fe_models.foundation.tall.on_disk import copied, in_memory, row_slices
 
-__all__ = ["FinishedBasis", "finish"]
+__all__ = ["IN_SPAN", "FinishedBasis", "elastic_directions", "finish", "orthonormal_motions"]
+
 
 #: energy of a shape from a Gram matrix relative to its rounding, below which the energy is computed from the shape
 SUSPECT_ENERGY = 1e3
@@ -253,3 +253,57 @@ def free_elastic(Q: Basis, elastic: Array, condition: FrameCondition, omega2_1: 
     A_K = within(Q.G_K, elastic)
     Z, is_massive = elastic_eigenvectors(A_K, within(G_M, elastic), omega2_1)
     return np.sort(diagonal_within(A_K, Z)[is_massive])
+
+
+# rigid-body motion in the span of columns, found from the rigid-body vectors themselves (docs/theory.md §3) -----------
+# No ratio of energies decides, so the slowest elastic shape may be arbitrarily slow compared to the stiffest shape.
+
+
+#: squared W-length of the remainder of a unit rigid-body motion, below which the span contains the motion
+IN_SPAN = 1e-6
+NO_INERTIA = 1e-12  #: eigenvalue of the scaled rigid mass matrix, below which a rigid-body motion has no inertia
+
+
+def orthonormal_motions(rigid_mass: Array, omega2: float) -> Array:
+    """Return S, (n_r, k), that makes rigid-body motions R S orthonormal in W = K + omega² M, where K R = 0.
+
+    Motions without inertia have zero W-length, so k is smaller than n_r by their number.
+
+    Parameters
+    ----------
+    rigid_mass
+        Rᵀ M R, (n_r, n_r).
+    omega2
+        omega_1² in W [1/s²].
+    """
+    if not rigid_mass.size:
+        return np.zeros((0, 0))
+    size = np.sqrt(np.maximum(np.diag(rigid_mass), 0.0))
+    has_size = size > 0
+    unit = np.where(has_size, 1 / np.where(has_size, size, 1.0), 0.0)
+    values, vectors = la.eigh(rigid_mass * np.outer(unit, unit))
+    kept = values > NO_INERTIA
+    return np.asarray(unit[:, None] * vectors[:, kept] / np.sqrt(values[kept] * omega2))
+
+
+def elastic_directions(C: Array, rest: Array) -> Array:
+    """Return an orthonormal basis of a span without the rigid-body motions that it contains, (k, k - n_held).
+
+    (1) a motion R v of unit length is contained if its remainder outside the span is small: |rest v|_W² < `IN_SPAN`
+    (2) the result is the orthogonal complement of the contained motions, C v
+
+    Parameters
+    ----------
+    C
+        Coefficients Qᵀ W R of W-orthonormal rigid-body motions R in a W-orthonormal basis Q of the span, (k, n_r).
+    rest
+        Gram matrix of the remainders, Eᵀ W E with E = R - Q C, computed from E itself, (n_r, n_r).
+    """
+    k = C.shape[0]
+    if not C.size:
+        return np.eye(k)
+    values, vectors = la.eigh((rest + rest.T) / 2)
+    held = C @ vectors[:, values < IN_SPAN]  # (1)
+    if not held.shape[1]:
+        return np.eye(k)
+    return np.asarray(la.qr(held)[0][:, held.shape[1] :])  # (2)

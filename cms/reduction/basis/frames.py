@@ -16,7 +16,7 @@ from cms.errors import BodyError
 from cms.linear_algebra.lu_factors import solve_factored
 from cms.linear_algebra.solvers.tall import inner, rows_times
 from cms.modes.families.rigid_modes import geometric_rigid_modes
-from cms.reduction.basis.node_weights import node_weights, weighted_rigid_modes
+from cms.reduction.basis.node_motion import node_weights, weighted_rigid_modes
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.components import MOTION_COMPONENTS

@@ -3,13 +3,25 @@
 import numpy as np
 import scipy.sparse as sp
 
+from cms.body.kept_points import KeptPoints
 from cms.errors import BodyError
 from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.tall.on_disk import in_memory
 
-__all__ = ["are_spread", "interface_node_motion", "is_mean", "node_motion", "reference_motion", "translation_rows"]
+__all__ = [
+    "are_spread",
+    "interface_node_motion",
+    "is_mean",
+    "kept_points",
+    "node_motion",
+    "node_weights",
+    "reference_motion",
+    "translation_rows",
+    "weighted_rigid_modes",
+]
 
 
 def node_motion(body: FEBody, node: int) -> sp.csr_array | None:
@@ -115,3 +127,108 @@ def mean_translation(weights: Array) -> Array:
     """Return the matrix of the weighted mean translation of points, without rotation, (6, 3 n_points), node-major."""
     translation = np.kron(weights, np.eye(3))
     return np.vstack([translation, np.zeros_like(translation)])
+
+
+# rotations of the kept nodes, over the shapes -------------------------------------------------------------------------
+
+
+def kept_points(body: FEBody, Phi: Array, axes: Array, row_of: IntArray) -> KeptPoints | None:
+    """Return the points that a body keeps with rotations; None if there are none.
+
+    (1) if all three rotations of the node are dofs (beams, shells, leaders of rigid groups): these dofs
+    (2) else, if the elements know the rotation: half the curl of the displacement
+    (`fe_models.elements.solids.body`)
+    (3) else the rotations that are dofs, and zero for the others, as in a plane model; without any, the rotation is
+        unknown
+
+    Parameters
+    ----------
+    body
+        Coupled body.
+    Phi
+        Shapes over its dofs, (n_dof, n_q).
+    axes
+        Axes of B as columns, in mesh axes, (3, 3).
+    row_of
+        Row of every node among the kept nodes, (n_nodes,).
+    """
+    nodes = body.kept
+    if not len(nodes):
+        return None
+    Phi = in_memory(Phi)
+    u = body.mesh_displacement(Phi)
+    rotation, has = rotations_of_dofs(body, Phi, u, nodes)
+    source = np.where(has.any(axis=1), "dofs", "unknown").astype(object)
+    ask = np.flatnonzero(~has.all(axis=1))
+    if len(ask) and body.element_model is not None:
+        own = body.element_model.nodal_rotation(u, nodes[ask])
+        known = np.isfinite(own).all(axis=(1, 2))
+        rotation[ask[known]], source[ask[known]] = own[known], "elements"
+    order = np.argsort(row_of[nodes])
+    in_body = np.einsum("ba,nbk->nak", axes, rotation)
+    return KeptPoints(row_of[nodes][order], in_body[order], tuple(str(word) for word in source[order]))
+
+
+def rotations_of_dofs(body: FEBody, Phi: Array, u: Array, nodes: IntArray) -> tuple[Array, np.ndarray]:
+    """Return rotations that are dofs, (n, 3, n_q), zero for others, and which are dofs, (n, 3) bool.
+
+    A recovery row without entries gives no motion: that rotation had no stiffness and was removed from the model.
+    """
+    place = np.full(len(body.nodes), -1)
+    place[nodes] = np.arange(len(nodes))
+    rotation, has = np.zeros((len(nodes), 3, Phi.shape[1])), np.zeros((len(nodes), 3), dtype=bool)
+    tables = [(body.dofs, Phi, np.ones(len(body.dofs), dtype=bool))]
+    if body.recovery is not None:
+        is_motion = np.diff(body.recovery.matrix.tocsr().indptr) > 0
+        tables.insert(0, (body.recovery.dofs, u, is_motion))
+    for dofs, values, is_motion in tables:
+        rows = np.flatnonzero((dofs[:, 1] >= 3) & (place[dofs[:, 0]] >= 0) & is_motion)
+        at, component = place[dofs[rows, 0]], dofs[rows, 1] - 3
+        rotation[at, component], has[at, component] = values[rows], True
+    return rotation, has
+
+
+# sums over the nodes of a body, weighted with nodal volume: the norm of a Buckens frame (theory.md §4) ----------------
+
+
+def node_weights(body: FEBody) -> Array:
+    """Return the weight of each node, (n_nodes,): its volume, or 1; 0 if it lacks a translation of its own.
+
+    Reference nodes of couplings have weight 0, because they represent no material.
+    """
+    dofs = mesh_dofs(body)
+    has = np.zeros((len(body.nodes), 3), dtype=bool)
+    translation = dofs[(dofs[:, 1] >= 0) & (dofs[:, 1] < 3)]
+    has[translation[:, 0], translation[:, 1]] = True
+    weights = np.ones(len(body.nodes)) if body.node_volumes is None else np.asarray(body.node_volumes)
+    return np.where(has.all(axis=1), weights, 0.0)
+
+
+def mesh_dofs(body: FEBody) -> IntArray:
+    """Return (node, component) of the mesh dofs, (n_mesh_dof, 2)."""
+    return body.dofs if body.recovery is None else body.recovery.dofs
+
+
+def weighted_rigid_modes(body: FEBody, origin: Array) -> Array:
+    """Return W Psi_R over the dofs of the body, (n_dof, 6); its product with columns gives their weighted sums.
+
+    Raises
+    ------
+    BodyError
+        If no node has three translations, or all such nodes are collinear.
+    """
+    weights, dofs = node_weights(body), mesh_dofs(body)
+    used = weights > 0
+    points = body.nodes[used]
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False) if used.sum() > 2 else np.zeros(3)
+    if spread[1] <= 1e-8 * spread[0]:
+        raise BodyError(
+            f"body {body.name!r}: a Buckens frame needs at least three nodes with translations that are not on one "
+            "line; take a Tisserand or a nodal frame"
+        )
+    motion = rigid_motion_of_points(body.nodes, origin)
+    node, component = dofs.T
+    rows = np.flatnonzero((component >= 0) & (component < 3))
+    on_mesh = np.zeros((len(dofs), 6))
+    on_mesh[rows] = weights[node[rows], None] * motion[node[rows], component[rows]]
+    return on_mesh if body.recovery is None else np.asarray(body.recovery.matrix.T @ on_mesh)

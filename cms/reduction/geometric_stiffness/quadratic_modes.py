@@ -11,12 +11,10 @@ twice.
 import numpy as np
 
 from cms.errors import BodyError
-from cms.modes.families.families import Families
-from cms.modes.families.sharing import body_of, families_of
+from cms.modes.families.families import Families, body_of, families_of
 from cms.reduction.basis.frames import FrameCondition
 from cms.reduction.basis.node_motion import translation_rows
-from cms.reduction.geometric_stiffness.geometric_reduction import distributing_part, elastic_part
-from cms.reduction.geometric_stiffness.link_work import link_work
+from cms.reduction.geometric_stiffness.geometric_reduction import distributing_part, elastic_part, link_work
 from cms.reduction.geometric_stiffness.unit_loads import balanced, together
 from cms.reduction.geometric_stiffness.unit_states import require_geometric_stiffness
 from fe_models.body.fe_body import FEBody

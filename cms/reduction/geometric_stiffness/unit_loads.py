@@ -3,7 +3,7 @@
 Loads per unit mass, about the origin and along the axes of the frame B: -e_a for the acceleration of the origin, -e_a ×
 c for the angular acceleration, -½ [e_a × (e_b × c) + e_b × (e_a × c)] for products of angular velocities. Then a unit
 force and a unit moment at every interface, or at chosen interfaces. Optionally, six loads distributed over the nodes
-(`cms.reduction.geometric_stiffness.spread_loads`). All are balanced by the same support, W Psi_R of the frame
+(`cms.reduction.geometric_stiffness.unit_loads`). All are balanced by the same support, W Psi_R of the frame
 condition.
 """
 
@@ -13,13 +13,16 @@ import numpy as np
 
 from cms.body.geometric_stiffness import SPIN_PAIRS
 from cms.body.reduced_body import BodyFrame
+from cms.errors import BodyError
+from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.frames import FrameCondition
-from cms.reduction.basis.node_motion import reference_motion
+from cms.reduction.basis.node_motion import node_weights, reference_motion, weighted_rigid_modes
 from fe_models.body.fe_body import FEBody
 from fe_models.body.mass_loads import MassLoads
 from fe_models.foundation.arrays import Array
 
-__all__ = ["UnitLoads", "balanced", "unit_loads", "unit_mass_loads"]
+__all__ = ["UnitLoads", "balanced", "spread_forces", "turned_rigid_work", "unit_loads", "unit_mass_loads"]
+
 
 #: remainder of a load, relative to the load, that counts as zero, because the support carries all of it
 BALANCED = 1e-10
@@ -96,3 +99,44 @@ def together(body: FEBody, mass: MassLoads, on_dofs: Array) -> UnitLoads:
     on_mesh = body.element_model.mass_forces(mass)
     F = on_dofs + (on_mesh if body.recovery is None else body.recovery.matrix.T @ on_mesh)
     return UnitLoads(mass, on_dofs, F, np.asarray(~F.any(axis=0)))
+
+
+# six loads distributed over the nodes of a body by weight, and their work when they are rotated (theory.md §7) --------
+
+
+def spread_forces(body: FEBody, frame: BodyFrame) -> Array | None:
+    """Return the loads (w_i/w) e_a and (w_i/w) e_a × c_i, axes and origin of B, over the dofs, (n_dof, 6).
+
+    None if there is no Buckens frame, because nodes are collinear or have no translations.
+    """
+    weights = node_weights(body)
+    if not weights.any():
+        return None
+    try:
+        W_Psi_R = weighted_rigid_modes(body, frame.origin)
+    except BodyError:
+        return None
+    return np.asarray(W_Psi_R @ np.kron(np.eye(2), frame.axes) / weights.sum())
+
+
+def turned_rigid_work(body: FEBody, forces: Array, frame: BodyFrame) -> Array:
+    """Return the work of loads, rotated about the axes of B, on the rotations about its axes and origin, (k, 3, 3).
+
+    At a node, e_x × f does work on the translation, and ½ e_x × m on the rotation.
+
+    Parameters
+    ----------
+    forces
+        Loads over the dofs of the body, (n_dof, k) [N, N m].
+    """
+    node, component = body.dofs.T
+    own = np.flatnonzero(component >= 0)
+    by_node = np.zeros((len(body.nodes), 2, 3, forces.shape[1]))
+    by_node[node[own], component[own] // 3, component[own] % 3] = forces[own]
+    by_node[:, 1] /= 2
+    rotations = geometric_rigid_modes(body, origin=frame.origin)[own, 3:] @ frame.axes
+    work = np.empty((forces.shape[1], 3, 3))
+    for x, axis in enumerate(frame.axes.T):
+        turned = np.cross(axis[:, None], by_node, axisa=0, axisb=2, axisc=2)
+        work[:, x] = turned[node[own], component[own] // 3, component[own] % 3].T @ rotations
+    return work

@@ -8,12 +8,10 @@ import scipy.linalg as la
 
 from cms.errors import BodyError
 from cms.linear_algebra.solvers.tall import combine
-from cms.modes.families.families import Families
+from cms.modes.families.families import Families, body_of, families_of
 from cms.modes.families.flexibility import held_factor
-from cms.modes.families.sharing import body_of, families_of
 from cms.reduction.basis.frames import Frame, FrameCondition, TisserandFrame, frame_condition
-from cms.reduction.geometric_stiffness.spread_loads import spread_forces
-from cms.reduction.geometric_stiffness.unit_loads import balanced, unit_loads
+from cms.reduction.geometric_stiffness.unit_loads import balanced, spread_forces, unit_loads
 from fe_models.body.fe_body import FEBody
 from fe_models.body.mass_loads import MassLoads
 from fe_models.foundation.arrays import Array, IntArray

@@ -17,9 +17,8 @@ import numpy as np
 from cms.body.recovery_table import N_RIGID, RecoveryTable, spin_accelerations
 from cms.body.reduced_body import ReducedBody
 from cms.errors import RecoveryError
-from cms.modes.families.families import Families
+from cms.modes.families.families import Families, body_of, families_of
 from cms.modes.families.rigid_modes import geometric_rigid_modes
-from cms.modes.families.sharing import body_of, families_of
 from cms.reduction.basis.frames import FrameCondition
 from cms.reduction.recovery.blocks import Block, RowName
 from cms.reduction.recovery.interface_rows import PartOfTable, interface_part

@@ -5,8 +5,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.meshes.cells.node_order import mirrored_cells, mirrored_order
-from fe_models.meshes.cells.raw_mesh import RawBlock, RawMesh
+from fe_models.meshes.cells.raw_mesh import RawBlock, RawMesh, mirrored_cells, mirrored_order
 
 __all__ = ["CELL_NUMBERS", "NODE_NUMBERS", "groups_of_values", "numbers_among", "raw_from_meshio", "upright_wedges"]
 

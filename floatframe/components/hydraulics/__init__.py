@@ -5,7 +5,7 @@ validates them, `circuit_data` writes their data, and `circuit_law` is the compi
 absorber.
 """
 
-from floatframe.components.hydraulics.circuit import Circuit
+from floatframe.components.hydraulics.circuit_data import Circuit
 from floatframe.components.hydraulics.components import (
     Accumulator,
     CheckValve,
@@ -25,7 +25,7 @@ from floatframe.components.hydraulics.fluid import Fluid
 from floatframe.components.hydraulics.oleo_strut import OleoStrut
 
 ELEMENTS = {
-    "circuit": "floatframe.components.hydraulics.circuit:Circuit",
+    "circuit": "floatframe.components.hydraulics.circuit_data:Circuit",
     "oleo-strut": "floatframe.components.hydraulics.oleo_strut:OleoStrut",
 }
 

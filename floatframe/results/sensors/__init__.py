@@ -1,18 +1,35 @@
 """Named sensors, which measure a motion, in Python and in the tables [sensors.NAME] of a system file."""
 
 from collections.abc import Sequence
+from dataclasses import fields
 from typing import cast
 
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
+from floatframe.model.bodies.markers import Marker
 from floatframe.model.system import System
 from floatframe.results.sensors.body_loads import InterfaceForceSensor, RecoverySensor, SpringSensor
 from floatframe.results.sensors.channels import Channel, CoordinateChannel, StressChannel
 from floatframe.results.sensors.elements import BushingSensor, ControlSensor, CouplerSensor, ElementSensor
 from floatframe.results.sensors.loads import CoordinateSensor, EnergySensor, ModeSensor, MomentumSensor, ReactionSensor
 from floatframe.results.sensors.measurement import Measurement, Sensor
-from floatframe.results.sensors.places import PLACE_QUANTITIES, AngleSensor, DisplacementSensor, PlaceSensor
-from floatframe.results.sensors.stresses import ElongationSensor, StrainGauge, StressSensor, VonMisesSensor
+from floatframe.results.sensors.places import (
+    PLACE_QUANTITIES,
+    AngleSensor,
+    DisplacementSensor,
+    PlaceSensor,
+    found_at,
+    found_nodes,
+    is_at_node,
+)
+from floatframe.results.sensors.stresses import (
+    ElongationSensor,
+    StrainGauge,
+    StressSensor,
+    VonMisesSensor,
+    address_of,
+    flexible_body,
+)
 from floatframe.results.trajectory import Trajectory
 
 __all__ = [
@@ -44,8 +61,10 @@ __all__ = [
     "measured",
     "measurement_of",
     "sensor_of",
+    "sensor_points",
     "sensors_of",
 ]
+
 
 #: sensor classes by the `type` of a table [sensors.NAME]; a new sensor is added here alone. The fields of a class are
 #: the keys of its table, unless `channel_section.KEYS_OF_PLACES` puts its places together from several keys
@@ -138,3 +157,36 @@ def measurement_of(system: System, trajectory: Trajectory, name: str) -> Measure
     if column not in whole.columns:
         raise ModelError(f"sensor {owner!r}: no column {quoted(column)}{nearest(column, list(whole.columns))}")
     return Measurement(name, whole.t, {column: whole.columns[column]}, {column: whole.units[column]})
+
+
+# descriptions of the points that sensors use: the requested place, the node used for it, and their distance -----------
+
+
+def sensor_points(system: System) -> dict[str, tuple[str, ...]]:
+    """Return, by sensor, the points on flexible bodies that are not interfaces; sensors without any are omitted.
+
+    Raises
+    ------
+    ModelError
+        If a sensor refers to a node, element or set that is not kept, or no kept node is at its position.
+    """
+    found = {sensor.name: places_of(system, sensor) for sensor in sensors_of(system)}
+    return {name: words for name, words in found.items() if words}
+
+
+def places_of(system: System, sensor: Sensor) -> tuple[str, ...]:
+    """Return descriptions of the points of a sensor."""
+    where = f"sensor {sensor.name!r}"
+    if isinstance(sensor, StressSensor | StrainGauge | VonMisesSensor):
+        body, address = flexible_body(system, sensor.name, sensor.body), address_of(sensor)
+        return () if address is None else (found_at(body, where, address, of_stress=True).description(),)
+    if isinstance(sensor, ElongationSensor):
+        return tuple(each.description() for each in sensor.ends(flexible_body(system, sensor.name, sensor.body)))
+    at_nodes = [marker for marker in markers_of(sensor) if is_at_node(system, marker)]
+    return tuple(found_nodes(system, where, marker)[1].description() for marker in at_nodes)
+
+
+def markers_of(sensor: Sensor) -> tuple[Marker, ...]:
+    """Return the markers among the fields of a sensor."""
+    values = [getattr(sensor, field.name) for field in fields(sensor)]
+    return tuple(value for value in values if isinstance(value, Marker))

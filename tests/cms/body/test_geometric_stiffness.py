@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from cms.body.geometric_stiffness import GeometricStiffness, RotatedLoads, SpreadLoads
+from cms.body.invariants import NodalSums
 from cms.body.modal_file.file import convert_units
-from cms.body.nodal_sums import NodalSums
 from cms.errors import BodyError
 from floatframe.model.bodies.mode_choice import with_modes
 from tests.synthetic import synthetic_reduced_body

@@ -10,7 +10,7 @@ import cms
 from cms import Address, BuckensFrame, NodalFrame, craig_bampton, reduce
 from cms.errors import BodyError
 from cms.modes.families.rigid_modes import geometric_rigid_modes
-from cms.reduction.basis.kept_rotations import kept_points
+from cms.reduction.basis.node_motion import kept_points
 from cms.reduction.frame_conversion import convert_frame, six_motions
 from fe_models.body.couplings.couplings import couple
 from fe_models.body.fe_body import Interface

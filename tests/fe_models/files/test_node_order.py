@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fe_models.errors import MeshError
-from fe_models.meshes.cells.node_order import require_node_order
+from fe_models.meshes.cells.raw_mesh import require_node_order
 from tests.bodies import box_mesh
 
 

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from cms.body.modal_file.file import write
 from floatframe.cli.app import app
-from floatframe.cli.record import run_record
+from floatframe.cli.view import run_record
 from floatframe.pictures.animation import bodies_of
 from floatframe.results.energy_balance import balance_defect, energy_scale
 from floatframe.results.trajectory import read_results

@@ -45,8 +45,8 @@ from floatframe.results.sensors import (
     StressSensor,
     VonMisesSensor,
     measured,
+    sensor_points,
 )
-from floatframe.results.sensors.sensor_points import sensor_points
 from tests.bodies import STEEL, box_mesh
 
 UNITS = unit_system("m-kg-s")

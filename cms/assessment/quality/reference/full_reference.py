@@ -11,8 +11,7 @@ from cms.assessment.quality.reference.reference_response import ReferenceRespons
 from cms.body.reduced_body import ReducedBody
 from cms.linear_algebra.solvers.eigen import EigenResult
 from cms.linear_algebra.solvers.mode_count import ModeCount
-from cms.modes.families.families import Families
-from cms.modes.families.sharing import body_of, families_of
+from cms.modes.families.families import Families, body_of, families_of
 from cms.modes.mode_set import ModeSet
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array

@@ -2,7 +2,7 @@ import numpy as np
 from numpy.testing import assert_allclose
 from scipy.stats import ortho_group
 
-from cms.linear_algebra.solvers.orientation import orientation, turn
+from cms.linear_algebra.solvers.eigen import orientation, turn
 
 
 def test_any_rotation_of_a_multiple_mode_gives_the_same_basis():

@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from cms.errors import ModeSetError
 from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.modes.mode_sets.classical import craig_bampton
+from cms.modes.mode_sets.given_columns import user_basis
 from cms.modes.mode_sets.mesh_field import coupled_field
-from cms.modes.mode_sets.user_basis import user_basis
 from cms.reduction.reduction import reduce
 from fe_models.body.couplings.couplings import couple
 from fe_models.body.fe_body import Interface

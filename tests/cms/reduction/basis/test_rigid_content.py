@@ -17,8 +17,8 @@ from cms.modes.families.families import Families
 from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets import craig_bampton_ir
+from cms.reduction.basis.finishing import elastic_directions, orthonormal_motions
 from cms.reduction.basis.frames import NodalFrame, TisserandFrame
-from cms.reduction.basis.rigid_content import elastic_directions, orthonormal_motions
 from cms.reduction.reduction import reduce
 from fe_models.body.couplings.couplings import couple
 from tests.bodies import beam, chain

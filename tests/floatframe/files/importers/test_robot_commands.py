@@ -51,7 +51,7 @@ def test_a_system_file_becomes_a_description_with_the_same_dynamics(gripper, tmp
     run("import", gripper, "-o", tmp_path / "out", "--keep-fixed")
     result = run("urdf", tmp_path / "out" / "gripper.toml", "-o", tmp_path / "back" / "g.urdf")
     assert result.exit_code == 2
-    assert "URDF asks for limits of a prismatic joint; effort, velocity not given" in result.stderr
+    assert "URDF requires limits of a prismatic joint; effort, velocity not given" in result.stderr
     assert not (tmp_path / "back").exists()
     result = run("urdf", tmp_path / "out" / "gripper.toml", "-o", tmp_path / "back" / "g.urdf", "--effort", 9,
                  "--velocity", 2)  # fmt: skip

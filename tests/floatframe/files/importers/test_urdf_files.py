@@ -10,8 +10,7 @@ from floatframe.files.importers.mesh_files import mesh_path
 from floatframe.files.importers.read_urdf import read_urdf
 from floatframe.files.importers.robot import MeshFile, Pose
 from floatframe.files.importers.robot_system import range_of, robot_system
-from floatframe.files.importers.system_robot import robot_of_system
-from floatframe.files.importers.write_urdf import urdf_text, write_urdf
+from floatframe.files.importers.system_robot import robot_of_system, urdf_text, write_urdf
 from floatframe.model.rotations import rotation_exp, rotation_matrix
 from floatframe.model.shapes import Box, Cylinder, Mesh, Sphere
 from tests.floatframe.files.importers.examples import GRIPPER
@@ -335,7 +334,7 @@ def test_what_urdf_does_not_have_is_refused_or_listed(gripper):
     with pytest.raises(UrdfError, match=r"there is no joint 'x'; choices"):
         robot_of_system(found, values={"x": 1.0})
     made = robot_of_system(replace(found, couplers=[]))
-    with pytest.raises(UrdfError, match=r"URDF asks for limits of a prismatic joint; lower, upper, effort, velocity"):
+    with pytest.raises(UrdfError, match=r"URDF requires limits of a prismatic joint; lower, upper, effort, velocity"):
         urdf_text(made.robot)
     pair = CoordinateCoupler("pair", [(found.couplers[0].terms[0][0], 1.0)], 0.0)
     assert "coupler 'pair'" in robot_of_system(replace(found, couplers=[pair])).notes

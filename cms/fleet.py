@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cms.errors import JobError
-from cms.jobs.fleets.inputs import inputs_of
-from cms.jobs.job import read_job
+from cms.jobs.job import Job, read_job
 from cms.linear_algebra.solvers.registry import solver_of
 from fe_models.foundation.digest import file_digest
 from fe_models.foundation.errors import ReportedError
@@ -21,8 +20,9 @@ from fe_models.foundation.tasks.installation import source_mark
 from fe_models.foundation.tasks.journal import TaskJournal, open_task_journal
 from fe_models.foundation.tasks.task_map import ProcessError
 from fe_models.foundation.tasks.workers import Workers, tasks_of
+from fe_models.foundation.toml_file import files_named
 
-__all__ = ["FleetJob", "FleetRow", "failed_row", "reduce_and_write_one", "reduce_fleet"]
+__all__ = ["FleetJob", "FleetRow", "failed_row", "inputs_of", "reduce_and_write_one", "reduce_fleet"]
 
 
 # one job of a fleet: the request to a worker, its work, and its answer ------------------------------------------------
@@ -209,3 +209,11 @@ def record_of(row: FleetRow) -> dict[str, object]:
         "made": file_digest(row.job.output), "name": row.name, "n_modes": row.n_modes, "seconds": row.seconds,
         "notes": row.notes,
     }  # fmt: skip
+
+
+def inputs_of(path: Path, job: Job) -> list[Path]:
+    """Return the job file and all files that it names: meshes, tables, matrices, columns, and neighbours' files."""
+    found = [path]
+    for each in files_named(job):
+        found += inputs_of(each, read_job(each)) if each.suffix == ".toml" and each not in found else [each]
+    return found

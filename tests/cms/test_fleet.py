@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 import cms
 from cms.cli.app import app
 from cms.errors import JobError
-from cms.jobs.fleets.fleet import reduce_and_write_one, reduce_fleet
+from cms.fleet import reduce_and_write_one, reduce_fleet
 from fe_models.foundation.tasks.workers import ThisProcess
 
 ROD = """
@@ -161,7 +161,7 @@ def interrupted(job):
 
 
 def test_a_worker_killed_at_its_writing_loses_no_job(jobs, monkeypatch):
-    monkeypatch.setattr("cms.jobs.fleets.fleet.reduce_and_write_one", killed_once)
+    monkeypatch.setattr("cms.fleet.reduce_and_write_one", killed_once)
     rows = reduce_fleet(jobs, workers=2)
     assert (jobs[0].parent / "killed").is_file()
     assert not any(row.error for row in rows)
@@ -172,7 +172,7 @@ def test_a_worker_killed_at_its_writing_loses_no_job(jobs, monkeypatch):
 def test_an_interrupt_leaves_nothing_half_written_and_a_second_call_goes_on(jobs, monkeypatch):
     journal = jobs[0].with_name("reduce.journal")
     with monkeypatch.context() as patch:
-        patch.setattr("cms.jobs.fleets.fleet.reduce_and_write_one", interrupted)
+        patch.setattr("cms.fleet.reduce_and_write_one", interrupted)
         with pytest.raises(KeyboardInterrupt):
             reduce_fleet(jobs, workers=1, journal=journal)
     assert not list(jobs[0].parent.glob(".*.part"))

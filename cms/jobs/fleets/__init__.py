@@ -1,1 +1,0 @@
-"""Fleets: many jobs reduced by parallel workers, with a journal of finished jobs."""
