@@ -195,7 +195,7 @@ def eliminated(
             node, component = (int(i[0]) for i in np.nonzero(dof_of == slave))
             raise BodyError(
                 f"constraints: component {component + 1} of node {node} is defined by two of them, {by[slave]} "
-                "and {name}; remove it from one"
+                f"and {name}; remove it from one"
             )
         by[slave] = name
     for _ in range(len(rows) + 1):  # (2)

@@ -133,7 +133,7 @@ def test_equations_are_resolved_along_their_chain_and_rings_are_refused():
     ring = NodeEquation("ring", ((2, 1, 1.0), (0, 0, 1.0)))
     with pytest.raises(BodyError, match="form a loop"):
         join("j", part, mesh.nodes, [first, second, ring])
-    with pytest.raises(BodyError, match="component 1 of node 0 follows two of them, first and again"):
+    with pytest.raises(BodyError, match="component 1 of node 0 is defined by two of them, first and again"):
         join("j", part, mesh.nodes, [first, NodeEquation("again", ((0, 0, 1.0), (2, 0, 1.0)))])
     with pytest.raises(BodyError, match="node 1 has no dof for component 4; nodes of solids have no rotations"):
         join("j", part, mesh.nodes, [NodeEquation("turn", ((0, 0, 1.0), (1, 3, 1.0)))])
