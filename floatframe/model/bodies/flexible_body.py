@@ -89,7 +89,7 @@ class FlexibleBody:
                 f"{where}: a motion needs the inertia terms {', '.join(missing)}, which the reduced body "
                 f"{self.reduced.name!r} does not hold: the program that reduced it did not write them. "
                 "Import it again with its full mass matrix, its nodal masses, or its mesh and density (cms import); or "
-                "give leave_out_missing = true: {self.reduced.moments.trust}"
+                f"give leave_out_missing = true: {self.reduced.moments.trust}"
             )
         if self.reduced.moments.m <= 0:
             raise ModelError(f"{where}: expected a mass above zero, got {self.reduced.moments.m:g}")
