@@ -56,7 +56,6 @@ def test_every_error_has_the_one_root(module):
 
 #: caught where they are raised for, never seen outside
 INNER = (
-    "floatframe/engine/structure_preserving/newton.py: StepError",
     "floatframe/engine/compiling/callbacks/law_source.py: NoKeyError",
 )
 

@@ -15,7 +15,7 @@ from tests.root import ROOT
 SHARED = set(
     """
     Balance Block BodySection Box BoxSection Bracket Branch Builder Carrier Case Column Columns Connections
-    Coordinates Counted Coupling Cut Cylinder DampingSection Drawing Element Elements End Ends Entry
+    Coordinates Counted Coupling Cut Cylinder DampingSection Drawing Element Elements End Entry
     Equations Evaluated Evaluation Family Frame FrequencyResponse FullModel Functions Graph Held Kept Kind
     Layout Limits Line Lines Link Load Loads MassSection MaterialSection Mesh MeshError Modes Motion Named
     Observed Output OutputSection Parameter ParameterSection Part Picture Place Placed Places Plane Point
@@ -87,7 +87,6 @@ floatframe/engine/kernels/compiler/choice.py words
 floatframe/engine/kernels/model.py bend
 floatframe/engine/kernels/model.py soft
 floatframe/engine/kernels/vector.py turned
-floatframe/engine/structure_preserving/forces.py taken
 floatframe/engine/structure_preserving/kernels/records.py kept
 floatframe/engine/structure_preserving/kernels/records.py taken
 floatframe/engine/tree/kernels/kinematics.py nearest

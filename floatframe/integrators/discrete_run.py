@@ -1,10 +1,9 @@
 """Common parts of the conserving and variational schemes: start, continuation and observation of a run."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.initial_conditions.initial import (
     consistent_motion,
@@ -14,10 +13,8 @@ from floatframe.engine.initial_conditions.initial import (
 from floatframe.engine.kernels.entry import Outcome
 from floatframe.engine.kernels.memory import Rows, new_rows
 from floatframe.engine.kernels.work import Work
-from floatframe.engine.structure_preserving.bodies import Placed
 from floatframe.engine.structure_preserving.compiled import kept_of
-from floatframe.engine.structure_preserving.constraints import Span
-from floatframe.engine.structure_preserving.system import DiscreteSystem, discrete_system
+from floatframe.engine.structure_preserving.system import discrete_system
 from floatframe.errors import ModelError
 from floatframe.integrators.carry import (
     LEAST_STEP,
@@ -35,22 +32,11 @@ from floatframe.integrators.carry import (
 from floatframe.model.state import State
 from floatframe.model.system import System
 
-__all__ = ["DiscreteScheme", "StepResult", "check_options"]
-
-
-@dataclass(frozen=True, eq=False)
-class StepResult:
-    """The bodies after a step, and the work over it."""
-
-    placed: list[Placed]
-    f: Array  #: multipliers of the joints, (n_held,)
-    work: tuple[float, float]  #: work supplied; work dissipated by dampers and friction
-    n_iterations: int
-    w: Array  #: memory of connections, (n_w,), see `discrete.constraints.Span`
+__all__ = ["DiscreteScheme", "check_options"]
 
 
 class DiscreteScheme:
-    """A scheme that steps from bodies to bodies; all its parts except `one_step`."""
+    """A scheme that steps from bodies to bodies."""
 
     tolerance: float
     max_iterations: int
@@ -64,10 +50,6 @@ class DiscreteScheme:
     def damping(self) -> float:
         """Spectral radius of modes far above 1/h; 1 without dissipation."""
         return 1.0
-
-    def one_step(self, ds: DiscreteSystem, placed: list[Placed], span: Span, f: Array) -> StepResult:
-        """Return the bodies, multipliers and work after a step; `StepError` if it fails."""
-        raise NotImplementedError
 
     def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
         """Return the memory at the beginning, from a consistent state.

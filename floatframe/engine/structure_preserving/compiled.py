@@ -11,11 +11,11 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.engine.initial_conditions.initial import has_normal_friction
 from floatframe.engine.initial_conditions.newton_equations import modal_matrix, modal_weight
+from floatframe.engine.kernels.connections.contact import V_0
 from floatframe.engine.kernels.model import CONTACT, STIFFNESS, Model
 from floatframe.engine.kernels.records import filled, measured, zeros
 from floatframe.engine.kernels.work import Work, sizes_of
 from floatframe.engine.structure_preserving.bodies import CentralBody
-from floatframe.engine.structure_preserving.contacts import V_0
 from floatframe.engine.structure_preserving.kernels.records import N_BLOCKS, SMALL, Discrete, Pattern, StepWork
 from floatframe.engine.structure_preserving.system import DiscreteSystem
 from floatframe.model.joints.rows import is_held_length, is_held_velocity
@@ -34,7 +34,7 @@ class Filter:
 
 def filter_of(body: CentralBody, h: float, rho_inf: float) -> Filter:
     """Return the dissipation of the modes of a body for steps of size h."""
-    M = body.mass_matrix(np.zeros(body.n))
+    M = body.mass_matrix
     E = np.linalg.solve(M[:3, :3], M[:3, 3:])
     effective = M[3:, 3:] - M[3:, :3] @ E
     squares, Phi = la.eigh(body.K, 0.5 * (effective + effective.T))
@@ -147,14 +147,14 @@ def discrete_of(ds: DiscreteSystem, scheme: int, h: float, rho_inf: float) -> tu
     of_multipliers[equation], of_held_rows[equation] = 0.5 * h**2 * model.laws.equation_size, 1.0
     of_states = np.maximum(model.states.size, np.abs(model.states.start))
     slides = model.markers.line >= 0
-    markers = [(end.body, end.turns or slides[m]) for m, end in enumerate(ds.markers)]
-    sizes_of_markers = [ds.bodies[body].n if body >= 0 else 0 for body, _ in markers]
+    turns = [ds.turns(m) or bool(slides[m]) for m in range(len(slides))]
+    sizes_of_markers = [ds.bodies[int(i)].n if i >= 0 else 0 for i in model.markers.body]
     weighted = [modal_weight(model, i) * modal_matrix(model, i, STIFFNESS) for i in range(len(ds.bodies))]
     row_scale = np.concatenate([scale / (mass * ds.length**2), of_held_rows])
     scale = np.concatenate([scale, of_multipliers, of_states])
     made = filled(
         Discrete(), scheme=scheme, center=center, is_bent=is_bent, is_filtered=int(rho_inf < 1.0),
-        is_loaded=int(does_work(model)), blocks=blocks, block0=block0, turns=[turns for _, turns in markers],
+        is_loaded=int(does_work(model)), blocks=blocks, block0=block0, turns=turns,
         psi0=np.cumsum([0, *sizes_of_markers])[:-1], first=[*(c.first for c in ds.connections), ds.n_held], row=held,
         is_driven=[ds.is_driven(c, k) for c in ds.connections for k in c.held], weight=weight, scale=scale,
         row_scale=np.concatenate([row_scale, 1.0 / of_states]),

@@ -1,106 +1,31 @@
-"""A compiled system for the discrete schemes, and the loads of its joints and forces over a step."""
+"""A compiled system as the structure-preserving schemes see it: its bodies, and what each connection holds."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.arrays import IntArray
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
-from floatframe.engine.kernels.model import BUSHING, CONTACT, COUPLER, ELEMENT, JOINT, USER_FORCE, Model
-from floatframe.engine.kernels.model import SPRING as SPRING_LAW
-from floatframe.engine.structure_preserving.bodies import BodyStep, CentralBody, central_bodies
-from floatframe.engine.structure_preserving.constraints import (
-    Loads,
-    Pair,
-    Span,
-    add_reaction,
-    constraint_value,
-    rate_in_time,
-    reaction_direction,
-)
-from floatframe.engine.structure_preserving.contacts import V_0, contact_load, speed_of_approach
-from floatframe.engine.structure_preserving.coordinates import coordinate_ends, counted
-from floatframe.engine.structure_preserving.couplers import add_coupler_reaction, coordinates_of, coupler_value
-from floatframe.engine.structure_preserving.deformed_lines import (
-    DeformedLine,
-    Slide,
-    add_line_reaction,
-    deformed_line,
-    line_rate_in_time,
-    line_value,
-)
-from floatframe.engine.structure_preserving.forces import (
-    Given,
-    body_load,
-    bushing_load,
-    coordinate_load,
-    element_of,
-    point_load,
-    spring_load,
-    state_rows,
-    user_force_load,
-    user_state_rates,
-)
-from floatframe.engine.structure_preserving.functions import value_of
-from floatframe.engine.structure_preserving.markers import BodyMarker, Load, MarkerStep, body_marker, marker_step
-from floatframe.engine.structure_preserving.public_elements import (
-    add_height_reaction,
-    add_roll_reaction,
-    element_load,
-    element_rates,
-    element_states,
-    element_values,
-    height_value,
-    multiplier_rows,
-    roll_value,
-)
+from floatframe.engine.kernels.model import COUPLER, ELEMENT, JOINT, USER_FORCE, Model
+from floatframe.engine.structure_preserving.bodies import CentralBody, central_bodies
 from floatframe.errors import ModelError
-from floatframe.model.joints.rows import COUPLE, PUSH, RIM_HEIGHT, ROLL, is_held_length, is_held_velocity, kind_of
-from floatframe.model.rotations import dot
+from floatframe.model.joints.rows import is_held_velocity, kind_of
 from floatframe.model.system import System
 
-__all__ = ["Connection", "DiscreteSystem", "Ends", "discrete_system"]
+__all__ = ["Connection", "DiscreteSystem", "discrete_system", "element_states", "multiplier_rows"]
 
 
 @dataclass(frozen=True, eq=False)
 class Connection:
-    """A joint, force or coupler between markers A and B.
-
-    For couplers and user forces the markers of each coordinate.
-    """
+    """A joint, force or coupler between markers A and B; a coupler or user force has a pair for each coordinate."""
 
     number: int
-    ends: tuple[BodyMarker, ...]
-    held: tuple[int, ...]  #: constraint rows
-    loaded: tuple[int, ...]  #: rows with forces along their coordinate
+    markers: tuple[int, ...]
+    bodies: tuple[int, ...]  #: numbers of its bodies, each once
+    held: tuple[int, ...]  #: rows that hold something
     first: int  #: first multiplier
     states: tuple[int, ...]  #: rows of its states
-    first_state: int  #: number of the first constraint row among all
-    line: DeformedLine | None = None  #: line along which marker A slides
-
-    @property
-    def bodies(self) -> tuple[int, ...]:
-        """Numbers of its bodies, without duplicates."""
-        return tuple(sorted({end.body for end in self.ends} - {-1}))
-
-
-@dataclass(frozen=True, eq=False)
-class Ends:
-    """The markers of a connection over a step, and the loads on their bodies."""
-
-    markers: list[MarkerStep]
-    loads: list[Load | None]
-    slide: Slide | None = None  #: for a marker A that slides along a line
-
-    @property
-    def pairs(self) -> list[Pair]:
-        """The markers A and B of each coordinate."""
-        return list(zip(self.markers[::2], self.markers[1::2], strict=True))
-
-    @property
-    def of_loads(self) -> list[Loads]:
-        """The loads of these."""
-        return list(zip(self.loads[::2], self.loads[1::2], strict=True))
+    first_state: int  #: number of the first of them among all
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,150 +35,28 @@ class DiscreteSystem:
     model: Model
     bodies: tuple[CentralBody, ...]
     connections: tuple[Connection, ...]
-    loads: tuple[tuple[tuple[int, BodyMarker], ...], ...]  #: point forces on each body: number, marker
-    cases: tuple[tuple[int, ...], ...]  #: load cases on each body
     n_held: int
     n_states: int
     length: float
-    markers: tuple[BodyMarker, ...]  #: all
 
     @property
     def held(self) -> IntArray:
         """The constraint rows, one for each multiplier."""
         return np.array([k for c in self.connections for k in c.held], dtype=np.int64)
 
-    def own_loads(self, i: int, step: BodyStep, load: Load, span: Span) -> Given:
-        """Add gravity, point forces and load cases on body i; gravity has a potential and supplies no work."""
-        body = self.bodies[i]
-        load.force += body.m * self.model.gravity
-        given: Array | float = 0.0
-        for k, marker in self.loads[i]:
-            given = given + point_load(self.model, k, marker_step(marker, step), load, span).given
-        for k in self.cases[i]:
-            given = given + body_load(self.model, k, body, step, load, span).given
-        return Given(given)
-
-    def connection_loads(
-        self, connection: Connection, ends: Ends, span: Span, f: Array, dz: Array, *, is_middle: bool
-    ) -> Given:
-        """Add reactions with multipliers f, (..., n_held of it), and the forces of a connection.
-
-        dz, (..., n_states of it): changes of its states; is_middle: whether forces act in the middle of the step.
-        """
-        model, c = self.model, connection.number
-        law = int(model.connections.law[c])
-        if law == ELEMENT:
-            return Given(*element_load(model, c, ends.markers, ends.loads, span, dz, f, is_middle=is_middle))
-        pair, loads = ends.pairs[0], ends.of_loads[0]
-        if law == SPRING_LAW:
-            return spring_load(model, c, pair, loads, span)
-        if law == BUSHING:
-            return Given(*bushing_load(model, c, pair, loads, span))
-        if law == CONTACT:
-            return Given(0.0, contact_load(model, c, pair, loads, span))
-        if law == USER_FORCE:
-            return Given(user_force_load(model, c, ends.pairs, ends.of_loads, span, dz, is_middle=is_middle))
-        for j, k in enumerate(connection.held):
-            self.add_row(connection, k, ends, span, f[..., j])
-        given: Array | float = 0.0
-        taken: Array | float = 0.0
-        for k in connection.loaded:
-            normal = normal_force(model, k, connection, pair, f, span)
-            part = coordinate_load(model, k, pair, loads, span, normal)
-            given, taken = given + part.given, taken + part.taken
-        return Given(given, taken)
-
-    def add_row(self, connection: Connection, k: int, ends: Ends, span: Span, f: Array) -> None:
-        """Add the loads of constraint row k with multiplier f, (...,); the loads of elements are among their forces."""
-        kind, pair, loads = int(self.model.rows.kind[k]), ends.pairs[0], ends.of_loads[0]
-        if ends.slide is not None:
-            add_line_reaction(self.model, k, pair, loads, ends.slide, f)
-        elif kind == COUPLE:
-            add_coupler_reaction(self.model, connection.number, ends.pairs, ends.of_loads, f)
-        elif kind == RIM_HEIGHT:
-            add_height_reaction(self.model, k, pair, loads, f)
-        elif kind == ROLL:
-            add_roll_reaction(self.model, k, pair, loads, f)
-        else:
-            add_reaction(self.model, k, pair, loads, span, f)
-
-    def values(self, connection: Connection, ends: Ends, span: Span, dz: Array, f: Array) -> list[Array]:
-        """Return the held rows of a connection at the end of a step."""
-        if self.model.connections.law[connection.number] == ELEMENT:
-            return element_values(self.model, connection.number, ends.markers, span, dz, f)
-        return [self.value(connection, k, ends, span) for k in connection.held]
-
-    def value(self, connection: Connection, k: int, ends: Ends, span: Span) -> Array:
-        """Return held row k of a joint or coupler at the end of a step."""
-        kind, pair = int(self.model.rows.kind[k]), ends.pairs[0]
-        if ends.slide is not None:
-            return line_value(self.model, k, pair, ends.slide)
-        if kind == COUPLE:
-            return coupler_value(self.model, connection.number, ends.pairs, span)
-        if kind == RIM_HEIGHT:
-            return height_value(self.model, k, pair)
-        if kind == ROLL:
-            return roll_value(self.model, k, pair)
-        return constraint_value(self.model, k, pair, span)
-
-    def rate_in_time(self, k: int, ends: Ends, t: float) -> float:
-        """Return the rate of constraint row k at one configuration without motion."""
-        if ends.slide is not None:
-            return line_rate_in_time(self.model, k, ends.pairs[0], ends.slide, t)
-        if int(self.model.rows.kind[k]) != COUPLE:
-            return rate_in_time(self.model, k, ends.pairs[0], t)
-        motion = int(self.model.rows.motion[k])
-        return 0.0 if motion < 0 else -float(self.model.rows.x[k, 0]) * value_of(self.model, motion, t)[1]
-
     def is_driven(self, connection: Connection, k: int) -> bool:
-        """Whether constraint row k of a connection does the work of a prescribed motion."""
-        driven = connection.line is not None and connection.line.row >= 0
-        return driven or bool(self.model.rows.motion[k] >= 0)
+        """Whether held row k of a connection does the work of a prescribed motion."""
+        line = line_of(self.model, connection.number)
+        is_driven_line = line >= 0 and self.model.lines.row[line] >= 0
+        return bool(is_driven_line or self.model.rows.motion[k] >= 0)
 
-    def state_residual(
-        self, connection: Connection, ends: Ends, span: Span, dz: Array, f: Array, *, is_along: bool
-    ) -> Array:
-        """Return the equations of the states of a connection for their changes, (..., n_states of it).
-
-        is_along: whether forces act along the step, with the mean angular velocities.
-        """
-        if self.model.connections.law[connection.number] == ELEMENT:
-            rates = element_rates(self.model, connection.number, ends.markers, span, dz, f)
-        else:
-            rates = user_state_rates(self.model, connection.number, ends.pairs, span, dz, is_along=is_along)
-        return dz - span.h * rates
-
-    def remembered(self, ends: list[Ends], span: Span, dz: Array) -> Array:
-        """Return the memory of connections at the end of a step, (n_w,), from their ends over it."""
-        model, w = self.model, span.w.copy()
-        for connection, own in zip(self.connections, ends, strict=True):
-            c = connection.number
-            law = int(model.connections.law[c])
-            if law == CONTACT:
-                w[int(model.connections.w0[c]) + V_0] = speed_of_approach(model, c, own.pairs[0], span)
-            if law in (COUPLER, USER_FORCE):
-                element = int(model.connections.item[c]) if law == COUPLER else element_of(model, c)
-                for p, pair in zip(coordinates_of(model, c, element), own.pairs, strict=True):
-                    k = int(model.coordinates.row[p])
-                    w[k] = float(counted(model, k, coordinate_ends(model, k, pair)[1], span.w[k]))
-            for s, k in enumerate(connection.states, start=connection.first_state):
-                w[k] += dz[s]
-        return w
-
-
-def normal_force(model: Model, k: int, connection: Connection, pair: Pair, f: Array, span: Span) -> Array:
-    """Return the size of the force in a joint normal to the axis of its row k."""
-    a, _ = pair
-    F = np.zeros((*f.shape[:-1], 3), f.dtype)
-    for j, row in enumerate(connection.held):
-        if is_held_length(model.rows.kind[row]):
-            F = F + f[..., j, None] * reaction_direction(model, row, pair, span)
-    axis = model.rows.x[k] if int(model.rows.kind[k]) == PUSH else np.cross(model.rows.x[k], model.rows.z[k])
-    E_0, E_1 = a.ends(axis)
-    E = 0.5 * (E_0 + E_1)
-    square = dot(F, F) - dot(F, E) ** 2
-    is_zero = np.real(square) <= 0
-    return np.where(is_zero, 0.0, np.sqrt(np.where(is_zero, 1.0, square)))
+    def turns(self, m: int) -> bool:
+        """Whether marker m turns in its body."""
+        markers, i = self.model.markers, int(self.model.markers.body[m])
+        if i < 0:
+            return False
+        n, first = self.bodies[i].n, int(markers.psi0[m])
+        return bool(markers.bend0[m] >= 0 or (first >= 0 and markers.psi[first + 3 * n : first + 6 * n].any()))
 
 
 def discrete_system(system: System, scheme: str) -> DiscreteSystem:
@@ -268,36 +71,28 @@ def discrete_system(system: System, scheme: str) -> DiscreteSystem:
     model = compiled.model
     require_known(compiled, scheme)
     bodies = central_bodies(model, compiled.body_names, scheme)
-    markers = tuple(body_marker(model, bodies, m) for m in range(len(model.markers.body)))
     connections, n_held, n_states = [], 0, 0
     for c in range(len(model.connections.size)):
-        rows = range(int(model.connections.w0[c]), int(model.connections.w0[c + 1]))
         law = int(model.connections.law[c])
+        rows = range(int(model.connections.w0[c]), int(model.connections.w0[c + 1]))
         held = tuple(k for k in rows if kind_of(model.rows.kind[k]).holds)
         if law == ELEMENT:
             held = multiplier_rows(model, c)
-        loaded = tuple(k for k in rows if kind_of(model.rows.kind[k]).is_loaded and law == JOINT)
-        ends = tuple(markers[m] for m in ends_of(model, c))
         states = state_rows(model, c) if law == USER_FORCE else element_states(model, c) if law == ELEMENT else ()
-        number = int(model.markers.line[model.connections.a[c]]) if law == JOINT else -1
-        line = deformed_line(model, markers, number) if number >= 0 else None
-        connections.append(Connection(c, ends, held, loaded, n_held, states, n_states, line))
+        markers = tuple(markers_of(model, c))
+        joined = tuple(sorted({int(model.markers.body[m]) for m in markers} - {-1}))
+        connections.append(Connection(c, markers, joined, held, n_held, states, n_states))
         n_held, n_states = n_held + len(held), n_states + len(states)
-    point_forces: list[list[tuple[int, BodyMarker]]] = [[] for _ in bodies]
-    cases: list[list[int]] = [[] for _ in bodies]
-    for k, m in enumerate(model.loads.marker):
-        marker = markers[int(m)]
-        if marker.body >= 0:
-            point_forces[marker.body].append((k, marker))
-    for k, i in enumerate(model.body_loads.body):
-        cases[int(i)].append(k)
-    return DiscreteSystem(
-        model, bodies, tuple(connections), tuple(map(tuple, point_forces)), tuple(map(tuple, cases)), n_held,
-        n_states, compiled.length, markers,
-    )  # fmt: skip
+    return DiscreteSystem(model, bodies, tuple(connections), n_held, n_states, compiled.length)
 
 
-def ends_of(model: Model, c: int) -> list[int]:
+def line_of(model: Model, c: int) -> int:
+    """Return the number of the deformed line along which marker A of connection c slides, -1 for none."""
+    is_joint = int(model.connections.law[c]) == JOINT
+    return int(model.markers.line[model.connections.a[c]]) if is_joint else -1
+
+
+def markers_of(model: Model, c: int) -> list[int]:
     """Return the markers of connection c."""
     law, item = int(model.connections.law[c]), int(model.connections.item[c])
     if law == ELEMENT:
@@ -305,9 +100,36 @@ def ends_of(model: Model, c: int) -> list[int]:
         return list(range(first, first + int(model.laws.head[item, 0])))
     if law not in (COUPLER, USER_FORCE):
         return [int(model.connections.a[c]), int(model.connections.b[c])]
-    element = item if law == COUPLER else element_of(model, c)
-    own = coordinates_of(model, c, element)
+    own = coordinates_of(model, item if law == COUPLER else element_of(model, c))
     return [int(m) for p in own for m in (model.coordinates.a[p], model.coordinates.b[p])]
+
+
+def coordinates_of(model: Model, element: int) -> range:
+    """Return the numbers of the coordinates of an element."""
+    return range(int(model.elements.coordinate0[element]), int(model.elements.coordinate0[element + 1]))
+
+
+def element_of(model: Model, c: int) -> int:
+    """Return the number of user force c among all elements (couplers come first)."""
+    return int(model.connections.item[c]) + len(model.elements.core) - len(model.users.n_states)
+
+
+def state_rows(model: Model, c: int) -> tuple[int, ...]:
+    """Return the rows of the states of user force c."""
+    u = int(model.connections.item[c])
+    return tuple(int(k) for k in model.states.row[model.users.state0[u] : model.users.state0[u + 1]])
+
+
+def element_states(model: Model, c: int) -> tuple[int, ...]:
+    """Return the rows of the states of element c."""
+    i = int(model.connections.item[c])
+    return tuple(int(k) for k in model.states.row[model.laws.state0[i] : model.laws.state0[i + 1]])
+
+
+def multiplier_rows(model: Model, c: int) -> tuple[int, ...]:
+    """Return the rows of the multipliers of element c, the last of its rows."""
+    n_multipliers, last = int(model.laws.head[int(model.connections.item[c]), 3]), int(model.connections.w0[c + 1])
+    return tuple(range(last - n_multipliers, last))
 
 
 def require_known(compiled: CompiledSystem, scheme: str) -> None:

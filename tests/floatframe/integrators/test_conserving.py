@@ -34,8 +34,6 @@ from floatframe import (
     resume,
 )
 from floatframe.components.mechanisms import four_bar
-from floatframe.engine.structure_preserving.markers import mean_jacobian
-from floatframe.engine.structure_preserving.rotation import cayley, cayley_parameters, relative_cayley
 from floatframe.model.functions.time_functions import cycloidal_spin_up
 from floatframe.model.functions.time_functions import table as table_function
 from floatframe.model.rotations import (
@@ -45,6 +43,8 @@ from floatframe.model.rotations import (
     rotation_matrix,
     tilde,
 )
+from tests.floatframe.engine.structure_preserving.in_python.markers import mean_jacobian
+from tests.floatframe.engine.structure_preserving.in_python.rotation import cayley, cayley_parameters, relative_cayley
 from tests.floatframe.integrators.examples import (  # noqa: F401
     KNOWN,
     SCHEMES,

@@ -1,1 +1,1 @@
-"""Compiled steps of the conserving, decaying and variational schemes; formulas as in the parent package."""
+"""Compiled steps of the conserving, decaying and variational schemes: a module for each part, with its formulas."""

@@ -1,4 +1,14 @@
-"""Bodies over a step, see `floatframe.engine.structure_preserving.bodies` for the formulas."""
+"""Bodies about their centre of mass, and one step of a body.
+
+With v the velocity of the centre of mass and a = omega × s + 1C q_dot, s = s(q)/m, 1C = ds/dq (over the mass here, and
+with K_t of a stiffened body, docs/theory.md §7), the kinetic energy separates:
+
+    T = m |v|²/2 + T_r,   T_r = 1/2 omega·J omega + omega·B q_dot + 1/2 q_dot·M q_dot - m |a|²/2 = 1/2 wᵀ M_c(q) w
+    Pi = J omega + B q_dot - m s × a,   Y = Bᵀ omega + M q_dot - m 1Cᵀ a,   w = (omega, q_dot)
+
+with J, B, M of theory.md §6 about the frame origin, of degree two in q. Between q_0 and q_1 products change by the
+product rule with means, so that w_0ᵀ (M_c(q_1) - M_c(q_0)) w_1 = 2 Σ (q_1 - q_0)_k N_k exactly, N from `inertia_force`.
+"""
 
 from floatframe.engine.kernels.body import block, column, column_sum
 from floatframe.engine.kernels.compiler.compilation import inner, loops

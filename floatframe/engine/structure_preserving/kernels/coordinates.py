@@ -1,4 +1,14 @@
-"""Coordinates over a step, see `floatframe.engine.structure_preserving.coordinates` for the formulas."""
+"""Coordinates over a step: their values at its ends, how they change, and forces along them whose work is exact.
+
+A distance along an axis of A is a sum of products of a direction and a position, a distance of points the root of one,
+an angle that of kernels/rows.py: each has a discrete derivative, so that a force Q along a coordinate does the
+work Q times its change. TWIST_B is an angle about an axis of B: that of A seen from B, the other way.
+
+In a step a body turns by 2 atan(|theta|/2) with the mean angular velocity theta/h. A torque by the discrete derivative
+of the angle is so much weaker, which keeps the energy of springs and reactions. Motors, dampers, friction and user
+forces act by the whole torque about the mean axis, with the rate of the mean angular velocities: their impulse is h Q,
+their work h Q times the rate, exactly.
+"""
 
 import math
 

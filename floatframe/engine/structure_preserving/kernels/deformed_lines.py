@@ -1,4 +1,28 @@
-"""A point that slides along the deformed line of a body; formulas as in the module of the same name above."""
+"""A point that slides along the deformed line of a body over a step, see engine/kernels/joints/deformed_line.py.
+
+With d_j(q), th_j(q) of the stations and Hermite functions a_j, b_j of the place s, in the axes of the body from its
+centre of mass,
+
+    sigma(s, q) = c + s e + Σ a_j(s) d_j + b_j(s) th_j × e - s_c(q)
+    th(s, q) = e × D' + e (e · Σ l_j(s) th_j),   D' = Σ a_j' d_j + b_j' th_j × e
+
+From (s_0, q_0) to (s_1, q_1) both change by the product rule with means: by q with the shapes of the stations at the
+mean q and the mean of the functions at both places, Psi_sigma dq and Psi_r dq; and by s, with the means of d_j and th_j
+and the quotients (a_j(s_1) - a_j(s_0))/ds, which are the means of a_j' over the way and so have no small divisor,
+
+    sigma_1 - sigma_0 = Psi_sigma dq + T ds,    th_1 - th_0 = Psi_r dq + T_r ds
+
+exactly. So the point of the line goes by d + theta_G × l + R_m Psi_sigma dq at its place, and by t ds along the line,
+t = R_m T; its axes turn by the Cayley vector Gamma Psi_r dq in the body, and by kappa ds, kappa = Gamma T_r. The joint
+is closed at both ends of the step, where the point of B is: x_B1 - x_B0 - (its change at the place) = t ds. Then
+
+    LINE i       f N_i on the point of B and back on the line, N_1 and N_2 normal to t: no work as s changes
+                 if the place is prescribed N_0 = t/|t| too, whose work f |t| ds is that of the drive
+    LINE_TURN    f along the change of E · D, which as s changes is m ds, m = D · R_m (kappa × eps): where the place is
+                 not prescribed a force f m t/|t|² on the point of B and back on the line does its part of the work
+
+do no work, or that of the drive, and balance about any point. At one configuration t and kappa are those there.
+"""
 
 import math
 

@@ -1,4 +1,9 @@
-"""Forces over a step, formulas as in `structure_preserving.forces`; each returns its work: supplied, dissipated."""
+"""Forces over a step: loads whose work is the change of their potential, and what they give and take.
+
+Springs act by the discrete derivative of their potential (Gonzalez 1996), here in closed form: with the lengths l_0,
+l_1 at both ends, |d_1|² - |d_0|² = 2 d_mean·(d_1 - d_0), so that the tension k ((l_0 + l_1)/2 - l_free) along
+2 d_mean/(l_0 + l_1) does the work of the change of k (l - l_free)²/2 exactly. Rates are changes over the step.
+"""
 
 import math
 

@@ -1,4 +1,24 @@
-"""Markers over a step, and loads on them, see `floatframe.engine.structure_preserving.markers` for the formulas."""
+"""Markers over a step: where they are, how they turn, and how loads on them act on their bodies, exactly in work.
+
+cay(theta) = (1 - tilde/2)⁻¹ (1 + tilde/2), the rotation by 2 atan(|theta|/2) about theta. With R_1 = R_0 cay(theta) and
+theta_G = R_0 theta
+
+    R_1 a_1 - R_0 a_0 = theta_G × (R_0 a_0 + R_1 a_1)/2 + R_m (a_1 - a_0),    R_m = R_0 (1 + tilde(theta)/2):
+
+the change of a vector that turns with a body and changes in it, exact for a step of any size.
+
+So over a step, with the lever l = (R_0 sigma_0 + R_1 sigma_1)/2 from the centre of mass, and for a
+direction E = R exp(Psi_r q) e = R eps of a marker,
+
+    dx = d + theta_G × l + R_m Psi_sigma dq,        dE = theta_G × (E_0 + E_1)/2 + R_m (psi × (eps_0 + eps_1)/2)
+
+where sigma(q) and th(q) are of degree two in q at most (a stiffened body bends its interfaces, theory.md §7), so that
+their changes are Psi_sigma dq and Psi_r dq with the derivatives at the mean of q, and psi = Gamma Psi_r dq is the
+Cayley vector of the elastic rotation. A force F with work F·dx acts by F, l × F and Psi_sigmaᵀ R_mᵀ F; a load G with
+work G·dE by the torque E_mean × G and (Gamma Psi_r)ᵀ (eps_mean × R_mᵀ G).
+Gamma = T + (psi - T dth) dthᵀ/|dth|², T the left Jacobian at the mean of th = Psi_r q: the discrete derivative of
+Gonzalez (1996), Journal of Nonlinear Science 6, 449-467, of the map th -> exp(th).
+"""
 
 import math
 

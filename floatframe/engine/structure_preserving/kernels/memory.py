@@ -1,6 +1,6 @@
 """Memory of connections between steps: angles beyond full turns, states, approach speeds of contacts.
 
-In the rows of the memory that are theirs, see `discrete.constraints.Span`; other rows hold wrenches of the results.
+They stand in the rows of the memory that are theirs; the other rows hold wrenches of the results.
 """
 
 from floatframe.engine.kernels.compiler.compilation import inner

@@ -1,6 +1,8 @@
-"""Newton's method for one step, see `structure_preserving.newton`, with factors that are reused in many steps.
+"""Newton's method for one step, with factors that serve for many steps.
 
-Unknowns and residuals of a body are in its axes at the beginning of the step, so that the matrix does not turn with it.
+Unknowns are the increments x = (d, theta, dq) of the bodies and mu = h²/2 f, with f the multipliers of the joints; the
+equations of motion are multiplied by h/2, so that the matrix stays well-conditioned as h falls. Unknowns and residuals
+of a body are in its axes at the beginning of the step, so that the matrix does not turn with it.
 Derivatives are differences of residuals, those of unknowns far from each other by one evaluation.
 """
 

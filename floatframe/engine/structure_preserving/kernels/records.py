@@ -18,7 +18,7 @@ __all__ = [
 ]  # fmt: skip
 
 CONSERVING, VARIATIONAL = range(2)
-#: columns of `Discrete.block0`: those of `discrete.bodies.CentralBody` by name, and the filters of dissipation
+#: columns of `Discrete.block0`: those of `bodies.CentralBody` by name, and the filters of dissipation
 (
     C1, BENT, C2, INERTIA, PRODUCTS, TURNED_PRODUCTS, MASS, STIFFNESS, DAMPING, FILTER, STIFFNESS_FILTER, FREE_TURNING,
 ) = range(12)  # fmt: skip

@@ -1,4 +1,10 @@
-"""Constraints of joints over a step, see `floatframe.engine.structure_preserving.constraints` for the formulas."""
+"""Constraints of joints over a step: their values at its end, and loads that do no work while joints stay closed.
+
+A constraint is a sum of products of marker positions and directions; by the product rule with means,
+a_1·b_1 - a_0·b_0 = (a_1 - a_0)·b_mean + a_mean·(b_1 - b_0), each has discrete derivatives whose sum with the changes of
+its parts is its own change, and which turn with the ground axes. So its reaction does no work between two
+configurations that fulfil it, and adds no linear or angular momentum.
+"""
 
 import math
 

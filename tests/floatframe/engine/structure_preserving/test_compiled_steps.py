@@ -27,15 +27,17 @@ from floatframe import (
     integrate,
 )
 from floatframe.engine.compiling.system import compile_system, compiled_system
+from floatframe.engine.kernels.connections.contact import V_0
 from floatframe.engine.kernels.model import CONTACT
 from floatframe.engine.kernels.work import new_work
-from floatframe.engine.structure_preserving.bodies import placed_bodies, state_of
-from floatframe.engine.structure_preserving.constraints import Span
-from floatframe.engine.structure_preserving.contacts import V_0
 from floatframe.engine.structure_preserving.system import discrete_system
 from floatframe.model.functions.time_functions import cycloidal_spin_up, harmonic
 from floatframe.model.functions.time_functions import table as table_function
 from floatframe.model.joints.rows import POINT
+from tests.floatframe.engine.structure_preserving.in_python.bodies import placed_bodies, state_of
+from tests.floatframe.engine.structure_preserving.in_python.constraints import Span
+from tests.floatframe.engine.structure_preserving.in_python.schemes import one_step
+from tests.floatframe.engine.structure_preserving.in_python.system import step_system
 from tests.floatframe.engine.structure_preserving.systems import CONNECTED, CONTACTS, HELD_BY_ELEMENTS, ROLLING
 from tests.floatframe.integrators.examples import floating_pair
 from tests.floatframe.point_masses import random_point_masses, stiffened_body, stiffness
@@ -152,13 +154,13 @@ def assert_steps_are_those_of_python(system, method, name, n_steps=8, h=0.04):
 
     The multipliers of a point are forces in ground axes there, in axes of a body here: their sizes are the same.
     """
-    ds = discrete_system(system, name)
+    ds = step_system(discrete_system(system, name))
     model = compiled_system(system).model
     contacts = model.connections.w0[:-1][model.connections.law == CONTACT] + V_0
     carry, work, f = method.start(system, 0.0), new_work(model), np.zeros(ds.n_held)
     for k in range(n_steps):
         placed = placed_bodies(ds.bodies, ds.model, carry.state)
-        expected = method.one_step(ds, placed, Span(k * h, (k + 1) * h, (k + 0.5) * h, carry.w), f)
+        expected = one_step(method, ds, placed, Span(k * h, (k + 1) * h, (k + 0.5) * h, carry.w), f)
         before = carry.work
         carry, _, _, failure = method.advance(system, carry, work, t0=0.0, h=h, first=k, n_steps=1, every=100)
         assert failure is None

@@ -18,9 +18,9 @@ from floatframe import (
     UserForce,
 )
 from floatframe.engine.compiling.system import compiled_system
-from floatframe.engine.structure_preserving.forces import user_values
-from floatframe.engine.structure_preserving.public_elements import Motion
 from floatframe.model.elements import Element, ElementLaw
+from tests.floatframe.engine.structure_preserving.in_python.forces import user_values
+from tests.floatframe.engine.structure_preserving.in_python.public_elements import Motion
 
 MASS, OMEGA = 1e-3, 20.0
 AXIS = np.array([1.0, 2.0, -2.0]) / 3

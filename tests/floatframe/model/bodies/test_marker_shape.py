@@ -10,7 +10,6 @@ from floatframe.engine.initial_conditions.newton_equations import set_iterate
 from floatframe.engine.kernels.entry import evaluate_and_linearize, rates_of_constraints
 from floatframe.engine.kernels.work import new_work
 from floatframe.engine.structure_preserving.bodies import central_bodies
-from floatframe.engine.structure_preserving.markers import body_marker
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.bodies.ground import GROUND
 from floatframe.model.bodies.marker_shape import BodyFrameMotion, interface_shape, marker_motion, motion_in_body
@@ -20,6 +19,8 @@ from floatframe.model.rotations import euler_parameters_of_rotation_vector, rota
 from floatframe.model.state import State
 from floatframe.model.system import System
 from floatframe.results.small_motions.marker_jacobian import marker_jacobian
+from tests.floatframe.engine.structure_preserving.in_python.bodies import step_bodies
+from tests.floatframe.engine.structure_preserving.in_python.markers import body_marker
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffened_body, stiffness
 
 N_Q = 3
@@ -76,7 +77,7 @@ def test_place_at_the_start_and_in_discrete_steps_is_that_of_the_results(kind):
     R = rotation_matrix(state.p[0])
     assert_allclose(r_P, state.r[0] + R @ rho, rtol=0, atol=ROUNDOFF)
     assert_allclose(A_P, R @ axes, rtol=0, atol=ROUNDOFF)
-    bodies = central_bodies(compiled.model, ("body",), "test")
+    bodies = step_bodies(central_bodies(compiled.model, ("body",), "test"))
     own = body_marker(compiled.model, bodies, int(compiled.model.connections.a[0]))
     sigma, theta = own.deformation(state.q)
     assert_allclose(sigma + bodies[0].center(state.q), rho, rtol=0, atol=ROUNDOFF)

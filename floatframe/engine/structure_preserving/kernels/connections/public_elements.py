@@ -1,4 +1,29 @@
-"""Public elements over a step, see `floatframe.engine.structure_preserving.public_elements` for the formulas."""
+"""Public elements over a step: their law in the middle of it, and what their potential lacks there.
+
+Marker m goes from r_0, A_0 to r_1, A_1 = cay(c) A_0. The law is asked once, at the middle of both places and both
+rotations with the rates of the step, and its wrench acts over the step,
+
+    r = (r_0 + r_1)/2,   A = cay(c') A_0,  c' = c/(1 + sqrt(1 + |c|²/4)),   v = dr/h,   omega = c/h
+    work = Σ F·dr + M·c
+
+A moment M enters by its directions: G_j = M' × E_j/2 at the mean axes E_j, (tr S - S) M'/2 = M with S = Σ E_j E_jᵀ,
+so that the torque on the body is M, and its work that of the rotation of the marker, elastic or not.
+States follow z_1 - z_0 = h z_dot, multipliers lam belong to the step. An element holds g(t_1, r_1, A_1) = 0 at the end
+of the step if g is of positions, h g = 0 in the middle if it is of velocities, g = 0 there if it is an equation.
+
+The law names its energy E, and its reactions are lam times the gradient of g: together they have the potential
+U = E - Σ lam_j g_j of places alone, t, v, z and lam held. What its change over the step lacks,
+
+    delta = (dr, c)·grad U - (U_1 - U_0)
+
+is done by a wrench along the motion (Gonzalez 1996, discrete gradient), so that E and lam·dg are exact; delta is of
+third order, the wrench of second. If the wrenches of an element balance, it is that of markers against each other,
+
+    F_k = lambda rho_k,  rho_k = dr_k - dr_r - c_r × (r_k - r_r),   M_k = lambda L² (c_k - c_r)
+
+with the opposite on marker r, the first that takes a whole wrench; between points along their lines; else the motion of
+each marker by itself. lambda = delta/(|motion|² + (1e-6 L)²): what is left undone is of the size of rounding.
+"""
 
 import math
 

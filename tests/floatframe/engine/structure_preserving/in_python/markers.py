@@ -1,16 +1,6 @@
 """Markers over a step: positions, rotations, and loads on them with exact work on their bodies.
 
-Over a step (see rotation.py), with the lever l = (R_0 sigma_0 + R_1 sigma_1)/2 from the centre of mass, and for a
-direction E = R exp(Psi_r q) e = R eps of a marker,
-
-    dx = d + theta_G × l + R_m Psi_sigma dq,        dE = theta_G × (E_0 + E_1)/2 + R_m (psi × (eps_0 + eps_1)/2)
-
-where sigma(q) and th(q) are of degree two in q at most (a stiffened body bends its interfaces, theory.md §7), so that
-their changes are Psi_sigma dq and Psi_r dq with the derivatives at the mean of q, and psi = Gamma Psi_r dq is the
-Cayley vector of the elastic rotation. A force F with work F·dx acts by F, l × F and Psi_sigmaᵀ R_mᵀ F; a load G with
-work G·dE by the torque E_mean × G and (Gamma Psi_r)ᵀ (eps_mean × R_mᵀ G).
-Gamma = T + (psi - T dth) dthᵀ/|dth|², T the left Jacobian at the mean of th = Psi_r q: the discrete derivative of
-Gonzalez (1996), Journal of Nonlinear Science 6, 449-467, of the map th -> exp(th).
+Formulas: `tests.floatframe.engine.structure_preserving.in_python.kernels.markers`.
 """
 
 from dataclasses import dataclass
@@ -19,12 +9,10 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.engine.kernels.model import Model
-from floatframe.engine.structure_preserving.bodies import BodyStep, CentralBody
-from floatframe.engine.structure_preserving.rotation import relative_cayley
 from floatframe.model.bodies.marker_shape import MarkerShape
 from floatframe.model.rotations import cross, dot, left_jacobian, rotation_exp, turned
-
-__all__ = ["BodyMarker", "Load", "MarkerStep", "body_marker", "marker_step"]
+from tests.floatframe.engine.structure_preserving.in_python.bodies import Body, BodyStep
+from tests.floatframe.engine.structure_preserving.in_python.rotation import relative_cayley
 
 SMALL = 1e-14  #: square of an elastic rotation in a step below which its Cayley vector is T dth to rounding
 
@@ -34,7 +22,7 @@ class BodyMarker:
     """Constants of a marker; body -1 is the ground."""
 
     body: int
-    constants: CentralBody | None
+    constants: Body | None
     shape: MarkerShape  #: from the frame origin
 
     @property
@@ -56,7 +44,7 @@ class BodyMarker:
         return self.shape.position + d[..., :3] - self.constants.center(q), d[..., 3:]
 
 
-def body_marker(model: Model, bodies: tuple[CentralBody, ...], m: int) -> BodyMarker:
+def body_marker(model: Model, bodies: tuple[Body, ...], m: int) -> BodyMarker:
     """Return the constants of marker m of a model."""
     i = int(model.markers.body[m])
     if i < 0:

@@ -1,28 +1,6 @@
 """Public elements over a step: their law in the middle of it, and the correction of their work.
 
-Marker m goes from r_0, A_0 to r_1, A_1 = cay(c) A_0. The law is asked once, at the middle of both places and both
-rotations with the rates of the step, and its wrench acts over the step,
-
-    r = (r_0 + r_1)/2,   A = cay(c') A_0,  c' = c/(1 + sqrt(1 + |c|²/4)),   v = dr/h,   omega = c/h
-    work = Σ F·dr + M·c
-
-A moment M enters by its directions: G_j = M' × E_j/2 at the mean axes E_j, (tr S - S) M'/2 = M with S = Σ E_j E_jᵀ,
-so that the torque on the body is M, and its work that of the rotation of the marker, elastic or not.
-States follow z_1 - z_0 = h z_dot, multipliers lam belong to the step. An element holds g(t_1, r_1, A_1) = 0 at the end
-of the step if g is of positions, h g = 0 in the middle if it is of velocities, g = 0 there if it is an equation.
-
-The law names its energy E, and its reactions are lam times the gradient of g: together they have the potential
-U = E - Σ lam_j g_j of places alone, t, v, z and lam held. What its change over the step lacks,
-
-    delta = (dr, c)·grad U - (U_1 - U_0)
-
-is done by a wrench along the motion (Gonzalez 1996, discrete gradient), so that E and lam·dg are exact; delta is of
-third order, the wrench of second. If the wrenches of an element balance, it is that of markers against each other,
-
-    F_k = lambda rho_k,  rho_k = dr_k - dr_r - c_r × (r_k - r_r),   M_k = lambda L² (c_k - c_r)
-
-with the opposite on marker r, the first that takes a whole wrench; between points along their lines; else the motion of
-each marker by itself. lambda = delta/(|motion|² + (1e-6 L)²): what is left undone is of the size of rounding.
+Formulas: `tests.floatframe.engine.structure_preserving.in_python.kernels.connections.public_elements`.
 """
 
 import numpy as np
@@ -31,25 +9,13 @@ from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.callbacks.law_functions import called_law
 from floatframe.engine.compiling.coordinate_elements import LEAST_SIZE
 from floatframe.engine.kernels.model import Model
-from floatframe.engine.structure_preserving.constraints import Loads, Pair, Span
-from floatframe.engine.structure_preserving.coordinates import add_pair
-from floatframe.engine.structure_preserving.markers import Load, MarkerStep
-from floatframe.engine.structure_preserving.rotation import cayley
+from floatframe.engine.structure_preserving.system import element_states, multiplier_rows
 from floatframe.model.joints.rows import POSITION, VELOCITY
 from floatframe.model.rotations import cross, dot, rotation_exp, turned
-
-__all__ = [
-    "add_height_reaction",
-    "add_roll_reaction",
-    "element_load",
-    "element_rates",
-    "element_states",
-    "element_values",
-    "height_value",
-    "multiplier_rows",
-    "roll_value",
-]
-
+from tests.floatframe.engine.structure_preserving.in_python.constraints import Loads, Pair, Span
+from tests.floatframe.engine.structure_preserving.in_python.coordinates import add_pair
+from tests.floatframe.engine.structure_preserving.in_python.markers import Load, MarkerStep
+from tests.floatframe.engine.structure_preserving.in_python.rotation import cayley
 
 WAY = 1 / 64  #: fraction of the step over which the gradient of the potential is taken
 #: coefficients of sixth-order differences at -3 to 3
@@ -174,18 +140,6 @@ def half_turned(A: Array, c: Array) -> Array:
     """Return axes turned by half of the rotation with the Cayley vector c."""
     half: Array = c / (1 + np.sqrt(1 + 0.25 * dot(c, c)))[..., None]
     return cayley(half) @ A
-
-
-def multiplier_rows(model: Model, c: int) -> tuple[int, ...]:
-    """Return the multiplier rows of element c, which are its last rows."""
-    n_lam, last = int(model.laws.head[int(model.connections.item[c]), 3]), int(model.connections.w0[c + 1])
-    return tuple(range(last - n_lam, last))
-
-
-def element_states(model: Model, c: int) -> tuple[int, ...]:
-    """Return the rows of the states of element c."""
-    i = int(model.connections.item[c])
-    return tuple(int(k) for k in model.states.row[model.laws.state0[i] : model.laws.state0[i + 1]])
 
 
 def states_at(model: Model, c: int, span: Span, dz: Array, part: float) -> Array:
@@ -371,13 +325,7 @@ def element_values(model: Model, c: int, markers: list[MarkerStep], span: Span, 
     return values
 
 
-# A disc that rolls without slip over a step, see kernels/joints/rolling.py for N, n, c, s and rho ---------------------
-# RIM_HEIGHT, N · d - R s with s = sqrt(1 - c²), changes by the product rule with means, ds = -(c_0 + c_1)/(s_0 + s_1)
-# dc. ROLL holds the displacement of the rim over the step along t, all directions and places at their means:
-#
-#     t · (dx_B - dx_A + phi_B × rho - phi_A × (d + rho)) = 0
-#
-# by a force along t at the rim, whose work it is: none. Forces and moments on A and B balance about any point.
+# A disc that rolls without slip over a step, formulas: kernels/held_rows.py ------- ---------------------
 
 
 def leanings(model: Model, k: int, pair: Pair) -> tuple[Array, ...]:

@@ -1,8 +1,6 @@
 """Forces over a step: loads whose work is the change of their potential, and the work that they supply and dissipate.
 
-Springs act by the discrete derivative of their potential (Gonzalez 1996), here in closed form: with the lengths l_0,
-l_1 at both ends, |d_1|² - |d_0|² = 2 d_mean·(d_1 - d_0), so that the tension k ((l_0 + l_1)/2 - l_free) along
-2 d_mean/(l_0 + l_1) does the work of the change of k (l - l_free)²/2 exactly. Rates are changes over the step.
+Formulas: `tests.floatframe.engine.structure_preserving.in_python.kernels.loads`.
 """
 
 import ctypes
@@ -15,9 +13,13 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.callbacks.user_forces import C_FUNCTION
 from floatframe.engine.kernels.model import Model
-from floatframe.engine.structure_preserving.bodies import BodyStep, CentralBody
-from floatframe.engine.structure_preserving.constraints import Loads, Pair, Span, arctan2
-from floatframe.engine.structure_preserving.coordinates import (
+from floatframe.engine.structure_preserving.system import coordinates_of, element_of, state_rows
+from floatframe.model.functions import expressions as ex
+from floatframe.model.joints.rows import kind_of
+from floatframe.model.rotations import continued_rotation, cross, dot, rotation_exp, tilde, turned
+from tests.floatframe.engine.structure_preserving.in_python.bodies import Body, BodyStep
+from tests.floatframe.engine.structure_preserving.in_python.constraints import Loads, Pair, Span, arctan2
+from tests.floatframe.engine.structure_preserving.in_python.coordinates import (
     add_coordinate_force,
     add_impulsive_force,
     add_pair,
@@ -26,31 +28,11 @@ from floatframe.engine.structure_preserving.coordinates import (
     coordinate_rate,
     counted,
 )
-from floatframe.engine.structure_preserving.couplers import coordinates_of
-from floatframe.engine.structure_preserving.functions import along_imaginary, value_of
-from floatframe.engine.structure_preserving.markers import Load, MarkerStep, mean_jacobian
-from floatframe.engine.structure_preserving.rotation import relative_cayley
-from floatframe.model.functions import expressions as ex
-from floatframe.model.joints.rows import kind_of
-from floatframe.model.rotations import continued_rotation, cross, dot, rotation_exp, tilde, turned
-
-__all__ = [
-    "Given",
-    "body_load",
-    "bushing_load",
-    "coordinate_load",
-    "element_of",
-    "point_load",
-    "spring_load",
-    "state_rows",
-    "user_force_load",
-    "user_state_rates",
-]
-
+from tests.floatframe.engine.structure_preserving.in_python.functions import along_imaginary, value_of
+from tests.floatframe.engine.structure_preserving.in_python.markers import Load, MarkerStep, mean_jacobian
+from tests.floatframe.engine.structure_preserving.in_python.rotation import relative_cayley
 
 # user forces over a step: Q = f(t, x, v, z) along coordinates, z_1 - z_0 = h g(t, x, v, z) ----------------------------
-# Forces act at the middle of the step, with the mean coordinates and the rates v of their changes, or at one
-# configuration of a variational step; their work Q dx counts as given. States follow the midpoint rule in all schemes.
 
 
 UNARY: dict[int, Callable[[float], float]] = {
@@ -121,17 +103,6 @@ def sizes_of_inputs(model: Model, u: int) -> Array:
     return np.concatenate([[1.0], model.coordinates.size[x], model.coordinates.speed[x], z])
 
 
-def state_rows(model: Model, c: int) -> tuple[int, ...]:
-    """Return the rows of the states of user force c."""
-    u = int(model.connections.item[c])
-    return tuple(int(k) for k in model.states.row[model.users.state0[u] : model.users.state0[u + 1]])
-
-
-def element_of(model: Model, c: int) -> int:
-    """Return the number of user force c among all elements (couplers come first)."""
-    return int(model.connections.item[c]) + len(model.elements.core) - len(model.users.n_states)
-
-
 def inputs_of(
     model: Model, c: int, pairs: list[Pair], t: float, span: Span, z: Array, *, is_middle: bool
 ) -> tuple[Array, list[Array]]:
@@ -140,7 +111,7 @@ def inputs_of(
     X at the end of the force interval, or the mean.
     """
     x, v, changes = [], [], []
-    for p, pair in zip(coordinates_of(model, c, element_of(model, c)), pairs, strict=True):
+    for p, pair in zip(coordinates_of(model, element_of(model, c)), pairs, strict=True):
         k = int(model.coordinates.row[p])
         rate = coordinate_rate(model, k, pair, span.h)
         begin, end = coordinate_ends(model, k, pair)
@@ -161,7 +132,7 @@ def user_force_load(
     values = user_values(model, int(model.connections.item[c]), inputs)
     given = np.zeros(values.shape[:-1], values.dtype)
     i = element_of(model, c)
-    for p, pair, load, change in zip(coordinates_of(model, c, i), pairs, loads, changes, strict=True):
+    for p, pair, load, change in zip(coordinates_of(model, i), pairs, loads, changes, strict=True):
         if model.coordinates.force[p] >= 0:
             Q = values[..., int(model.coordinates.core[p] - model.elements.core[i])]
             add_impulsive_force(model, int(model.coordinates.row[p]), pair, load, Q)
@@ -181,27 +152,7 @@ def user_state_rates(model: Model, c: int, pairs: list[Pair], span: Span, dz: Ar
     return user_values(model, u, inputs)[..., int(model.users.n_forces[u]) :]
 
 
-# forces ---------------------------------------------------------------------------------------------------------------
-
-
 # bushings -------------------------------------------------------------------------------------------------------------
-# Bushings over a step: the potential of six deformations by its exact discrete derivative, see kernels/bushing.py.
-#
-# With R = A_Aᵀ A_B = exp(theta), s = A_Aᵀ d and Q = exp(-share theta) the deformations are xi = (e, theta), e = Q s;
-# the share is 0 in axes of A, 1 in axes of B, 1/2 half way. Products of axes and places change by the product rule with
-# means, and with the Cayley vectors psi and chi of the two rotations
-#
-# R_1 - R_0 = tilde(psi) R_mean,   psi = Gamma dtheta,     Q_1 - Q_0 = tilde(chi) Q_mean,   chi = -share Gamma' dtheta
-# de = Q_mean ds + chi × (Q_mean s_mean)
-#
-# Gamma and Gamma' by Gonzalez' discrete derivative of exp (discrete/markers.py). So the force f and the moment m of the
-# mean deformations, f·de + m·dtheta being the change of a potential of degree two, act by
-#
-#     f on s:  Q_meanᵀ f,      tau = Gamma⁻ᵀ (m - share Gamma'ᵀ ((Q_mean s_mean) × f)),
-#     on the products a_i · b_j of the axes:  1/2 tilde(tau) P,  P = (1 + tilde(psi)/2) R_0 = R_mean⁻ᵀ,
-#
-# because <tilde(tau) P, tilde(psi) R_mean> = 2 tau·psi. They depend on products of directions alone and add no angular
-# momentum. Rates of damping are changes over the step, so that damping takes energy whatever h; tables act at the mean.
 
 
 def transposed(A: Array) -> Array:
@@ -345,7 +296,7 @@ def point_load(model: Model, k: int, marker: MarkerStep, load: Load | None, span
     return Given(work)
 
 
-def body_load(model: Model, k: int, body: CentralBody, step: BodyStep, load: Load, span: Span) -> Given:
+def body_load(model: Model, k: int, body: Body, step: BodyStep, load: Load, span: Span) -> Given:
     """Add load case k of a body: force and torque about its frame origin in its axes, and modal forces."""
     factor = value_of(model, int(model.body_loads.factor[k]), span.t_force)[0]
     first = int(model.body_loads.value0[k])

@@ -1,20 +1,15 @@
 """Coordinates over a step: their values at its ends, their changes, and forces along them with exact work.
 
-A distance along an axis of A is a sum of products of a direction and a position, a distance of points the root of one,
-an angle that of discrete/constraints.py: each has a discrete derivative, so that a force Q along a coordinate does the
-work Q times its change. TWIST_B is an angle about an axis of B: that of A seen from B, the other way.
-
-In a step a body turns by 2 atan(|theta|/2) with the mean angular velocity theta/h. A torque by the discrete derivative
-of the angle is so much weaker, which keeps the energy of springs and reactions. Motors, dampers, friction and user
-forces act by the whole torque about the mean axis, with the rate of the mean angular velocities: their impulse is h Q,
-their work h Q times the rate, exactly.
+Formulas: `floatframe.engine.structure_preserving.kernels.coordinates`.
 """
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.engine.kernels.model import Model
-from floatframe.engine.structure_preserving.constraints import (
+from floatframe.model.joints.rows import PUSH, SPAN, TWIST_B, kind_of
+from floatframe.model.rotations import dot
+from tests.floatframe.engine.structure_preserving.in_python.constraints import (
     Loads,
     Pair,
     angle_change,
@@ -22,14 +17,7 @@ from floatframe.engine.structure_preserving.constraints import (
     end_angle,
     slip_change,
 )
-from floatframe.engine.structure_preserving.markers import MarkerStep
-from floatframe.model.joints.rows import PUSH, SPAN, TWIST_B, kind_of
-from floatframe.model.rotations import dot
-
-__all__ = [
-    "add_coordinate_force", "add_impulsive_force", "add_pair", "coordinate_change", "coordinate_ends",
-    "coordinate_rate", "counted", "has_two_ends",
-]  # fmt: skip
+from tests.floatframe.engine.structure_preserving.in_python.markers import MarkerStep
 
 
 def add_pair(pair: Pair, loads: Loads, F: Array) -> None:

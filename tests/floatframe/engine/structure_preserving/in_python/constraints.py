@@ -1,9 +1,6 @@
 """Constraints of joints over a step: values at its end, and loads that do no work while the joints are closed.
 
-A constraint is a sum of products of marker positions and directions; by the product rule with means,
-a_1·b_1 - a_0·b_0 = (a_1 - a_0)·b_mean + a_mean·(b_1 - b_0), each has discrete derivatives whose sum with the changes of
-its parts is its own change, and which turn with the ground axes. So its reaction does no work between two
-configurations that fulfil it, and adds no linear or angular momentum.
+Formulas: `tests.floatframe.engine.structure_preserving.in_python.kernels.rows`.
 """
 
 import math
@@ -12,27 +9,11 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.engine.kernels.model import Model
-from floatframe.engine.structure_preserving.functions import value_of
-from floatframe.engine.structure_preserving.markers import Load, MarkerStep
 from floatframe.model.joints.rows import DISTANCE, DOT, POINT, SCREW, SLIDE, TURN, TURN_B, kind_of
 from floatframe.model.joints.rows.kinds import EQUAL_TURN
 from floatframe.model.rotations import dot
-
-__all__ = [
-    "Loads",
-    "Pair",
-    "Span",
-    "add_reaction",
-    "angle_change",
-    "angle_loads",
-    "constraint_value",
-    "end_angle",
-    "held",
-    "is_driven",
-    "rate_in_time",
-    "reaction_direction",
-    "slip_change",
-]
+from tests.floatframe.engine.structure_preserving.in_python.functions import value_of
+from tests.floatframe.engine.structure_preserving.in_python.markers import Load, MarkerStep
 
 Pair = tuple[MarkerStep, MarkerStep]
 Loads = tuple[Load | None, Load | None]

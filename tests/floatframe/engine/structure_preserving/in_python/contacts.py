@@ -1,27 +1,18 @@
 """Contacts of a sphere on B with a plane or a sphere on A over a step, see kernels/contact.py.
 
-The normal force is the discrete derivative of its potential U = k x^(n+1)/(n+1), x the depth, times the factor of
-restitution with the mean rate; friction acts at the point rho = -R_B N of the mean normal against the mean slip V_t:
-
-    f_s = -(U_1 - U_0)/(gap_1 - gap_0),   f = f_s max(0, 1 - (h/v_0) dgap/dt)
-    V = (dx_B - dx_A + phi_B × rho - phi_A × (d + rho))/dt,   T = -mu f V_t/sqrt(|V_t|² + v_s²)
-
-so that what is taken, (f_s - f) dgap and -T·V dt, is never negative, and forces and moments balance about any point.
-The speed of approach v_0 is that of the step before the contact began.
+Formulas: `tests.floatframe.engine.structure_preserving.in_python.kernels.connections.contacts`.
 """
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from floatframe.engine.kernels.connections.contact import V_0
 from floatframe.engine.kernels.model import Model
-from floatframe.engine.structure_preserving.constraints import Loads, Pair, Span, slip_change
-from floatframe.engine.structure_preserving.coordinates import add_pair, span_parts
 from floatframe.model.rotations import cross, dot
+from tests.floatframe.engine.structure_preserving.in_python.constraints import Loads, Pair, Span, slip_change
+from tests.floatframe.engine.structure_preserving.in_python.coordinates import add_pair, span_parts
 
-__all__ = ["V_0", "contact_load", "speed_of_approach"]
-
-V_0 = 9  #: index of the row of the approach speed in a contact
-ALIKE = 0.02  #: difference of depths relative to their sum, below which the quotient is the mean force
+ALIKE = 0.02  #: difference of depths over their sum below which the quotient is a mean of forces
 GAUSS = ((-np.sqrt(0.6), 5 / 18), (0.0, 8 / 18), (np.sqrt(0.6), 5 / 18))  #: points and weights: exact to degree five
 
 

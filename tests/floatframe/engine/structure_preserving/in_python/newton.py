@@ -17,13 +17,11 @@ from scipy.sparse.linalg import splu
 
 from cms.linear_algebra.lu_factors import solve_factored
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.engine.structure_preserving.bodies import BodyStep, CentralBody, Placed, step_of
-from floatframe.engine.structure_preserving.constraints import Span
-from floatframe.engine.structure_preserving.deformed_lines import slid
-from floatframe.engine.structure_preserving.markers import Load, marker_step
-from floatframe.engine.structure_preserving.system import Connection, DiscreteSystem, Ends
-
-__all__ = ["Scheme", "Solution", "StepError", "ends_of", "generalised_force", "remembered", "solve_step", "work_of"]
+from tests.floatframe.engine.structure_preserving.in_python.bodies import Body, BodyStep, Placed, step_of
+from tests.floatframe.engine.structure_preserving.in_python.constraints import Span
+from tests.floatframe.engine.structure_preserving.in_python.deformed_lines import slid
+from tests.floatframe.engine.structure_preserving.in_python.markers import Load, marker_step
+from tests.floatframe.engine.structure_preserving.in_python.system import Ends, StepConnection, StepSystem
 
 TINY = 1e-20  #: of the imaginary parts
 SLOW = 0.1  #: ratio of successive corrections above which the derivatives are renewed
@@ -38,7 +36,7 @@ class Scheme(Protocol):
     def acts_along(self) -> bool:
         """Whether forces act along the step; otherwise they act at its start."""
 
-    def inertia(self, body: CentralBody, place: Placed, x: Array, h: float) -> Array:
+    def inertia(self, body: Body, place: Placed, x: Array, h: float) -> Array:
         """Return h/2 times the change of momentum without loads, (..., 6 + n); modal forces of K and D included."""
 
     def force_step(self, place: Placed, x: Array) -> BodyStep:
@@ -86,7 +84,7 @@ def empty_load(n: int, x: Array) -> Load:
 
 
 def ends_of(
-    ds: DiscreteSystem, connection: Connection, steps: dict[int, BodyStep], loads: dict[int, Load], span: Span
+    ds: StepSystem, connection: StepConnection, steps: dict[int, BodyStep], loads: dict[int, Load], span: Span
 ) -> Ends:
     """Return the markers of a connection over a step, and the loads on their bodies, by the numbers of bodies."""
     markers = [marker_step(marker, steps.get(marker.body)) for marker in connection.ends]
@@ -97,7 +95,7 @@ def ends_of(
     return Ends(markers, [loads.get(marker.body) for marker in connection.ends], slide)
 
 
-def body_residual(ds: DiscreteSystem, scheme: Scheme, i: int, place: Placed, span: Span, x: Array) -> Array:
+def body_residual(ds: StepSystem, scheme: Scheme, i: int, place: Placed, span: Span, x: Array) -> Array:
     """Return the residual of body i without its joints, (..., 6 + n)."""
     load = empty_load(ds.bodies[i].n, x)
     ds.own_loads(i, scheme.force_step(place, x), load, span)
@@ -106,7 +104,7 @@ def body_residual(ds: DiscreteSystem, scheme: Scheme, i: int, place: Placed, spa
 
 
 def connection_residual(
-    ds: DiscreteSystem, scheme: Scheme, connection: Connection, placed: list[Placed], span: Span, z: Array
+    ds: StepSystem, scheme: Scheme, connection: StepConnection, placed: list[Placed], span: Span, z: Array
 ) -> Array:
     """Return the contributions of a connection to its bodies, and its rows, for z = (x of A, x of B, mu), (..., n)."""
     x: dict[int, Array] = {}
@@ -132,7 +130,7 @@ def connection_residual(
     return np.concatenate(out, axis=-1)
 
 
-def unknowns_of(ds: DiscreteSystem, connection: Connection) -> IntArray:
+def unknowns_of(ds: StepSystem, connection: StepConnection) -> IntArray:
     """Return the numbers of the unknowns of a connection."""
     parts = [np.arange(ds.model.bodies.u0[i], ds.model.bodies.u0[i + 1]) for i in connection.bodies]
     n_u = int(ds.model.bodies.u0[-1])
@@ -142,7 +140,7 @@ def unknowns_of(ds: DiscreteSystem, connection: Connection) -> IntArray:
 
 
 def assemble(
-    ds: DiscreteSystem, scheme: Scheme, placed: list[Placed], span: Span, z: Array, *, with_derivative: bool
+    ds: StepSystem, scheme: Scheme, placed: list[Placed], span: Span, z: Array, *, with_derivative: bool
 ) -> tuple[Array, list[tuple[IntArray, Array]]]:
     """Return the residual of all unknowns, and the blocks of its derivative with their positions."""
     residual, blocks = np.zeros(len(z)), []
@@ -188,7 +186,7 @@ def factorized(blocks: list[tuple[IntArray, Array]], n: int) -> Callable[[Array]
 
 
 def solve_step(
-    ds: DiscreteSystem, scheme: Scheme, placed: list[Placed], span: Span, f: Array, tolerance: float,
+    ds: StepSystem, scheme: Scheme, placed: list[Placed], span: Span, f: Array, tolerance: float,
     max_iterations: int,
 ) -> Solution:  # fmt: skip
     """Return the increments of a step.
@@ -240,7 +238,7 @@ def solve_step(
 
 
 def work_of(
-    ds: DiscreteSystem, scheme: Scheme, placed: list[Placed], span: Span, solution: Solution
+    ds: StepSystem, scheme: Scheme, placed: list[Placed], span: Span, solution: Solution
 ) -> tuple[float, float]:
     """Return the work supplied over a step by forces and prescribed motions, and the work dissipated by dampers.
 
@@ -271,7 +269,7 @@ def work_of(
     return given, taken
 
 
-def remembered(ds: DiscreteSystem, placed: list[Placed], span: Span, solution: Solution) -> Array:
-    """Return the memory of connections at the end of a step, (n_w,)."""
+def remembered(ds: StepSystem, placed: list[Placed], span: Span, solution: Solution) -> Array:
+    """Return what connections remember at the end of a step, (n_w,)."""
     steps = {i: step_of(place, x) for i, (place, x) in enumerate(zip(placed, solution.x, strict=True))}
     return ds.remembered([ends_of(ds, connection, steps, {}, span) for connection in ds.connections], span, solution.dz)

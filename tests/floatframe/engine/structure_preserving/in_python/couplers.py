@@ -1,22 +1,19 @@
 """Couplers over a step: Σ a_p x_p = c(t_1) at its end, by forces a_p lam along the coordinates.
 
-Each coordinate has its discrete derivative (discrete/coordinates.py), so that the reaction does the work lam times the
-change of the sum: none, or that of the prescribed constant. The row is divided by its largest coefficient.
+Formulas: `tests.floatframe.engine.structure_preserving.in_python.kernels.held_rows`.
 """
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.engine.kernels.model import Model
-from floatframe.engine.structure_preserving.constraints import Loads, Pair, Span, held
-from floatframe.engine.structure_preserving.coordinates import add_coordinate_force, coordinate_ends, counted
-
-__all__ = ["add_coupler_reaction", "coordinates_of", "coupler_value"]
-
-
-def coordinates_of(model: Model, c: int, element: int) -> range:
-    """Return the numbers of the coordinates of an element of connection c."""
-    return range(int(model.elements.coordinate0[element]), int(model.elements.coordinate0[element + 1]))
+from floatframe.engine.structure_preserving.system import coordinates_of
+from tests.floatframe.engine.structure_preserving.in_python.constraints import Loads, Pair, Span, held
+from tests.floatframe.engine.structure_preserving.in_python.coordinates import (
+    add_coordinate_force,
+    coordinate_ends,
+    counted,
+)
 
 
 def coupler_value(model: Model, c: int, pairs: list[Pair], span: Span) -> Array:
@@ -24,7 +21,7 @@ def coupler_value(model: Model, c: int, pairs: list[Pair], span: Span) -> Array:
     i = int(model.connections.item[c])
     k = int(model.elements.core[i])
     total: Array = np.array(-held(model, k, span.t_1))
-    for p, pair in zip(coordinates_of(model, c, i), pairs, strict=True):
+    for p, pair in zip(coordinates_of(model, i), pairs, strict=True):
         row = int(model.coordinates.row[p])
         _, end = coordinate_ends(model, row, pair)
         total = total + model.coordinates.factor[p] * counted(model, row, end, span.w[row])
@@ -35,6 +32,6 @@ def add_coupler_reaction(model: Model, c: int, pairs: list[Pair], loads: list[Lo
     """Add the loads of coupler c with multiplier f, (...,), whose work is f times the change of its row."""
     i = int(model.connections.item[c])
     scale = model.rows.x[int(model.elements.core[i]), 0]
-    for p, pair, load in zip(coordinates_of(model, c, i), pairs, loads, strict=True):
+    for p, pair, load in zip(coordinates_of(model, i), pairs, loads, strict=True):
         row = int(model.coordinates.row[p])
         add_coordinate_force(model, row, pair, load, scale * model.coordinates.factor[p] * f)

@@ -1,11 +1,6 @@
 """Rotations of a step, for stacks of vectors and complex numbers.
 
-cay(theta) = (1 - tilde/2)⁻¹ (1 + tilde/2), the rotation by 2 atan(|theta|/2) about theta. With R_1 = R_0 cay(theta) and
-theta_G = R_0 theta
-
-    R_1 a_1 - R_0 a_0 = theta_G × (R_0 a_0 + R_1 a_1)/2 + R_m (a_1 - a_0),    R_m = R_0 (1 + tilde(theta)/2):
-
-the change of a vector that turns with a body and changes in it, exact for a step of any size.
+Formulas: `floatframe.engine.structure_preserving.kernels.markers`.
 """
 
 import numpy as np
@@ -13,8 +8,6 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.engine.initial_conditions.newton_equations import product
 from floatframe.model.rotations import cross, dot, euler_parameters_of_rotation_vector, tilde
-
-__all__ = ["cayley", "cayley_parameters", "relative_cayley"]
 
 
 def cayley(theta: Array) -> Array:

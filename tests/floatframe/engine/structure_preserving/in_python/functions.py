@@ -5,8 +5,6 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.engine.kernels.model import Model
 
-__all__ = ["along_imaginary", "value_of"]
-
 
 def value_of(model: Model, f: int, t: float) -> tuple[float, float]:
     """Return function f at t and its rate: a polynomial of degree five and a sine on each piece."""

@@ -1,0 +1,1 @@
+"""Steps of the structure-preserving schemes in readable Python with exact derivatives, the oracle of compiled steps."""
