@@ -19,8 +19,8 @@ SHARED = set(
     Equations Evaluated Evaluation Family Frame FrequencyResponse FullModel Functions Graph Held Kept Kind
     Layout Limits Line Lines Link Load Loads MassSection MaterialSection Mesh MeshError Modes Motion Named
     Observed Output OutputSection Parameter ParameterSection Part Picture Place Placed Places Plane Point
-    Progress Quantity Recovery Reference Request Rod RodSection Rows Run Scheme Search Section Selection
-    ShellSection Signals SolidSection Solution Solver SpectrumRequest Spin Step Structure Superelement Table
+    Progress Quantity Recovery Reference Request Rod RodSection Rows Run Search Section Selection
+    ShellSection Signals SolidSection Solver SpectrumRequest Spin Step Structure Superelement Table
     Tangents Taylor Track Tree Trial Tube Wheel Work Wrench Writer
 """.split()
 )

@@ -85,7 +85,7 @@ def row_rate(model, step, c, k, t):
 
 
 # couplers -------------------------------------------------------------------------------------------------------------
-# Σ a_p x_p = c(t_1) holds at the end of a step, by forces a_p lam along the coordinates. Each coordinate has its discrete
+# Σ a_p x_p = c(t_1) holds at the end of a step, by forces a_p lam along the coordinates. Each has its discrete
 # derivative (kernels/coordinates.py), so that the reaction does the work lam times the change of the sum: none, or that
 # of the prescribed constant. The row is divided by its largest coefficient.
 
@@ -132,7 +132,7 @@ def coupler_rate(model, c, t):
     return -model.rows.x[k, 0] * rate
 
 
-# a disc that rolls without slip: N, n, c, s and rho as in the engine's kernels/joints/rolling.py -----------------------
+# a disc that rolls without slip; N, n, c, s and rho as in the engine kernels/joints/rolling.py -----------------------
 # RIM_HEIGHT, N · d - R s with s = sqrt(1 - c²), changes by the product rule with means, ds = -(c_0 + c_1)/(s_0 + s_1)
 # dc. ROLL holds the displacement of the rim over the step along t, all directions and places at their means:
 #
