@@ -1,6 +1,6 @@
 """Constraints of joints over a step: values at its end, and loads that do no work while the joints are closed.
 
-Formulas: `tests.floatframe.engine.structure_preserving.in_python.kernels.rows`.
+Formulas: `floatframe.engine.structure_preserving.kernels.rows`.
 """
 
 import math

@@ -1,6 +1,6 @@
 """Contacts of a sphere on B with a plane or a sphere on A over a step, see kernels/contact.py.
 
-Formulas: `tests.floatframe.engine.structure_preserving.in_python.kernels.connections.contacts`.
+Formulas: `floatframe.engine.structure_preserving.kernels.connections.contacts`.
 """
 
 import numpy as np

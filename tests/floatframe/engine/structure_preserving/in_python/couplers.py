@@ -1,6 +1,6 @@
 """Couplers over a step: Σ a_p x_p = c(t_1) at its end, by forces a_p lam along the coordinates.
 
-Formulas: `tests.floatframe.engine.structure_preserving.in_python.kernels.held_rows`.
+Formulas: `floatframe.engine.structure_preserving.kernels.held_rows`.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """A point that slides along the deformed line of a body over a step, see kernels/joints/deformed_line.py.
 
-Formulas: `tests.floatframe.engine.structure_preserving.in_python.kernels.deformed_lines`.
+Formulas: `floatframe.engine.structure_preserving.kernels.deformed_lines`.
 """
 
 from dataclasses import dataclass

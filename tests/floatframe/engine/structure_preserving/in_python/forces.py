@@ -1,6 +1,6 @@
 """Forces over a step: loads whose work is the change of their potential, and the work that they supply and dissipate.
 
-Formulas: `tests.floatframe.engine.structure_preserving.in_python.kernels.loads`.
+Formulas: `floatframe.engine.structure_preserving.kernels.loads`.
 """
 
 import ctypes

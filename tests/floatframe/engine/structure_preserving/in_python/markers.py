@@ -1,6 +1,6 @@
 """Markers over a step: positions, rotations, and loads on them with exact work on their bodies.
 
-Formulas: `tests.floatframe.engine.structure_preserving.in_python.kernels.markers`.
+Formulas: `floatframe.engine.structure_preserving.kernels.markers`.
 """
 
 from dataclasses import dataclass

@@ -1,6 +1,6 @@
 """Public elements over a step: their law in the middle of it, and the correction of their work.
 
-Formulas: `tests.floatframe.engine.structure_preserving.in_python.kernels.connections.public_elements`.
+Formulas: `floatframe.engine.structure_preserving.kernels.connections.public_elements`.
 """
 
 import numpy as np
