@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from floatframe.durability.shaking.loads.levels import Level
 from floatframe.durability.shaking.loads.pulses import damped_sines, pulse, synthesised
-from floatframe.durability.shaking.loads.shock import SpectrumRequest, TimeTest, time_runs
+from floatframe.durability.shaking.loads.shock import SpectrumRequest, TimeTest, sampled, time_runs
 from floatframe.durability.shaking.loads.uncertainty import Uncertainty
 from floatframe.durability.shaking.responses.response_spectrum import shock_response_spectrum
 from floatframe.errors import ModelError
@@ -231,3 +231,10 @@ def test_unequal_times_keep_areas_and_what_is_fast():
         assert_allclose(run.values[DISPLACEMENT, k], -(area * green).sum(), rtol=2e-3)
     assert_allclose(run.velocity_left, [np.trapezoid(a, t)], rtol=1e-9)
     assert any("areas under the straight pieces kept" in note for note in run.notes)
+
+
+def test_a_history_in_equal_steps_keeps_its_last_sample():
+    t = np.linspace(0.0, 1.0, 11)
+    times, values, _ = sampled(t, 1.0 + t[None], 0.03, 0.0)
+    assert_allclose(times[-1], 1.0, rtol=1e-12)
+    assert_allclose(values[0], 1.0 + times, rtol=1e-12)
