@@ -37,7 +37,7 @@ from .elements.beams.sections import Rectangle as Rectangle
 from .elements.beams.sections import Tube as Tube
 from .elements.recovery.element_points import element_points as element_points
 from .elements.shells.body import shell_body as shell_body
-from .elements.shells.interfaces import shell_interface as shell_interface
+from .elements.shells.body import shell_interface as shell_interface
 from .elements.shells.normals import orient_normals as orient_normals
 from .elements.shells.shell_points import layer_stress as layer_stress
 from .elements.shells.shell_points import shell_points as shell_points

@@ -337,7 +337,7 @@ def accept_command(
 
     Example: cms accept received.h5 --deck model.bdf --density steel=7.85e-9 -o acceptance.html
     """
-    from cms.cli.verdicts.accept import AcceptRequest, run_accept
+    from cms.cli.verdicts.check import AcceptRequest, run_accept
 
     raise typer.Exit(
         run_accept(

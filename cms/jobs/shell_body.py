@@ -130,7 +130,7 @@ def _laminate_of(job: Job, shell: ShellSection) -> "AnyShellProperty":
 def shell_interface_of(name: str, section: InterfaceSection, mesh: "ShellMesh") -> Interface:
     """Return one interface on the shell: its selection, kind, reference point and axes."""
     from cms.jobs.parts_of_job import selection_of
-    from fe_models.elements.shells.interfaces import shell_interface
+    from fe_models.elements.shells.body import shell_interface
 
     chosen = selection_of(section.selection, getattr(section, section.selection))
     # the job lists axes as rows; here they are columns

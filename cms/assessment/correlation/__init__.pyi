@@ -1,11 +1,11 @@
 from .correlate import Correlation as Correlation
+from .correlate import DampingFit as DampingFit
 from .correlate import Pairing as Pairing
 from .correlate import comac as comac
 from .correlate import correlate as correlate
+from .correlate import fit_damping as fit_damping
 from .correlate import mac as mac
 from .correlate import orthogonality as orthogonality
-from .damping_fit import DampingFit as DampingFit
-from .damping_fit import fit_damping as fit_damping
 from .errors import CorrelationError as CorrelationError
 from .measured import MeasuredModes as MeasuredModes
 from .mode_table import read_mode_table as read_mode_table

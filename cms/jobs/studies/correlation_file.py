@@ -8,8 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from cms.assessment.correlation.correlate import Correlation, Pairing, correlate
-from cms.assessment.correlation.damping_fit import DampingFit, fit_damping
+from cms.assessment.correlation.correlate import Correlation, DampingFit, Pairing, correlate, fit_damping
 from cms.assessment.correlation.errors import CorrelationError
 from cms.assessment.correlation.measured import MeasuredModes
 from cms.assessment.correlation.mode_table import read_mode_table

@@ -7,7 +7,7 @@ what they did is added to those that stay:
     phi = (phi_1, phi_2),   N = (N_1, N_2):     beta = phi_1 - N_1 N_2⁻¹ phi_2,      Y phi = Y_1 beta.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,34 +15,295 @@ import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.words import nearest, quoted
-from floatframe.design.identification.inertial_parameters import parameters_in
+from floatframe.design.identification.inertial_parameters import PAIRS, parameters_in, point_mass
 from floatframe.design.identification.regressors import LinearForm
-from floatframe.design.identification.transfer_rules import (
-    SAME,
-    Move,
-    chain,
-    common,
-    dipole,
-    moves_of,
-    passing,
-    rotations,
-    silent_directions,
-    square_to,
-    tensor_row,
-)
 from floatframe.design.identification.tree_samples import TreeSamples, as_placed, gravity_of, rigid_tree, tree_samples
 from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.tree.kernels.tree import Tree
 from floatframe.errors import ModelError
 
 __all__ = [
+    "SAME",
     "SOURCES",
     "BaseParameters",
+    "Move",
     "base_parameters",
+    "chain",
+    "common",
+    "dipole",
     "form_rows",
+    "moves_of",
+    "passing",
     "random_samples",
+    "rotations",
     "sampled_silence",
     "silent_at_base",
+    "silent_directions",
+    "square_to",
+    "tensor_row",
 ]
+
+
+# which parameters of a tree do nothing, by rules over its joints: the closed road to base parameters ------------------
+# Three kinds of changes of the parameters leave all torques as they are. With everything in ground axes at the placed
+# configuration (a: direction of a rotation through p, d: direction of a translation):
+#
+# (1) Transfers: what sits at body i so that it may as well sit at its parent, because the joint between them does not
+#     move it. A rotation lets through the masses along its axis (a mass at p, and two changes of it along a), a
+#     translation every inertia tensor without mass; a joint of several coordinates what passes all of them.
+#     What passes to the ground does nothing.
+# (2) Parameters without effect on their own body, because it cannot move so that they count.
+#     No rotation on the way to the ground: S and J; m too, if there is no translation either.
+#     All rotations parallel to e: J but for e·J e, and S·e; a translation along e then lets also the rest of S through;
+#     about a line that stays (all rotations on it, translations along it): m on it unless there is a translation, and
+#     the rest of S if gravity is along e or there is none.
+#     Rotations in several directions through one point that stays: a mass there; S about it if there is no gravity.
+# (3) Inertia of a drive that is also one of its body: about the first rotation, and rotations that stay square to all
+#     before them, the rotor's J and e·J e of the body; along a translation along which nothing before it moves or
+#     weighs, and which nothing turns away, the rotor's and the mass.
+#
+# That these are all is not proven here but for the kinds of joints named; `base_parameters` finds the same by the rank
+# of sampled regressors, and tests hold them against each other over trees of all kinds. The rules for chains of single
+# rotations and translations are those of Gautier & Khalil (1990) [1]_, said without a convention of frames.
+#
+# References
+# ----------
+# .. [1] Gautier & Khalil (1990), IEEE Transactions on Robotics and Automation 6, 368-373.
+
+
+SAME = 1e-9  #: sine of an angle, or distance over the size of the system, that is none
+
+
+@dataclass(frozen=True, eq=False)
+class Move:
+    """A coordinate of a joint at the placed configuration."""
+
+    turn: Array  #: direction of its rotation, (3,); zero: a translation
+    shift: Array  #: direction of its translation, (3,); zero: a rotation
+    point: Array  #: on the axis, (3,)
+
+
+def silent_directions(form: LinearForm) -> Array:
+    """Return directions of the parameters, (p, k), along which no torque of the tree changes; independent.
+
+    Raises
+    ------
+    ModelError
+        If the tree has a screw joint, for which there is no rule, or terms that hide each other.
+    """
+    system = form.system
+    tree = rigid_tree(system, f"system {system.name!r}: rules of base parameters").tree
+    n_c, n_b = len(tree.side), len(tree.parent)
+    zero = np.zeros((1, n_c))
+    placed = tree_samples(system, as_placed(system)[None], zero, zero)
+    moves = [moves_of(form, placed, tree, i) for i in range(n_b)]
+    gravity = gravity_of(system)
+    size = compiled_system(system).length
+    to_ground = [parameters_in(placed.r[0, i], placed.R[0, i]) for i in range(n_b)]
+    found: list[Array] = []
+
+    def note(i: int, phi: Array, parent: int = -1, drive: int = -1) -> None:
+        """Note that phi at body i, less phi at its parent, less one at a drive, does nothing."""
+        direction = np.zeros(len(form.names))
+        direction[10 * i : 10 * i + 10] = la.solve(to_ground[i], phi)
+        if parent >= 0:
+            direction[10 * parent : 10 * parent + 10] = -la.solve(to_ground[parent], phi)
+        if drive >= 0:
+            direction[form.n_inertial + n_c * form.terms.index("motor-inertia") + drive] = -1.0
+        found.append(direction)
+
+    for i in range(n_b):
+        parent = int(tree.parent[i])
+        way = [move for j in chain(tree, i) for move in moves[j]]
+        before = [move for j in chain(tree, parent) for move in moves[j]]
+        for phi in passing(moves[i], before, size, unweighed_dipoles):
+            note(i, phi, parent)
+        for phi in without_effect(way, gravity, size):
+            note(i, phi)
+        if "motor-inertia" in form.terms:
+            for k, move in enumerate(moves[i]):
+                if len(moves[i]) > 1:
+                    raise ModelError(
+                        f"system {system.name!r}: rules of base parameters: motor-inertia: the joint of body "
+                        f"{system.bodies[i].name!r} has {len(moves[i])} coordinates, and rules are for one; find the "
+                        "base parameters by samples"
+                    )
+                for phi, is_relative in drive_twins(move, before, gravity):
+                    note(i, phi, parent if is_relative else -1, int(tree.column0[i]) + k)
+    if not found:
+        return np.zeros((len(form.names), 0))
+    U, s, _ = la.svd(np.array(found).T, full_matrices=False)
+    return U[:, s > 1e-9 * s[0]]
+
+
+def moves_of(form: LinearForm, placed: TreeSamples, tree: Tree, i: int) -> list[Move]:
+    """Return the moves of the joint of body i, from its parent on."""
+    made = []
+    first, end = int(tree.column0[i]), int(tree.column0[i + 1])
+    for k in range(first, end):
+        turn, shift = placed.turn[0, k], placed.t[0, k]
+        if np.linalg.norm(turn) > 0 and np.linalg.norm(shift) > 0:
+            name = form.columns[k].joint
+            raise ModelError(
+                f"system {form.system.name!r}: joint {name!r} is a screw, for which there is no closed rule; find the "
+                "base parameters by samples"
+            )
+        made.append(Move(turn, shift, placed.point[0, k]))
+    return made
+
+
+def chain(tree: Tree, i: int) -> list[int]:
+    """Return the bodies from the ground to body i."""
+    way: list[int] = []
+    while i >= 0:
+        way.append(i)
+        i = int(tree.parent[i])
+    return way[::-1]
+
+
+def line_masses(move: Move) -> Array:
+    """Return what masses along the axis of a rotation span, (3, 10)."""
+    one, p, a = point_mass(move.point), move.point, move.turn
+    ahead, behind = point_mass(p + a), point_mass(p - a)
+    return np.array([one, 0.5 * (ahead - behind), 0.5 * (ahead + behind) - one])
+
+
+def tensors() -> Array:
+    """Return what inertia tensors without mass span, (6, 10)."""
+    return np.eye(10)[4:]
+
+
+def dipole(p: Array, d: Array) -> Array:
+    """Return a first moment d at p without mass, (10,)."""
+    return 0.5 * (point_mass(p + d) - point_mass(p - d))
+
+
+def common(spaces: list[Array]) -> Array:
+    """Return a basis, rows, of what lies in all row spaces; their rows are scaled to the lengths of the system."""
+    kept = spaces[0]
+    for space in spaces[1:]:
+        if not len(kept):
+            break
+        null = la.null_space(np.vstack([kept, -space]).T, rcond=1e-9)
+        kept = la.orth((null[: len(kept)].T @ kept).T, rcond=1e-9).T
+    return kept
+
+
+def passing(own: list[Move], before: list[Move], size: float, dipoles: Callable[[list[Move], Array], Array]) -> Array:
+    """(1) Return what passes from a body to its parent, rows of 10.
+
+    dipoles: the first moments without mass, (k, 10), that a translation lets through, by the moves before it and its
+    direction.
+    """
+    if not own:
+        return np.eye(10)
+    scale = np.array([1.0] + [size] * 3 + [size**2] * 6)
+    spaces = []
+    for k, move in enumerate(own):
+        if move.shift.any():
+            space = np.vstack([tensors(), dipoles(before + own[:k], move.shift)])
+        else:
+            space = line_masses(move)
+        spaces.append(space / scale)
+    return common(spaces) * scale
+
+
+def unweighed_dipoles(before: list[Move], shift: Array) -> Array:
+    """Return the first moments square to a translation along the common axis of all rotations before it."""
+    e, _ = rotations(before)
+    if e is None or np.linalg.norm(np.cross(e, shift)) >= SAME:
+        return np.zeros((0, 10))
+    return np.array([dipole(np.zeros(3), d) for d in square_to(e)])
+
+
+def rotations(moves: list[Move]) -> tuple[Array | None, bool]:
+    """Return the common direction of all rotations (None: none, or several), and whether there are several."""
+    e: Array | None = None
+    for move in moves:
+        if move.turn.any():
+            if e is None:
+                e = move.turn / np.linalg.norm(move.turn)
+            elif np.linalg.norm(np.cross(e, move.turn)) > SAME:
+                return None, True
+    return e, False
+
+
+def square_to(e: Array) -> Array:
+    """Return two unit vectors square to e, (2, 3)."""
+    return la.null_space(e[None]).T
+
+
+def tensor_row(J: Array) -> Array:
+    """Return the parameters of an inertia tensor without mass, (10,)."""
+    return np.array([0.0] * 4 + [J[pair] for pair in PAIRS])
+
+
+def without_effect(way: list[Move], gravity: Array, size: float) -> list[Array]:
+    """(2) Return parameters of a body that its ways to move never show."""
+    e, are_several = rotations(way)
+    shifts = [move.shift for move in way if move.shift.any()]
+    turns = [move for move in way if move.turn.any()]
+    still = np.zeros(3)
+    has_gravity = bool(gravity.any())
+    if not turns:
+        silent = [dipole(still, axis) for axis in np.eye(3)] + list(tensors())
+        return silent if shifts else [*silent, point_mass(still)]
+    if are_several:
+        centre = common_point(turns, size)
+        if shifts or centre is None:
+            return []
+        about = [] if has_gravity else [dipole(centre, axis) for axis in np.eye(3)]
+        return [point_mass(centre), *about]
+    assert e is not None
+    across = square_to(e)
+    silent = [dipole(still, e)]
+    axes = (e, *across)
+    silent += [
+        tensor_row(np.outer(x, y) + np.outer(y, x)) for a, x in enumerate(axes) for y in axes[a:] if a or y is not e
+    ]
+    point = turns[0].point
+    stays = all(np.linalg.norm(np.cross(e, move.point - point)) < SAME * size for move in turns)
+    stays = stays and all(np.linalg.norm(np.cross(e, shift)) < SAME for shift in shifts)
+    if stays:
+        if not shifts:
+            silent.append(point_mass(point))
+        if np.linalg.norm(np.cross(e, gravity)) <= SAME * np.linalg.norm(gravity):
+            silent += [dipole(point, d) for d in across]
+    return silent
+
+
+def common_point(turns: list[Move], size: float) -> Array | None:
+    """Return the point in which all axes of rotation meet, or None."""
+    A, b = np.zeros((3, 3)), np.zeros(3)
+    for move in turns:
+        a = move.turn / np.linalg.norm(move.turn)
+        across = np.eye(3) - np.outer(a, a)
+        A += across
+        b += across @ move.point
+    centre = la.solve(A, b, assume_a="sym")
+    misses = [np.linalg.norm(np.cross(move.turn, centre - move.point)) for move in turns]
+    return centre if max(misses) < SAME * size else None
+
+
+def drive_twins(move: Move, earlier: list[Move], gravity: Array) -> list[tuple[Array, bool]]:
+    """(3) Return parameters of a body that act as the inertia of its drive, and whether less those at its parent."""
+    if move.turn.any():
+        if all(abs(move.turn @ other.turn) < SAME for other in earlier if other.turn.any()):
+            directions = [other for other in earlier if other.turn.any()]
+            _, are_several = rotations(directions)
+            if not are_several:
+                return [(tensor_row(np.outer(move.turn, move.turn)), False)]
+        return []
+    if any(np.linalg.norm(np.cross(other.turn, move.shift)) > SAME for other in earlier):
+        return []
+    if abs(move.shift @ gravity) > SAME * np.linalg.norm(gravity):
+        return []
+    if any(abs(move.shift @ other.shift) > SAME for other in earlier):
+        return []
+    return [(point_mass(np.zeros(3)), True)]
+
+
+# base parameters: the smallest set of parameter combinations that determines torques or reactions ---------------------
 
 
 # rules for parameters of a tree without effect on the ground reaction: base parameters of reactions

@@ -17,10 +17,9 @@ from cms.body.modal_file.file import write as write_body
 from cms.modes.families.families import Families
 from cms.pipeline import reduce_job
 from floatframe.cli import main
-from floatframe.design.laboratory.bodies import BodyShelf
 from floatframe.design.laboratory.figures import convergence_figure
 from floatframe.design.laboratory.full_model import all_dofs
-from floatframe.design.laboratory.laboratory import distance
+from floatframe.design.laboratory.laboratory import BodyShelf, distance
 from floatframe.design.laboratory.laboratory_file import read_laboratory, run_laboratory
 from floatframe.design.laboratory.substitution import with_body
 from floatframe.errors import ModelError
