@@ -121,8 +121,10 @@ def answer(sets: Sequence[SetResult], order: Sequence[str], band_hz: float) -> s
         if not tried:
             return "No mode set could be made; the reasons stand below."
         severe = ("pass", "warn", "fail", "error")
-        # type: ignore[arg-type]
-        nearest_ = min(tried, key=lambda result: (severe.index(result.verdict), len(missed(result.detail))))
+        nearest_ = min(
+            tried,
+            key=lambda result: (severe.index(result.verdict), len(missed(result.detail))),  # type: ignore[arg-type]
+        )
         assert nearest_.detail is not None
         what = ", ".join(DECIDING[record.name] for record in missed(nearest_.detail))
         return (

@@ -174,8 +174,9 @@ def superelement_of_matrices(
             f"{where}: {len(foreign.constrained)} rows are held by the other program; write the superelement without "
             "supports: a floating frame carries free bodies"
         )
-    # type: ignore[arg-type]
-    known = {} if foreign.nodes is None else dict(zip(map(int, foreign.node_numbers), foreign.nodes, strict=True))
+    known: dict[int, Array] = {}
+    if foreign.nodes is not None and foreign.node_numbers is not None:
+        known = dict(zip(map(int, foreign.node_numbers), foreign.nodes, strict=True))
     for number, place in (places or {}).items():
         known.setdefault(int(number), np.asarray(place, dtype=float))
     numbers = np.array(sorted(known), dtype=np.int64)
