@@ -83,22 +83,27 @@ __all__ = [
 ]
 
 DONE, DIVERGED, SINGULAR_BODY, SINGULAR_CONNECTION, INACCURATE, STOPPED = 0, 1, 2, 3, 4, 5
-UNRESOLVED = 7  # a step is too long for a contact; 6 is `relative.kernels.steps.SINGULAR`
-TURNED = 8  # a body turns too far in a step
-MOST_TURN = 1.0  #: rad in a step, of a body on joints away from the axis: above 1.15 joints can give it energy
-OFF_AXIS = 1e-3  # of the size of the system: how far from the axis of turning a joint counts as away from it
-SLOW = 0.2  # ratio of corrections above which the factors are made anew
-OF_MOTION = 1e-5  # of the way of a step counts beside what accelerations move in it
-FAST = 0.1  # corrections that shrink this fast end a step where the next one is expected to be small enough:
-SAFE = 0.5  # this much of the one that is wanted
+UNRESOLVED = 7  # status: a step is too long for a contact; 6 is `relative.kernels.steps.SINGULAR`
+TURNED = 8  # status: a body rotates too far in a step
+#: largest rotation in a step [rad] of a body with joints away from its axis; above 1.15 joints can add energy
+MOST_TURN = 1.0
+# distance of a joint from the axis of rotation, relative to the size of the system, above which it is away from it
+OFF_AXIS = 1e-3
+SLOW = 0.2  # ratio of successive corrections above which the factors are renewed
+# weight of the displacement increment, compared with the displacement due to accelerations, in the norm
+OF_MOTION = 1e-5
+FAST = 0.1  # contraction rate below which the predicted next correction ends a step,
+SAFE = 0.5  # if it is below this fraction of the tolerance
 OF_ROUNDOFF = 0.1  # and of roundoff
 AGED = 5e-4  # of the first correction: what the age of the factors may change velocities by
 ROUNDOFF = 2e-15  # of a position
-NOISE = 1e-7  # accelerations by rounding of positions, over those of the motion, that reach results
-SAFETY = 0.9  # of the step that would just meet the error that is allowed
-LEAST, MOST, WORTH = 0.2, 2.0, 1.2  # a step becomes this much shorter, longer at most; longer only if by this much
-STEADY = 0.1  # of an angular acceleration by its size without the turn of the axis: below, the body turns steadily
-SAME = 1e-12  # relative difference of step sizes that are one
+NOISE = 1e-7  # accelerations due to rounding of positions, relative to those of the motion, that may appear in results
+SAFETY = 0.9  # safety factor on the step that would just meet the allowed error
+# largest reduction and growth of a step; smallest growth for which the size is changed
+LEAST, MOST, WORTH = 0.2, 2.0, 1.2
+# ratio of an angular acceleration to the same without the rotation of the axis, below which the rotation is steady
+STEADY = 0.1
+SAME = 1e-12  # relative difference below which step sizes count as equal
 
 
 @inner
@@ -161,14 +166,14 @@ def spin_axis(model, i):
 
 @small
 def takes_spin(turn, alpha):
-    """Whether a step takes a spin by itself: alpha is not much smaller than without the turn of the axis."""
+    """Whether a step integrates a spin separately: alpha is not much smaller than without the rotation of the axis."""
     rest = sub(alpha, turn)
     return dot(turn, turn) > 0.0 and dot(alpha, alpha) >= STEADY * STEADY * dot(rest, rest)
 
 
 @inner
 def begin_spin(model, work, memory, i):
-    """Choose whether the step takes the spin of body i by itself; return what its accelerations are less then.
+    """Choose whether the step integrates the spin of body i separately; return the reduction of its accelerations.
 
     So it is done where its axis of symmetry does not hold still in the body's angular velocity, but in space: the
     angular acceleration is small without w omega × e, or is not much smaller with it.
@@ -184,7 +189,7 @@ def begin_spin(model, work, memory, i):
 
 @inner
 def take_to_body(model, state, i):
-    """Turn omega and alpha - w omega × e of body i, in axes that do not spin, into omega and alpha in its own axes.
+    """Convert omega and alpha - w omega × e of body i from axes that do not spin to omega and alpha in its own axes.
 
     These axes are those of the beginning of the step turned by exp(across).
     """
@@ -197,7 +202,7 @@ def take_to_body(model, state, i):
 
 @inner
 def take_age(solver, n_iterations):
-    """Count a step with the present factors; new ones are due where it took longer than the mean of all of them.
+    """Count a step with the present factors, and request new ones if it took longer than the mean of all steps.
 
     The mean counts what the factors cost: to go on would raise it, and new ones come back to it.
     """
@@ -241,7 +246,7 @@ def predict(model, work, memory, h, order):
 
 @inner
 def update(model, work, memory, by_rate, by_acceleration, c_k, is_held):
-    """Add the correction (y, mu) to the iterate, and y_rate to velocities if they are held; return its squared norm."""
+    """Add the correction (y, mu) to the iterate, and y_rate to enforced velocities; return its squared norm."""
     total = 0.0
     for i in range(model.bodies.kind.shape[0]):
         n, u0, q0 = model.bodies.n_q[i], model.bodies.u0[i], model.bodies.q0[i]
@@ -293,7 +298,7 @@ def change_rates(model, work, i, by_theta, by_rate, by_acceleration):
 
 @inner
 def turns_too_far(model, work, length):
-    """Return the first body that would turn by more than `MOST_TURN` and has a joint away from the axis, or -1.
+    """Return the first body that would rotate by more than `MOST_TURN` with a joint away from the axis, or -1.
 
     A spin that is taken by itself does not count. Where all joints lie on the axis through the frame, its origin does
     not move on a circle, and any turn is followed.
@@ -315,7 +320,7 @@ def turns_too_far(model, work, length):
 
 @inner
 def hold_velocities(model, work, c_k):
-    """Write the correction y_rate of velocities that closes the gaps in mu, for `update`; return its squared norm.
+    """Write the velocity correction y_rate for `update` that closes the gaps in mu; return its squared norm.
 
     Accelerations change with velocities, and reactions, which are changed here, with accelerations. Positions stay: so
     what the factors take of forces that follow positions (modal stiffness, forces that turn against the body) stays
@@ -391,7 +396,7 @@ def take_stiffness(model, i, q, residual):
 
 @inner
 def add_reactions(model, work, c_k):
-    """Add the wrenches of the velocity correction to those of joints and of what else is held.
+    """Add the wrenches of the velocity correction to those of joints and of other constraints.
 
     Those of force elements stay, as positions do. The wrench of a joint has parts along axes of the ground: all of them
     change, but for what acts along its soft rows, whose rates disagree with those they repeat by rounding.
@@ -414,7 +419,7 @@ def add_reactions(model, work, c_k):
 
 @inner
 def is_enough(norm, last, wanted, allowed):
-    """Whether a correction is small enough, or the next one will be: they shrink by the ratio of the last two.
+    """Whether a correction is small enough, or the next one will be, estimated from the ratio of the last two.
 
     allowed: what is wanted and roundoff. A correction that is not made counts more than one at roundoff, for what is
     left open in every step has the same sign.
@@ -460,7 +465,7 @@ def roundoff_floor(model, work, length):
 
 @inner
 def local_error(model, work, memory, order, h):
-    """Return the estimated error of the increment of a step that has converged: that of the worst body."""
+    """Return the estimated error of the increment of a converged step: the largest of all bodies."""
     alpha_m, alpha_f = order.alpha_m, order.alpha_f
     largest = 0.0
     for i in range(model.bodies.kind.shape[0]):
@@ -479,13 +484,13 @@ def local_error(model, work, memory, order, h):
 
 @inner
 def error_factor(order, h):
-    """Return by what a change of the algorithmic acceleration in a step becomes the error of its increment."""
+    """Return the factor from a change of the algorithmic acceleration in a step to the error of its increment."""
     return abs(0.5 * order.gamma - order.beta - 1.0 / 12.0) * h * h  # 1/6 - (1/2 - gamma)/2 - beta
 
 
 @inner
 def mean_square(model, work, i, jump):
-    """Return jumpᵀ M jump of body i by its mass and the square of its size: that of its points in the mean.
+    """Return jumpᵀ M jump of body i divided by its mass and the square of its size: the mean over its points.
 
     A body is measured alone, so that a heavy one, or one far away, hides nothing. jump, (6 + n_q,), translation in
     ground axes, is turned to body axes.
@@ -501,7 +506,7 @@ def mean_square(model, work, i, jump):
 
 @inner
 def one_step(model, work, memory, order, h):
-    """Advance the memory by one step, unless its error is above the one that is allowed.
+    """Advance the memory by one step, unless its error is above the allowed error.
 
     Return (status, index of what is singular, last correction by the allowed one, error; -1 if not estimated).
     """
@@ -524,7 +529,7 @@ def one_step(model, work, memory, order, h):
     last, last_of_states = math.inf, math.inf
     excess = math.inf
     holds = order.stabilized != 0 and solver.mu.shape[0] > 0
-    least_gap = SAFE * wanted / math.sqrt(mass) if mass > 0.0 else 0.0  # all bodies move by less than is wanted
+    least_gap = SAFE * wanted / math.sqrt(mass) if mass > 0.0 else 0.0  # all bodies are within the limit
     is_new, is_aged, first_of_rates = True, False, 0.0
     has_states = model.states.row.shape[0] + model.laws.equation.shape[0] > 0
     for iteration in range(order.max_iterations):
@@ -575,7 +580,7 @@ def one_step(model, work, memory, order, h):
         excess = norm / allowed if allowed > 0.0 else math.inf
         is_new = False
         of_states = 0.0
-        if has_states:  # they follow the bodies by one iteration
+        if has_states:  # velocities lag behind the bodies by one iteration
             of_states = correction_of_states(model, work, c_k) / order.tolerance
             if not math.isfinite(of_states):
                 work.solver.is_due, work.solver.has_late_gaps = 1, 0
@@ -610,7 +615,7 @@ def one_step(model, work, memory, order, h):
 
 @inner
 def is_too_long(model, work, h):
-    """Whether a step of size h that has converged is too long for a contact, see `connections.gap`."""
+    """Whether a converged step of size h is too long for a contact, see `connections.gap`."""
     if model.gaps.connection.shape[0] == 0:
         return False
     take_ends(model, work)
@@ -653,14 +658,14 @@ def angular_accelerations(model, work, memory, i, alpha_m, alpha_f):
 
 @inner
 def next_acceleration(a, before, now, alpha_m, alpha_f):
-    """Return (3), the algorithmic acceleration after a step, of vectors in axes that are one."""
+    """Return (3), the algorithmic acceleration after a step, for vectors in the same axes."""
     mean = add(scaled(1 - alpha_f, now), scaled(alpha_f, before))
     return scaled(1 / (1 - alpha_m), sub(mean, scaled(alpha_m, a)))
 
 
 @inner
 def keep_iterate(model, work, memory, h):
-    """Write the iterate, but for rotations, into the memory; count turns and sum work on by a step of size h."""
+    """Write the iterate, except rotations, into the memory; count turns and add work for a step of size h."""
     copy(work.state.r.reshape(memory.r.size), memory.r.reshape(memory.r.size))
     copy(work.state.q, memory.q)
     copy(work.state.u, memory.u)
@@ -698,14 +703,14 @@ def write_row(model, work, memory, t, rows):
     for j in range(model.body_loads.body.shape[0]):
         rows.load_case[k, j], _, _ = time_function(model.functions, model.body_loads.factor[j], t)
     if shares(model):
-        work.solver.is_due = 1  # the factors of the step are overwritten
+        work.solver.is_due = 1  # this overwrites the factors of the step
         if share_reactions(model, work, memory.h * memory.h):
             copy(work.state.w, rows.w[k])
 
 
 @inner
 def settle_row(model, work, memory, rows):
-    """Write accelerations and reactions of the row that was written last as they follow from positions and velocities.
+    """Write accelerations and reactions into the last row, computed from positions and velocities.
 
     In steps so short that they are noise otherwise: reactions of a step close its joints, whose gaps are known to
     rounding alone, and that by h² counts beside the accelerations. Rounding of velocities does not.
@@ -720,7 +725,7 @@ def settle_row(model, work, memory, rows):
     work.states.rho = 1.0
     copy(memory.w, work.state.w_start)
     evaluate(model, work, 1.0)
-    work.solver.is_due = 1  # the factors of the step are overwritten
+    work.solver.is_due = 1  # this overwrites the factors of the step
     if settle_accelerations(model, work, memory.h * memory.h):
         copy(work.state.u_dot, rows.u_dot[k])
         if not shares(model) or share_reactions(model, work, memory.h * memory.h):
@@ -729,7 +734,7 @@ def settle_row(model, work, memory, rows):
 
 @inner
 def is_noise(model, work, h):
-    """Whether rounding of positions by h² counts beside the accelerations."""
+    """Whether rounding of positions divided by h² is significant relative to the accelerations."""
     is_held, noise, size = False, 0.0, math.sqrt(dot(model.gravity, model.gravity))
     for k in range(model.rows.holds.shape[0]):
         is_held = is_held or model.rows.holds[k] != NOTHING
@@ -744,7 +749,7 @@ def is_noise(model, work, h):
 
 @inner
 def shares(model):
-    """Whether constraints that repeat others share their reactions."""
+    """Whether redundant constraints share their reactions."""
     for k in range(model.rows.soft.shape[0]):
         if model.rows.soft[k] > 0.0:
             return True
@@ -753,7 +758,7 @@ def shares(model):
 
 @inner
 def ratio_of_steps(model, memory, h):
-    """Return h over the size of the steps before, by which what `a` and u_dot differ by changes.
+    """Return h divided by the size of the previous steps, the factor on the difference between `a` and u_dot.
 
     Zero where steps grow in a system with contacts. What they differ by is then of the contact, and in the directions
     of joints of the scheme: it would grow with the step. So u_dot and a begin anew, from the equations of motion.
@@ -765,7 +770,7 @@ def ratio_of_steps(model, memory, h):
 
 @inner
 def resize(model, work, memory, t, h):
-    """Turn the algorithmic accelerations into those of a step of size h to t.
+    """Convert the algorithmic accelerations to those of a step of size h to t.
 
     Their distance from u_dot is of first order. The iterate is the state of the memory where steps may begin anew.
     """
@@ -781,7 +786,7 @@ def resize(model, work, memory, t, h):
 
 @inner
 def step_after(h, error, most_error, has_failed):
-    """Return the step to take after a good one of size h: local errors grow with its cube."""
+    """Return the size of the step after an accepted one of size h: local errors grow with its cube."""
     if most_error <= 0.0:
         return h if has_failed else MOST * h
     fitting = MOST * h if error <= 0.0 else SAFETY * h * (most_error / error) ** (1.0 / 3.0)
@@ -805,7 +810,7 @@ def time_loop(try_step, write):
 
     @inner
     def advance(model, work, memory, rows, others, order):
-        """Advance by n_steps of size h, the first of them number `first` from t0; write a row after every `every`-th.
+        """Advance by n_steps of size h, the first with the number `first` from t0; write a row at the interval `every`.
 
         The order is an `entry.Order`. With h_min above 0 each of these is divided into equal parts of at most the size
         that is wanted: one that fails, or whose error is above `most_error` (if above 0), is tried again, shorter, down
@@ -841,7 +846,7 @@ def time_loop(try_step, write):
                     if h_min > 0.0:
                         wanted = step_after(part, error, most_error, has_failed)
                         if has_gaps and most_error <= 0.0 and work.gaps.n_closed == 0:
-                            wanted = h  # a contact that is ahead is seen
+                            wanted = h  # an approaching contact is detected
                         memory.h_wanted = min(wanted, h, work.gaps.step)
                     has_failed = False
                     continue
@@ -865,7 +870,7 @@ def time_loop(try_step, write):
 
 @inner
 def is_resized(model, work, memory, order, h):
-    """Whether steps of size h differ from those before; the weights of the norm are then those of h."""
+    """Whether the step size h differs from that of the previous steps; the weights of the norm are updated to h."""
     if abs(h - memory.h) <= SAME * h:
         return False
     put_weights(model, work, order.beta * h * h)

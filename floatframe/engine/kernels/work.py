@@ -51,11 +51,12 @@ class Iterate(NamedTuple):
     u: Array = real(n_u, unit="m/s, rad/s, 1/s")  #: velocities
     u_dot: Array = real(n_u, unit="m/s², rad/s², 1/s²")  #: accelerations
     theta: Array = real(n_b, 3, unit="rad")  #: rotation since the beginning of the step, body axes
-    spins: IntArray = integer(n_b)  #: whether the step takes the spin about the axis of symmetry by itself
+    spins: IntArray = integer(n_b)  #: whether the step integrates the spin about the axis of symmetry separately
     w: Array = real(n_w, unit="N, N m")  #: wrenches of the connections on their markers A
     w_start: Array = real(n_w, unit="N, N m")  #: the same at the beginning of the step
     time: Array = real(unit="s")
-    angle: Array = real(n_angles, unit="rad")  #: those counted, where their rates lead: rotations are next to it
+    #: counted angles predicted by their rates; the counted rotations are those nearest to them
+    angle: Array = real(n_angles, unit="rad")
 
 
 class BodyWork(NamedTuple):
@@ -105,9 +106,9 @@ class LineWork(NamedTuple):
     s: Array = real(n_lines, unit="m")  #: place
     s_dot: Array = real(n_lines, unit="m/s")
     slope: Array = real(n_lines)  #: |r'|
-    by_place: Array = real(n_lines)  #: 1/|r'|: how s follows the point of B; 0 if it is driven
+    by_place: Array = real(n_lines)  #: 1/|r'|: factor with which s follows the point of B; 0 if s is prescribed
     n_0: Array = real(n_lines, 3)  #: r'/|r'|
-    kappa: Array = real(n_lines, 3, unit="rad/m")  #: turning of the axes by s
+    kappa: Array = real(n_lines, 3, unit="rad/m")  #: rotation of the axes by s
     curve: Array = real(n_lines, 3, unit="1/m")  #: r''
     slope_dot: Array = real(n_lines, 3, unit="1/s")  #: rate of r' at a place
     turning: Array = real(n_lines, 3, unit="rad/s²")  #: angular acceleration of the axes by s_dot
@@ -115,11 +116,12 @@ class LineWork(NamedTuple):
 
 
 class ConnectionWork(NamedTuple):
-    """Rows of connections, and what the bodies and the wrenches make of them."""
+    """Rows of connections, and their dependence on bodies and wrenches."""
 
     g: Array = real(n_w, unit="m, rad, kg m")  #: residual of the rows, scaled
     P: Array = real(n_m, most_rows, 12)  #: derivative of the rows by the motion of a marker (r, phi, v, omega)
-    P_a: Array = real(n_accelerated, most_rows, 6)  #: by the acceleration of a marker, without the weight c_k
+    #: derivative by the acceleration of a marker, without the weight c_k
+    P_a: Array = real(n_accelerated, most_rows, 6)
     V: Array = real(n_c, most_rows, most_rows)  #: derivative of the rows by their own wrench
     rate: Array = real(n_w, unit="m/s, rad/s")  #: of what the rows hold
     bias: Array = real(n_w, unit="m/s², rad/s²")  #: its second rate at zero u_dot
@@ -128,7 +130,7 @@ class ConnectionWork(NamedTuple):
 class PairWork(NamedTuple):
     """One bushing or contact, see kernels/connections/pair_force.py."""
 
-    law: Array = real(10, unit="N, N m, m/s")  #: F and M on A, N, of a contact v_0, as they follow from the motion
+    law: Array = real(10, unit="N, N m, m/s")  #: F and M on A, N, and v_0 of a contact, from the motion
     motion: Array = real(18)  #: variation of d, phi_A, phi_B, and of their rates
     change: Array = real(10)  #: of `law` by it
 
@@ -143,7 +145,7 @@ class BushingWork(NamedTuple):
     slope: Array = real(6, unit="N/m, N m")  #: of the tables
     v: Array = real(3, unit="m/s")  #: d_dot
     omega: Array = real(3, unit="rad/s")  #: of B less that of A
-    mean: Array = real(3, unit="rad/s")  #: of A and B, by their shares in the axes
+    mean: Array = real(3, unit="rad/s")  #: rotations of A and B, by their shares in the axes
     gamma: Array = real(3, unit="rad/s")  #: angular velocity of C
     p: Array = real(3, unit="N m")  #: f × e
     alpha: Array = real()
@@ -164,7 +166,7 @@ class ContactWork(NamedTuple):
     N: Array = real(3)
     d: Array = real(3, unit="m")
     rho: Array = real(3, unit="m")
-    V: Array = real(3, unit="m/s")  #: velocity of B at the point of contact as seen from A
+    V: Array = real(3, unit="m/s")  #: velocity of B at the point of contact relative to A
     V_t: Array = real(3, unit="m/s")  #: slip
     slip: Array = real(unit="m/s")  #: sqrt(|V_t|² + v_s²)
     gap: Array = real(unit="m")
@@ -181,10 +183,10 @@ class GapWork(NamedTuple):
 
     start: Array = real(n_gaps, unit="m, rad")  #: at its beginning
     end: Array = real(n_gaps, unit="m, rad")  #: at its end
-    wrench: Array = real(n_m, 6)  #: on markers, whose work is the change of a gap
-    step: Array = real(unit="s")  #: the next may be as long, or the one that is too long should be
-    shortest: IntArray = integer()  #: which of them says so, -1 for none
-    n_closed: IntArray = integer()  #: how many are closed at its end
+    wrench: Array = real(n_m, 6)  #: on markers, conjugate to the change of a gap
+    step: Array = real(unit="s")  #: allowed size of the next step, or of the repeated one
+    shortest: IntArray = integer()  #: gap that determines it, -1 for none
+    n_closed: IntArray = integer()  #: number of gaps that are closed at its end
 
 
 class UserWork(NamedTuple):
@@ -192,7 +194,7 @@ class UserWork(NamedTuple):
 
     inputs: Array = real(n_inputs)  #: t, values and rates of the coordinates, states
     outputs: Array = real(n_outputs)  #: forces, rates of states
-    trial: Array = real(n_outputs)  #: the same, for differences
+    trial: Array = real(n_outputs)  #: copy for differences
     gradients: Array = real(n_gradients)  #: of the outputs by the inputs, row by row
 
 
@@ -200,9 +202,9 @@ class LawWork(NamedTuple):
     """One public element, see kernels/connections/element_law.py."""
 
     inputs: Array = real(n_law_inputs)  #: t, motion of its markers, states, multipliers
-    outputs: Array = real(n_law_outputs)  #: wrenches, rates of states, what is held, what is seen
+    outputs: Array = real(n_law_outputs)  #: wrenches, rates of states, held quantities, outputs
     trial: Array = real(n_law_outputs)  #: the same along the motion
-    slopes: Array = real(n_law_slopes)  #: derivatives of all outputs but those seen by the variations, row by row
+    slopes: Array = real(n_law_slopes)  #: derivatives of all results except outputs by the variations, row by row
 
 
 class StateWork(NamedTuple):
@@ -210,7 +212,7 @@ class StateWork(NamedTuple):
 
     base: Array = real(n_states)  #: known part of the value after the step
     rate_base: Array = real(n_states, unit="1/s")  #: known part of its algorithmic rate
-    kappa: Array = real(n_states, unit="s")  #: by which it follows its rate
+    kappa: Array = real(n_states, unit="s")  #: factor from its rate to its value
     rho: Array = real()
 
 
@@ -218,7 +220,7 @@ class TapeWork(NamedTuple):
     """One expression."""
 
     results: Array = real(n_results)  #: of its operations
-    bars: Array = real(n_results)  #: derivatives of its value by them
+    bars: Array = real(n_results)  #: derivatives of its value by its inputs
 
 
 class Solver(NamedTuple):
@@ -236,8 +238,8 @@ class Solver(NamedTuple):
     block_pivot: IntArray = integer(n_w)
     mu: Array = real(n_w)  #: correction of the wrenches, times c_k
     y: Array = real(n_u)  #: correction of the bodies
-    y_rate: Array = real(n_u)  #: correction of the velocities of bodies alone, over c_d/c_k
-    surplus: Array = real(n_b, 3, unit="rad")  #: by how much it turns bodies beyond their unknowns
+    y_rate: Array = real(n_u)  #: velocity correction of the bodies only, divided by c_d/c_k
+    surplus: Array = real(n_b, 3, unit="rad")  #: additional rotation of the bodies due to it, beyond their unknowns
     late_gap: Array = real(n_w)  #: of velocities, over c_d/c_k, that the first iteration of the step before left open
     late_gap_change: Array = real(n_w)  #: by how much that was more than in the step before it
     has_late_gaps: IntArray = integer()  #: whether they are of steps like the next one
@@ -246,36 +248,36 @@ class Solver(NamedTuple):
     motion: Array = real(12)  #: correction of the motion of one marker
     row: Array = real(12)  #: one row of P in body axes
     wrench: Array = real(6)  #: correction of the wrench on one marker, body axes
-    c_m: Array = real()  #: coefficients for which H was factorised, zero for never
+    c_m: Array = real()  #: coefficients for which H was factorised, zero if never
     c_d: Array = real(unit="s")
     c_k: Array = real(unit="s²")
     is_due: IntArray = integer()  #: whether to factorise at the next iterate
-    price: Array = real()  #: of new factors, in iterations
-    n_steps: IntArray = integer()  #: done with the present factors
-    n_spent: Array = real()  #: iterations of these steps, and the price of the factors
+    price: Array = real()  #: cost of new factors, in iterations
+    n_steps: IntArray = integer()  #: number of steps with the present factors
+    n_spent: Array = real()  #: iterations of these steps, plus the cost of the factors
 
 
 class Counted(NamedTuple):
-    """What has been done since these arrays were made."""
+    """Counts since these arrays were made."""
 
     evaluations: IntArray = integer()
     factorisations: IntArray = integer()
     iterations: IntArray = integer()
-    no_number: IntArray = integer()  #: 1 + the first element of a step whose law gave what is no number, 0 for none
+    no_number: IntArray = integer()  #: 1 + the first element of a step whose law was not finite, 0 for none
     stopped: IntArray = integer()  #: 1 + the first output of a step that ends the run, 0 for none
-    rows: IntArray = integer()  #: written into the results of the present call
+    rows: IntArray = integer()  #: rows written into the results of the present call
 
 
 class Past(NamedTuple):
-    """The memories after each of the last steps, as many as there is room for; see kernels/past.py."""
+    """The memories after each of the last steps, if there is space for them; see kernels/past.py."""
 
-    n: IntArray = integer()  #: kept so far; from zero on where the caller says so
+    n: IntArray = integer()  #: number stored so far; the caller resets it to zero
     r: Array = real(n_past, n_b, 3, unit="m")
     p: Array = real(n_past, n_b, 4)
     q: Array = real(n_past, n_q)
     u: Array = real(n_past, n_u, unit="m/s, rad/s, 1/s")
     u_dot: Array = real(n_past, n_u, unit="m/s², rad/s², 1/s²")
-    a: Array = real(n_past, n_remembered)  #: what the method remembers: algorithmic accelerations, or multipliers
+    a: Array = real(n_past, n_remembered)  #: further memory of the method: algorithmic accelerations, or multipliers
     w: Array = real(n_past, n_w, unit="N, N m")
     work: Array = real(n_past, 2, unit="J")  #: given, taken
     power: Array = real(n_past, 2, unit="W")  #: given, taken
@@ -308,14 +310,14 @@ class Work(NamedTuple):
 
 
 def state_sizes(model: Model) -> dict[str, int]:
-    """Return the sizes of what changes with time, by name."""
+    """Return the sizes of the arrays that change with time, by name."""
     bodies = model.bodies
     n_u, n_w = int(bodies.u0[-1]), int(model.connections.w0[-1])
     return {"n_b": len(bodies.kind), "n_q": int(bodies.q0[-1]), "n_u": n_u, "n_w": n_w}
 
 
 def sizes_of(model: Model) -> dict[str, int]:
-    """Return the sizes of all arrays of a system by name; `ValueError` if those of the model do not fit together."""
+    """Return the sizes of all arrays of a system by name; `ValueError` if those of the model are inconsistent."""
     bodies, markers, users = model.bodies, model.markers, model.users
     is_end = (markers.connection >= 0) & (markers.body >= 0)
     n_coordinates = np.diff(model.elements.coordinate0)[len(model.elements.core) - len(users.n_states) :]
@@ -340,7 +342,7 @@ def sizes_of(model: Model) -> dict[str, int]:
 
 
 def law_sizes(head: IntArray) -> dict[str, int]:
-    """Return the sizes of the arrays of a public element that suffice for all of them."""
+    """Return the sizes of the arrays of a public element that suffice for all elements."""
     n, width, n_z, n_lam, n_seen = head[:, :5].T
     n_out = 6 * n + n_z + n_lam
     return {
@@ -351,7 +353,7 @@ def law_sizes(head: IntArray) -> dict[str, int]:
 
 
 def acceleration_sizes(model: Model) -> dict[str, int]:
-    """Return the sizes of what belongs to markers whose acceleration is an input of a law."""
+    """Return the sizes of the arrays of markers whose acceleration is an input of a law."""
     markers = model.markers
     accelerated = markers.accelerated >= 0
     moving = accelerated & (markers.body >= 0)
@@ -362,12 +364,12 @@ def acceleration_sizes(model: Model) -> dict[str, int]:
     }
 
 
-KEPT = 4  # sizes of as many models
+KEPT = 4  # number of models whose sizes are cached
 kept: list[tuple[Model, dict[str, int]]] = []
 
 
 def kept_sizes_of(model: Model) -> dict[str, int]:
-    """Return `sizes_of` a model that is used again and again, from what is kept; models keep their sizes."""
+    """Return `sizes_of` for a model that is used repeatedly, from a cache; the sizes of a model are constant."""
     for known, sizes in kept:
         if known is model:
             return sizes
