@@ -82,7 +82,7 @@ def test_a_drive_against_what_the_joints_hold_is_named():
         RevoluteJoint("one", GROUND, Marker("bar"), axis=(0, 0, 1)),
         RevoluteJoint("two", GROUND, Marker("bar", position=(1, 0, 0)), axis=(0, 0, 1), motions={"angle": 0.0}),
     ]
-    with pytest.raises(ModelError, match="the drive of 'angle' of joint 'two' prescribes what the joints"):
+    with pytest.raises(ModelError, match="the drive of 'angle' of joint 'two' prescribes a motion that the joints"):
         consistent_state(System([bar], hinges))
 
 

@@ -451,7 +451,7 @@ def test_impossible_layups_are_refused(make, words):
 
 def test_cells_across_the_direction_and_layers_that_do_not_exist_are_refused():
     mesh = fm.flat_plate(1.0, 1.0, 2, 2)
-    with pytest.raises(ShellError, match=r"4 quad cells stand across direction \(0.0, 0.01, 1.0\), first cell 0"):
+    with pytest.raises(ShellError, match=r"4 quad cells are normal to direction \(0.0, 0.01, 1.0\), first cell 0"):
         shell(mesh, laminate(*ODD, direction=(0, 0.01, 1)))
     body = shell(mesh, laminate(*ODD))
     with pytest.raises(ShellError, match=r"quad 1 has 4 layers; expected 0..3, got 4"):

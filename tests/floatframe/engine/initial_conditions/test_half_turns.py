@@ -27,7 +27,7 @@ def body(turn):
 def test_a_fixed_orientation_also_vanishes_at_half_a_turn_and_this_is_told(axis):
     joint = FixedJoint("weld", Marker(GROUND), Marker("body"), rotation=np.eye(3))
     consistent_state(System([body(0.3 * np.array(axis))], [joint]))  # near by it is turned back
-    with pytest.raises(ModelError, match="joint 'weld' is closed half a turn away from the orientation that it holds"):
+    with pytest.raises(ModelError, match="joint 'weld' is closed half a turn away from its orientation"):
         consistent_state(System([body(np.pi * np.array(axis))], [joint]))
 
 

@@ -140,7 +140,7 @@ def test_a_folder_with_a_flexible_link_is_the_same_system(beam, tmp_path):
         write_system(robot_system(robot, flexible=arm(beam, tmp_path)[1]), tmp_path / "no")
     with pytest.raises(UrdfError, match=r"link 'upper' is flexible, so that its frame is no place.*: root, tip"):
         found.place("upper")
-    with pytest.raises(UrdfError, match="URDF has no flexible bodies; put rigid ones in the place of upper"):
+    with pytest.raises(UrdfError, match="URDF has no flexible bodies; replace by rigid bodies: upper"):
         robot_of_system(found.system)
 
 
@@ -148,7 +148,7 @@ def test_a_folder_with_a_flexible_link_is_the_same_system(beam, tmp_path):
     ("changes", "words"),
     [
         ({"rotation_vector": (0, 0, 0)}, r"'tip' is 1\.131 m from joint 'elbow', at \[0\.8, .*check position"),
-        ({"interfaces": {"shoulder": "root"}}, "at which interface is joint 'elbow'"),
+        ({"interfaces": {"shoulder": "root"}}, "the interface of joint 'elbow' is unknown"),
         ({"interfaces": {"shoulder": "root", "elbow": "top"}}, "no interface 'top'; did you mean 'tip'"),
     ],
 )
