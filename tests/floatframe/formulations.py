@@ -67,9 +67,9 @@ EXCEPTIONS: dict[str, str] = {
 
 def take_relative() -> None:
     """Make the relative formulation that of all that is not given one."""
+    import floatframe.simulation.integrate as integration
     from floatframe import linearize, static_equilibrium, steady_rotation
     from floatframe.integrators.generalized_alpha import GeneralizedAlpha
-    from floatframe.simulation import integration
 
     for function in (linearize, static_equilibrium, steady_rotation):
         function.__kwdefaults__["formulation"] = "relative"

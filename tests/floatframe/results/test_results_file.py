@@ -118,7 +118,7 @@ def test_an_interrupt_while_something_is_freed_ends_the_run():
 
 KILLED = """
 import sys
-from floatframe.simulation import integration
+import floatframe.simulation.integrate as integration
 from tests.floatframe.results.test_results_file import SYSTEM, METHOD
 integration.SEGMENT_SECONDS = 0.02
 integration.integrate(SYSTEM, METHOD, 1e6, 1e-3, output=sys.argv[1], batch_steps=20, output_every=10)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+import floatframe.simulation.integrate as integration
 from floatframe import (
     GROUND,
     AngleSensor,
@@ -39,7 +40,6 @@ from floatframe import (
 )
 from floatframe.model.functions.time_functions import harmonic, polynomial_of_time
 from floatframe.model.rotations import rotation_matrix
-from floatframe.simulation import integration
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
 FAST = 100.0  # rad/s; 100 steps of 1 ms are 1.6 turns
