@@ -65,8 +65,8 @@ def carry_of_record(record: Mapping[str, Array], system: System) -> tuple[Carry,
 
 def system_digest(system: System, integrator: Integrator) -> str:
     """Return the sha256 of everything that determines the motion: compiled system, start, method and parameters."""
-    # type: ignore[call-overload]
-    digest = hashlib.sha256(repr((type(integrator).__name__, asdict(integrator))).encode())
+    parameters = asdict(integrator)  # type: ignore[call-overload]
+    digest = hashlib.sha256(repr((type(integrator).__name__, parameters)).encode())
     if events_of(system):
         digest.update(repr(events_of(system)).encode())
     compiled = compiled_system(system)

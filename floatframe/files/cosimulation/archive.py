@@ -294,8 +294,10 @@ def licences(package: str) -> dict[str, bytes]:
     except PackageNotFoundError:
         return {}
     texts = [each for each in files if each.name.upper().startswith(("LICENSE", "LICENCE", "NOTICE"))]
-    # type: ignore[attr-defined]
-    return {f"documentation/licenses/{package}-{each.name}.txt": each.locate().read_bytes() for each in texts}
+    return {
+        f"documentation/licenses/{package}-{each.name}.txt": each.locate().read_bytes()  # type: ignore[attr-defined]
+        for each in texts
+    }
 
 
 def documentation(about: Description, variables: Sequence[Variable], page: str) -> str:
