@@ -283,6 +283,21 @@ def other_numbers(body: ReducedBody, rng: np.random.Generator) -> ReducedBody | 
     return replace(body, numbering=replace(body.numbering, nodes=np.roll(numbers, 1)))
 
 
+def modal_forces(change: Callable[[np.ndarray, np.random.Generator], Any]) -> Corruption:
+    """Modal forces of the first load case, if it works on a mode: one on dofs that the frame holds does not."""
+
+    def spoil(body: ReducedBody, rng: np.random.Generator) -> ReducedBody | None:
+        if not body.load_cases:
+            return None
+        first = body.load_cases[0]
+        largest = np.linalg.norm(first.force) * np.abs(body.Phi).max(initial=0.0)
+        if np.abs(first.h).max(initial=0.0) <= 1e-3 * largest:
+            return None
+        return of("load_cases.h", change)(body, rng)
+
+    return spoil
+
+
 def other_set(body: ReducedBody, rng: np.random.Generator) -> ReducedBody | None:
     for k, each in enumerate(body.numbering.sets):
         if len(each.members) > 1:
@@ -349,8 +364,8 @@ CORRUPTIONS: dict[str, tuple[str, Corruption]] = {
     "quadratic modes of wrong sign": ("quadratic-modes", of("quadratic", times(-1.0))),
     "quadratic modes of nodes shuffled": ("quadratic-modes", of("quadratic", shuffled(0))),
     "quadratic modes of axes exchanged": ("quadratic-modes", of("quadratic", exchanged(1, [1, 0, 2]))),
-    "load case: modal forces of wrong sign": ("load-cases", of("load_cases.h", times(-1.0))),
-    "load case: modal forces shuffled": ("load-cases", of("load_cases.h", shuffled(0))),
+    "load case: modal forces of wrong sign": ("load-cases", modal_forces(times(-1.0))),
+    "load case: modal forces shuffled": ("load-cases", modal_forces(shuffled(0))),
     "load case: resultant twice": ("load-cases", of("load_cases.force", times(2.0))),
     "load case: torque of wrong sign": ("load-cases", of("load_cases.torque", times(-1.0))),
     "load case renamed": ("load-cases", of("load_cases.name", lambda x, rng: "another")),

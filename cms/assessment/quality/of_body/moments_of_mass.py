@@ -17,6 +17,7 @@ __all__ = ["check_gram", "check_moments_of_shapes"]
 
 ROUNDING = 1e3 * np.finfo(float).eps  #: of the Gram matrix about the origin of B, relative
 LEAST_NODES = 60  #: smallest number of nodes that can represent the mass of a body
+EVEN = 0.3  #: weight of equal masses beside the second moment
 CLEAR = 0.1  #: smallest moment whose direction is judged, relative to the largest that the mass could have
 
 
@@ -45,7 +46,7 @@ def check_gram(reduced: ReducedBody) -> QualityRecord:
 def check_moments_of_shapes(reduced: ReducedBody) -> QualityRecord:
     """Moments are parallel to those of masses at the kept nodes, with the shapes there.
 
-    (1) find the masses with the right sum and centre that are nearest to equal masses
+    (1) find masses near to equal masses with the sum, the centre and about the second moment of the file
     (2) compute P of each mode, and S_kl without its trace, of these masses
     (3) compute the cosine between these moments and those of the file, if both are at least `CLEAR` of the largest that
         the mass could have
@@ -79,13 +80,28 @@ def check_moments_of_shapes(reduced: ReducedBody) -> QualityRecord:
 
 
 def masses_at_nodes(reduced: ReducedBody) -> Array | None:
-    """Return the masses nearest to equal masses with the correct sum and centre, (n,); None if one is negative."""
-    moments, L = reduced.moments, body_length(reduced)
-    c = (np.asarray(reduced.nodes) - moments.center_of_mass) / L
-    rows, equal = np.vstack([np.ones(len(c)), c.T]), np.full(len(c), 1 / len(c))
-    change, *_ = np.linalg.lstsq(rows, np.eye(4)[0] - rows @ equal, rcond=1e-9)
-    weights = equal + change
-    return np.asarray(moments.m * weights) if weights.min() >= 0 else None
+    """Return the masses near to equal masses with the sum and centre of the file, (n,); None if one is negative.
+
+    Nodes of the surface lie farther out than the mass, so equal masses have a second moment that is up to twice too
+    large. The masses w minimise |R(w) - R|² + `EVEN` n |w - 1/n|² with the correct sum and centre; total mass and
+    radius of gyration are one here. Where one of the masses is negative, the second moment is left out.
+    """
+    moments, n = reduced.moments, len(reduced.nodes)
+    center = moments.center_of_mass
+    R = moments.R / moments.m - np.outer(center, center)
+    radius = np.sqrt(max(float(np.trace(R)), 0.0)) or body_length(reduced)
+    c = (np.asarray(reduced.nodes) - center) / radius
+    i, j = np.triu_indices(3)
+    rows = np.vstack([np.ones(n), c.T, (c[:, i] * c[:, j]).T])
+    wanted = np.concatenate([[1.0], np.zeros(3), R[i, j] / radius**2])
+    free = np.concatenate([np.zeros(4), np.full(6, EVEN * n)])
+    for k in (10, 4):
+        A = rows[:k]
+        y, *_ = np.linalg.lstsq(A @ A.T + np.diag(free[:k]), wanted[:k] - A.mean(axis=1), rcond=1e-12)
+        weights = 1 / n + A.T @ y
+        if weights.min() >= 0:
+            return np.asarray(moments.m * weights)
+    return None
 
 
 def cosines(a: Array, b: Array) -> Array:

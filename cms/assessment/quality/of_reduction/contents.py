@@ -374,7 +374,10 @@ def carried_damping(case: Case, damping: Damping | None, frame: Frame | HeldFram
 
 
 def compare_load_cases(case: Case) -> Iterator[Compared]:
-    """Resultants and modal forces over the sum of the nodal forces."""
+    """Resultants and modal forces over the sum of the nodal forces.
+
+    A load on dofs that the frame holds works on no mode: its modal forces are rounding errors of the shapes there.
+    """
     file, expected = case.reduced.load_cases, case.expected.load_cases
     yield same("load_cases.name", tuple(each.name for each in file), tuple(each.name for each in expected))
     is_turn = case.body.dofs[:, 1] >= 3
@@ -384,7 +387,8 @@ def compare_load_cases(case: Case) -> Iterator[Compared]:
         yield same("load_cases.kind", own.kind, made.kind, own.name)
         yield apart("load_cases.force", own.force, made.force, force, own.name)
         yield apart("load_cases.torque", own.torque, made.torque, force * case.reach, own.name)
-        yield apart("load_cases.h", own.h, made.h, size @ np.abs(case.Phi), own.name, "mode")
+        work = np.maximum(size @ np.abs(case.Phi), NEGLIGIBLE * force * mode_size(case.reduced))
+        yield apart("load_cases.h", own.h, made.h, work, own.name, "mode")
 
 
 def compare_sources(case: Case) -> Iterator[Compared]:

@@ -7,8 +7,10 @@ from numpy.testing import assert_allclose
 from cms.assessment.quality.body_check import check_body
 from cms.assessment.quality.of_body.effective_mass import effective_mass, effective_mass_at
 from cms.assessment.quality.of_body.interface_motions import missing_motions
+from cms.assessment.quality.of_body.moments_of_mass import check_moments_of_shapes, masses_at_nodes
 from cms.assessment.quality.of_body.step_size import step_size
 from cms.assessment.quality.reference.free_pencil import free_elastic_modes, free_pencil
+from cms.body.invariants import moments_from_gram
 from cms.errors import BodyError
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets import craig_bampton
@@ -17,6 +19,7 @@ from cms.reduction.basis.frames import NodalFrame, TisserandFrame
 from cms.reduction.reduction import reduce
 from fe_models.body.couplings.couplings import couple
 from tests.bodies import bar, beam
+from tests.synthetic import synthetic_reduced_body
 
 FRAMES = [
     TisserandFrame(), NodalFrame("left"), NodalFrame("right"), NodalFrame(),
@@ -221,3 +224,46 @@ def test_damping_is_told_in_ratios(nodal, tisserand):
     found = {r.name: r for r in check_body(nodal)}["damping"]
     assert_allclose(found.data["ratio"], 0.01, rtol=1e-9)
     assert {r.name: r for r in check_body(tisserand)}["damping"].value == 1.0
+
+
+def skinned_bar(s):
+    """Return a bar of even mass that keeps the nodes of its skin, with a mode u_x ~ z³ - s z; its moments are exact."""
+    x, z = np.linspace(-0.2, 0.2, 5), np.linspace(-1.0, 1.0, 5)
+    grid = np.stack(np.meshgrid(x, x, z, indexing="ij"), axis=-1).reshape(-1, 3)
+    nodes = grid[(np.abs(grid[:, :2]).max(axis=1) > 0.19) | (np.abs(grid[:, 2]) > 0.99)]
+    points, weights = np.polynomial.legendre.leggauss(4)  # exact
+    p = np.stack(np.meshgrid(0.2 * points, 0.2 * points, points, indexing="ij"), axis=-1).reshape(-1, 3)
+    w = np.einsum("i,j,k->ijk", weights, weights, weights).ravel() / 8
+
+    def shape(at):
+        u = np.zeros((len(at), 3, 1))
+        u[:, 0, 0] = (at[:, 2] ** 3 - s * at[:, 2]) / np.sqrt(1 / 7 - 2 * s / 5 + s**2 / 3)
+        return u
+
+    a = np.concatenate([np.ones((len(p), 1)), p, shape(p)[:, :, 0]], axis=1)
+    made = synthetic_reduced_body(n_q=1, n_nodes=len(nodes))
+    return replace(
+        made, nodes=nodes, Phi=shape(nodes), interfaces=(), moments=moments_from_gram(a.T @ (w[:, None] * a))
+    )
+
+
+def test_masses_at_the_nodes_do_not_reverse_the_moments_of_a_sound_body():
+    """Of equal masses ∫ z u_x is large and positive: a sound body failed (seed 93119). Of the bar it is negative."""
+    body = skinned_bar(0.8)
+    size = np.linalg.norm(np.ptp(body.nodes, axis=0))
+    of_equal = body.nodes[:, 2] @ body.Phi[:, 0, 0] / len(body.nodes)
+    assert body.moments.P[2, 0, 0] < -0.1 * size
+    assert of_equal > 0.1 * size
+    weights = masses_at_nodes(body)
+    assert weights is not None
+    assert weights.min() >= 0
+    assert_allclose([weights.sum(), *(weights @ body.nodes)], [1, 0, 0, 0], atol=1e-12)
+    assert weights * body.nodes[:, 2] @ body.Phi[:, 0, 0] < 0
+    assert check_moments_of_shapes(body).verdict in ("pass", "info")
+
+
+def test_reversed_moments_are_found_by_the_shapes_at_the_nodes():
+    body = skinned_bar(0.0)
+    assert check_moments_of_shapes(body).verdict == "pass"
+    reversed_one = replace(body, moments=replace(body.moments, P=-np.asarray(body.moments.P)))
+    assert check_moments_of_shapes(reversed_one).verdict == "fail"
