@@ -147,8 +147,8 @@ class Trajectory:
 
         States of elements and user forces, and counted angles, go on in that motion (`State.w`, `State.angle`).
         """
-        arrays = [self.source.read(name)[i_time] for name in ("position", "euler_parameters", "q", "u", "w")]
-        return State(*arrays, None if self.head.angles is None else self.source.read("angle")[i_time])
+        r, p, q, u, w = (self.source.read(name)[i_time] for name in ("position", "euler_parameters", "q", "u", "w"))
+        return State(r, p, q, u, w, None if self.head.angles is None else self.source.read("angle")[i_time])
 
     def reaction(self, name: str) -> Reaction:
         """Return force and moment that a joint or spring-damper exerts on its marker A."""

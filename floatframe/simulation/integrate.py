@@ -3,7 +3,7 @@
     (1) start       bodies made consistent; memory of the integrator and results at the start    `Integrator.start`
     (2) step        a batch of steps in one compiled call, cut where laws jump and events happen  `next_steps`
     (3) observe     what steps, energy, laws and ranges of validity say about the motion          `Run.observe`
-    (4) write       results, records to go on from, and progress                                  `Run.write`
+    (4) write       results, records to go on from, and progress                   `Run.keep`, `Run.close_segment`
 
 `resume` begins with the record of an interrupted run in place of (1). The memory between steps is the `Carry` of the
 integrator; results of output times are `Rows`.

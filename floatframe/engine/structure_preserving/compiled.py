@@ -35,7 +35,7 @@ class Filter:
 def filter_of(body: CentralBody, h: float, rho_inf: float) -> Filter:
     """Return the dissipation of the modes of a body for steps of size h."""
     M = body.mass_matrix
-    E = np.linalg.solve(M[:3, :3], M[:3, 3:])
+    E = np.asarray(np.linalg.solve(M[:3, :3], M[:3, 3:]), dtype=np.float64)
     effective = M[3:, 3:] - M[3:, :3] @ E
     squares, Phi = la.eigh(body.K, 0.5 * (effective + effective.T))
     x = h**2 * np.maximum(squares, 0.0)
