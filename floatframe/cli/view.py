@@ -2,18 +2,17 @@
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
 from cms.cli.console import guarded, output_path, say, stages
 from floatframe.cli.analyses import Axis, Center, Speed, linearized
 from floatframe.cli.analyses import read as read_model
-from floatframe.model.system import System
-from floatframe.results.energy_balance import balance_defect, energy_scale
-from floatframe.results.sensors import measured
-from floatframe.results.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from floatframe.model.system import System
+    from floatframe.results.trajectory import Trajectory
 
 __all__ = ["register", "run_record"]
 
@@ -81,7 +80,7 @@ def view_command(
                             magnification=magnification)  # fmt: skip
             else:
                 if magnification is not None:
-                    raise ModelError("--magnification: a mode has no size of its own; choose how large in the page")
+                    raise ModelError("--magnification: amplitude of a mode is arbitrary; choose it in the page")
                 page = view_modes(model, linear.equilibrium, system_modes(linear), path, n_modes=n_modes, color=color,
                                   largest=largest)  # fmt: skip
     else:
@@ -107,11 +106,15 @@ def page_path(output: Path | None, file: Path, inputs: tuple[Path | str, ...]) -
 # the quality of a computed motion as a record, printed by `floatframe run` and `floatframe info` ----------------------
 
 
-def run_record(trajectory: Trajectory, system: System | None = None) -> dict[str, Any]:
+def run_record(trajectory: "Trajectory", system: "System | None" = None) -> dict[str, Any]:
     """Return times, bodies, energies, energy balance, drift and ranges of sensors, in plain types and units of the run.
 
     `energy_defect` is the largest |balance defect| divided by `energy_scale`; a drift is the largest over time.
     """
+    import numpy as np
+
+    from floatframe.results.energy_balance import balance_defect, energy_scale
+
     energies, scale = trajectory.energies, energy_scale(trajectory)
     defect = float(np.abs(balance_defect(trajectory)).max(initial=0.0))
     drifts = {name: trajectory.drift(name) for name in trajectory.head.joints}
@@ -166,8 +169,10 @@ def run_record(trajectory: Trajectory, system: System | None = None) -> dict[str
     }
 
 
-def sensors_record(system: System, trajectory: Trajectory) -> dict[str, Any]:
+def sensors_record(system: "System", trajectory: "Trajectory") -> dict[str, Any]:
     """Return unit, least, greatest and last value of every column of the sensors of a system."""
+    from floatframe.results.sensors import measured
+
     return {
         f"{measurement.sensor} {name}": {
             "unit": measurement.units[name],

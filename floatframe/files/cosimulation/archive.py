@@ -345,6 +345,7 @@ from pathlib import Path
 
 try:
     from floatframe.errors import ConvergenceError
+    from floatframe.files.cosimulation.archive import HostedUnit, words_of
 except ImportError as error:  # told by the instance: the binary does not survive an error of the script itself
     missing = (
         f"this FMU needs floatframe in the Python that hosts it ({{sys.executable}}, {{sys.version.split()[0]}}), "

@@ -40,7 +40,7 @@ def test_angles_about_two_axes_are_told(axes, caplog):
     apart = np.abs(cardan - theta).max() / np.linalg.norm(theta)
     assert_allclose(note.largest, apart, rtol=0.05)
     assert note.largest > note.limit == 0.05
-    assert "forces.bush, t = 0: it turns about several axes so far that its angles, the components" in caplog.text
+    assert "forces.bush, t = 0: it rotates so far about several axes that its angles, the components" in caplog.text
     assert notes_of(turning(0.4 * theta, axes=axes)) == {}
 
 

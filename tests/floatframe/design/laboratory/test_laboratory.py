@@ -263,15 +263,15 @@ def test_command_and_picture(folder, result, tmp_path, capsys, monkeypatch):
 
 
 def test_the_full_model_is_where_cases_lead(folder, tmp_path):
-    """Unreduced inside the system: distances from it fall with the modes, and the richest is almost it."""
+    """Unreduced inside the system: distances from it fall with the modes, down to modes of it that no step resolves."""
     system, run = read_system(folder / "spin.toml")
     found = ff.study(
         system, "blade", folder / "blade.toml", ff.grid(mode_sets=("craig-bampton-ir",), n_modes=(0, 2, 6)),
         integrator=run.integrator, t_end=0.2, h=run.h, reference=ff.FullModel(), sensors=["tip"],
     )  # fmt: skip
     errors = [row.error for row in found.cases]
-    assert errors[0] > errors[1] > errors[2] > 0
-    assert errors[2] < errors[0] / 10
+    assert errors[0] > 10 * errors[1]
+    assert errors[0] > 10 * errors[2] > 0
     assert "full finite element model" in found.reference
     with pytest.raises(ModelError, match=r"full model of body 'blade' has \d+ dofs, more than 20"):
         ff.study(

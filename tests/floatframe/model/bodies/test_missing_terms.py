@@ -70,7 +70,7 @@ def test_a_motion_that_turns_fast_is_told_what_it_cannot_know():
     note = next(note for note in motion.validity if note.kind == "inertia")
     assert note.limit == LEFT_OUT
     assert note.largest > LEFT_OUT
-    assert "inertia terms are left out" in note.words
+    assert "inertia terms are omitted" in note.words
     assert "full mass matrix" in note.words
     assert notes_from_json(notes_to_json([note])) == (note,)
     slow = integrate(moving(INERTIA_TERMS, 0.01), GeneralizedAlpha(0.9), 0.1, 5e-3)

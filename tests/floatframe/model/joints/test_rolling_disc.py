@@ -129,7 +129,7 @@ def test_a_disc_that_lies_flat_is_refused():
 @pytest.mark.parametrize(
     ("ends", "words"),
     [
-        ((GROUND, Marker("disc")), r"marker_a: expected a Marker, a point of the plane, as Marker\('ground'"),
+        ((GROUND, Marker("disc")), r"marker_a: expected a Marker, a point of the plane, such as Marker\('ground'"),
         (
             (Marker(GROUND), "disc"),
             r"marker_b: expected a Marker, the centre of the disc, .* got the body 'disc' alone",
