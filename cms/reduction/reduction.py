@@ -55,6 +55,8 @@ __all__ = ["assembled", "reduce"]
 
 log = logging.getLogger(__name__)
 
+FAR = 10.0  #: distance of the frame from the mesh origin over the radius of gyration, beyond which R loses two digits
+ROUNDING = 1e3 * np.finfo(float).eps  #: of a second moment about the mesh origin, relative
 SHAPES_AT_ONCE = 64  #: number of shapes whose displacements of all nodes are held at a time
 
 
@@ -242,11 +244,33 @@ def kept_nodes(body: FEBody) -> IntArray:
 
 def reduced_moments(body: FEBody, Phi: Array, frame: BodyFrame) -> Moments:
     """Return the canonical moments of the shapes in B, from exact element integrals if the body has them."""
-    if body.element_model is not None:
-        gram = body.element_model.mass_gram(body.mesh_displacement(Phi))
-    else:
-        gram = gram_from_matrices(body, Phi)
-    return moments_from_gram(gram_in_frame(gram, frame), is_exact=body.element_model is not None)
+    if body.element_model is None:
+        gram = gram_from_matrices(body, Phi, frame.origin)
+        return moments_from_gram(gram_in_frame(gram, replace(frame, origin=np.zeros(3))), is_exact=False)
+    gram = gram_in_frame(body.element_model.mass_gram(body.mesh_displacement(Phi)), frame)
+    return moments_from_gram(with_near_second_moment(gram, body, frame))
+
+
+def with_near_second_moment(gram: Array, body: FEBody, frame: BodyFrame) -> Array:
+    """Return the Gram matrix with first and second moment about the origin of B where that is far from the mesh origin.
+
+    About the mesh origin R loses (distance / size)² digits. A unit rotation about the origin of B moves a point by the
+    coordinates that are needed: e_z × c has c_x along y. The given array is overwritten, if the rotations differ from
+    the positions by rounding only; a body that is held or planar has not all of them.
+    """
+    assert body.element_model is not None
+    own, far = float(np.trace(gram[1:4, 1:4])), float(gram[0, 0] * (frame.origin @ frame.origin))
+    if not far > FAR**2 * own:
+        return gram
+    turns = geometric_rigid_modes(body, origin=frame.origin)[:, 3:]
+    near = body.element_model.mass_gram(body.mesh_displacement(turns))
+    of = [0, 4 + 3 + 2, 4 + 6 + 0, 4 + 0 + 1]  # mass, y of the third column, z of the first, x of the second
+    near = near[np.ix_(of, of)]
+    near[1:] = frame.axes.T @ near[1:]
+    near[:, 1:] = near[:, 1:] @ frame.axes
+    if np.abs(near - gram[:4, :4])[1:, 1:].max() <= ROUNDING * far:
+        gram[:4, :4] = near
+    return gram
 
 
 def gram_in_frame(gram: Array, frame: BodyFrame) -> Array:

@@ -6,6 +6,7 @@ import scipy.linalg as la
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
+import fe_models as fm
 from cms.errors import BodyError, ModeSetError
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.modes.families.rigid_modes import geometric_rigid_modes
@@ -16,10 +17,12 @@ from cms.reduction.basis.frames import NodalFrame, TisserandFrame
 from cms.reduction.reduction import reduce
 from fe_models.body.couplings.couplings import couple
 from fe_models.body.fe_body import FEBody, Interface
-from tests.bodies import STEEL, bar, with_interfaces
+from fe_models.foundation.units import unit_system
+from tests.bodies import STEEL, bar, box_mesh, with_interfaces
 from tests.cms.examples import hinged_bricks
 
 ROUNDOFF = 1e-12
+SI = unit_system("m-kg-s")
 FRAMES = [TisserandFrame(), NodalFrame("left"), NodalFrame("right"), NodalFrame()]
 
 
@@ -330,3 +333,41 @@ def test_a_mode_set_of_another_body_is_refused(body):
 def test_unknown_frame_interface_names_the_nearest(body):
     with pytest.raises(BodyError, match="did you mean 'left'"):
         reduce(body, guyan(body), frame=NodalFrame("lefft"))
+
+
+def far_body(kind, offset):
+    """Return a body whose nodes have exact coordinates, also at the offset."""
+    if kind in ("solid", "matrices"):
+        mesh = box_mesh(4, 1, 1, 1.0, 0.5, 0.25)
+        mesh = replace(mesh, nodes=mesh.nodes + offset)
+        own = mesh.node_sets["left"]
+        joint = Interface("left", "rigid", own, np.array([0.0, 0.25, 0.125]) + offset)
+        made = couple(fm.solid_body(mesh, STEEL, name="far", units=SI, interfaces=[joint]))
+        return made if kind == "solid" else replace(made, element_model=None, recovery=None, stress_points=None)
+    if kind == "shell":
+        mesh = fm.flat_plate(1.0, 0.5, 4, 2, kind="quad")
+        mesh = replace(mesh, nodes=mesh.nodes + offset)
+        own = np.flatnonzero(mesh.nodes[:, 0] == mesh.nodes[:, 0].min())
+        joint = Interface("left", "rigid", own, mesh.nodes[own].mean(axis=0))
+        return couple(fm.shell_body(
+            mesh, fm.ShellProperty(0.0625, STEEL), name="far", units=SI, interfaces=[joint]
+        ))  # fmt: skip
+    points = np.array([(0, 0, 0), (0.5, 0.25, 0), (1, 0, 0.25), (0.5, 0.5, 0.5)]) + offset
+    mesh = fm.LineMesh(points, [(0, 1), (1, 2), (1, 3)])
+    joint = fm.line_interface(mesh, "left", fm.NodeIndices((0,)))
+    section = fm.BeamProperty(fm.Rectangle(0.125, 0.0625), STEEL)
+    return couple(fm.beam_body(mesh, section, name="far", units=SI, interfaces=[joint]))
+
+
+@pytest.mark.parametrize("kind", ["solid", "matrices", "shell", "beams"])
+def test_moments_of_a_body_far_from_the_mesh_origin_keep_their_digits(kind):
+    """About the mesh origin the second moment lost (distance / size)² of them: 2e-9 to 1e-8 here."""
+    near, far = (far_body(kind, np.array(at)) for at in ((0.0, 0, 0), (2048.0, -1024.0, 512.0)))
+    turn = tuple(map(tuple, Rotation.from_rotvec([0.3, -0.4, 0.5]).as_matrix()))
+    moments = [
+        reduce(body, craig_bampton(body, n_modes=2),
+               frame=NodalFrame("left", axes=turn), geometric=False, stress=False).moments
+        for body in (near, far)
+    ]  # fmt: skip
+    assert_allclose(moments[1].R, moments[0].R, rtol=0, atol=3e-12 * np.trace(moments[0].R))
+    assert_allclose(moments[1].S, moments[0].S, rtol=0, atol=1e-12 * np.abs(moments[0].S).max())

@@ -14,7 +14,7 @@ from fe_models.foundation.tall.on_disk import in_memory
 __all__ = ["gram_from_matrices"]
 
 
-def gram_from_matrices(body: FEBody, Phi: Array) -> Array:
+def gram_from_matrices(body: FEBody, Phi: Array, origin: Array | None = None) -> Array:
     """Return the Gram matrix ∫ a aᵀ dm of a = [1, c, phi_x, phi_y, phi_z] from M and the node positions.
 
     (1) m, S, R from the rigid-body mass matrix: exact
@@ -22,16 +22,22 @@ def gram_from_matrices(body: FEBody, Phi: Array) -> Array:
     (3) P_ab,k = (field c_a e_b)ᵀ M phi_k, whose antisymmetric part 2C is exact
     (4) S_ab,kl = phi_kᵀ M (e_a (e_b·phi_l))
 
+    Parameters
+    ----------
+    origin
+        Point that c starts from, (3,) [m]; default: the mesh origin, about which a body far away loses digits.
+
     Returns
     -------
     Array
-        (4 + 3 n_q, 4 + 3 n_q) in mesh axes about the mesh origin.
+        (4 + 3 n_q, 4 + 3 n_q) in mesh axes.
     """
     Phi = in_memory(Phi)
     n = Phi.shape[1]
     node, component = body.dofs.T
     gram = np.zeros((4 + 3 * n, 4 + 3 * n))
-    Psi_R = geometric_rigid_modes(body)
+    at = np.zeros(3) if origin is None else origin
+    Psi_R = geometric_rigid_modes(body, origin=at)
     rigid_mass = Psi_R.T @ (body.M @ Psi_R)
     J = rigid_mass[3:, 3:]
     gram[0, 0] = np.trace(rigid_mass[:3, :3]) / 3
@@ -54,7 +60,7 @@ def gram_from_matrices(body: FEBody, Phi: Array) -> Array:
         gram[0, blocks[b]] = Psi_R[:, b] @ M_Phi
         gram[blocks[b], 0] = gram[0, blocks[b]]
         for a in range(3):  # (3)
-            field = np.where(component == b, body.nodes[node, a], 0.0)
+            field = np.where(component == b, body.nodes[node, a] - at[a], 0.0)
             half_curl = np.cross(np.eye(3)[a], np.eye(3)[b]) / 2
             is_rotation = component >= 3
             field[is_rotation] = half_curl[component[is_rotation] - 3]
