@@ -1,10 +1,17 @@
 """The sources of compiled kernels: a module and all modules of the project that it imports.
 
-Kernels take codes and constants from modules outside their folder, whose change must reach them as well.
+Kernels take codes and constants from modules outside their folder, whose change must reach them as well. Comments,
+docstrings and the way lines are broken make no difference: only the syntax of the sources decides whether kernels are
+compiled again.
 """
 
+import ast
+import gc
 import hashlib
+import os
 import re
+import sys
+from functools import cache
 from pathlib import Path
 
 __all__ = ["imported_modules", "source_digest", "source_files"]
@@ -40,9 +47,65 @@ def source_files(module: str, root: Path = ROOT) -> list[Path]:
 
 
 def source_digest(module: str, *extra: str, root: Path = ROOT) -> int:
-    """Return a positive key that changes with the source of a module, of all that it imports, and with `extra`."""
+    """Return a positive key that changes with the syntax of a module, of all that it imports, and with `extra`.
+
+    Syntax trees take a few tenths of a second; a file beside this one keeps the last key together with a digest of the
+    sources as they were. Where no file can be written, as in an installation of another user, the sources count as they
+    are.
+    """
+    texts = {path.relative_to(root).as_posix(): path.read_bytes() for path in source_files(module, root)}
+    whole = digest_of(extra, texts)
+    record = record_of(root, module, extra)
+    try:
+        read, key = record.read_text(encoding="ascii").split()
+        if read == f"{whole:x}":
+            return int(key, 16)
+    except (OSError, ValueError):  # none yet, or half of one
+        pass
+    key_of_syntax = digest_of(extra, {name: syntax_of(text) for name, text in texts.items()})
+    return key_of_syntax if keep(record, f"{whole:x} {key_of_syntax:x}") else whole
+
+
+def digest_of(extra: tuple[str, ...], texts: dict[str, bytes]) -> int:
+    """Return a positive number of 56 bits."""
     digest = hashlib.sha256(repr(extra).encode())
-    for path in source_files(module, root):
-        text = path.read_bytes()
-        digest.update(repr((path.relative_to(root).as_posix(), len(text))).encode() + text)
+    for name, text in texts.items():
+        digest.update(repr((name, len(text))).encode() + text)
     return int.from_bytes(digest.digest()[:7], "big") + 1
+
+
+@cache
+def syntax_of(text: bytes) -> bytes:
+    """Return a digest of the syntax tree of a source without comments, docstrings and numbers of lines."""
+    was_enabled = gc.isenabled()
+    gc.disable()  # else half of the time goes into looking for garbage among the nodes
+    try:
+        tree = ast.parse(text)
+        for node in ast.walk(tree):
+            if isinstance(node, DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
+                node.body = node.body[1:]
+        return hashlib.sha256(ast.dump(tree, annotate_fields=False).encode()).digest()
+    finally:
+        if was_enabled:
+            gc.enable()
+
+
+DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+
+
+def record_of(root: Path, module: str, extra: tuple[str, ...]) -> Path:
+    """Return the file that keeps the key of a module: one for each version of Python, whose trees differ."""
+    name = "-".join((module, *extra, str(sys.implementation.cache_tag)))
+    return root / PACKAGES[-1] / "__pycache__" / f"{name}.key"
+
+
+def keep(record: Path, words: str) -> bool:
+    """Write a record, whole or not at all; return whether it was written."""
+    part = record.with_name(f"{record.name}.{os.getpid()}")
+    try:
+        record.parent.mkdir(exist_ok=True)
+        part.write_text(words, encoding="ascii")
+        part.replace(record)
+    except OSError:
+        return False
+    return True

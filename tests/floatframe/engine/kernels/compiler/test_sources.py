@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from floatframe.engine.kernels.compiler.sources import PACKAGES, source_digest, source_files
+from floatframe.engine.kernels.compiler.sources import PACKAGES, source_digest, source_files, syntax_of
 from tests.root import ROOT
 
 ENTRY = "floatframe.engine.kernels.entry"
@@ -55,13 +55,78 @@ def test_the_digest_sees_a_change_in_every_room_and_where_codes_come_from(copy, 
     assert before == source_digest(ENTRY)  # the copy is faithful
     path = copy / name
     text = path.read_text()
-    path.write_text(text.replace("1", "2", 1))
     try:
-        assert path.read_text() != text
+        path.write_text(with_another_name(text))
         assert source_digest(ENTRY, root=copy) != before
+        path.write_text(text.replace('"""', '"""In other words.\n\n', 1) + "\n\n# a comment\n")
+        assert source_digest(ENTRY, root=copy) == before
     finally:
         path.write_text(text)
     assert source_digest(ENTRY, root=copy) == before
+
+
+def with_another_name(text: str) -> str:
+    """Return a source whose last name is another one."""
+    last = max((node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)), key=place_of)
+    lines = text.splitlines()
+    row, column = place_of(last)
+    lines[row - 1] = f"{lines[row - 1][:column]}other_{lines[row - 1][column:]}"
+    return "\n".join(lines)
+
+
+def place_of(node: ast.Name) -> tuple[int, int]:
+    return node.lineno, node.col_offset
+
+
+SOURCE = """
+'A module.'
+A = 1.0  # m
+
+def law(x, y=2.0):
+    'Return a force.'
+    if x > 0.0:
+        'no docstring'
+        return A * x - y
+    return 0.0
+"""
+
+
+@pytest.mark.parametrize(("old", "new"), [
+    ("A module.", "Another."), ("Return a force.", "Return a moment."), ("# m", "# mm\n\n# more"), ("# m", ""),
+    ("    'Return a force.'\n", ""), ("A * x - y", "(A * x\n                - y)"), ("2.0):", "2.0,):"),
+])  # fmt: skip
+def test_words_about_a_source_make_no_difference(old, new):
+    assert old in SOURCE
+    assert syntax_of(SOURCE.replace(old, new).encode()) == syntax_of(SOURCE.encode())
+
+
+@pytest.mark.parametrize(("old", "new"), [
+    ("1.0", "2.0"), ("1.0", "1"), ("A * x - y", "A * x + y"), ("x > 0.0", "x >= 0.0"), ("y=2.0", "y=3.0"),
+    ("    return 0.0", "        return 0.0"), ("no docstring", "no words"), ("def law", "@small\ndef law"),
+    ("A *", "-A *"),
+])  # fmt: skip
+def test_every_change_of_the_syntax_counts(old, new):
+    assert old in SOURCE
+    assert syntax_of(SOURCE.replace(old, new, 1).encode()) != syntax_of(SOURCE.encode())
+
+
+def test_a_record_that_cannot_be_read_or_written_leaves_the_sources_as_they_are(tmp_path):
+    """A half-written record is made again; with no folder for one, comments count too."""
+    (tmp_path / "floatframe").mkdir()
+    module = tmp_path / "floatframe" / "kernel.py"
+    module.write_text("A = 1  # m\n")
+    key = source_digest("floatframe.kernel", root=tmp_path)
+    (record,) = (tmp_path / "floatframe" / "__pycache__").iterdir()
+    record.write_text(record.read_text().split()[0])
+    assert source_digest("floatframe.kernel", root=tmp_path) == key
+    module.write_text("A = 1  # mm\n")
+    assert source_digest("floatframe.kernel", root=tmp_path) == key
+    record.unlink()
+    record.parent.rmdir()
+    record.parent.write_text("no folder")
+    of_mm = source_digest("floatframe.kernel", root=tmp_path)
+    module.write_text("A = 1  # m\n")
+    assert len({key, of_mm, source_digest("floatframe.kernel", root=tmp_path)}) == 3
 
 
 def test_the_digest_does_not_change_with_what_kernels_do_not_import(copy):
@@ -134,7 +199,8 @@ def test_codes_that_change_elsewhere_reach_a_cached_function(tmp_path):
         return done.stdout
 
     assert run() == "2.5 0\n"
-    assert run() == "2.5 1\n"  # warm
+    (folder / "codes.py").write_text('"""Codes."""\n\nADD, SUBTRACT = 1, 2  # of operations\n')
+    assert run() == "2.5 1\n"  # warm: words compile nothing
     (folder / "codes.py").write_text("SUBTRACT, ADD = 1, 2\n")
     assert run() == "2.5 0\n"
 
