@@ -9,6 +9,7 @@ from cms.errors import ModeSetError
 from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
 from cms.modes.centrifugal import CENTRIFUGAL, centrifugal_loads
 from cms.modes.families.families import Families, body_of, families_of
+from cms.modes.families.mechanism import without_energy
 from cms.modes.mode_set import ModeSet
 from fe_models.body.fe_body import FEBody
 from fe_models.body.load_cases import LoadCase, load_columns
@@ -29,7 +30,7 @@ def with_load_cases(modes: ModeSet, body: FEBody | Families, *, names: Sequence[
     (1) held: K_II⁻¹ f_I with all boundary dofs held; makes the response of a supported body exact
     (2) accelerating: Pᵀ G P f of the free body, in equilibrium with the acceleration by the load; exact in free motion
     (3) of each response only the part u - V (Vᵀ K V)⁺ Vᵀ K u that the set lacks is added, if it exceeds 1e-6 of the
-        response
+        response and its energy exceeds the rounding: a part that is rigid-body motion has none
 
     A statically complete set needs one column per load case, other sets two. Uniform gravity has no response (2).
 
@@ -150,6 +151,7 @@ def _not_in_span(body: FEBody, V: Array, U: Array, F: Array) -> tuple[Array, np.
         left = abs(float(x[:, 0] @ (K @ x)[:, 0]))
         # A load that is balanced by rigid-body acceleration leaves only rounding, far less than its dofs taken singly.
         is_new[k] = left > IN_THE_SPAN**2 * energy[k] and energy[k] > IN_THE_SPAN**2 * local[k]
+        is_new[k] &= not without_energy(body, x)[0]
         if is_new[k]:
             new = np.hstack([new, x / np.sqrt(left)])
     return new, is_new
