@@ -9,15 +9,26 @@ module need not use it either: whether it fails when a line is wrong, only a wro
 """
 
 import ast
+import gc
 import re
 import subprocess
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
 from tests.root import ROOT
 
-__all__ = ["PACKAGES", "changed_files", "files_of", "graph", "guards", "modules", "named_modules"]
+__all__ = [
+    "PACKAGES",
+    "changed_files",
+    "files_of",
+    "graph",
+    "guards",
+    "modules",
+    "named_modules",
+    "statements",
+    "tree_of",
+]
 
 PACKAGES = ("fe_models", "cms", "floatframe")  #: each imports itself and those before it
 AROUND = ("tests", "benchmarks")  #: what else is on the way from a test to a module
@@ -32,6 +43,32 @@ def files_of(package: str) -> list[Path]:
 def module_name(path: Path) -> str:
     """Return the name by which a file is imported."""
     return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+
+
+def tree_of(path: Path) -> ast.Module:
+    """Return the syntax tree of a file.
+
+    Nothing keeps it: the trees of all files take 400 MB. Python would look for garbage in the million nodes of a pass
+    again and again, which takes four times as long as the parser.
+    """
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        return ast.parse(path.read_text(encoding="utf-8"))
+    finally:
+        if was_enabled:
+            gc.enable()
+
+
+def statements(tree: ast.AST) -> Iterator[ast.AST]:
+    """Yield the statements in a tree, those inside functions, classes and branches alike, without expressions."""
+    for name in BLOCKS:
+        for node in getattr(tree, name, ()):
+            yield node
+            yield from statements(node)
+
+
+BLOCKS = ("body", "handlers", "orelse", "finalbody", "cases")  #: fields with statements, or with holders of statements
 
 
 @cache
@@ -53,14 +90,14 @@ def public_names(package: str) -> dict[str, str]:
     stub = path.with_suffix(".pyi") if path else None
     if stub is None or not stub.exists():
         return {}
-    nodes = [node for node in ast.parse(stub.read_text()).body if isinstance(node, ast.ImportFrom)]
+    nodes = [node for node in tree_of(stub).body if isinstance(node, ast.ImportFrom)]
     return {alias.name: f"{package}.{node.module}" for node in nodes for alias in node.names}
 
 
 def imported_modules(path: Path) -> set[str]:
     """Return our modules that a file imports anywhere in it; a public name of a package counts as its module."""
     found = set()
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in statements(tree_of(path)):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -86,7 +123,9 @@ def used_modules(path: Path) -> set[str]:
     A package that is used as a whole, such as `getattr(cms, name)`, counts with all of its public names.
     """
     known = modules().keys() | test_modules().keys()
-    nodes = list(ast.walk(ast.parse(path.read_text())))
+    nodes: dict[type, list] = {}
+    for node in ast.walk(tree_of(path)):
+        nodes.setdefault(type(node), []).append(node)
     found: set[str] = set()
     packages: dict[str, str] = {}  # name here -> package whose names are imported when they are first used
 
@@ -95,29 +134,29 @@ def used_modules(path: Path) -> set[str]:
         if public_names(name):
             packages[local] = name
 
-    for node in nodes:
-        if isinstance(node, ast.Import):
-            for alias in node.names:
-                add(alias.name if alias.asname else alias.name.split(".")[0], alias.asname or alias.name.split(".")[0])
-                found.add(alias.name)
-        elif isinstance(node, ast.ImportFrom):
-            for alias in node.names:
-                inner = f"{node.module}.{alias.name}"
-                public = public_names(str(node.module)).get(alias.name, str(node.module))
-                add(inner if inner in known else public, alias.asname or alias.name)
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+    for node in nodes.get(ast.Import, ()):
+        for alias in node.names:
+            add(alias.name if alias.asname else alias.name.split(".")[0], alias.asname or alias.name.split(".")[0])
+            found.add(alias.name)
+    for node in nodes.get(ast.ImportFrom, ()):
+        for alias in node.names:
+            inner = f"{node.module}.{alias.name}"
+            public = public_names(str(node.module)).get(alias.name, str(node.module))
+            add(inner if inner in known else public, alias.asname or alias.name)
+    for node in nodes.get(ast.Constant, ()):
+        if isinstance(node.value, str):
             for words in NAMED.findall(node.value):
                 parts = words.split(".")
                 found |= {".".join(parts[:k]) for k in range(2, len(parts) + 1)}
     by_name = set()
-    for node in nodes:
-        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in packages:
+    for node in nodes.get(ast.Attribute, ()):
+        if isinstance(node.value, ast.Name) and node.value.id in packages:
             package = packages[node.value.id]
             inner = f"{package}.{node.attr}"
             found.add(inner if inner in known else public_names(package).get(node.attr, package))
             by_name.add(node.value)
-    for node in nodes:
-        if isinstance(node, ast.Name) and node.id in packages and node not in by_name:
+    for node in nodes.get(ast.Name, ()):
+        if node.id in packages and node not in by_name:
             found |= set(public_names(packages[node.id]).values())
     return found & known
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.import_graph import PACKAGES, files_of, graph, modules
+from tests.import_graph import PACKAGES, files_of, graph, modules, statements, tree_of
 from tests.root import ROOT
 
 MOST_MODULES = 18  #: of a room, its __init__ not counted
@@ -154,14 +154,13 @@ def test_every_room_says_what_is_in_it():
 
 
 def doc_of(path: Path) -> str | None:
-    return ast.get_docstring(ast.parse(path.read_text()))
+    return ast.get_docstring(tree_of(path))
 
 
 def test_no_package_imports_the_tests():
     for package in PACKAGES:
         for path in files_of(package):
-            text = path.read_text()
-            nodes = ast.walk(ast.parse(text)) if "tests" in text else []
+            nodes = statements(tree_of(path)) if "tests" in path.read_text() else []
             wrong = [
                 node for node in nodes if isinstance(node, ast.ImportFrom) and f"{node.module}.".startswith("tests.")
             ]
@@ -174,8 +173,7 @@ def test_tests_share_helpers_and_fixtures_and_import_no_other_tests():
     tests = {name for name in files if name.rpartition(".")[2].startswith("test_")}
     wrong = {}
     for name, path in files.items():
-        text = path.read_text()
-        nodes = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Import | ast.ImportFrom)]
+        nodes = [node for node in statements(tree_of(path)) if isinstance(node, ast.Import | ast.ImportFrom)]
         named = {f"{node.module}.{a.name}" for node in nodes if isinstance(node, ast.ImportFrom) for a in node.names}
         named |= {str(node.module) for node in nodes if isinstance(node, ast.ImportFrom)}
         named |= {a.name for node in nodes if isinstance(node, ast.Import) for a in node.names}
@@ -200,7 +198,7 @@ def test_output_of_the_core_goes_through_the_command_line():
         parts, text = path.relative_to(ROOT).parts, path.read_text()
         if "cli" in parts or "print" not in text:
             continue
-        calls = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Call)]
+        calls = [node for node in ast.walk(tree_of(path)) if isinstance(node, ast.Call)]
         if any(isinstance(c.func, ast.Name) and c.func.id == "print" for c in calls):
             talkers.append(str(path.relative_to(ROOT)))
     assert [name for name in talkers if "rendering" not in name] == []

@@ -7,8 +7,9 @@ import ast
 from collections import Counter
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
-from tests.import_graph import modules
+from tests.import_graph import modules, statements, tree_of
 from tests.root import ROOT
 
 #: names of two or more public classes, from before there was this test
@@ -109,15 +110,27 @@ floatframe/simulation/step_advice.py words
 ) - {""}
 
 
+class Names(NamedTuple):
+    """The names that a module gives."""
+
+    classes: list[str]  #: public
+    all: set[str]  #: of the module, of its functions and methods, and of the fields of its classes
+
+
 @cache
-def trees() -> dict[Path, ast.Module]:
-    return {path: ast.parse(path.read_text()) for path in modules().values()}
+def given_names() -> dict[Path, Names]:
+    """Return the names that each module of the packages gives."""
+    trees = ((path, tree_of(path)) for path in modules().values())
+    return {path: Names(public_classes(tree), names_of(path, tree)) for path, tree in trees}
+
+
+def public_classes(tree: ast.Module) -> list[str]:
+    return [node.name for node in tree.body if isinstance(node, ast.ClassDef) and not node.name.startswith("_")]
 
 
 def names_of(path: Path, tree: ast.Module) -> set[str]:
-    """Return the names of a module, of its functions and methods, and of the fields of its classes."""
     found = {path.parent.name if path.name == "__init__.py" else path.stem}
-    for node in ast.walk(tree):
+    for node in statements(tree):
         if isinstance(node, ast.FunctionDef):
             found.add(node.name)
         elif isinstance(node, ast.ClassDef):
@@ -130,12 +143,7 @@ def names_of(path: Path, tree: ast.Module) -> set[str]:
 
 
 def test_no_two_public_classes_have_one_name():
-    classes = Counter(
-        node.name
-        for tree in trees().values()
-        for node in tree.body
-        if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
-    )
+    classes = Counter(name for names in given_names().values() for name in names.classes)
     twice = {name for name, count in classes.items() if count > 1}
     assert twice - SHARED == set(), "give the class another name"
     assert SHARED - twice == set(), "take the name off the list of exceptions"
@@ -144,8 +152,8 @@ def test_no_two_public_classes_have_one_name():
 def test_names_are_nouns_and_verbs_of_the_field():
     found = {
         f"{path.relative_to(ROOT)} {name}"
-        for path, tree in trees().items()
-        for name in names_of(path, tree) & set(FORBIDDEN)
+        for path, names in given_names().items()
+        for name in names.all & set(FORBIDDEN)
     }
     assert found - EXCEPTIONS == set(), f"expected other words, such as {FORBIDDEN}"
     assert EXCEPTIONS - found == set(), "take the place off the list of exceptions"
