@@ -16,6 +16,7 @@ from cms.body.reduced_body import ReducedBody
 __all__ = ["CORRUPTIONS", "spoilt"]
 
 Corruption = Callable[[ReducedBody, np.random.Generator], ReducedBody | None]
+ROUNDING = 1e-12  #: of an entry relative to the largest of its array: a change of less is none
 QUARTER = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
 
 
@@ -33,6 +34,7 @@ def spoilt(name: str, body: ReducedBody, rng: np.random.Generator) -> ReducedBod
         for x, y in zip(a, b, strict=True):
             if isinstance(x, np.ndarray) and isinstance(y, np.ndarray) and x.shape == y.shape and x.dtype.kind == "f":
                 scale = np.maximum(np.abs(x), np.abs(y))
+                scale = np.maximum(scale, ROUNDING * scale.max(initial=0.0))
                 changes = max(changes, float((np.abs(x - y) / np.where(scale > 0, scale, 1.0)).max(initial=0.0)))
             elif isinstance(x, float) and isinstance(y, float):
                 changes = max(changes, abs(x - y) / max(abs(x), abs(y), 1e-300))

@@ -159,6 +159,16 @@ def test_a_corruption_is_found_by_the_record_that_it_is_named_for(benches, what)
     assert tried
 
 
+def test_a_change_of_rounding_is_no_corruption(solid):
+    """Shares of a source that no mode needs are zero to rounding; shuffled they are the same."""
+    shares = np.ones(solid.reduced.energy_shares.shape)
+    shares[:, 0] = 1e-29 * np.arange(1, 1 + len(shares))
+    body = replace(solid.reduced, energy_shares=shares)
+    assert spoilt("energy shares shuffled", body, np.random.default_rng(0)) is None
+    body = replace(solid.reduced, energy_shares=1e20 * shares)
+    assert spoilt("energy shares shuffled", body, np.random.default_rng(0)) is not None
+
+
 def test_there_are_many_corruptions_and_each_record_has_one():
     assert len(CORRUPTIONS) >= 60
     assert {name for name, _ in CORRUPTIONS.values()} == set(FIELDS.values())
