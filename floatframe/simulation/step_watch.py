@@ -5,17 +5,20 @@ It works for second-order methods, with fixed steps and with an error tolerance:
 (1) A companion is the same motion with steps twice as long (or an error tolerance eight times as large). It costs half
     a step for each step of the run. The run and the companion differ by three times the error of the run. This includes
     how the motion magnifies or damps earlier errors.
-(2) If that error exceeds `SCREEN` of the limit, or a long step fails, a companion with half steps starts from the same
-    memory and replaces the first one. It differs from the run by 3/4 of the error. Only its estimate is reported.
+(2) If that error exceeds `SCREEN` of the limit, or a long step fails, or a flexible body turns by more than `FAR_TURN`
+    in a step, a companion with half steps starts from the same memory and replaces the first one. It differs from the
+    run by 3/4 of the error. Only its estimate is reported. From the start of a run it has little numerical damping
+    (`LIGHT`): a run may damp vibrations that its steps do not resolve, and equal damping would hide what they do to the
+    motion.
 (3) The companion covers `COMPANION_STEPS` steps. It crosses jumps of forces and has its own events. In a run of more
     than `LONG_RUN` steps it starts after the first steps, from their memory. There it ends as soon as the error,
     extrapolated in proportion to the end of the run, is far below the limit.
 (4) After that, windows of `WINDOW` steps are repeated with half steps. The distance between windows grows. The errors
     of all steps are summed; steps between two windows get the mean error of both.
 (5) Position errors are relative to the longest displacement of any body from its start. Rotation errors are relative to
-    the largest rotation, or to `SMALL_TURN` where that is larger. Windows also count the errors of speeds, relative to
-    twice the largest speed (a vibration moves by two amplitudes). Errors a of place and b of speed combine to
-    sqrt(a² + b²), since they turn into one another.
+    the largest rotation; where that is below `SMALL_TURN`, to the displacement over the length of the system. Windows
+    also count the errors of speeds, relative to twice the largest speed (a vibration moves by two amplitudes). Errors a
+    of place and b of speed combine to sqrt(a² + b²), since they turn into one another.
 
 A companion restarts where a run can be resumed; its error up to there is added. The sum over windows does not know how
 the motion changes earlier errors: it may forget them (damping) or magnify them (chaos).
@@ -62,6 +65,8 @@ SHORT_LIMIT = 0.01  #: the same for runs of less than `FIRST_VERDICT` steps, whi
 REST_LENGTH = 1e-7  #: displacement over the length of the system below which the system is at rest
 REST_ANGLE = 1e-6  #: rotation below which the system is at rest [rad]
 SMALL_TURN = 1e-3  #: rotation below which errors of rotation do not count in a motion as long as the system [rad]
+FAR_TURN = 1.0  #: rotation of a flexible body in a step above which double steps say nothing [rad]
+LIGHT = 0.9  #: rho_inf at least of companions with half steps from the start of a run
 FULL_TURN = 3.0  #: rotation above which errors are relative to a whole turn [rad]
 SCREEN = 0.25  #: share of the limit above which half steps decide: double steps may be outside the asymptotic range
 AIM = 0.2  #: share of the limit that the recommended step would reach
@@ -89,19 +94,23 @@ class Companion:
     peak: Array  #: largest error of position and rotation, (n_b, 2)
     events: EventWatch | None  #: its events
     events_at_begin: EventWatch | None  #: events of the run where it started
+    share: float  #: error of the run over the difference
 
     @classmethod
     def begun(
         cls, integrator: Integrator, carry: Carry, work: Work, start: int, ratio: float, h: float = 0.0,
-        events: EventWatch | None = None,
+        events: EventWatch | None = None, is_light: bool = False,
     ) -> "Companion":  # fmt: skip
         """Return a companion that starts from the memory of the run after `start` steps.
 
         h: fixed step size of the run; the step then grows to that of the companion without a new start. 0: not fixed.
         events: those of the run after `start` steps, if it has any; the companion gets a copy with working arrays.
+        is_light: with the numerical damping of `LIGHT` where that is less.
         """
         none = np.zeros((len(carry.state.r), 2, 3))
-        method, begin = integrator_of(integrator, ratio), carry
+        method, begin, share = integrator_of(integrator, ratio), carry, ERROR_SHARE[ratio]
+        if is_light:
+            method, share = lighter(integrator, share)
         if h and carry.h and isinstance(method, GeneralizedAlpha | RelativeGeneralizedAlpha) and method.h_min is None:
             method, begin = replace(method, h_min=h), replace(carry, h_next=ratio * h)  # without a new start
         own = None if events is None else events.copied()
@@ -109,7 +118,7 @@ class Companion:
             work = own.new_work()
         work.solver.c_k[...] = 0.0  # a resumed run has no factors of other steps
         peak = lengths(none)
-        return cls(method, carry, start, ratio, start, begin, work, none, start, none, peak, own, events)
+        return cls(method, carry, start, ratio, start, begin, work, none, start, none, peak, own, events, share)
 
     def follow(
         self, system: System, end: Carry, last: int, t0: float, h: float, jumps: Mapping[int, list[float]]
@@ -134,9 +143,14 @@ class Companion:
         except FloatframeError:
             return False
         self.carry, self.before, self.error_before, self.at = carry, self.at, self.error, last
-        self.error = ERROR_SHARE[self.ratio] * difference(end.state, carry.state)
+        self.error = self.share * difference(end.state, carry.state)
         self.peak = np.maximum(self.peak, lengths(self.error))
         return True
+
+    @property
+    def is_light(self) -> bool:
+        """Whether it has less numerical damping than the run."""
+        return self.share != ERROR_SHARE[self.ratio]
 
     def speeds(self, h: float) -> Array:
         """Return the mean speed errors between the last two comparisons, (n_b, 2)."""
@@ -260,11 +274,17 @@ class StepWatch:
         if self.is_comparable(last):
             self.update_size(begin.state, end.state, h * (last - first))
             self.turn = np.maximum(self.turn, turns_in_a_step(system, end.state, h))
-            is_good = other.follow(system, end, last, t0, h, self.jumps)
+            is_good = False
+            if other.ratio == HALVES or not self.turns_far(system):
+                is_good = other.follow(system, end, last, t0, h, self.jumps)
             is_small = is_good and self.relative_errors(system, other).max() < SCREEN * self.limit
             if other.ratio == DOUBLES and not is_small:
                 other = self.companion = self.with_half_steps(system, other)
                 is_good = other.follow(system, end, last, t0, h, self.jumps)
+            if not is_good and other.is_light:  # less damping may be what fails
+                damped = self.with_half_steps(system, other, is_light=False)
+                is_good = damped.follow(system, end, last, t0, h, self.jumps)
+                other = self.companion = damped if is_good else other
             if not is_good:  # what it has found so far counts
                 self.close_companion(h)
                 self.companions_done, self.next_window = True, last
@@ -283,11 +303,20 @@ class StepWatch:
             self.next_window = last + self.window_distance
         return note
 
-    def with_half_steps(self, system: System, other: Companion) -> Companion:
-        """Return a companion with half steps that starts where another one started."""
+    def turns_far(self, system: System) -> bool:
+        """Return whether a flexible body has turned by more than `FAR_TURN` in a step."""
+        is_flexible = np.diff(compiled_system(system).model.bodies.q0) > 0
+        return bool((self.turn[is_flexible] > FAR_TURN).any())
+
+    def with_half_steps(self, system: System, other: Companion, *, is_light: bool = True) -> Companion:
+        """Return a companion with half steps that starts where another one started.
+
+        is_light: with little numerical damping at the start of a run; a memory of the run has that of its method.
+        """
         return Companion.begun(
-            self.integrator, other.begin, self.work_arrays(system), other.start, HALVES, events=other.events_at_begin
-        )
+            self.integrator, other.begin, self.work_arrays(system), other.start, HALVES, events=other.events_at_begin,
+            is_light=is_light and other.begin.h == 0.0,
+        )  # fmt: skip
 
     def close_companion(self, h: float) -> None:
         """Add the error that the companion has found, and remove the companion."""
@@ -348,7 +377,7 @@ class StepWatch:
                 return note
         other = self.companion
         if other is not None and other.at == other.start and n_done > other.start:  # a run of one or three steps
-            other = self.with_half_steps(system, other)
+            other = self.with_half_steps(system, other, is_light=False)
             if other.follow(system, end, n_done, t0, h, self.jumps):
                 self.update_size(other.begin.state, end.state, h * (n_done - other.start))
                 self.companion = other
@@ -363,7 +392,8 @@ class StepWatch:
         compiled = compiled_system(system)
         least = np.array([REST_LENGTH * compiled.length, REST_ANGLE])
         size = self.size.copy()
-        size[1] = np.maximum(size[1], SMALL_TURN * np.minimum(size[0] / compiled.length, 1.0))
+        if size[1, 0] < SMALL_TURN * min(size[0, 0] / compiled.length, 1.0):
+            size[1] = np.maximum(size[1], size[0] / compiled.length)
         moves = size[:, 0] > least
         total = self.total
         if companion is not None:
@@ -432,6 +462,20 @@ def integrator_of(integrator: Integrator, ratio: float) -> Integrator:
     if tolerance is None:
         return integrator
     return replace(integrator, error_tolerance=tolerance * ratio**3)  # type: ignore[type-var]
+
+
+def lighter(integrator: Integrator, share: float) -> tuple[Integrator, float]:
+    """Return the method with the numerical damping of `LIGHT` where that is less, and the share of half steps.
+
+    The phase error of generalized-alpha in a period is c(rho_inf) (omega h)², c as below.
+    """
+    if not isinstance(integrator, GeneralizedAlpha | RelativeGeneralizedAlpha):
+        return integrator, share
+    is_other = integrator.parameters is not None or integrator.error_tolerance is not None
+    if is_other or integrator.rho_inf >= LIGHT:
+        return integrator, share
+    own, light = (1 / 12 + 3 / 8 * ((1 - rho) / (1 + rho)) ** 2 for rho in (integrator.rho_inf, LIGHT))
+    return replace(integrator, rho_inf=LIGHT), own / (own - light / 4)
 
 
 def lengths(vectors: Array) -> Array:

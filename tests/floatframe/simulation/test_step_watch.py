@@ -7,14 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.integrate import solve_ivp
 from typer.testing import CliRunner
 
+import cms
 import floatframe.simulation.integrate as integration
+from fe_models.foundation.units import unit_system
 from floatframe import (
     Bushing,
     ConvergenceError,
     EnergyMomentum,
     Event,
+    FlexibleBody,
     GeneralizedAlpha,
     Gravity,
     JointForce,
@@ -25,6 +29,7 @@ from floatframe import (
     RevoluteJoint,
     RigidBody,
     SphericalJoint,
+    SpringDamper,
     System,
     integrate,
     read_results,
@@ -397,12 +402,12 @@ def test_notes_of_older_files_are_read():
     assert notes_from_json(json.dumps(fields)) == (note,)
 
 
-def test_errors_of_rotation_are_told_beside_a_long_way():
-    """Exact: the sine of a disc on a spring, on a cart that goes far; six steps in a period."""
+def disc_on_a_cart(angle):
+    """Return a disc that swings by an angle on a spring, on a cart that goes far, and its angular frequency."""
     omega, v = 10.0, 20.0
-    h, place = 2 * np.pi / omega / 6, np.array([5.0, -3.0, 2.0])
+    place = np.array([5.0, -3.0, 2.0])
     cart = RigidBody("cart", 2.0, 0.1 * np.eye(3), position=place, velocity=(v, 0, 0))
-    disc = RigidBody("disc", 1.0, 0.2 * np.eye(3), position=place, velocity=(v, 0, 0), omega_B=(0, 0, 0.3 * omega))
+    disc = RigidBody("disc", 1.0, 0.2 * np.eye(3), position=place, velocity=(v, 0, 0), omega_B=(0, 0, angle * omega))
     rail = PrismaticJoint(
         "rail", Marker("ground", position=place), Marker("cart", position=np.zeros(3)), axis=(1, 0, 0)
     )
@@ -410,10 +415,75 @@ def test_errors_of_rotation_are_told_beside_a_long_way():
         "hinge", Marker("cart", position=np.zeros(3)), Marker("disc", position=np.zeros(3)), axis=(0, 0, 1)
     )
     spring = JointForce("spring", "hinge", "angle", stiffness=0.2 * omega**2)
-    motion = integrate(System([cart, disc], [rail, hinge], [spring]), GeneralizedAlpha(0.8), 30 * h, h)
+    return System([cart, disc], [rail, hinge], [spring]), omega
+
+
+@pytest.mark.parametrize(("angle", "told"), [(0.3, {"steps"}), (3e-4, set())])
+def test_errors_of_rotation_are_told_beside_a_long_way_unless_they_are_small_beside_it(angle, told):
+    """Exact: the sine of a disc on a spring, on a cart that goes far; six steps in a period."""
+    system, omega = disc_on_a_cart(angle)
+    h = 2 * np.pi / omega / 6
+    motion = integrate(system, GeneralizedAlpha(0.8), 30 * h, h)
     R = rotations_between(motion.body("disc").p, np.array([1.0, 0, 0, 0]))
-    assert np.abs(R[:, 2] - 0.3 * np.sin(omega * motion.t)).max() > 0.05 * 0.3
-    assert np.abs(motion.body("cart").r[-1, 0] - place[0]) > 30.0
+    assert np.abs(R[:, 2] - angle * np.sin(omega * motion.t)).max() > 0.05 * angle
+    cart = motion.body("cart").r[:, 0]
+    assert cart[-1] - cart[0] > 30.0
+    assert_allclose(cart - cart[0], 20.0 * motion.t, rtol=0, atol=1e-6)
+    assert kinds(motion) == told
+
+
+@pytest.mark.parametrize("damping", [0.01, 0.05])
+def test_vibrations_that_steps_and_their_companion_damp_count_in_the_error(damping):
+    """SciPy: a mass that turns about a point on a stiff spring, three periods of the spring in a step.
+
+    rho_inf = 0 stops the vibration in the first step. The turning depends on it: angular momentum is kept.
+    """
+    stretch, rate, h, n = 0.04, 1.0, 0.05, 40
+    omega, first = 2 * np.pi * 3 / h, 1.0 + stretch
+    body = RigidBody(
+        "mass", 1.0, np.eye(3), position=PLACE + np.array([first, 0, 0]), velocity=(0.0, first * rate, 0.0)
+    )
+    spring = SpringDamper(
+        "spring", Marker("ground", position=PLACE), Marker("mass", position=np.zeros(3)), stiffness=omega**2,
+        damping=2 * damping * omega, free_length=1.0,
+    )  # fmt: skip
+    motion = integrate(System([body], [], [spring]), GeneralizedAlpha(0.0), n * h, h)
+
+    def rates(t, y):
+        momentum = first**2 * rate
+        return [
+            y[1],
+            momentum**2 / y[0] ** 3 - omega**2 * (y[0] - 1) - 2 * damping * omega * y[1],
+            momentum / y[0] ** 2,
+        ]
+
+    r, _, angle = solve_ivp(rates, (0, n * h), [first, 0.0, 0.0], t_eval=motion.t, rtol=1e-8, atol=1e-9).y
+    exact = PLACE[:2] + np.stack([r * np.cos(angle), r * np.sin(angle)], axis=1)
+    places = motion.body("mass").r[:, :2]
+    error = np.linalg.norm(places - exact, axis=1).max() / np.linalg.norm(exact - exact[0], axis=1).max()
+    assert error > 0.3
+    (note,) = (note for note in motion.validity if note.kind == "steps")
+    assert note.largest > error / 2
+
+
+def test_double_steps_do_not_judge_a_flexible_body_that_turns_by_more_than_a_radian_in_a_step():
+    """A free beam that turns by 2.2 rad in a step, as in the motion 81953 of the campaign, against fine steps."""
+    line = cms.BeamLine(1.0, 1.0, 6.28e4, 62.8, 94.2, 62.8, 1e-3, 1e-3)
+    beam = cms.beam_from_assumed_modes(
+        line, name="beam", units=unit_system("m-kg-s"), n_axial=1, n_bending=2, n_torsion=1,
+        damping=cms.ModalDamping(0.02),
+    )  # fmt: skip
+    h = 0.03276788
+    body = FlexibleBody(
+        "beam", beam, position=PLACE, stiffening=False, omega_B=np.array([-1.125019, 1.853261, 0.18154]) / h
+    )
+    motion, fine = (
+        integrate(System([body]), GeneralizedAlpha(0.9), 32 * h, h / n, output_every=n, watch=watch)
+        for n, watch in ((1, "stop"), (16, "off"))
+    )
+    assert (
+        np.linalg.norm(rotations_between(motion.body("beam").p, fine.body("beam").p), axis=1).max() > 0.05 * 2 * np.pi
+    )
     assert "steps" in kinds(motion)
 
 
