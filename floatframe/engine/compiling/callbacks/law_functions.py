@@ -15,6 +15,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.callbacks.law_source import digest_of
 from floatframe.engine.compiling.callbacks.user_forces import Callback
+from floatframe.engine.kernels.compiler.garbage import without_garbage_collection
 from floatframe.errors import ModelError
 from floatframe.model.elements.element import ElementLaw
 
@@ -83,7 +84,8 @@ def compiled_callback(where: str, function: Any, kind: str, template: Callable[[
         made = filled(template, function, 1 if digest is None else digest)
         try:
             try:
-                whole = cfunc(signature, cache=digest is not None, error_model="numpy")(made)
+                with without_garbage_collection():
+                    whole = cfunc(signature, cache=digest is not None, error_model="numpy")(made)
             except RuntimeError:  # no folder for the cache
                 whole = cfunc(signature, error_model="numpy")(made)
         except (NumbaError, NotImplementedError) as error:

@@ -16,7 +16,6 @@ compilation. Inner functions are never called from Python and own no memory, so 
 (5) variables, operations and calls become lean code of LLVM, see kernels/compiler/lowering.py.
 """
 
-import gc
 import types
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
@@ -44,6 +43,7 @@ from numba.core.types.functions import BaseFunction
 from numba.core.untyped_passes import FixupArgs, IRProcessing, TranslateByteCode
 
 from floatframe.engine.kernels.compiler.block import Block, make_block
+from floatframe.engine.kernels.compiler.garbage import without_garbage_collection
 from floatframe.engine.kernels.compiler.lowering import KernelContext, KernelLower
 
 __all__ = [
@@ -292,18 +292,6 @@ def remembered_calls() -> Iterator[None]:
         yield
     finally:
         BaseFunction.get_call_type = plain  # type: ignore[method-assign]
-
-
-@contextmanager
-def without_garbage_collection() -> Iterator[None]:
-    """(3): avoid repeated walks through the hundreds of thousands of objects of a compilation."""
-    was_enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_enabled:
-            gc.enable()
 
 
 class InnerCompiler(CompilerBase):
