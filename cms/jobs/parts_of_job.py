@@ -122,8 +122,7 @@ def frame_of(job: Job, *, held: bool = False) -> "Frame | HeldFrame":
         if "frame" in reduction.model_fields_set:
             raise JobError(
                 f'reduction.frame = "{reduction.frame}": body {job.body.name!r} is held to the ground, as it was '
-                "said; its "
-                "frame is the ground: remove frame"
+                "said; its frame is the ground: remove frame"
             )
         return HeldFrame(reduction.origin, reduction.axes)
     return moving_frame_of(job)

@@ -107,10 +107,9 @@ class DiscreteScheme:
             tolerance=self.tolerance, max_iterations=self.max_iterations, length=ds.length,
             h_min=least,
         )  # fmt: skip
-        if outcome.status == NO_ACCELERATION:  # the memory has passed the failed step: repeat the good steps
-            failure = explained(
-                compiled, work, outcome, self.max_iterations, LEAST_STEP * h
-            )  # data that they would lose
+        if outcome.status == NO_ACCELERATION:  # the memory is beyond the last good step: repeat the good steps
+            # explained first, because the repeated steps overwrite what it needs
+            failure = explained(compiled, work, outcome, self.max_iterations, LEAST_STEP * h)
             work.past.n[...] = 0
             again = self.advance(system, carry, work, t0=t0, h=h, first=first, n_steps=outcome.n_steps, every=every)
             return *again[:3], failure

@@ -64,9 +64,8 @@ class ValidityNote:
         """Return the problem as text."""
         if self.kind == "steps":
             return (
-                f"the error of the steps is about {100 * self.largest:.2g} % of the motion (limit {100 * self.limit:g} "
-                "%), "
-                "estimated by repeating some of them as half steps"
+                f"the error of the steps is about {100 * self.largest:.2g} % of the motion (limit "
+                f"{100 * self.limit:g} %), estimated by repeating some of them as half steps"
             )
         if self.kind == "energy":
             return (
@@ -86,8 +85,7 @@ class ValidityNote:
         if self.kind == "tilt":
             return (
                 f"its shaft tilts so far that its sine, on which the moment depends, is {100 * self.largest:.2g} % "
-                "below "
-                f"the angle (limit {100 * self.limit:g} %)"
+                f"below the angle (limit {100 * self.limit:g} %)"
             )
         if self.kind == "rotation":
             return f"an interface turns by {self.largest:.3g} rad against the body frame (limit {self.limit:g})"

@@ -394,8 +394,7 @@ def motion_section(comparison: Comparison) -> Section:
     )
     caption = (
         "In the energy norm. The grey hill is the force; while it acts the local deformation under it counts, "
-        "afterwards "
-        "the free vibration."
+        "afterwards the free vibration."
         if comparison.full.force is not None
         else "In the energy norm."
     )

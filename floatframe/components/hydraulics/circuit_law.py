@@ -141,9 +141,7 @@ def circuit_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
             q = part * data[n] * turbulent(dp, data[n + 1]) + data[n + 5] * dp
             outputs[s] = q
             outputs[total + 1] += q * (h_a - h_b)
-        elif (
-            kind == VALVE
-        ):  # parameters: conductance, transition, pressure at which it opens, pressure at which it is open, leakage
+        elif kind == VALVE:  # parameters: conductance, transition, pressures at which it opens and is open, leakage
             part = ramp((dp - data[n + 2]) / (data[n + 3] - data[n + 2]))
             q = part * data[n] * turbulent(dp, data[n + 1]) + data[n + 4] * dp
             outputs[s] = q
@@ -237,9 +235,8 @@ def circuit_rest(t, x, z, lam, data, wrench, z_dot, g, outputs):
             V, _, slope, _, Q = node_volume(data, i, z[i], outputs)
             z_dot[i] = v * v * Q * np.sqrt(Q * Q + scale * scale) / scale / (v * slope - V * dv)
     at = int(data[ISLANDS])
-    for _ in range(
-        int(data[N_ISLANDS])
-    ):  # parameters: number of nodes, content, pressure for a relative defect of one, node numbers
+    for _ in range(int(data[N_ISLANDS])):
+        # parameters: number of nodes, content, pressure for a relative defect of one, node numbers
         n, content, scale = int(data[at]), data[at + 1], data[at + 2]
         held = 0.0 * z[0]
         for k in range(n):

@@ -191,9 +191,8 @@ class Track:
                 )
         except (TypeError, KeyError) as error:
             raise ModelError(
-                f"{where}: expected a segment with length, curvature and cant (a number or [begin, end]); a curve has "
-                "radius, "
-                f"length, transition, cant, before, after: {error}"
+                f"{where}: expected a segment with length, curvature and cant (a number or [begin, end]); a curve "
+                f"has radius, length, transition, cant, before, after: {error}"
             ) from None
         irregular = table.get("irregularities")
         return cls(

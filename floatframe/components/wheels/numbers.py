@@ -41,8 +41,7 @@ def tyre_numbers(
     if c[2] <= ground:
         raise ModelError(
             f"{where}: its centre lies at z = {c[2]:g}, below the road at {ground:g} (axes of marker_a); expected it "
-            "one "
-            f"radius, {common[0]:g}, above the road: check that z of marker_a points up and that marker_b is the "
+            f"one radius, {common[0]:g}, above the road: check that z of marker_a points up and that marker_b is the "
             "wheel's centre"
         )
     head = [*common, *axis, *c, *A.ravel()]

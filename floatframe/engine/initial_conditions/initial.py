@@ -534,7 +534,7 @@ def require_no_half_turns(compiled: CompiledSystem, work: Work, state: State) ->
 FEW = 200  #: number of rows up to which all are checked first: this takes milliseconds
 WELL = 1e-6  #: smallest eigenvalue of G M⁻¹ Gᵀ, for unit rows, above which no constraint is redundant
 SMALL = 1e-5  #: singular value relative to the largest, below which constraints may be redundant
-GAP = 1e-3  #: ratio of the next larger singular value, if they are
+GAP = 1e-3  #: ratio to the next larger singular value, below which they are redundant
 #: singular value relative to the largest, or norm of a row relative to its part for bodies only, that counts as zero
 ROUNDING = 1e-11
 

@@ -149,7 +149,7 @@ def call(model: Model, work: Work, memory: Memory, rows: Rows, **order: float) -
     if not run.signatures:
         began = time.perf_counter()
         if prepare():
-            level = logging.INFO if is_lean else logging.WARNING  # unusual results are reported
+            level = logging.INFO if is_lean else logging.WARNING  # plain numba is unusual, so the user should see it
             log.log(level, "compiled the code of the motion in %.0f s, once: %s", time.perf_counter() - began, words())
     ordered, numbers = table_of_numbers(ORDER, order)
     outcome = run(kept_table_of(model), kept_table_of(work), table_of(memory), table_of(rows), ordered)

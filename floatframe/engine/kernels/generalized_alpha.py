@@ -83,7 +83,7 @@ __all__ = [
 ]
 
 DONE, DIVERGED, SINGULAR_BODY, SINGULAR_CONNECTION, INACCURATE, STOPPED = 0, 1, 2, 3, 4, 5
-UNRESOLVED = 7  # status: a step is too long for a contact; 6 is `relative.kernels.steps.SINGULAR`
+UNRESOLVED = 7  # status: a step is too long for a contact; 6 is `tree.kernels.steps.SINGULAR`
 TURNED = 8  # status: a body rotates too far in a step
 #: largest rotation in a step [rad] of a body with joints away from its axis; above 1.15 joints can add energy
 MOST_TURN = 1.0
@@ -580,7 +580,7 @@ def one_step(model, work, memory, order, h):
         excess = norm / allowed if allowed > 0.0 else math.inf
         is_new = False
         of_states = 0.0
-        if has_states:  # velocities lag behind the bodies by one iteration
+        if has_states:  # states follow the bodies by one iteration
             of_states = correction_of_states(model, work, c_k) / order.tolerance
             if not math.isfinite(of_states):
                 work.solver.is_due, work.solver.has_late_gaps = 1, 0

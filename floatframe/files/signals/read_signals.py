@@ -230,8 +230,7 @@ def require_whole_steps(time: Array, lost: IntArray, step: float, place: Callabl
         k = int(odd[0])
         raise SignalError(
             f"{place(k + 1)}: the step is {dt[k]:.6g} s, elsewhere {step:.6g} s, and no multiple of it ({len(odd)} "
-            f"such "
-            "places); resample it (resample = ..., or uneven steps allowed)"
+            "such places); resample it (resample = ..., or uneven steps allowed)"
         )
 
 

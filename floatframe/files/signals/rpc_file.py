@@ -68,9 +68,8 @@ def read_rpc(path: str | os.PathLike[str]) -> Signals:
         if found not in (full, exact) and not full < found < full + BLOCK:
             raise SignalError(
                 f"{path}: {found} bytes follow the head, expected {full}: {n_channels} channels of {n_frames} frames "
-                f"of "
-                f"{per_frame} samples, in groups of {per_group}, {width} bytes each; the file is cut off, or DATA_TYPE "
-                f"= {head['DATA_TYPE']} is wrong"
+                f"of {per_frame} samples, in groups of {per_group}, {width} bytes each; the file is cut off, or "
+                f"DATA_TYPE = {head['DATA_TYPE']} is wrong"
             )
         file.seek(begin)
         raw = np.frombuffer(file.read(min(found, full)), dtype=order + kind)

@@ -63,8 +63,7 @@ def torsion_stiffness(chassis: ReducedBody) -> float:
     for axle, name in (("front", "kingpin"), ("rear", "rear")):
         ends = [chassis.interface(f"{name}_{side}") for side in ("left", "right")]
         widths[axle] = float(ends[0].position[1] - ends[1].position[1])
-        rows[axle] = (ends[0].Psi[2] - ends[1].Psi[2]) / widths[
-            axle
-        ]  # rotation of the axle, and the load of its torque
+        # rotation of the axle by the modes, and the modal load of its torque
+        rows[axle] = (ends[0].Psi[2] - ends[1].Psi[2]) / widths[axle]
     twist = rows["front"] - rows["rear"]
     return float(1.0 / (twist @ np.linalg.solve(chassis.K, twist)))

@@ -29,7 +29,8 @@ from floatframe.model.joints.rows.kinds import NOTHING, POSITION, VELOCITY
 
 __all__ = ["law_derivatives", "law_power", "law_rates", "law_rows", "law_values"]
 
-#: number of steps that replaces an unknown time over which a law changes
+#: steps of differences in time, if the time over which a law changes is unknown: how many are tried, the first of them
+#: relative to `REACH`, and the ratio of the next to the one before
 MOST_LEVELS, SHORTEST, LONGER = 22, 2.0**-20, 4.0
 ROUNDING = 1e-15  #: relative step of positions in differences
 REACH = 5e-3  #: displacement for the differences of rates, relative to the length over which the law changes

@@ -108,7 +108,7 @@ def inputs_of(
 ) -> tuple[Array, list[Array]]:
     """Return t, x, v, z, (..., n_in), and the changes of the coordinates.
 
-    X at the end of the force interval, or the mean.
+    With x at the end of the force interval, or its mean.
     """
     x, v, changes = [], [], []
     for p, pair in zip(coordinates_of(model, element_of(model, c)), pairs, strict=True):

@@ -65,7 +65,7 @@ class VariationalScheme:
     acts_along: bool = False
 
     def inertia(self, body: Body, place: Placed, x: Array, h: float) -> Array:
-        """H times the right sides of (1) without loads, less the momenta at the beginning."""
+        """Return h times the right sides of (1) without loads, minus the momenta at the beginning."""
         d, theta = x[..., :3], x[..., 3:6]
         Pi_0, Y_0 = body.momenta(place.q, place.omega, place.q_dot)
         Pi, Y, force = interval(body, place, x, h)
