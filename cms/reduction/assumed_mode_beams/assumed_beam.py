@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import scipy.linalg as la
 
-from cms.body.geometric_stiffness import SPIN_PAIRS, GeometricStiffness
+from cms.body.geometric_stiffness import GeometricStiffness
 from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.body.source_columns import source_columns
 from cms.errors import BodyError, ModeSetError
@@ -34,6 +34,7 @@ from cms.reduction.basis.frames import (
     determinate_rows,
     placed,
 )
+from cms.reduction.geometric_stiffness.unit_loads import unit_mass_loads
 from fe_models.body.beam_line import BeamLine
 from fe_models.body.mass_loads import MassLoads, rotation_work
 from fe_models.foundation.arrays import Array, IntArray
@@ -416,18 +417,11 @@ def beam_geometric_stiffness(
 
 def unit_loads(x_station: Array, frame: BodyFrame) -> BeamLoads:
     """Return the 12 loads per unit mass, then six for each station, along the axes of B."""
-    e, k = frame.axes.T, 12 + 6 * len(x_station)  # e[a]: axis a of B
-    A, b = np.zeros((k, 3, 3)), np.zeros((k, 3))
-    b[:3] = -e
-    for a in range(3):
-        A[3 + a] = -np.cross(e[a], np.eye(3)).T
-    for j, (p, q) in enumerate(SPIN_PAIRS):
-        A[6 + j] = float(p == q) * np.eye(3) - (np.outer(e[p], e[q]) + np.outer(e[q], e[p])) / 2
-    b[3:] = -A[3:] @ frame.origin
-    wrench = np.zeros((len(x_station), 6, k))
+    mass = unit_mass_loads(frame, 6 * len(x_station))
+    wrench = np.zeros((len(x_station), 6, mass.k))
     for i in range(len(x_station)):
         wrench[i, :, 12 + 6 * i : 18 + 6 * i] = np.kron(np.eye(2), frame.axes)
-    return BeamLoads(MassLoads(A, b), x_station, wrench)
+    return BeamLoads(mass, x_station, wrench)
 
 
 def balanced(line: BeamLine, loads: BeamLoads, frame: BodyFrame) -> BeamLoads:

@@ -141,13 +141,12 @@ def new_unit_loads(reduced: ReducedBody, p: Array, R: Array) -> Loads:
     assert reduced.geometric is not None
     n, n_spread = len(reduced.geometric.interfaces), 0 if reduced.geometric.spread is None else 6
     k = 12 + 6 * n + n_spread
-    mass, none = unit_mass_loads(BodyFrame("", p, R)), MassLoads.none(k - 12)
     wrenches, spread = np.zeros((k, n, 6)), np.zeros((k, n_spread))
     for i in range(n):
         wrenches[12 + 6 * i : 18 + 6 * i, i] = np.kron(np.eye(2), R).T
     if n_spread:
         spread[12 + 6 * n :] = placed_spread(p, R)
-    return Loads(MassLoads(np.concatenate([mass.A, none.A]), np.concatenate([mass.b, none.b])), wrenches, spread)
+    return Loads(unit_mass_loads(BodyFrame("", p, R), k - 12), wrenches, spread)
 
 
 def placed_spread(p: Array, R: Array) -> Array:

@@ -3,8 +3,7 @@
 Loads per unit mass, about the origin and along the axes of the frame B: -e_a for the acceleration of the origin, -e_a ×
 c for the angular acceleration, -½ [e_a × (e_b × c) + e_b × (e_a × c)] for products of angular velocities. Then a unit
 force and a unit moment at every interface, or at chosen interfaces. Optionally, six loads distributed over the nodes
-(`cms.reduction.geometric_stiffness.unit_loads`). All are balanced by the same support, W Psi_R of the frame
-condition.
+(`spread_forces`). All are balanced by the same support, W Psi_R of the frame condition.
 """
 
 from dataclasses import dataclass
@@ -45,7 +44,6 @@ def unit_loads(
 
     Without `is_loaded`, all interfaces are loaded.
     """
-    mass = unit_mass_loads(frame)
     turn = np.kron(np.eye(2), frame.axes)
     chosen = is_loaded or (True,) * len(body.interfaces)
     columns = [
@@ -54,14 +52,16 @@ def unit_loads(
         if is_chosen
     ]
     on_dofs = np.hstack([np.zeros((body.n_dof, 12)), *columns, *([] if spread is None else [spread])])
-    none = MassLoads.none(on_dofs.shape[1] - 12)
-    return together(body, MassLoads(np.concatenate([mass.A, none.A]), np.concatenate([mass.b, none.b])), on_dofs)
+    return together(body, unit_mass_loads(frame, on_dofs.shape[1] - 12), on_dofs)
 
 
-def unit_mass_loads(frame: BodyFrame) -> MassLoads:
-    """Return the 12 loads per unit mass of a frame: 3 translations, 3 rotations, 6 products as in `SPIN_PAIRS`."""
+def unit_mass_loads(frame: BodyFrame, n_more: int = 0) -> MassLoads:
+    """Return the 12 loads per unit mass of a frame: 3 translations, 3 rotations, 6 products as in `SPIN_PAIRS`.
+
+    `n_more` loads of zero follow, for loads that do not act on the mass.
+    """
     e = frame.axes.T  # e[a]: axis a of B
-    A, b = np.zeros((12, 3, 3)), np.zeros((12, 3))
+    A, b = np.zeros((12 + n_more, 3, 3)), np.zeros((12 + n_more, 3))
     b[:3] = -e
     for a in range(3):
         A[3 + a] = -np.cross(e[a], np.eye(3)).T
