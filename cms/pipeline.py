@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from cms.reduction.geometric_stiffness.room_for_stiffness import Asked
     from cms.reduction.geometric_stiffness.unit_states import UnitStates
 
-__all__ = ["Plan", "reduce_job", "reduced", "states_of_job"]
+__all__ = ["Plan", "budget_of", "expected_columns", "reduce_job", "reduced", "states_of_job"]
 
 log = logging.getLogger(__name__)
 
@@ -96,8 +96,8 @@ def reduce_job(
             with stages("static states"):
                 states = states_of_job(job, families)  # (7)
         if job.recovery:  # the static part of recovery rows needs the factorisation
-            return reduced(job, families, modes, states, stages)  # (8)
-    return reduced(job, body, modes, states, stages)  # (8), with the memory of the factorisation free
+            return reduced(job, plan, families, modes, states, stages)  # (8)
+    return reduced(job, plan, body, modes, states, stages)  # (8), with the memory of the factorisation free
 
 
 def states_of_job(job: Job, families: "Families") -> "UnitStates":
@@ -115,10 +115,11 @@ def states_of_job(job: Job, families: "Families") -> "UnitStates":
 
 def reduced(
     job: Job,
+    plan: "Plan",
     source: "FEBody | Families",
     modes: "ModeSet",
     states: "UnitStates | None",
-    stages: Stages | None = None,
+    stages: Stages,
 ) -> ReducedBody:
     """Reduce the body of a job to its modes.
 
@@ -130,22 +131,20 @@ def reduced(
         Static states of the unit loads; None: without geometric stiffness.
     """
     from cms.jobs.tables.recovery_section import requests_of
-    from cms.modes.families.families import body_of
     from cms.reduction.reduction import reduce
 
-    body = body_of(source)
-    with (stages or Stages())("reduce"):
+    with stages("reduce"):
         made = reduce(
             source,
             modes,
-            frame=frame_of(job, held=body.is_held),
+            frame=frame_of(job, held=plan.body.is_held),
             damping=None if job.damping is None else job.damping.damping,
             stress=job.reduction.stress is not False,
             quadratic=bool(job.reduction.quadratic_modes),
             geometric=False if states is None else states,
             recovery=requests_of(job.recovery),
         )
-    left_out = Plan.of_stiffness(job, body).left_out(len(modes.labels)) if states is None else ""
+    left_out = plan.left_out(len(modes.labels)) if states is None else ""
     return replace(made, provenance={**made.provenance, "geometric stiffness": left_out}) if left_out else made
 
 
@@ -159,7 +158,7 @@ class Plan:
     body: FEBody  #: the coupled body
     asked: "Asked"  #: geometric stiffness: True, False, the interfaces whose loads it has; None: if it is small
     has_quadratic_modes: bool
-    solver: Solver | None = None
+    solver: Solver
     to_disk: bool = False  #: whether the columns lie on disk
 
     @classmethod
@@ -174,7 +173,7 @@ class Plan:
             If the geometric stiffness is requested, but the elements do not know it, an interface is unknown, or the
             memory of this machine does not suffice.
         """
-        plan = replace(cls.of_stiffness(job, body), solver=solver)
+        plan = cls(body, job.reduction.geometric_stiffness, bool(job.reduction.quadratic_modes), solver)
         plan.check_stiffness(min(expected_columns(job, body), body.n_dof))  # the mode set refuses a job with more modes
         if budget is None:
             return plan
@@ -182,26 +181,27 @@ class Plan:
         shape = columns_within(budget, ReductionShape(body.n_dof, len(body.b) + n_modes, n_modes, resident_bytes()))
         return replace(plan, solver=solver_within(budget, shape), to_disk=shape.to_disk)
 
-    @classmethod
-    def of_stiffness(cls, job: Job, body: FEBody) -> "Plan":
-        """Plan the geometric stiffness alone."""
-        return cls(body, job.reduction.geometric_stiffness, bool(job.reduction.quadratic_modes))
+    @property
+    def is_requested(self) -> bool:
+        """Whether the job requests the geometric stiffness, or quadratic modes, which need it."""
+        return self.has_quadratic_modes or self.asked not in (None, False)
+
+    @property
+    def is_optional(self) -> bool:
+        """Whether the geometric stiffness is computed if it is small: nobody decided, and the elements know it."""
+        from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffness
+
+        return self.asked is None and not self.has_quadratic_modes and has_geometric_stiffness(self.body)
 
     def needs_states(self, n_modes: int) -> bool:
         """Return whether a mode set of this size is reduced with the static states of unit loads."""
-        from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffness
-
-        if self.has_quadratic_modes or self.asked is not None:
-            return self.has_quadratic_modes or self.asked is not False
-        return has_geometric_stiffness(self.body) and not self.left_out(n_modes)
+        return self.is_requested or (self.is_optional and not self.left_out(n_modes))
 
     def left_out(self, n_modes: int) -> str:
-        """Return a note that the geometric stiffness is left out because nobody asked for it and it is large, or ""."""
+        """Return a note that an optional geometric stiffness is left out because it is large, or ""."""
         from cms.reduction.geometric_stiffness.room_for_stiffness import left_out_words
-        from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffness
 
-        is_open = self.asked is None and not self.has_quadratic_modes and has_geometric_stiffness(self.body)
-        return left_out_words(self.body, n_modes) if is_open else ""
+        return left_out_words(self.body, n_modes) if self.is_optional else ""
 
     def check_stiffness(self, n_modes: int) -> None:
         """Refuse a geometric stiffness that cannot be made, and log what it costs if it is large or left out."""
@@ -209,7 +209,7 @@ class Plan:
         from cms.reduction.geometric_stiffness.unit_states import loaded_interfaces, require_geometric_stiffness
 
         words = self.left_out(n_modes)
-        if self.asked not in (None, False) or self.has_quadratic_modes:
+        if self.is_requested:
             require_geometric_stiffness(self.body)
             if isinstance(self.asked, list):
                 loaded_interfaces(self.body, self.asked)

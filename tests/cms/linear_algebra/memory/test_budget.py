@@ -11,7 +11,6 @@ from scipy.sparse.linalg import splu
 from typer.testing import CliRunner
 
 import cms
-import cms.pipeline as reduce_job_module
 from cms.cli.app import app
 from cms.errors import FactorizationError, MemoryBudgetError
 from cms.linear_algebra.memory import budget
@@ -147,7 +146,7 @@ def test_a_job_with_columns_on_disk_gives_the_same_body(tmp_path, monkeypatch):
     job = write_job(tmp_path, 'memory = "20GB"')
     kept = cms.reduce_job(job)
     assert not is_on_disk(kept.Phi)
-    monkeypatch.setattr(reduce_job_module, "columns_within", lambda _, shape: replace(shape, to_disk=True))
+    monkeypatch.setattr("cms.pipeline.columns_within", lambda _, shape: replace(shape, to_disk=True))
     stored = cms.reduce_job(job)
     assert is_on_disk(stored.Phi)
     for name in ("K", "Phi", "free_frequencies"):
