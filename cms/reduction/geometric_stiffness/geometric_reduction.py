@@ -157,7 +157,7 @@ def elastic_part(body: FEBody, u: Array, mass: MassLoads, Phi: Array) -> Array:
 def mean_nodes_part(body: FEBody, forces: Array, Phi: Array) -> Array:
     """Return the work of forces on the mesh dofs on the second-order motion of nodes that follow a mean, (k, n, n).
 
-    The node moves to second order as the mean of its members does, and its own followers by their levers besides.
+    To second order the node moves as the mean of its members; its own followers move by their levers in addition.
     """
     K = np.zeros((forces.shape[1], Phi.shape[1], Phi.shape[1]))
     six = np.stack([np.zeros(6, np.int64), np.arange(6)], axis=1)

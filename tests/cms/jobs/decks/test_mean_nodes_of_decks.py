@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
 
 import cms
 from cms.assessment.quality.of_body.second_order import turned_loads
+from cms.reduction.geometric_stiffness.geometric_reduction import mean_nodes_part
 from fe_models.body.weld import weld
 from tests.cms.jobs.decks.nastran_bodies import body_of
 
@@ -39,6 +41,42 @@ def test_loads_of_a_mass_on_a_mean_node_turn_with_the_body(tmp_path, mass):
     found = np.concatenate([geometric.turned.translation, geometric.turned.rotation, geometric.turned.spin])
     assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
     assert np.abs(expected[6:]).max() > 1e-2 * np.abs(expected).max()
+
+
+def test_forces_work_on_the_second_order_of_the_nearest_rotation(tmp_path):
+    """Second differences of f·x + m·theta, with R(theta) the rotation nearest to the moved members, by their SVD."""
+    chain = "GRID,51,,3.2,1.1,.2\nRBE2,66,50,123456,51\nCONM2,88,51,,400.\n"
+    body, _ = body_of(tmp_path, BLOCK + MEAN + chain, is_coupled=True)
+    (mean,) = body.mean_nodes
+    rng = np.random.default_rng(4)
+    Phi = rng.normal(size=(body.n_dof, 3))
+    mesh, at_mesh = body.to_mesh.dofs, body.mesh_displacement(Phi)
+    node, follower = (int(np.flatnonzero(np.linalg.norm(body.nodes - x, axis=1) < 1e-9)[-1]) for x in
+                      ((3, 1, 0.5), (3.2, 1.1, 0.2)))  # fmt: skip
+    force = {(n, c): rng.normal() for n in (node, follower) for c in range(6)}
+    f = np.zeros((len(mesh), 1))
+    for key, value in force.items():
+        f[(mesh == key).all(axis=1)] = value
+    x = body.nodes[mean.members]
+    v = np.stack([[at_mesh[(mesh == (m, c)).all(axis=1)][0] for c in range(3)] for m in mean.members])
+    center = mean.weights @ x
+
+    def work(q):
+        moved = x + v @ q
+        now = mean.weights @ moved
+        U, _, Vt = np.linalg.svd(np.einsum("i,ia,ib->ab", mean.weights, moved - now, x - center))
+        R = U @ np.diag([1, 1, np.linalg.det(U @ Vt)]) @ Vt
+        theta = Rotation.from_matrix(R).as_rotvec()
+        return sum(
+            np.array([force[n, c] for c in range(6)]) @ np.concatenate([now + R @ (body.nodes[n] - center), theta])
+            for n in (node, follower)
+        )
+
+    h, e = 1e-4, np.eye(3)
+    found = mean_nodes_part(body, f, Phi)[0]
+    expected = [[(work(h * (a + b)) - work(h * (a - b)) - work(h * (b - a)) + work(-h * (a + b))) / (4 * h**2)
+                 for a in e] for b in e]  # fmt: skip
+    assert_allclose(found, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
 
 
 def test_mean_nodes_of_welded_decks_stay_where_they_are(tmp_path):
