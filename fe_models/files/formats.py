@@ -24,8 +24,7 @@ FORMATS = (
         reads=True,
         key="cms job",
         tried="decks of MSC Nastran 2020",
-        lost="smeared layers, MAT2, RBE1, scalar points, contact, external superelements, fluids: each listed with "
-        "its count",
+        lost="smeared layers, RBE1, scalar points, contact, external superelements, fluids: each listed with its count",
     ),
     FileFormat(
         "CDB",

@@ -128,7 +128,7 @@ def stiffness_shells(model: NastranModel, known: Card, cards: list[Card], offset
         why = f"property {pid}: its materials give a stiffness that is not positive definite"
         model.ledger.refuse("PSHELL", why, count=len(cards))
         return
-    mass = (_density(model, names[0]) * T + known.real(8, 0.0)) * model.wtmass  # (3)
+    mass = _density(model, names[0]) * T + known.real(8, 0.0) * model.wtmass  # (3)
     why = f"property {pid}: stiffness by matrices, without rotary inertia; stress as in one layer of thickness T"
     model.ledger.note("PSHELL", why)
     section = ShellSection(
@@ -184,9 +184,9 @@ def _shear_matrix(model: NastranModel, name: str) -> Array | None:
 
 
 def _density(model: NastranModel, name: str) -> float:
-    """Return the density of a material before WTMASS."""
+    """Return the density of a material, 0 if it has none."""
     card = _sheet(model, name)
-    return card.real(8, 0.0) if card is not None else (model.materials[name].density or 0.0) / model.wtmass
+    return model.materials[name].density or 0.0 if card is None else card.real(8, 0.0) * model.wtmass
 
 
 def _laid_shells(

@@ -160,13 +160,17 @@ def test_a_spring_along_the_line_of_two_points(tmp_path):
     d = e @ np.array([at[2, c] - at[1, c] for c in range(3)])
     assert_allclose(u @ (body.K - plain.K) @ u, 1e5 * d**2, rtol=1e-8)
     assert_allclose(u @ body.D @ u, 20 * d**2, rtol=1e-9)
-    _, deck = body_of(tmp_path, TWO_BARS + "CBUSH1D,8,9,2,3\nPBUSH1D,9,1.+5,20.\n")
-    assert not [row for row in deck.ledger.rows() if row[0] == "PBUSH1D"]
-    law = "PBUSH1D,9,1.+5,20.,,,,,\n,SPRING,TABLE,12\n"
-    _, deck = body_of(tmp_path, TWO_BARS + f"CBUSH1D,8,9,2,3\n{law}")
-    assert [row[2] for row in deck.ledger.rows() if row[0] == "PBUSH1D"] == [
-        "laws that are not linear, or vary with time: K and C are taken"
-    ]
+
+
+@pytest.mark.parametrize(
+    ("further", "is_noted"),
+    [("", False), (",,,1.,2.", False), (",,,,,\n,SPRING", True), (",,,1.,2.,\n,SPRING,TABLE,12", True)],
+)
+def test_a_law_of_pbush1d_is_noted_and_its_stress_recovery_is_not(tmp_path, further, is_noted):
+    """Fields 6 and 7, SA and SE, are harmless; the laws begin with field 9."""
+    _, deck = body_of(tmp_path, TWO_BARS + f"CBUSH1D,8,9,2,3\nPBUSH1D,9,1.+5,20.{further}\n")
+    why = "laws that are not linear, or vary with time: K and C are taken"
+    assert [row[2] for row in deck.ledger.rows() if row[0] == "PBUSH1D"] == [why] * is_noted
 
 
 def test_a_spring_to_a_held_point_of_nothing_else_is_one_to_the_ground(tmp_path):

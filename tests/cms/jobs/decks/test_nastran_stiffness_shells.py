@@ -98,6 +98,13 @@ def test_matrices_of_a_layup_give_the_body_of_the_layup(tmp_path, ratio, theta):
     assert np.abs(turned.K.toarray() - K).max() > 1e-3 * np.abs(K).max()
 
 
+def test_wtmass_scales_the_mass_of_sheets(tmp_path):
+    text = deck_text(shell_law(laminate()).H)
+    plain, scaled = body_of(tmp_path, text), body_of(tmp_path, text.replace("BULK\n", "BULK\nPARAM,WTMASS,.25\n"))
+    assert_allclose(scaled.M.toarray(), plain.M.toarray() / 4, rtol=1e-12)
+    assert_allclose(scaled.K.toarray(), plain.K.toarray(), rtol=1e-12)
+
+
 def test_the_mass_is_that_of_the_membrane_without_rotary_inertia(tmp_path):
     H = shell_law(laminate()).H
     ours, theirs = body_of(tmp_path, deck_text(H)), body_of_laminate()
