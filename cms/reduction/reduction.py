@@ -254,9 +254,9 @@ def reduced_moments(body: FEBody, Phi: Array, frame: BodyFrame) -> Moments:
 def with_near_second_moment(gram: Array, body: FEBody, frame: BodyFrame) -> Array:
     """Return the Gram matrix with first and second moment about the origin of B where that is far from the mesh origin.
 
-    About the mesh origin R loses (distance / size)² digits. A unit rotation about the origin of B moves a point by the
-    coordinates that are needed: e_z × c has c_x along y. The given array is overwritten, if the rotations differ from
-    the positions by rounding only; a body that is held or planar has not all of them.
+    About the mesh origin R has a relative error of eps (distance / size)². A unit rotation about the origin of B moves
+    a point by the coordinates that are needed: e_z × c has c_x along y. The given array is overwritten if the rotations
+    differ from the positions by rounding only; a held or planar body lacks some rotations, and keeps its array.
     """
     assert body.element_model is not None
     own, far = float(np.trace(gram[1:4, 1:4])), float(gram[0, 0] * (frame.origin @ frame.origin))

@@ -81,8 +81,7 @@ def coupled_columns(where: str, body: FEBody, V: Array, over: str | None) -> tup
         if own**2 > DEARER * else_**2:
             raise ModeSetError(
                 f'{where}: columns_over = "{over}": in this order, the columns vibrate at {own / (2 * np.pi):.4g} per '
-                "time "
-                f"unit (median of sqrt(uᵀKu / uᵀMu) / 2 pi), as {WORDS[other]} at {else_ / (2 * np.pi):.4g}; give "
+                f"time unit (median of sqrt(uᵀKu / uᵀMu) / 2 pi), as {WORDS[other]} at {else_ / (2 * np.pi):.4g}; give "
                 f'columns_over = "{other}", or correct the order of the rows'
             )
     return columns, options

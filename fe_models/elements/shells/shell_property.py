@@ -21,7 +21,8 @@ __all__ = [
     "symmetric",
 ]
 
-ASYMMETRY = 1e-9  #: of a matrix of stiffness whose diagonal is scaled to ones, and its least eigenvalue
+#: of a stiffness matrix scaled to a unit diagonal: largest asymmetry, and largest eigenvalue that counts as zero
+ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -205,10 +206,10 @@ def _positive_matrix(where: str, given: object, n: int) -> Array:
     if not (diagonal > 0).all():
         raise ShellError(f"{where}: expected a positive definite matrix, got the diagonal {diagonal.tolist()}")
     scaled = matrix / np.sqrt(np.outer(diagonal, diagonal))
-    if np.abs(scaled - scaled.T).max() > ASYMMETRY:
+    if np.abs(scaled - scaled.T).max() > ROUNDING:
         raise ShellError(f"{where}: expected a symmetric matrix, got {given!r}")
     least = float(np.linalg.eigvalsh((scaled + scaled.T) / 2)[0])
-    if not least > ASYMMETRY:
+    if not least > ROUNDING:
         raise ShellError(f"{where}: expected a positive definite matrix, got the scaled eigenvalue {least:.3g}")
     return np.asarray((matrix + matrix.T) / 2)
 
