@@ -166,9 +166,7 @@ def export_command(
     units: Annotated[
         str | None, typer.Option(help="Unit system of the numbers, such as m-kg-s; that of the file by default.")
     ] = None,
-    nodes: Annotated[
-        str, typer.Option(help="Nodes, where the format leaves the choice: interfaces or all.")
-    ] = "default",
+    nodes: Annotated[str, typer.Option(help="Nodes, if the format allows both: interfaces or all.")] = "default",
     load: Annotated[
         list[str] | None, typer.Option(help="Load case that acts permanently (ext_ptfm): NAME=AMPLITUDE; repeatable.")
     ] = None,
@@ -361,7 +359,9 @@ def frf_command(
         float | None, typer.Option(help="Ratio of every free-free mode; default: the file's own, 0.01 with --job.")
     ] = None,
     inertance: Annotated[bool, typer.Option("--inertance", help="Acceleration instead of displacement.")] = False,
-    job: Annotated[Path | None, typer.Option("--job", "-j", help="Job file of the full model to draw over it.")] = None,
+    job: Annotated[
+        Path | None, typer.Option("--job", "-j", help="Job file of the full model, to draw its response too.")
+    ] = None,
     output: Annotated[
         list[Path] | None, typer.Option("--output", "-o", help="Picture (.png .svg .pdf) or table (.csv); repeatable.")
     ] = None,

@@ -19,7 +19,7 @@ Workers = Annotated[
         "--workers",
         "-j",
         help="Where tasks are computed: a number of processes, dask (dask:4), or dask://host:port, see "
-        "docs/cluster.md; default: one process a processor.",
+        "docs/cluster.md; default: one process per processor.",
     ),
 ]
 
@@ -27,7 +27,7 @@ Solver = Annotated[
     str | None,
     typer.Option(
         "--solver",
-        help="What factorises: pardiso, cholesky, superlu (docs/memory.md), petsc (docs/cluster_mpi.md), ....",
+        help="Solver for the factor: pardiso, cholesky, superlu (docs/memory.md), petsc (docs/cluster_mpi.md), ....",
     ),
 ]
 
@@ -35,11 +35,11 @@ Memory = Annotated[
     str | None,
     typer.Option(
         "--memory",
-        help="Most memory the process may take, such as 8GB: above it factor and columns go to disk (docs/memory.md).",
+        help="Memory limit, such as 8GB: beyond it, factor and columns are on disk (docs/memory.md).",
     ),
 ]
 
 Journal = Annotated[
     Path | None,
-    typer.Option("--journal", help="File that keeps every result, to go on from; default: beside the input file."),
+    typer.Option("--journal", help="File that records every result, to resume from; default: beside the input file."),
 ]

@@ -124,11 +124,11 @@ def reduce_and_write_fleet(fleet: Fleet) -> None:
 def reduce_command(
     jobs: Annotated[list[Path], typer.Argument(help="Job files (TOML), see docs/job_file.md.", metavar="JOB...")],
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Modal file to write; of several jobs their folder.")
+        Path | None, typer.Option("--output", "-o", help="Modal file to write; with several jobs: their folder.")
     ] = None,
     journal: Annotated[
         Path | None,
-        typer.Option("--journal", help="Of several jobs: file that keeps which are done; default: beside the files."),
+        typer.Option("--journal", help="With several jobs: file of the finished ones; default: beside the files."),
     ] = None,
     workers: Workers = None,
     solver: Solver = None,

@@ -107,7 +107,7 @@ def eig_command(
     center: Center = "0,0,0",
     n_modes: Modes = 20,
     animate: Annotated[
-        list[int], typer.Option("--animate", "-a", min=1, help="Draw this mode into a film; repeatable.")
+        list[int], typer.Option("--animate", "-a", min=1, help="Make a film of this mode; repeatable.")
     ] = [],  # noqa: B006
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Film (.gif, .mp4) or picture (.png) of the mode.")

@@ -47,8 +47,8 @@ def run_command(
         str | None,
         typer.Option(
             "--watch",
-            help="stop, tell or off: what a run does whose steps put its motion off or add energy to it; default: as "
-            "in [run], else stop.",
+            help="Reaction to steps that make the motion inaccurate or add energy: stop, tell or off; default: as in "
+            "[run], else stop.",
         ),
     ] = None,
 ) -> None:
@@ -92,7 +92,7 @@ def run_command(
 @guarded
 def resume_command(
     system: Annotated[Path, typer.Argument(help="System file (TOML) of the run that was interrupted.")],
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Results file the run was to write.")] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Results file of that run.")] = None,
 ) -> None:
     """Continue a run that was interrupted or killed; the motion is that of an uninterrupted run.
 
@@ -360,8 +360,8 @@ def plot_command(
         str,
         typer.Option("--as", help="Spectra: psd, amplitude, octave, third-octave, orders, waterfall; default: time."),
     ] = "",
-    resolution: Annotated[float | None, typer.Option(help="Of spectra: distance of lines in Hz.")] = None,
-    rotation: Annotated[str, typer.Option(help="Of orders: sensor with the angle or speed of the rotation.")] = "",
+    resolution: Annotated[float | None, typer.Option(help="For spectra: distance of lines [Hz].")] = None,
+    rotation: Annotated[str, typer.Option(help="For orders: sensor with the angle or speed of the rotation.")] = "",
 ) -> None:
     """Plot the motion: positions, energies, elastic displacement, reactions, energy error, joint drift, sensors.
 
@@ -419,12 +419,12 @@ def animate_command(
     file: ResultsFile,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Film to write (.gif or .mp4).")] = None,
     speed: Annotated[
-        float | None, typer.Option(help="Seconds of motion in a second of film; default: so that it is well seen.")
+        float | None, typer.Option(help="Seconds of motion per second of film; default: automatic.")
     ] = None,
     magnification: Annotated[
-        float | None, typer.Option(help="How many times larger elastic displacement is drawn; default: to be seen.")
+        float | None, typer.Option(help="Magnification of elastic displacement; default: automatic.")
     ] = None,
-    fps: Annotated[float, typer.Option(help="Frames a second.")] = 25.0,
+    fps: Annotated[float, typer.Option(help="Frames per second.")] = 25.0,
     color: Annotated[str, typer.Option(help="Colour of flexible bodies: displacement or von-mises.")] = "displacement",
 ) -> None:
     """Make a film of the motion: deformed bodies, coloured by elastic displacement or stress; needs no display.
@@ -471,7 +471,7 @@ def export_command(
         list[str],
         typer.Option("--sensor", "-s", help="Only this sensor, sensor.column or joint.coordinate; * and ? are wild."),
     ] = [],  # noqa: B006
-    every: Annotated[int, typer.Option(min=1, help="Take every so many output times (.pvd).")] = 1,
+    every: Annotated[int, typer.Option(min=1, help="Use every n-th output time only (.pvd).")] = 1,
 ) -> None:
     """Write a motion for other programs: a table with all sensors, or deformed surfaces with stress for ParaView.
 

@@ -165,7 +165,7 @@ def shake_command(
     sine: Annotated[
         str | None, typer.Option(help='Of a modal file: level in g, "5:1,100:1" (Hz:g), or a file.')
     ] = None,
-    rate: Annotated[float | None, typer.Option(help="Sweep rate in octaves a minute; none: steady.")] = None,
+    rate: Annotated[float | None, typer.Option(help="Sweep rate in octaves per minute; none: steady.")] = None,
     random: Annotated[
         str | None, typer.Option(help='Of a modal file: density in g2/Hz, "20:0.01,2000:0.01", or a file.')
     ] = None,

@@ -43,9 +43,9 @@ def generate_command(
             help="A number that stays a symbol: BODY/m, BODY (all ten), gravity, or a pattern; may be repeated.",
         ),
     ] = [],  # noqa: B006
-    name: Annotated[str | None, typer.Option("--name", help="What functions begin with; default: the system.")] = None,
+    name: Annotated[str | None, typer.Option("--name", help="Prefix of the functions; default: the system.")] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write.")] = Path(),
-    json: Annotated[bool, typer.Option("--json", help="Say what was written as JSON, for other programs.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="List the written files as JSON, for other programs.")] = False,
     fmu: Annotated[
         Path | None,
         typer.Option("--fmu", help="Write an FMU of compiled C instead, which needs nothing where it runs."),

@@ -42,7 +42,7 @@ def identify_command(
     ] = "viscous,coulomb",
     method: Annotated[str, typer.Option("--method", help="ordinary, weighted or robust.")] = "weighted",
     cutoff: Annotated[float | None, typer.Option("--cutoff", help="Filter all channels above this [Hz].")] = None,
-    thin: Annotated[int | None, typer.Option("--thin", min=1, help="Take every so many rows.")] = None,
+    thin: Annotated[int | None, typer.Option("--thin", min=1, help="Use every n-th row only.")] = None,
     check: Annotated[
         Path | None, typer.Option("--check", help="Another measured motion, on which the estimate is tried.")
     ] = None,
@@ -50,7 +50,7 @@ def identify_command(
         bool, typer.Option("--real/--no-real", help="Find real bodies (positive masses and inertias) too.")
     ] = True,
     motion: Annotated[
-        Path | None, typer.Option("--motion", help="Write the motion that would tell more, a .csv of positions.")
+        Path | None, typer.Option("--motion", help="Write a more informative motion, a .csv of positions.")
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the result as JSON, for other programs.")] = False,
 ) -> None:
@@ -107,7 +107,7 @@ def identify_command(
                             "of other motions within its range, rates and accelerations none excites better",
                         )
                 except ModelError as error:
-                    notes = (*notes, f"no motion that would tell more was found: {error}")
+                    notes = (*notes, f"no more informative motion was found: {error}")
         with clock("record"):
             record = identification_record(made, bodies, other, notes, better)
     if json:

@@ -62,7 +62,7 @@ def register_prepare(app: typer.Typer) -> None:
 
 @guarded
 def prepare_command(
-    workers: Annotated[int, typer.Option(min=0, help="Processes at a time; 0: one a processor.")] = 0,
+    workers: Annotated[int, typer.Option(min=0, help="Processes at a time; 0: one per processor.")] = 0,
 ) -> None:
     """Compile the code of motions and reductions in advance; otherwise it is compiled at first use.
 

@@ -42,8 +42,8 @@ def spectrum_command(
     rms: Annotated[bool, typer.Option("--rms", help="Amplitudes as rms; default: peak.")] = False,
     rotation: Annotated[str, typer.Option(help="Channel with angle or speed of the rotation, for orders.")] = "",
     max_order: Annotated[float, typer.Option(min=0.1, help="Highest order.")] = 10.0,
-    input_name: Annotated[str, typer.Option("--input", help="Channel that a response is to.")] = "",
-    rate: Annotated[float | None, typer.Option(help="Samples a second to resample to first, in Hz.")] = None,
+    input_name: Annotated[str, typer.Option("--input", help="Input channel of a response.")] = "",
+    rate: Annotated[float | None, typer.Option(help="Sampling rate to resample to first [Hz].")] = None,
 ) -> None:
     """Spectra of sensors of a motion, or of channels of a measured file, as a table or a picture.
 

@@ -296,7 +296,8 @@ def gradient_command(
 ) -> None:
     """Derivatives of motions, equilibria, steady rotations or frequencies by numbers of the system file, in one run.
 
-    Sensors as `floatframe info` lists them. direct costs a solution a parameter in every step, adjoint one an output.
+    Sensors as `floatframe info` lists them. The cost of direct grows with the number of parameters, that of adjoint
+    with the number of outputs.
 
     Example: floatframe gradient crank.toml -m "tip x" -p bodies.rod.mass -p forces.spring.stiffness
 

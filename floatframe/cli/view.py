@@ -34,9 +34,9 @@ def view_command(
     ] = [],  # noqa: B006
     color: Annotated[str, typer.Option(help="Colour at first: displacement or von-mises.")] = "displacement",
     magnification: Annotated[
-        float | None, typer.Option(help="How many times larger deformation is drawn at first; default: to be seen.")
+        float | None, typer.Option(help="Initial magnification of deformation; default: automatic.")
     ] = None,
-    largest: Annotated[float, typer.Option("--largest", help="MB of the page, at most.")] = 10.0,
+    largest: Annotated[float, typer.Option("--largest", help="Size limit of the page [MB].")] = 10.0,
     rest: Annotated[bool, typer.Option("--rest", help="Of a system file: its equilibrium alone.")] = False,
     n_modes: Annotated[int, typer.Option("--modes", "-n", min=1, help="How many modes, by frequency.")] = 20,
     speed: Speed = 0.0,
