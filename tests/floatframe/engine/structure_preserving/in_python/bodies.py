@@ -3,7 +3,7 @@
 Formulas: `floatframe.engine.structure_preserving.kernels.bodies`.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -87,7 +87,7 @@ class Body(CentralBody):
 
 def step_bodies(bodies: tuple[CentralBody, ...]) -> tuple[Body, ...]:
     """Return bodies with their functions, one for each type."""
-    made = {id(body): Body(*(getattr(body, field.name) for field in fields(body))) for body in bodies}
+    made = {id(body): Body(**vars(body)) for body in bodies}
     return tuple(made[id(body)] for body in bodies)
 
 

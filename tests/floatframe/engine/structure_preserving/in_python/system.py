@@ -80,36 +80,28 @@ class Ends:
         return list(zip(self.markers[::2], self.markers[1::2], strict=True))
 
     @property
-    def of_loads(self) -> list[Loads]:
-        """The loads of these."""
+    def pairs_of_loads(self) -> list[Loads]:
+        """The loads on the markers A and B of each coordinate."""
         return list(zip(self.loads[::2], self.loads[1::2], strict=True))
 
 
 @dataclass(frozen=True, eq=False)
-class StepConnection:
+class StepConnection(Connection):
     """A connection with its markers and their functions."""
 
-    own: Connection
     ends: tuple[BodyMarker, ...]
     loaded: tuple[int, ...]  #: rows with forces along their coordinate
     line: DeformedLine | None  #: along which marker A slides
 
-    def __getattr__(self, name: str) -> object:
-        return getattr(self.own, name)
-
 
 @dataclass(frozen=True, eq=False)
-class StepSystem:
+class StepSystem(DiscreteSystem):
     """A discrete system with bodies, markers and connections that have functions."""
 
-    own: DiscreteSystem
     bodies: tuple[Body, ...]
     connections: tuple[StepConnection, ...]
     loads: tuple[tuple[tuple[int, BodyMarker], ...], ...]  #: point forces on each body: number, marker
     cases: tuple[tuple[int, ...], ...]  #: load cases on each body
-
-    def __getattr__(self, name: str) -> object:
-        return getattr(self.own, name)
 
     def own_loads(self, i: int, step: BodyStep, load: Load, span: Span) -> Given:
         """Add gravity, point forces and load cases on body i; gravity has a potential and gives no work."""
@@ -133,7 +125,7 @@ class StepSystem:
         law = int(model.connections.law[c])
         if law == ELEMENT:
             return Given(*element_load(model, c, ends.markers, ends.loads, span, dz, f, is_middle=is_middle))
-        pair, loads = ends.pairs[0], ends.of_loads[0]
+        pair, loads = ends.pairs[0], ends.pairs_of_loads[0]
         if law == SPRING_LAW:
             return spring_load(model, c, pair, loads, span)
         if law == BUSHING:
@@ -141,7 +133,7 @@ class StepSystem:
         if law == CONTACT:
             return Given(0.0, contact_load(model, c, pair, loads, span))
         if law == USER_FORCE:
-            return Given(user_force_load(model, c, ends.pairs, ends.of_loads, span, dz, is_middle=is_middle))
+            return Given(user_force_load(model, c, ends.pairs, ends.pairs_of_loads, span, dz, is_middle=is_middle))
         for j, k in enumerate(connection.held):
             self.add_row(connection, k, ends, span, f[..., j])
         given: Array | float = 0.0
@@ -154,11 +146,11 @@ class StepSystem:
 
     def add_row(self, connection: StepConnection, k: int, ends: Ends, span: Span, f: Array) -> None:
         """Add the loads of held row k with multiplier f, (...,); those of elements are among their forces."""
-        kind, pair, loads = int(self.model.rows.kind[k]), ends.pairs[0], ends.of_loads[0]
+        kind, pair, loads = int(self.model.rows.kind[k]), ends.pairs[0], ends.pairs_of_loads[0]
         if ends.slide is not None:
             add_line_reaction(self.model, k, pair, loads, ends.slide, f)
         elif kind == COUPLE:
-            add_coupler_reaction(self.model, connection.number, ends.pairs, ends.of_loads, f)
+            add_coupler_reaction(self.model, connection.number, ends.pairs, ends.pairs_of_loads, f)
         elif kind == RIM_HEIGHT:
             add_height_reaction(self.model, k, pair, loads, f)
         elif kind == ROLL:
@@ -193,10 +185,6 @@ class StepSystem:
             return rate_in_time(self.model, k, ends.pairs[0], t)
         motion = int(self.model.rows.motion[k])
         return 0.0 if motion < 0 else -float(self.model.rows.x[k, 0]) * value_of(self.model, motion, t)[1]
-
-    def is_driven(self, connection: StepConnection, k: int) -> bool:
-        """Whether held row k of a connection does the work of a prescribed motion."""
-        return self.own.is_driven(connection.own, k)
 
     def state_residual(
         self, connection: StepConnection, ends: Ends, span: Span, dz: Array, f: Array, *, is_along: bool
@@ -256,7 +244,8 @@ def step_system(ds: DiscreteSystem) -> StepSystem:
         loaded = tuple(k for k in rows if kind_of(model.rows.kind[k]).is_loaded and is_joint)
         line = line_of(model, c)
         along = deformed_line(model, markers, line) if line >= 0 else None
-        connections.append(StepConnection(own, tuple(markers[m] for m in own.markers), loaded, along))
+        ends = tuple(markers[m] for m in own.markers)
+        connections.append(StepConnection(**vars(own), ends=ends, loaded=loaded, line=along))
     point_forces: list[list[tuple[int, BodyMarker]]] = [[] for _ in bodies]
     cases: list[list[int]] = [[] for _ in bodies]
     for k, m in enumerate(model.loads.marker):
@@ -265,4 +254,5 @@ def step_system(ds: DiscreteSystem) -> StepSystem:
             point_forces[marker.body].append((k, marker))
     for k, i in enumerate(model.body_loads.body):
         cases[int(i)].append(k)
-    return StepSystem(ds, bodies, tuple(connections), tuple(map(tuple, point_forces)), tuple(map(tuple, cases)))
+    known = vars(ds) | {"bodies": bodies, "connections": tuple(connections)}
+    return StepSystem(**known, loads=tuple(map(tuple, point_forces)), cases=tuple(map(tuple, cases)))
