@@ -1,4 +1,4 @@
-"""Python's search for garbage, left out while numba compiles."""
+"""Suspension of Python's garbage collection while very many objects are made: by a compilation or a parser."""
 
 import gc
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ __all__ = ["without_garbage_collection"]
 
 @contextmanager
 def without_garbage_collection() -> Iterator[None]:
-    """Avoid repeated walks through the hundreds of thousands of objects of a compilation."""
+    """Suspend garbage collection, which would walk through all these objects again and again."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:
