@@ -125,6 +125,8 @@ def reduced(
 
     Parameters
     ----------
+    plan
+        What was decided about the geometric stiffness.
     source
         The coupled body, or its families, whose factorisation recovery rows use.
     states
@@ -158,7 +160,7 @@ class Plan:
     body: FEBody  #: the coupled body
     asked: "Asked"  #: geometric stiffness: True, False, the interfaces whose loads it has; None: if it is small
     has_quadratic_modes: bool
-    solver: Solver
+    solver: Solver | None = None  #: of the factorisation; None: the fastest that is installed
     to_disk: bool = False  #: whether the columns lie on disk
 
     @classmethod
@@ -173,13 +175,18 @@ class Plan:
             If the geometric stiffness is requested, but the elements do not know it, an interface is unknown, or the
             memory of this machine does not suffice.
         """
-        plan = cls(body, job.reduction.geometric_stiffness, bool(job.reduction.quadratic_modes), solver)
+        plan = replace(cls.of_stiffness(job, body), solver=solver)
         plan.check_stiffness(min(expected_columns(job, body), body.n_dof))  # the mode set refuses a job with more modes
         if budget is None:
             return plan
         n_modes = job.reduction.n_modes if isinstance(job.reduction.n_modes, int) else GUESSED_MODES
         shape = columns_within(budget, ReductionShape(body.n_dof, len(body.b) + n_modes, n_modes, resident_bytes()))
         return replace(plan, solver=solver_within(budget, shape), to_disk=shape.to_disk)
+
+    @classmethod
+    def of_stiffness(cls, job: Job, body: FEBody) -> "Plan":
+        """Plan the geometric stiffness alone, for many reductions with one factorisation."""
+        return cls(body, job.reduction.geometric_stiffness, bool(job.reduction.quadratic_modes))
 
     @property
     def is_requested(self) -> bool:

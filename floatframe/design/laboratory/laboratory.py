@@ -367,8 +367,9 @@ class BodyShelf:
         families = self._families_of(self.job)
         modes = all_dofs(families.body, asked.most_dofs)
         job = changed_job(read_job(self.job), Case(frame="tisserand"))
-        states = self._states_of(self.job, job, families, 0)  # of a reference however many modes there are
-        return reduced(job, families, modes, states)
+        plan = Plan.of_stiffness(job, families.body)
+        states = self._states_of(self.job, job, plan, families, 0)  # of a reference however many modes there are
+        return reduced(job, plan, families, modes, states, Stages())
 
     def model(self) -> FEBody:
         """Return the coupled finite element model of the whole body."""
@@ -391,16 +392,18 @@ class BodyShelf:
             with suppress(ReportedError):  # found once, the others are its first ones; too many are told where they are
                 job_mode_set(families, reduction_of(largest, families.body))
         modes = job_mode_set(families, reduction_of(job, families.body))
-        return reduced(job, families, modes, self._states_of(path, job, families, len(modes.labels)))
+        plan = Plan.of_stiffness(job, families.body)
+        states = self._states_of(path, job, plan, families, len(modes.labels))
+        return reduced(job, plan, families, modes, states, Stages())
 
     def _families_of(self, path: Path) -> Families:
         if path not in self._families:
             self._families[path] = self._stack.enter_context(Families(job_body(read_job(path))))
         return self._families[path]
 
-    def _states_of(self, path: Path, job: Job, families: Families, n_modes: int) -> UnitStates | None:
+    def _states_of(self, path: Path, job: Job, plan: Plan, families: Families, n_modes: int) -> UnitStates | None:
         """Return the static states of the unit loads, which differ by the frame alone; None where none are wanted."""
-        if not Plan.of_stiffness(job, families.body).needs_states(n_modes):
+        if not plan.needs_states(n_modes):
             return None
         require_geometric_stiffness(families.body)
         key = (path, repr((moving_frame_of(job), job.reduction.geometric_stiffness)))
