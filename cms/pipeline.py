@@ -1,14 +1,14 @@
 """From a job file to a modal file, on one page: the steps of `cms reduce` in their order.
 
-    (1) read          the job, what to reduce and how: cms/jobs/job.py
-    (2) assemble      mesh, deck, tables or matrices to a body with M and K: cms/jobs/body_of_job.py
-    (3) couple        rigid, distributing and nodal interfaces: fe_models/body/couplings
-    (4) plan          solver, memory, geometric stiffness, before the long work: `Plan`, below
-    (5) families      one factorisation of K, for constraint and vibration modes: cms/modes/families
-    (6) mode set      columns over the dofs of the body: cms/modes/mode_sets
-    (7) unit states   static states of unit loads: cms/reduction/geometric_stiffness/unit_states.py
-    (8) reduce        independent orthonormal basis in a body frame, moments, stress: cms/reduction/reduction.py
-    (9) write         the modal file, by `cms.write`: cms/body/modal_file/file.py
+(1) read          the job, what to reduce and how: cms/jobs/job.py
+(2) assemble      mesh, deck, tables or matrices to a body with M and K: cms/jobs/body_of_job.py
+(3) couple        rigid, distributing and nodal interfaces: fe_models/body/couplings
+(4) plan          solver, memory, geometric stiffness, before the long work: `Plan`, below
+(5) families      one factorisation of K, for constraint and vibration modes: cms/modes/families
+(6) mode set      columns over the dofs of the body: cms/modes/mode_sets
+(7) unit states   static states of unit loads: cms/reduction/geometric_stiffness/unit_states.py
+(8) reduce        independent orthonormal basis in a body frame, moments, stress: cms/reduction/reduction.py
+(9) write         the modal file, by `cms.write`: cms/body/modal_file/file.py
 """
 
 import logging

@@ -55,9 +55,7 @@ def test_every_error_has_the_one_root(module):
 
 
 #: caught where they are raised for, never seen outside
-INNER = (
-    "floatframe/engine/compiling/callbacks/law_source.py: NoKeyError",
-)
+INNER = ("floatframe/engine/compiling/callbacks/law_source.py: NoKeyError",)
 
 
 def test_no_error_is_raised_that_is_not_reported():

@@ -53,9 +53,7 @@ def test_the_page_tells_both_runs_and_names_what_became_worse():
 
 def test_quoted_figures_are_renewed_with_their_decimals(tmp_path, monkeypatch):
     text = tmp_path / "page.md"
-    text.write_text(
-        "ratio 3.1<!-- recursive: a over b -->x, step 7<!--recursive: c--> ms, 2<!-- recursive: gone -->"
-    )
+    text.write_text("ratio 3.1<!-- recursive: a over b -->x, step 7<!--recursive: c--> ms, 2<!-- recursive: gone -->")
     monkeypatch.setattr(watch, "texts", lambda: [text])
     assert watch.quote(results(**{"a over b": 2.46, "c": 12.4})) == [text]
     assert text.read_text() == (

@@ -31,9 +31,7 @@ COLLECTED = ("multilevel",)
 
 
 def on_ranks(n, *command):
-    return subprocess.run(
-        [*MPIRUN, "-n", str(n), *map(str, command)], capture_output=True, text=True, env=ENVIRONMENT
-    )
+    return subprocess.run([*MPIRUN, "-n", str(n), *map(str, command)], capture_output=True, text=True, env=ENVIRONMENT)
 
 
 @pytest.mark.parametrize("n", [1, 2, 4])

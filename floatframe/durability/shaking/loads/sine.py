@@ -68,9 +68,7 @@ class SineRun:
     sizes: Array  #: steady amplitudes, (n_f, n_out) [units of the model]
     transfer: Array  #: complex response of the model outputs per unit of input, (n_f, n_rows)
     uncertain: Array  #: amplitudes with uncertainty, (n_f, n_out)
-    static: (
-        Array  #: quasi-static amplitudes: the response at the lowest frequency, scaled with the level, (n_f, n_out)
-    )
+    static: Array  #: quasi-static amplitudes: the response at the lowest frequency, scaled with the level, (n_f, n_out)
     swept_frequencies: Array = field(default_factory=lambda: np.zeros(0))  #: frequencies of the sweep, (n_t,) [Hz]
     swept: Array | None = None  #: envelopes during the sweep, (n_t, n_out)
     rate: float | None = None  #: octaves a minute

@@ -131,8 +131,6 @@ class ShakenModel:
                        E=self.E * by_output, D=D)  # fmt: skip
 
 
-
-
 def follows_stiffness(output: Output) -> bool:
     """Whether displacements act on an output through a stiffness: forces, stresses, accelerations made of forces."""
     return any(word in output.kind for word in ("force", "moment", "stress", "acceleration"))

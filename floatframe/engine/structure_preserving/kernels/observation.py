@@ -1,7 +1,7 @@
 """Accelerations and reactions at the end of a step, from the equations of motion, as in `initial_conditions.initial`.
 
-    (2) W du - Jᵀ w = 0,       G du = -G u              velocities that fulfil the joints, W = M + s K
-    (3) M u_dot - Jᵀ w = f,    G u_dot = -d(G)/dt u     there
+(2) W du - Jᵀ w = 0,       G du = -G u              velocities that fulfil the joints, W = M + s K
+(3) M u_dot - Jᵀ w = f,    G u_dot = -d(G)/dt u     there
 """
 
 import math

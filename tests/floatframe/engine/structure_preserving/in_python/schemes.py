@@ -57,7 +57,6 @@ def variational_step(method: Variational, ds: StepSystem, placed: list[Placed], 
     return StepResult(after, solution.f, work, solution.n_iterations, at_end.w)
 
 
-
 @dataclass(frozen=True, eq=False)
 class VariationalScheme:
     """(1) of one body, as `newton.Scheme`."""
