@@ -428,6 +428,8 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
                 error = local_error(model, work, tree, joints, tangent, memory, order, h)
                 if not error <= order.most_error:
                     return INACCURATE, -1, excess, error
+            if iteration == 0 and not is_open:  # reactions are those of kept wrenches before their correction
+                evaluate_placed(model, work, tree, joints, c_k)
             accept(model, work, memory, tree, joints, h, alpha_m, alpha_f)
             return DONE, -1, excess, error
         if norm > SLOW * last and not is_small and (tangent.is_exact != 0 or made < iteration):

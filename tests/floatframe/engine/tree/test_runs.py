@@ -6,11 +6,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from floatframe import (
     GROUND,
+    Bushing,
     EnergyMomentum,
     Event,
     GeneralizedAlpha,
     Marker,
     ModelError,
+    PrismaticJoint,
     RevoluteJoint,
     RigidBody,
     SphericalJoint,
@@ -22,6 +24,7 @@ from floatframe import (
 from floatframe.components.mechanisms import chain, double_pendulum, four_bar, slider_crank
 from floatframe.engine.tree.topology import tree_of
 from floatframe.files.system_file.read_system import read_system
+from floatframe.model.functions.time_functions import harmonic
 from tests.floatframe.engine.tree.examples import rubbed_block
 from tests.floatframe.engine.tree.mechanisms import DOWN, beam, falling
 from tests.floatframe.simulation.examples import StopHereError
@@ -187,3 +190,19 @@ def test_a_ball_turns_over_and_over_without_a_singular_place():
     ]
     assert drift[1] < 0.3 * drift[0]
     assert drift[1] < 1e-2 * 40
+
+
+@pytest.mark.parametrize("n_steps", [80, 640])
+def test_the_work_of_a_drive_against_a_spring_is_the_energy_in_it(n_steps):
+    """Nothing is left to solve for but the force of the bushing: a driven slide is at its place at once."""
+    K = np.diag([1e4, 1e4, 1e4, 10.0, 10.0, 10.0])
+    slide = PrismaticJoint(
+        "slide", Marker(GROUND, position=np.zeros(3)), Marker("body", position=np.zeros(3)), axis=(1, 0, 0),
+        motions={"distance": harmonic(0.1, 5.0)},
+    )  # fmt: skip
+    spring = Bushing("spring", Marker(GROUND, position=np.zeros(3)), Marker("body", position=np.zeros(3)), K)
+    system = System([RigidBody("body", 1.0, np.eye(3), velocity=(0.5, 0, 0))], [slide], [spring])
+    energies = integrate(system, GeneralizedAlpha(0.8), 1.0, 1.0 / n_steps, formulation="relative").energies
+    stored = energies.kinetic + energies.springs
+    of_power = 2 * 1e4 * (0.1 * 5.0) ** 2  # change of the rate of the power K x x_dot
+    assert np.abs(energies.work - (stored - stored[0])).max() < 1.1 * of_power / 12 / n_steps**2  # trapezoidal rule
