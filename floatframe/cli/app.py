@@ -153,7 +153,7 @@ def load_kernels(clock: "Stages") -> None:
 
 def print_run(trajectory: "Trajectory") -> None:
     """Print a summary of a motion, its cost and its accuracy."""
-    from floatframe.cli.view import run_record
+    from floatframe.results.export import run_record
 
     record = run_record(trajectory, known_system(trajectory))
     units = trajectory.units
@@ -295,7 +295,7 @@ def info_command(
     if json:
         import json as json_module
 
-        from floatframe.cli.view import run_record
+        from floatframe.results.export import run_record
 
         record = run_record(trajectory, known_system(trajectory))
         typer.echo(json_module.dumps(record, indent=2, ensure_ascii=True))

@@ -2,7 +2,9 @@
 
 import ast
 import importlib
+import io
 import re
+import tokenize
 from functools import cache
 
 import pytest
@@ -87,6 +89,26 @@ def is_name(dotted):
     return False
 
 
+#: modules of readers' own, in examples: a generated file, a package or script of theirs
+EXAMPLES = re.compile(r"(?:FILE|NAME|rubber/\w+|mount|arm_forces)\.py")
+
+
+def test_modules_named_in_docstrings_comments_and_pages_exist():
+    shipped = {f"/{path.relative_to(ROOT).as_posix()}" for path in SOURCES if path.suffix == ".py"}
+    file_name = re.compile(r"(?<![\w/.-])(?:\w+/)*\w+\.py\b")
+    dotted = re.compile(r"`((?:fe_models|cms|floatframe)(?:\.\w+)+)`")
+    missing = set()
+    for path, text in texts(path for path in SOURCES if path.suffix == ".py" or path in PAGES):
+        if not file_name.search(text) and not dotted.search(text):
+            continue
+        for prose in (*docstrings(text), *comments(text)) if path.suffix == ".py" else (text,):
+            for named in file_name.findall(prose):
+                if not EXAMPLES.fullmatch(named) and not any(module.endswith(f"/{named}") for module in shipped):
+                    missing.add(f"{path}: {named}")
+            missing |= {f"{path}: {named}" for named in dotted.findall(prose) if not is_name(named)}
+    assert sorted(missing) == []
+
+
 NAME = r"(?:Mac|Mc|O')?[A-ZÉ][a-zéüø]+(?:-[A-ZÉ]?[a-zéüø]+)*"
 CITED = re.compile(rf"\b({NAME})(?:(?:, | & | and |, & ){NAME})*(?: et al\.?)?(?:,? \(|,? )((?:19|20)\d\d)\b")
 MONTHS = "January February March April May June July August September October November December"
@@ -132,3 +154,11 @@ def docstrings(text):
     """Return the docstrings of a source file."""
     kinds = (ast.Module, ast.ClassDef, ast.FunctionDef)
     return [ast.get_docstring(node) or "" for node in ast.walk(ast.parse(text)) if isinstance(node, kinds)]
+
+
+def comments(text):
+    """Return the comments of a source file."""
+    if "#" not in text:
+        return []
+    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+    return [token.string for token in tokens if token.type == tokenize.COMMENT]

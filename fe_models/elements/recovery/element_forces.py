@@ -128,7 +128,7 @@ class ElementGroup:
     (`BeamModel.section_forces`). "shell resultant": in local axes, averaged over the points of the stiffness
     (`ShellCells.resultants`). "spring force": stiffness times the motion of the second side relative to the first, in
     the axes of the spring; tension is positive. "beam strain", "shell strain": the strains that belong to these forces
-    (`element_strains`). "element stress", "element strain": of solid cells, at the centre, in mesh axes.
+    (`beam_strains`, `shell_strains`). "element stress", "element strain": of solid cells, at the centre, in mesh axes.
     """
 
     quantity: str

@@ -477,7 +477,7 @@ def fastsim(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options):
 
 @numba.njit(cache=True)
 def creep_force(law, xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options, V):
-    """Return (F_x, F_y, M) at a rolling speed V, by the law with a number in `creep_names.CREEP_LAWS`."""
+    """Return (F_x, F_y, M) at a rolling speed V, by the law with a number in `CREEP_LAWS`."""
     if law == 0:
         return linear_creep(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options)
     if law == 1:

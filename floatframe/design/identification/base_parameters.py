@@ -1,8 +1,8 @@
 """Base parameters: the smallest set of parameter combinations that determines torques or reactions.
 
-All directions N of the parameters that change nothing, (p, k), are found either by rules (`transfer_rules`) or by the
-rank of a sampled linear form. Of the parameters k are then left out, chosen such that the rest is well determined, and
-what they did is added to those that stay:
+All directions N of the parameters that change nothing, (p, k), are found either by rules (`silent_directions`,
+`silent_at_base`) or by the rank of a sampled linear form. Of the parameters k are then left out, chosen such that the
+rest is well determined, and what they did is added to those that stay:
 
     phi = (phi_1, phi_2),   N = (N_1, N_2):     beta = phi_1 - N_1 N_2⁻¹ phi_2,      Y phi = Y_1 beta.
 """
@@ -303,13 +303,10 @@ def drive_twins(move: Move, earlier: list[Move], gravity: Array) -> list[tuple[A
     return [(point_mass(np.zeros(3)), True)]
 
 
-# base parameters: the smallest set of parameter combinations that determines torques or reactions ---------------------
-
-
-# rules for parameters of a tree without effect on the ground reaction: base parameters of reactions
-# ---------------------- The reaction of the ground is the rate of the momentum of all bodies less their weight.
-# Parameters do nothing to it where they bring no linear and no angular momentum in any motion, and no weight or moment
-# of weight where they are placed: without momentum their first moment stays. In the words of `transfer_rules`:
+# which parameters of a tree do nothing to the ground reaction: base parameters of reactions ---------------------------
+# The reaction of the ground is the rate of the momentum of all bodies less their weight. Parameters do nothing to it
+# where they bring no linear and no angular momentum in any motion, and no weight or moment of weight where they are
+# placed: without momentum their first moment stays. In the terms of the rules for torques above:
 #
 # (1) Transfers: masses along the axis of a rotation, inertia tensors without mass through a translation, and a first
 #     moment along the translation if all rotations before it, if any, have its direction. What passes to the ground has

@@ -1,7 +1,8 @@
 """Conversion of states, results and small motions between the frames of the engine and those of the files.
 
 Kernels, start, integrators and analyses work in the frames of the engine, where stiffened bodies move in mean axes
-(`floatframe.mean_axes`). What a user gives and gets, states, results and shapes, speaks of the frames of the files.
+(`floatframe.model.bodies.mean_axes`). What a user gives and gets, states, results and shapes, speaks of the frames of
+the files.
 """
 
 from typing import Literal

@@ -2,7 +2,7 @@
 
 It has numbers, names, + - * / ** (or ^), comparisons < <= > >=, `a if x < b else c`, and the functions of `FUNCTIONS`.
 The text is parsed by Python's own parser and never executed; nothing beyond this list is allowed. The kernels evaluate
-the tape and its exact gradient (kernels/connections/tape.py), so a new expression needs no compilation.
+the tape and its exact gradient (kernels/connections/user_force.py), so a new expression needs no compilation.
 """
 
 import ast

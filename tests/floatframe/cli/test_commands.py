@@ -13,9 +13,9 @@ from typer.testing import CliRunner
 
 from cms.body.modal_file.file import write
 from floatframe.cli.app import app
-from floatframe.cli.view import run_record
 from floatframe.pictures.animation import bodies_of
 from floatframe.results.energy_balance import balance_defect, energy_scale
+from floatframe.results.export import run_record
 from floatframe.results.trajectory import read_results
 from tests.floatframe.cli.examples import FLEXIBLE, RIGID
 from tests.root import ROOT, heed_signals

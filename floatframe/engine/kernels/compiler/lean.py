@@ -11,8 +11,7 @@ compilation. Inner functions are never called from Python and own no memory, so 
 (3) while an entry is compiled, the meaning of an operator or built-in function for given types is looked up once, and
     Python does not look for garbage; numba does not collect warnings about each statement, nor look for `with` and
     dictionaries of arguments, and finds the variables of a statement by the exact types of its parts;
-(4) the passes of numba are those that kernels need (no closures, lists, array expressions, `raise`), see
-    kernels/compiler/passes.py;
+(4) the passes of numba are those that kernels need (no closures, lists, array expressions, `raise`);
 (5) variables, operations and calls become lean code of LLVM, see kernels/compiler/lowering.py.
 """
 

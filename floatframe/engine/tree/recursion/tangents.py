@@ -7,7 +7,7 @@ X_j - V × Y_j with one motion X_j. Of a joint with its inner frame at V_P, A_P 
     by position   Y = V_P × S,  X = A_P × S + V_P × Y       (rotations taken back: V_Q, A_Q in the place of V_P, A_P)
     by rate       Y = S,        X = V_P × S + V_Q × S
 
-and of a mode what its markers do (elastic_tangents.py), with minus that of its own marker for the body itself. The
+and of a mode what its markers do (`put_marker_changes`), with minus that of its own marker for the body itself. The
 forces of a subtree, seen from itself, then change by I X + N Y, N = [[0, -2 p~], [0, Q]] (p its momentum, force by
 turning), and seen from the ground by S ×* f more. So
 
@@ -414,7 +414,7 @@ def force_tangents(nodes, work, dense, model, marker_work):
 #               d nu_dot = L(th, th_ddot) Psi_r + T d th_ddot + c_th Psi_r + c_w d th_dot
 #     by q_dot  Psi_t; -2 (K_P q_dot)_t;  phi;  -2 T (K_P q_dot)_r + c_w Psi_r
 #
-# L(th, v) = d(T v)/dth; c and its derivatives as in relative/kernels/elastic_turning.py.
+# L(th, v) = d(T v)/dth; c and its derivatives as in tree/kernels/elastic_turning.py.
 #
 # What is seen from the marker, which turns by phi: d_P x = dx - phi × x. Then Y = (d_P v, d_P omega) and
 # X = (d_P a - 2 d_P omega × v, d_P alpha + omega × d_P omega), which hold for all that hangs at the marker.

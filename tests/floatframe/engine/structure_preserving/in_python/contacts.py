@@ -1,4 +1,4 @@
-"""Contacts of a sphere on B with a plane or a sphere on A over a step, see kernels/contact.py.
+"""Contacts of a sphere on B with a plane or a sphere on A over a step, see kernels/connections/contact.py.
 
 Formulas: `floatframe.engine.structure_preserving.kernels.connections.contacts`.
 """
