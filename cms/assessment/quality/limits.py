@@ -248,7 +248,7 @@ LIMITS: dict[str, Limit] = {
     ),
     "mesh-error": Limit(
         "lowest frequencies too high by the mesh, estimated", 0.02, None,
-        "mesh finer, or with cells of second order",
+        "mesh finer; if the cells are of first order, cells of second order also help",
     ),
     "left-out": Limit(
         "kinds of cards of the deck that carry mass or stiffness and are left out", 0.0, None,

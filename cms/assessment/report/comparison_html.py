@@ -106,21 +106,28 @@ def header(comparison: Comparison) -> str:
     )
 
 
+def judged(comparison: Comparison) -> list[str]:
+    """Return the deciding quantities that were judged for at least one set; a body may have no load cases."""
+    points = [result.detail for result in comparison.sets if result.detail is not None]
+    return [name for name in DECIDING if any(point.record(name).verdict != "info" for point in points)]
+
+
 def verdict_section(comparison: Comparison) -> Section:
     """Return the verdict of every set, with the numbers that it depends on."""
-    headings = ["set", "verdict", "modes>", "coordinates>", *(f"{COLUMNS[name]}>" for name in DECIDING)]
+    names = judged(comparison)
+    headings = ["set", "verdict", "modes>", "coordinates>", *(f"{COLUMNS[name]}>" for name in names)]
     limits = [Cell("limit", "name"), Cell(""), Cell(""), Cell("")]
-    limits += [Cell(limit_words(name), "n") for name in DECIDING]
+    limits += [Cell(limit_words(name), "n") for name in names]
     rows: list[tuple[str, Sequence[Cell]]] = [("", limits)]
     for k, result in enumerate(comparison.sets):
         point = result.detail
         badge = f'<span class="badge {result.verdict}">{MARKS[result.verdict]}</span>'
         cells = [Cell(result.name, "name", markup=swatch(k)), Cell("", markup=badge)]
         if point is None:
-            cells += [Cell("\u2013", "n blank") for _ in range(2 + len(DECIDING))]
+            cells += [Cell("\u2013", "n blank") for _ in range(2 + len(names))]
         else:
             cells += [Cell(str(point.n_modes), "n"), Cell(str(point.n_q), "n")]
-            cells += [verdict_cell(point.record(name)) for name in DECIDING]
+            cells += [verdict_cell(point.record(name)) for name in names]
         rows.append(("has-why", cells))
         reason = Cell("", note=sentence_case(result.sentence), span=len(headings))
         rows.append(("why-row", [reason]))
@@ -270,7 +277,7 @@ def convergence_section(comparison: Comparison) -> Section:
     """Return the section with error against number of modes, one chart per record."""
     charts: dict[str, Chart] = {}
     figures = []
-    for name in (*DECIDING, "residual-bound", "effective-mass"):
+    for name in (*judged(comparison), "residual-bound", "effective-mass"):
         chart = convergence_chart(comparison, name)
         title = {**COLUMNS, "residual-bound": "residual bound", "effective-mass": "missing effective mass"}[name]
         if not chart["data"]:

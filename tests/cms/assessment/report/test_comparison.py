@@ -185,6 +185,17 @@ def test_verdicts_stand_before_anything_else(page):
     assert re.findall(r'<a href="#([a-z-]+)"', text) == order
 
 
+def test_the_page_shows_only_what_was_judged(comparison):
+    tables = comparison_html(comparison, stills=0).split('id="method"')[0]
+    assert all(point.record("static-load-cases").verdict == "info" for point in shown_points(comparison))
+    assert "load cases" not in tables.lower()
+    assert "No set has this number" not in tables
+
+
+def shown_points(comparison):
+    return [result.detail for result in comparison.sets if result.detail is not None]
+
+
 def test_the_page_holds_all_it_needs(page):
     text = page.read_text(encoding="utf-8")
     assert not re.search(r'<(?:script|link|img|iframe)[^>]+(?:src|href)="(?!data:)', text)
