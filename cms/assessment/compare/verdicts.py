@@ -165,20 +165,23 @@ def crossings(sets: Sequence[SetResult], name: str) -> str:
     if limit is None:
         return ""
     kept: dict[int, list[str]] = {}
-    never = []
+    never, not_judged = [], []
     for result in sets:
-        if not result.points:
+        verdicts = [point.record(name).verdict for point in result.points]
+        if not verdicts:
             continue
-        last = max(
-            (k for k, p in enumerate(result.points) if p.record(name).verdict not in ("pass", "info")), default=-1
-        )
-        if last + 1 < len(result.points):
+        last = max((k for k, verdict in enumerate(verdicts) if verdict != "pass"), default=-1)
+        if last + 1 < len(verdicts):
             kept.setdefault(result.points[last + 1].n_modes, []).append(result.name)
+        elif verdicts[-1] == "info":
+            not_judged.append(result.name)
         else:
             never.append(result.name)
     parts = [f"{listed(names)} from {n_modes} modes on" for n_modes, names in sorted(kept.items())]
     if never:
         parts.append(f"not {listed(never)}")
+    if not_judged:
+        parts.append(f"not judged: {listed(not_judged)}")
     return f"Within the limit of {number_words(limit)}: {'; '.join(parts)}." if parts else ""
 
 

@@ -269,7 +269,7 @@ SEEN = {
     "residual-bound": "What the residuals guarantee without knowing the full model: no true frequency is farther away. "
     "The true error is mostly near the square of it.",
     "effective-mass": "Largest share, over x, y and z, of the effective mass that the set leaves out while its "
-    "interfaces are held.",
+    "interfaces are held. A set that answers rigid-body accelerations statically is not judged by it.",
 }
 
 

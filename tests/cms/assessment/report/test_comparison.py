@@ -15,7 +15,7 @@ from numpy.testing import assert_allclose
 import cms
 from cms.assessment.compare.compare import compare
 from cms.assessment.compare.comparison import SetResult
-from cms.assessment.compare.verdicts import DECIDING
+from cms.assessment.compare.verdicts import DECIDING, crossings
 from cms.assessment.quality.limits import LIMITS
 from cms.assessment.report import comparison_csv, comparison_html, comparison_json
 from cms.assessment.report.charts import convergence_chart, deformation_chart, mac_chart, response_chart
@@ -190,6 +190,16 @@ def test_the_page_shows_only_what_was_judged(comparison):
     assert all(point.record("static-load-cases").verdict == "info" for point in shown_points(comparison))
     assert "load cases" not in tables.lower()
     assert "No set has this number" not in tables
+
+
+def test_no_set_is_said_to_keep_a_limit_that_its_number_exceeds(comparison):
+    caption = crossings(comparison.sets, "effective-mass")
+    within, _, not_judged = caption.partition("not judged: ")
+    last = {result.name: result.points[-1].record("effective-mass") for result in comparison.sets if result.points}
+    over = [name for name, record in last.items() if record.value > record.tolerance and record.verdict == "info"]
+    assert over, "the bar has a set that answers statically and leaves out mass"
+    assert not any(name in re.findall(r"[a-z-]+", within) for name in over)
+    assert all(name in not_judged for name in over)
 
 
 def shown_points(comparison):
