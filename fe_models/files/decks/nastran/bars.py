@@ -1,5 +1,6 @@
 """Bars and beams of Nastran: CBAR, CBEAM with orientation, offsets and released ends."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -54,6 +55,11 @@ def read_bars(model: NastranModel, known: Card, cards: list[Card]) -> None:
     if isinstance(shape, str):
         model.ledger.refuse(known.name, f"property {pid}: {shape}", count=len(cards))
         return
+    made = _with_own_shear(model, known.text(2), shape.keys)
+    if isinstance(made, str):
+        model.ledger.refuse(known.name, f"property {pid}: {made}", count=len(cards))
+        return
+    material, keys = made
     groups: dict[tuple[Any, ...], list[Card]] = {}
     for card in cards:
         ends = np.array([model.point(card, card.integer(k)) for k in (3, 4)])
@@ -87,8 +93,8 @@ def read_bars(model: NastranModel, known: Card, cards: list[Card]) -> None:
         model.lines.append(
             LineSection(
                 group,
-                known.text(2),
-                shape.keys,
+                material,
+                keys,
                 y_key,
                 offset_key,
                 shear=has_shear,
@@ -98,6 +104,29 @@ def read_bars(model: NastranModel, known: Card, cards: list[Card]) -> None:
         )
     for note in (*shape.notes, "inertia of torsion is that of the section; Nastran's has none"):
         model.ledger.note(cards[0].name, note, count=len(cards))
+
+
+def _with_own_shear(model: NastranModel, name: str, keys: dict[str, Any]) -> tuple[str, dict[str, Any]] | str:
+    """Return material and section of bars whose MAT1 has a G of its own; a text says why they cannot have it.
+
+    G scales the torsion constant and the shear areas of a general section; other shapes get a material with
+    nu = E/(2 G) - 1, since bars have no other use for nu.
+    """
+    factor = model.shear_factor(name)
+    if factor == 1.0:
+        return name, keys
+    if not factor > 0:
+        return f"material {name}: G = {model.shear_moduli[name]:g}: a beam without stiffness in torsion"
+    if keys["shape"] == "general":
+        scaled = ("torsion", "shear_area_y", "shear_area_z")
+        return name, {key: value * factor if key in scaled else value for key, value in keys.items()}
+    material, G, made = model.materials[name], model.shear_moduli[name], f"{name}_line"
+    assert isinstance(material.young, float)
+    nu = material.young / (2 * G) - 1
+    if not -1 < nu < 0.5:
+        return f"material {name}: E/(2 G) - 1 = {nu:g} is no Poisson's ratio; give the section as PBAR or PBEAM"
+    model.materials[made] = replace(material, name=made, poisson=nu)
+    return made, keys
 
 
 def line_of_ends(model: NastranModel, card: Card) -> Array:

@@ -74,10 +74,24 @@ def layered_shells(model: NastranModel, known: Card, cards: list[Card], offset_f
     if isinstance(layers, str):
         model.ledger.refuse(known.name, f"property {pid}: {layers}", count=len(cards))
         return
+    layers = tuple(replace(layer, material=_layer_material(model, layer.material)) for layer in layers)
     thickness = sum(layer.thickness for layer in layers)
     bottom = known.real(2, -thickness / 2)
     section = ShellSection("", "", thickness, bottom + thickness / 2, known.real(3, 0.0) * model.wtmass, layers=layers)
     _laid_shells(model, known, cards, offset_field, section)
+
+
+def _layer_material(model: NastranModel, name: str) -> str:
+    """Return the material of a layer; a MAT1 with a G of its own becomes a sheet that has it across the plane."""
+    if name not in model.shear_moduli:
+        return name
+    material, G, made = model.materials[name], model.shear_moduli[name], f"{name}_sheet"
+    E, nu = material.young, material.poisson
+    assert isinstance(E, float)
+    assert isinstance(nu, float)
+    shear = (E / (2 * (1 + nu)), G, G)
+    model.materials[made] = DeckMaterial(made, (E, E, E), (nu, 0.0, 0.0), material.density, shear)
+    return made
 
 
 def orthotropic_shells(
@@ -180,7 +194,7 @@ def _shear_matrix(model: NastranModel, name: str) -> Array | None:
     if material is not None and material.shear is not None:
         return np.diag(material.shear[1:])
     G = _plane_matrix(model, name)
-    return None if G is None else np.asarray(np.eye(2) * G[2, 2])
+    return None if G is None else np.asarray(np.eye(2) * model.shear_moduli.get(name, G[2, 2]))
 
 
 def _density(model: NastranModel, name: str) -> float:

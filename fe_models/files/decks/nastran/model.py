@@ -48,6 +48,8 @@ class NastranModel:
     wtmass: float = 1.0  #: PARAM,WTMASS: all masses are multiplied by it
     is_lumped: bool = True  #: unless PARAM,COUPMASS
     materials: dict[str, DeckMaterial] = field(default_factory=dict)
+    #: isotropic material -> G of its card, where it is not E/(2 (1 + nu))
+    shear_moduli: dict[str, float] = field(default_factory=dict)
     solids: list[SolidSection] = field(default_factory=list)
     shells: list[ShellSection] = field(default_factory=list)
     lines: list[LineSection] = field(default_factory=list)
@@ -117,6 +119,22 @@ class NastranModel:
         if key not in self.properties:
             self.properties[key] = {each.integer(1): each for each in self.of(*names)}
         return self.properties[key].get(card.integer(2, card.integer(1)))
+
+    def shear_modulus(self, name: str) -> float:
+        """Return G of an isotropic material: what its card gives, else E/(2 (1 + nu))."""
+        material = self.materials[name]
+        assert isinstance(material.young, float)
+        assert isinstance(material.poisson, float)
+        return self.shear_moduli.get(name, material.young / (2 * (1 + material.poisson)))
+
+    def shear_factor(self, name: str) -> float:
+        """Return G of the card of an isotropic material over E/(2 (1 + nu)); 1 where the card gives no other G."""
+        material = self.materials.get(name)
+        if name not in self.shear_moduli or material is None:
+            return 1.0
+        assert isinstance(material.young, float)
+        assert isinstance(material.poisson, float)
+        return self.shear_moduli[name] * 2 * (1 + material.poisson) / material.young
 
     def property_value(self, card: Card, name: str, size: int) -> float | None:
         """Return the value of the property of an element; a card holds several properties of `size` fields each."""

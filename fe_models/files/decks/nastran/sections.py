@@ -20,6 +20,8 @@ from fe_models.files.decks.spring_axes import as_triad, axes_along
 
 __all__ = ["SHELLS", "SOLIDS", "read_sections"]
 
+SAME_MODULUS = 1e-6  #: relative difference of G from E/(2 (1 + nu)) that is left to the digits of a card
+
 SOLIDS = ("CTETRA", "CHEXA", "CPENTA", "CPYRAM", "CPYRA")
 SHELLS = ("CTRIA3", "CTRIAR", "CTRIA6", "CQUAD4", "CQUADR", "CQUAD8")
 _OFFSET_FIELD = {"CTRIA3": 7, "CTRIAR": 7, "CTRIA6": 10, "CQUAD4": 8, "CQUADR": 8, "CQUAD8": 16}
@@ -65,15 +67,27 @@ def read_sections(model: NastranModel) -> None:
 
 
 def _material(model: NastranModel, card: Card) -> None:
+    """Take MAT1; a blank E, G or NU follows from the other two by E = 2 G (1 + NU).
+
+    Where all three are given and disagree, bars and rods have E and G, shells E and NU in their plane and G across it,
+    and solids E and NU, as in Nastran. Where only E or only G is given, Nastran has zero for the other two.
+    """
     young, shear, poisson = (card.real(k, 0.0) for k in (2, 3, 4))
-    if not card.text(4) and young and shear:
+    name, given = card.text(1), [bool(card.text(k)) for k in (2, 3, 4)]
+    if given == [False, True, False]:
+        model.ledger.refuse("MAT1", f"material {name}: G alone: E and NU would be zero")
+    if not given[2] and young and shear:
         poisson = young / (2 * shear) - 1
-    elif not card.text(2):
+    elif not given[0]:
         young = 2 * shear * (1 + poisson)
-    if card.text(2) and card.text(3) and card.text(4) and abs(young / (2 * (1 + poisson)) / shear - 1) > 0.01:
-        model.ledger.note("MAT1", "E, G and nu do not fit together: G is not taken")
+    if given == [True, False, False]:
+        model.ledger.note("MAT1", f"material {name}: E alone: NU = 0 and G = E/2 here, G = 0 in Nastran")
+    elif all(given) and abs(young - 2 * (1 + poisson) * shear) > SAME_MODULUS * young:
+        model.shear_moduli[name] = shear
+        why = f"material {name}: E, G and NU disagree: bars and rods have E and G, shells G across their plane"
+        model.ledger.note("MAT1", f"{why}, solids E and NU")
     density = card.real(5, 0.0) * model.wtmass
-    model.materials[card.text(1)] = DeckMaterial(card.text(1), young, poisson, density or None)
+    model.materials[name] = DeckMaterial(name, young, poisson, density or None)
 
 
 def _rubber(model: NastranModel, card: Card) -> None:
@@ -212,17 +226,11 @@ def _ratios(model: NastranModel, known: Card) -> tuple[float, float] | str:
         assert isinstance(first.young, float)
         assert isinstance(second.young, float)
         bending *= second.young / first.young
-    if third is not first:
-        shear *= _shear_modulus(third) / _shear_modulus(first)
+    if isinstance(third.young, float):
+        shear *= model.shear_modulus(third.name) / model.shear_modulus(first.name) * model.shear_factor(first.name)
     if not bending > 0 or not shear > 0:
         return f"12I/T**3 and TS/T must be above zero, got {known.text(5)} and {known.text(7)}"
     return bending, shear
-
-
-def _shear_modulus(material: DeckMaterial) -> float:
-    assert isinstance(material.young, float)
-    assert isinstance(material.poisson, float)
-    return material.young / (2 * (1 + material.poisson))
 
 
 def _rod(model: NastranModel, card: Card) -> None:
@@ -245,8 +253,7 @@ def _rod(model: NastranModel, card: Card) -> None:
         else:
             A, J, nsm = known.real(3), known.real(4, 0.0), known.real(6, 0.0)
     material = model.materials.get(mid)
-    E, nu = (None, None) if material is None else (material.young, material.poisson)
-    if material is None or not isinstance(E, float) or not isinstance(nu, float):
+    if material is None or not isinstance(material.young, float):
         model.ledger.refuse(card.name, f"material {mid} is not known here, or not isotropic")
         return
     numbers = [card.integer(k) for k in nodes]
@@ -256,7 +263,7 @@ def _rod(model: NastranModel, card: Card) -> None:
     if not L > 0:
         model.ledger.refuse(card.name, "has no length between its ends")
         return
-    G = E / (2 * (1 + nu))
+    E, G = material.young, model.shear_modulus(mid)
     names = [model.group(card, [number]) for number in numbers]
     stiffness = (E * A / L, 0.0, 0.0, G * J / L, 0.0, 0.0)
     model.springs.append(DeckSpring((names[0], names[1]), stiffness, triad=as_triad(axes_along(x))))

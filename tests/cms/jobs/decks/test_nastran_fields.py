@@ -44,7 +44,7 @@ READ: dict[str, tuple[str, dict[str, str | None]]] = {
     "GRDSET": (SHELL_3 + "\nGRDSET,,,,,,,\nSPC1,1,12,1", {"CP": "7", "CD": "7", "PS": "456"}),
     "MAT1": (
         SHELL_3.replace("PSHELL,1,1,.05,1,,1", "PSHELL,1,9,.05,9,,9") + "\nMAT1,9,2.+11,,.3,7800.",
-        {"MID": None, "E": "1.+11", "G": None, "NU": ".2", "RHO": "7000."},
+        {"MID": None, "E": "1.+11", "G": "7.+10", "NU": ".2", "RHO": "7000."},
     ),
     "MAT8": (
         SHELL_4.replace("PSHELL,1,1,.05,1,,1", "PSHELL,1,9,.05,9,,9")

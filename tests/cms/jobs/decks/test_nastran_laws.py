@@ -526,3 +526,75 @@ def test_masses_on_one_line_are_refused_with_the_axis(tmp_path, frame, axis):
         frame_condition(bare, frame)
     enough, _ = body_of(tmp_path, text.replace("INERTIA", "1.-3,0.,1.-3,0.,0.,1.-3"), is_coupled=True)
     assert frame_condition(enough, frame).center == pytest.approx(np.mean(points, axis=0))
+
+
+OWN_G = 7e10  #: of a MAT1 whose E and NU give another one
+DISAGREES = f"MAT1,1,2.+11,{OWN_G},.3,7800.\n"
+
+
+def test_bars_have_the_shear_modulus_of_a_material_that_disagrees_with_itself(tmp_path):
+    """E bends and stretches, G twists and shears: u = L³/(3 E I) + L/(K A G), as the usage table of MAT1 says."""
+    L = np.linalg.norm(GB - GA)
+    body, deck = body_of(tmp_path, GRIDS + f"{ORIENTED}\nPBAR,1,1,2.-3,3.-6,1.-6,2.-6\n,,,,,,,,\n,.8,.5\n" + DISAGREES)
+    shear = [L / (k * A * OWN_G) for k in (0.8, 0.5)]
+    expected = [L / (E * A), L**3 / (3 * E * I1) + shear[0], L**3 / (3 * E * I2) + shear[1], L / (OWN_G * J)]
+    assert_allclose(tip_flexibility(body).diagonal()[:4], expected, rtol=1e-9)
+    assert any("E, G and NU disagree" in row[2] for row in deck.ledger.rows())
+    body, _ = body_of(tmp_path, GRIDS + f"{ORIENTED}\nPBARL,1,1,,ROD\n,.02\n" + DISAGREES)
+    assert_allclose(tip_flexibility(body)[3, 3], L / (OWN_G * np.pi / 2 * 0.02**4), rtol=1e-9)
+    far = DISAGREES.replace(str(OWN_G), "1.+10")
+    body, _ = body_of(tmp_path, GRIDS + f"{ORIENTED}\n" + SECTION + far)
+    assert_allclose(tip_flexibility(body)[3, 3], L / (1e10 * J), rtol=1e-9)
+    with pytest.raises(ValueError, match=r"E/\(2 G\) - 1 = 9 is no Poisson's ratio"):
+        body_of(tmp_path, GRIDS + f"{ORIENTED}\nPBARL,1,1,,ROD\n,.02\n" + far)
+
+
+def test_a_rod_has_the_shear_modulus_of_its_material(tmp_path):
+    text = GRIDS + f"{ORIENTED}\n" + SECTION + MATERIAL
+    K = [
+        body_of(tmp_path, text + card)[0].K.toarray()
+        for card in ("", "CONROD,9,1,2,2,.1,.01\n" + DISAGREES.replace("MAT1,1", "MAT1,2"))
+    ]
+    x = (GB - GA) / np.linalg.norm(GB - GA)
+    added = (K[1] - K[0])[3:6, 3:6]
+    assert_allclose(
+        added, OWN_G * 0.01 / np.linalg.norm(GB - GA) * np.outer(x, x), atol=1e-6 * np.abs(K[0]).max() * 1e-6
+    )
+
+
+def test_shells_have_the_shear_modulus_of_their_material_across_their_plane_only(tmp_path):
+    """The same body as with (TS/T) G as the deck gives it; solids have E and NU alone."""
+    grids = "".join(
+        f"GRID,{k},,{x},{y},{z}\n"
+        for k, (x, y, z) in enumerate(
+            [(0, 0, 0), (2, 0, 0.1), (2.1, 1, 0), (0, 1.2, 0), (0.1, 0, 1), (2, 0.1, 1), (2, 1, 1.1), (0, 1, 1)],
+            start=1,
+        )
+    )
+    shell, factor = grids + "CTRIA3,1,1,1,2,3\n", OWN_G / G
+    K = lambda text: body_of(tmp_path, text)[0].K.toarray()  # noqa: E731
+    expected = K(shell + f"PSHELL,1,1,.3,1,,1,{5 / 6 * factor!r}\n" + MATERIAL)
+    assert_allclose(K(shell + "PSHELL,1,1,.3,1,,1\n" + DISAGREES), expected, rtol=1e-9, atol=1e-9 * expected.max())
+    assert_allclose(K(shell + "PSHELL,1,1,.3,1\n" + DISAGREES), expected, rtol=1e-9, atol=1e-9 * expected.max())
+    third = MATERIAL + DISAGREES.replace("MAT1,1", "MAT1,2")
+    assert_allclose(K(shell + "PSHELL,1,1,.3,1,,2\n" + third), expected, rtol=1e-9, atol=1e-9 * expected.max())
+    mixed = "MAT1,2,2.+11,,.2\n" + DISAGREES
+    of_mixed = [
+        K(shell + f"PSHELL,1,1,.3,2,,{mid},{ts!r}\n" + cards)
+        for mid, ts, cards in ((1, 5 / 6, mixed), (3, 5 / 6 * factor, mixed + MATERIAL.replace("MAT1,1", "MAT1,3")))
+    ]
+    assert_allclose(of_mixed[0], of_mixed[1], rtol=1e-9, atol=1e-9 * expected.max())
+    layers = "PCOMP,1,-.15,,,,,,\n,1,.1,,,1,.2\n"
+    two = [K(shell + layers + cards) for cards in (DISAGREES, MATERIAL)]
+    assert np.abs(two[0] - two[1]).max() > 1e-4 * expected.max()
+    assert_allclose(two[0], expected, rtol=1e-6, atol=1e-6 * expected.max())
+    solid = grids + "CHEXA,1,9,1,2,3,4,5,6\n,7,8\nPSOLID,9,1\n"
+    assert_allclose(K(solid + DISAGREES), K(solid + MATERIAL), rtol=1e-14)
+
+
+def test_a_material_of_one_modulus_is_noted_or_refused(tmp_path):
+    """Nastran takes the other two as zero: a bar without torsion, or one without stretch."""
+    _, deck = body_of(tmp_path, GRIDS + f"{ORIENTED}\n" + SECTION + "MAT1,1,2.+11,,,7800.\n")
+    assert any("E alone: NU = 0 and G = E/2 here, G = 0 in Nastran" in row[2] for row in deck.ledger.rows())
+    with pytest.raises(ValueError, match="G alone: E and NU would be zero"):
+        body_of(tmp_path, GRIDS + f"{ORIENTED}\n" + SECTION + "MAT1,1,,7.+10,,7800.\n")
