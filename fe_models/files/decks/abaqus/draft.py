@@ -179,6 +179,9 @@ class Draft:
         with_section = np.concatenate(self.sectioned) if self.sectioned else np.zeros(0, np.int64)
         counts: dict[str, int] = {}
         for name, _, table in self.mesh.elements:
+            if not table[:, 1:].any():  # of an unknown type, so that its nodes have not been read
+                self.ledger.refuse(name, "this element is not known here", count=len(table))
+                continue
             n = int((~np.isin(table[:, 0], with_section)).sum())
             if n:
                 counts[name] = counts.get(name, 0) + n
@@ -198,10 +201,11 @@ class Draft:
             for name, about in self.held.pop(turned, {}).items():
                 turns = {c + 3 for c in about if c < 3}
                 self.held.setdefault(leader, {}).setdefault(name, set()).update(turns)
-        for pilot, axis in self.pilots.items():
-            turns = {3 + int(np.argmax(np.abs(axis)))}
-            by_name = self.held.pop(pilot, {})
-            self.held |= {pilot: {name: turns for name, about in by_name.items() if 0 in about}} if by_name else {}
+        for pilot in self.pilots:
+            if self.held.pop(pilot, None):
+                members = f"mean_rotation_{pilot}_nodes"
+                why = f"the angle of node {pilot} is free here; to drive it, put a distributing interface on {members}"
+                self.ledger.note("*BOUNDARY", why)
         used = set(self.used_nodes().tolist())
         loose = [node for node in self.held if node not in used]
         if loose:

@@ -198,6 +198,8 @@ def _finished(path: Path, draft: Draft) -> Deck:
     blocks = []
     for block in mesh.blocks:
         assert block.numbers is not None
+        if (block.nodes < 0).all():  # of an unknown type, which the ledger has refused
+            continue
         own = {name: np.flatnonzero(np.isin(block.numbers, members)) for name, members in draft.cell_groups.items()}
         blocks.append(
             replace(block, groups={**block.groups, **{name: rows for name, rows in own.items() if rows.size}})

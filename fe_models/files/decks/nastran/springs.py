@@ -185,21 +185,30 @@ def _scalar_spring(model: NastranModel, card: Card) -> None:
             _ground(model, card, grids[0][0], (grids[0][1],), f" with {value:g}")
         return
     (a, c), (b, c_b) = grids
-    if c != c_b:
-        model.ledger.refuse(card.name, "between different components, whose forces do not balance")
-        return
     axes = [model.axes(node) for node in (a, b)]
     apart = model.point(card, b) - model.point(card, a)
     across = apart - (apart @ axes[0][:, c % 3]) * axes[0][:, c % 3]
-    if np.abs(axes[0] - axes[1]).max() > ALONG or (c < 3 and np.abs(across).max() > ALONG * np.abs(apart).max()):
-        model.ledger.refuse(
-            card.name, "between grid points of different axes, or apart across its direction: its forces do not balance"
-        )
+    has_other_axes = np.abs(axes[0] - axes[1]).max() > ALONG
+    if c != c_b or has_other_axes or (c < 3 and np.abs(across).max() > ALONG * np.abs(apart).max()):
+        _without_balance(model, card, grids, value)
         return
     names = [model.group(card, [node]) for node in (a, b)]
     six, none = tuple(value if k == c else 0.0 for k in range(6)), (0.0,) * 6
     stiffness, damping = (six, None) if card.name.startswith("CELAS") else (none, six)
     model.springs.append(DeckSpring((names[0], names[1]), stiffness, damping, as_triad(axes[0].T)))
+
+
+def _without_balance(model: NastranModel, card: Card, ends: list[tuple[int, int]], value: float) -> None:
+    """Take a scalar element whose forces do not balance where the deck holds an end of it: it acts to the ground."""
+    free = [(node, c) for node, c in ends if c not in model.held.get(node, set())]
+    if not free:
+        model.ledger.note(card.name, "between components that are held: without effect in the deck, left out")
+    elif len(free) == 1:
+        at = next(node for node, c in ends if (node, c) not in free)
+        _ground(model, card, free[0][0], (free[0][1],), f" with {value:g}, at grid point {at}, which is held there")
+    else:
+        why = "between different components, grid points of different axes, or apart across its direction"
+        model.ledger.refuse(card.name, f"{why}: its forces do not balance")
 
 
 def _bush_1d(model: NastranModel, card: Card) -> None:

@@ -295,6 +295,20 @@ def test_an_element_to_the_ground_becomes_an_interface_of_the_free_body(tmp_path
     assert np.sum(eigh(body.K.toarray(), eigvals_only=True) < 1e-3) == 12  # two free bars
 
 
+@pytest.mark.parametrize("at", ["3,1", "3,2", "4,1"])
+def test_a_spring_to_a_component_that_is_held_acts_to_the_ground(tmp_path, at):
+    """Apart across its direction or along another component: the deck has k u² / 2 of the free end alone."""
+    text = PAIR.format(x="1.", y=".4") + SECTION + MATERIAL + "SPC1,9,12,3,4\n"
+    body, deck = body_of(tmp_path, text + f"CELAS2,11,5.+3,2,1,{at}\n")
+    expected, grounded = body_of(tmp_path, text + "CELAS2,11,5.+3,2,1\n")
+    assert_allclose(body.K.toarray(), expected.K.toarray(), rtol=1e-14)
+    assert deck.supports == grounded.supports
+    (note,) = (row[2] for row in deck.ledger.rows() if row[0] == "CELAS2")
+    assert f"ties ux of grid point 2 to the ground with 5000, at grid point {at[0]}, which is held there" in note
+    body, deck = body_of(tmp_path, text + f"SPC1,9,1,2\nCELAS2,11,5.+3,2,1,{at}\n")
+    assert any("between components that are held" in row[2] for row in deck.ledger.rows())
+
+
 MPCS = "".join(f"MPC,7,3,{c},1.,2,{c},-1.\n" for c in (1, 2, 3)) + "MPC,8,3,1,1.,2,1,-1.\nMPCADD,9,7,8\n"
 
 

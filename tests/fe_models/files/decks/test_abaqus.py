@@ -131,6 +131,7 @@ def test_the_ledger_counts_what_is_not_taken_over_and_why(tmp_path):
         ("*SHELL SECTION, ELSET=skin, MATERIAL=STEEL, OFFSET=0.5\n0.1\n", "", "1 S4R: elements without a section"),
         ("TYPE=S4R", "TYPE=CPS4R", "1 CPS4R: not an element of"),
         ("TYPE=C3D8I", "TYPE=C3D8X", "1 C3D8X .*: this element is not known here"),
+        ("*STEP", "*ELEMENT, TYPE=D, ELSET=gas\n91, 0, 1, 2\n*STEP", "1 D: this element is not known here"),
         ("*ELASTIC\n", "*ELASTIC, TYPE=COUPLED\n", r"1 \*ELASTIC, TYPE=COUPLED"),
         ("*ELASTIC\n210., .25", f"*ELASTIC, TYPE=ENG\n{'1., ' * 3}{'0., ' * 3}1., 1.\n1.", "no ORIENTATION says"),
         ("*ELASTIC\n210., .25", f"*ELASTIC, TYPE=ORTHO\n{'0., ' * 6}1., 1.\n1.", "not positive definite"),
