@@ -27,6 +27,7 @@ SOLIDS = {
     186: ("reduced", "14-point", ""),
     187: ("reduced", "consistent", ""),
 }
+MESH_ONLY = 200  #: the element of ANSYS that is a mesh alone
 SHELLS = {181: (4, "quad"), 281: (8, "quad8")}  #: element -> nodes, cell; equal third and fourth corners: a triangle
 _DOFS = {"UX": 0, "UY": 1, "UZ": 2, "ROTX": 3, "ROTY": 4, "ROTZ": 5}
 _FORCES = {"FX": 0, "FY": 1, "FZ": 2, "MX": 3, "MY": 4, "MZ": 5}
@@ -207,6 +208,8 @@ def _command(name: str, words: list[str], draft: _Draft, line: int) -> None:
         draft.held.setdefault(int(words[1]), set()).update(_DOFS[label] for label in labels if label in _DOFS)
     elif name == "F" and words[1].isdigit() and words[2].upper() in _FORCES:
         draft.forces.setdefault(int(words[1]), np.zeros(6))[_FORCES[words[2].upper()]] += float(words[3])
+    elif name in ("N", "EN") and "-1" in words:
+        return  # ends a list of nodes or elements
     elif name in HARMLESS:
         draft.ledger.note(name, "belongs to the analysis, not to the body", line=line)
     elif (
@@ -231,6 +234,9 @@ def _deck(path: Path, draft: _Draft) -> Deck:
     cells: dict[tuple[str, str], tuple[list[int], list[list[int]]]] = {}
     for row in draft.elements:
         kind = draft.kinds.get(row[1], 0)
+        if kind == MESH_ONLY:
+            draft.ledger.note("MESH200", "has neither mass nor stiffness")
+            continue
         if kind in SHELLS:
             found = _shell(draft, kind, row)
             if found is not None:
@@ -246,6 +252,8 @@ def _deck(path: Path, draft: _Draft) -> Deck:
         group = f"mat_{row[0]}_solid{kind}" + ("" if _plain_type(draft, row[1]) else f"_type_{row[1]}")
         integration, mass, different = SOLIDS[kind]
         integration = _integration(draft, row[1], kind) or integration
+        if kind == 186 and shape == "wedge":  # without middle nodes: fewer points would not hold it
+            integration, group = "full", f"{group}_wedge"
         mass = "lumped" if draft.is_lumped else mass
         if different:
             draft.ledger.note(f"SOLID{kind}", different)
@@ -388,8 +396,13 @@ def _shape(where: str, kind: int, row: list[int]) -> tuple[str, list[int]]:
     n = row[COLUMNS:]
     if kind == 187 and len(n) >= 10:
         return "tetra10", n[:10]
-    if len(n) < 8:
-        raise MeshError(f"{where}: element {row[10]} (SOLID{kind}) has {len(n)} nodes; expected 8, 10 or 20")
+    if kind == 187 and len(n) == 4:
+        return "tetra", n
+    if len(n) < 8 or kind == 187:
+        expected = "4 or 10" if kind == 187 else "8" if kind == 185 else "8 or 20"
+        raise MeshError(f"{where}: element {row[10]} (SOLID{kind}) has {len(n)} nodes; expected {expected}")
+    if len(n) > 8 and 0 in n:
+        raise MeshError(f"{where}: element {row[10]} (SOLID{kind}) lacks some of its middle nodes; write all or none")
     is_quadratic = len(n) == 20 and kind == 186
     if len(set(n[4:8])) == 1:
         if n[2] != n[3]:

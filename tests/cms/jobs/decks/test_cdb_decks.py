@@ -135,6 +135,34 @@ def test_solid185_of_equal_nodes_is_a_prism_a_pyramid_or_a_tetrahedron(tmp_path,
     assert_allclose(x @ body.M @ x, 7850.0 * SHAPES[shape][1], rtol=1e-12)
 
 
+@pytest.mark.parametrize("shape", SHAPES)
+def test_solid186_without_middle_nodes_has_six_motions_without_energy(tmp_path, shape):
+    body = body_of(cube(tmp_path, shape=shape, kind=186), "m-kg-s")
+    energy = np.linalg.eigvalsh(body.K.toarray())
+    assert (energy < 1e-9 * energy[-1]).sum() == 6
+
+
+def test_solid187_without_middle_nodes_is_a_tetrahedron_of_first_order(tmp_path):
+    """Its stiffness is that of SOLID185 of the same corners; MESH200 and the ends of lists say nothing."""
+    K = []
+    for old, new in (("", ""), ("ET,1,185", "ET,1,187\nET,2,200")):
+        path = cube(tmp_path, shape="tetrahedron")
+        text = path.read_text().replace(old, new)
+        if new:
+            row = "".join(f"{v:9d}" for v in (1, 1, 1, 1, 0, 0, 0, 0, 8, 0, 1, *SHAPES["tetrahedron"][0]))
+            four = "".join(f"{v:9d}" for v in (1, 1, 1, 1, 0, 0, 0, 0, 4, 0, 1, 1, 2, 3, 5))
+            facet = "".join(f"{v:9d}" for v in (1, 2, 1, 1, 0, 0, 0, 0, 3, 0, 2, 1, 2, 3))
+            assert row in text
+            text = text.replace(row, f"{four}\n{facet}").replace("EBLOCK", "N,R5.1,LOC,       -1,\nEBLOCK")
+            text = text.replace("FINISH", "EN,R5.5,ATTR,       -1,\nFINISH")
+        path.write_text(text)
+        K.append(body_of(path, "m-kg-s").K.toarray())
+    assert_allclose(K[1], K[0], rtol=1e-12, atol=1e-12 * K[0].max())
+    path.write_text(text.replace(four, four.replace(f"{4:9d}{0:9d}{1:9d}", f"{5:9d}{0:9d}{1:9d}") + f"{6:9d}"))
+    with pytest.raises(MeshError, match=r"\(SOLID187\) has 5 nodes; expected 4 or 10"):
+        read_deck(path)
+
+
 def test_tables_over_temperature_are_taken_at_the_first_one(tmp_path):
     """MPDATA writes three values a line, at their places in MPTEMP: a later line does not overwrite the first."""
     table = STEEL.replace(
