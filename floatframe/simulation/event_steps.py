@@ -18,7 +18,7 @@ from fe_models.foundation.arrays import Array, IntArray
 from floatframe.engine.compiling.file_frames import rows_of_file, state_of_file
 from floatframe.engine.compiling.public_elements import PlacedLaw
 from floatframe.engine.compiling.system import compiled_system
-from floatframe.engine.initial_conditions.impact import impact
+from floatframe.engine.initial_conditions.impulses import impact
 from floatframe.engine.initial_conditions.initial import consistent_motion
 from floatframe.engine.kernels.memory import KINETIC, SPRINGS, WORK_GIVEN, WORK_TAKEN, Rows
 from floatframe.engine.kernels.work import Work, new_work

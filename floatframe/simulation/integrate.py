@@ -25,7 +25,7 @@ from fe_models.foundation.words import nearest
 from floatframe.engine.compiling.callbacks import raise_errors_of
 from floatframe.engine.compiling.file_frames import rows_of_file
 from floatframe.engine.compiling.system import compiled_system
-from floatframe.engine.initial_conditions.begun_drives import words_of_begun_drives
+from floatframe.engine.initial_conditions.impulses import words_of_begun_drives
 from floatframe.engine.initial_conditions.mass_positivity import indefinite_mass_words, indefinite_masses
 from floatframe.engine.kernels.memory import Rows
 from floatframe.engine.kernels.work import Work, new_work
@@ -45,11 +45,10 @@ from floatframe.simulation.energy_watch import EnergyWatch
 from floatframe.simulation.event_steps import EventWatch
 from floatframe.simulation.events import has_events, require_times_of_events
 from floatframe.simulation.jumps import jumps_of_steps, next_steps
-from floatframe.simulation.knots import knot_words
 from floatframe.simulation.law_watch import LawWatch
 from floatframe.simulation.motion_head import head_of, joint_rows
 from floatframe.simulation.restart import RESTART_STEPS, carry_of_record, restart_record, system_digest
-from floatframe.simulation.step_advice import frequency_words, step_advice
+from floatframe.simulation.step_advice import frequency_words, knot_words, step_advice
 from floatframe.simulation.step_watch import WATCHES, StepWatch
 from floatframe.simulation.validity_watch import ValidityWatch
 

@@ -1,4 +1,4 @@
-"""Which modes, supplies, loads and drives a step size resolves, with numbers."""
+"""Which modes, supplies, loads, drives and knots of tables a step size resolves, with numbers."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,11 +11,13 @@ from floatframe.engine.compiling.time_laws import functions_of_time, parts_of_ti
 from floatframe.engine.initial_conditions.newton_equations import modal_diagonals
 from floatframe.engine.kernels.model import MASS, STIFFNESS
 from floatframe.model.system import System
+from floatframe.simulation.jumps import jump_times
 
-__all__ = ["StepAdvice", "frequency_words", "step_advice"]
+__all__ = ["StepAdvice", "frequency_words", "knot_words", "step_advice"]
 
 FOLLOWED = 20.0  #: steps per period with which generalized-alpha resolves a mode within about 1 % of its period
 N_PLACES = 2000  #: number of times in a run at which changing frequencies are evaluated
+ON_A_STEP = 1e-6  #: fraction of a step by which a knot may differ from its end
 SEEN = 2.0  #: steps per period below which a mode is not visible in the results
 
 
@@ -113,3 +115,37 @@ def highest_frequencies(system: System, t: Array) -> Iterator[tuple[str, float]]
     for element in system.elements:
         if hasattr(element, "frequencies"):
             yield f"elements.{element.name}", float(np.abs(element.frequencies(t)).max())
+
+
+def knot_words(system: System, t_start: float, h: float, n_steps: int) -> tuple[str, ...]:
+    """Return messages about table data that the steps of a run miss.
+
+    (1) Several knots in one step: what lies between them is not seen. Where a force jumps a step ends.
+    (2) A jump of a driven acceleration inside a step: the step takes it for a ramp. Jumps at the ends of steps are met.
+    """
+    words = []
+    cuts = np.array(jump_times(system, t_start, h, n_steps))
+    for where, function, is_motion, _, _ in functions_of_time(system):
+        inside = (function.begins > t_start) & (function.begins < t_start + n_steps * h * (1 - 1e-12))
+        knots = function.begins[inside]
+        steps = np.ceil((knots - t_start) / h - ON_A_STEP)
+        parts = steps + np.searchsorted(cuts, knots - ON_A_STEP * h)  # range of the steps, which jumps divide
+        passed = len(knots) - len(np.unique(parts))
+        if passed:
+            shortest = float(np.diff(knots).min())
+            words.append(
+                f"{where}: steps of {h:.6g} pass over {passed} of the {len(knots)} knots of its table, which are down "
+                f"to {shortest:.6g} apart: what lies between is not seen; take a shorter step, or resample the signal"
+            )
+        if is_motion:
+            times, sizes = function.jumps(2)
+            at = (times - t_start) / h
+            within = (at > 0) & (at < n_steps) & (np.abs(at - np.rint(at)) > ON_A_STEP)
+            if within.any():
+                k = int(np.flatnonzero(within)[0])
+                words.append(
+                    f"{where}: its acceleration jumps inside {int(within.sum())} steps, first by {sizes[k]:.6g} at "
+                    f"t = {times[k]:.9g}: forces err in these steps; let a step end there (another h, or an event with "
+                    "at), or take a smoother table"
+                )
+    return tuple(words)

@@ -35,7 +35,7 @@ from floatframe.model.elements.expressions import ExpressionElement
 from floatframe.model.functions.tables import linear_table
 from floatframe.model.functions.time_functions import constant, harmonic, piecewise
 from floatframe.simulation.jumps import jump_times
-from floatframe.simulation.knots import knot_words
+from floatframe.simulation.step_advice import knot_words
 
 FIRST, LAST, SIZE = 0.0131, 0.0161, 100.0  #: of the pulse
 MASS, H, END = 2.0, 0.02, 0.1

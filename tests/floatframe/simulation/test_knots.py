@@ -16,7 +16,7 @@ from floatframe import (
     integrate,
 )
 from floatframe.model.functions.tables import acceleration_table, linear_table, monotone_table, quintic_table
-from floatframe.simulation.knots import knot_words
+from floatframe.simulation.step_advice import knot_words
 
 t = np.linspace(0.0, 0.1, 101)
 

@@ -1,4 +1,4 @@
-"""Descriptions in a file: labels from its columns, damping from its provenance, and data that it cannot verify."""
+"""Descriptions in a file: labels from its columns, damping and cells from its provenance, and unverifiable data."""
 
 import numpy as np
 import scipy.linalg as la
@@ -6,8 +6,10 @@ import scipy.linalg as la
 from cms.assessment.quality.record import QualityRecord, information, judge
 from cms.body.reduced_body import ReducedBody
 from cms.reduction.basis.damping import damping_of_words, modal_damping
+from fe_models.checks.first_order import PROVENANCE
+from fe_models.meshes.quadratic_mesh import FIRST_ORDER
 
-__all__ = ["check_damping_told", "check_labels", "check_scope"]
+__all__ = ["check_damping_told", "check_labels", "check_mesh_order", "check_scope"]
 
 
 def check_labels(reduced: ReducedBody) -> QualityRecord:
@@ -69,3 +71,20 @@ def check_scope(reduced: ReducedBody) -> QualityRecord:
     names = [name for name, is_held in unknown.items() if is_held]
     reason = f"not checked without the model: {', '.join(names)}"
     return information("scope", reason, {"unknown": names})
+
+
+def check_mesh_order(reduced: ReducedBody) -> QualityRecord:
+    """Excess of the lowest frequencies due to first-order cells, from the provenance of the file."""
+    counts = {kind: reduced.provenance.get(f"cells {kind}", "") for kind in FIRST_ORDER}
+    cells = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
+    told = reduced.provenance.get(PROVENANCE, "")
+    if not told:
+        if not cells:
+            return information("mesh-order", "the file names no cells of first order")
+        return information(
+            "mesh-order",
+            f"{cells}: cells of first order may be far too stiff in bending, and the file does not say how much; the "
+            "mesh report measures it (report_mesh, or reduce by a job)",
+        )
+    error = float(told.split()[0])
+    return judge("mesh-order", error, f"{cells}: {told.partition(' ')[2]}", {"error": error})

@@ -1,0 +1,115 @@
+"""Velocities that jump: after an impact, and at the start where drives begin at once.
+
+In an impact constraints become active at an instant, or reverse the rate of a coordinate.
+
+With M the masses of all bodies and modes and G the rows of all constraints, those of joints among them,
+
+    M (u_after - u) - Jᵀ i = 0,    G u_after = -e G u for the rows that strike, 0 for all others
+
+i are impulses. No weight but the mass enters, so that momentum is kept and the energy lost is that of the impact law
+(Pfeiffer & Glocker (1996), with Newton's coefficient e of each row).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.initial_conditions.constraint_words import drive_name
+from floatframe.engine.initial_conditions.initial import assembled, checked, known_of, start_unknowns, work_from
+from floatframe.engine.initial_conditions.newton_equations import (
+    in_ground_axes,
+    linearized,
+    set_iterate,
+    solve,
+    with_mass_for_all,
+)
+from floatframe.model.joints.rows import is_held, is_held_length
+from floatframe.model.state import State
+from floatframe.model.system import System
+
+__all__ = ["Impact", "impact", "words_of_begun_drives"]
+
+#: distance in a step, in radians or relative to the size of the system, that a drive may deviate from its bodies
+FITS = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Impact:
+    """The result of an impact."""
+
+    state: State  #: with the velocities after it
+    rate: Array  #: rate of the held quantity of each row before the impact, (n_w,)
+    impulse: Array  #: impulse of the unknown of each row, (n_w,) [N s, N m s]
+    gap: Array  #: gap of the held quantity of each row, (n_w,) [m, rad; for held velocities m/s]
+
+
+def impact(
+    compiled: CompiledSystem, state: State, *, t: float, known: Array, restitution: Mapping[int, float]
+) -> Impact:
+    """Return the state (frames of the engine) after all constraints of a system become active at once.
+
+    Parameters
+    ----------
+    compiled
+        The system with the constraints that begin to hold.
+    known
+        Unknowns of the connections before, (n_w,): counted angles and states of forces.
+    restitution
+        By row: the part of its rate with which it is thrown back; 0 where a row is not named.
+    """
+    from floatframe.engine.kernels.entry import rates_of_constraints
+
+    model = compiled.model
+    work = work_from(model, known)
+    work.state.time[...] = t
+    set_iterate(work, state, w=start_unknowns(model, known))
+    parts = linearized(model, work, 1.0, 0.0, 0.0)
+    gap = work.connections.g.copy()
+    rate, _ = rates_of_constraints(model, work)
+    wanted = -rate
+    for row, e in restitution.items():
+        wanted[row] = -(1.0 + e) * rate[row]
+    y, impulse = solve(with_mass_for_all(model, parts.H), parts, np.zeros(len(state.u)), wanted)
+    after = State(state.r, state.p, state.q, state.u + in_ground_axes(model, state, y))
+    return Impact(after, rate, impulse, gap)
+
+
+def words_of_begun_drives(system: System, t: float, state: State | None, h: float) -> str:
+    """Return a message about the drive whose rate at t differs most from that of its bodies, "" if none does.
+
+    A motion then begins with velocities that fit, the nearest ones by mass and modal stiffness. Rigid mechanisms move
+    so; what is elastic, as bars of segments, takes it as a blow whose waves long steps h do not follow.
+    """
+    from floatframe.engine.kernels.entry import rates_of_constraints
+
+    compiled = compiled_system(system)
+    model = compiled.model
+    drives = np.flatnonzero((model.rows.motion >= 0) & is_held(model.rows.kind))
+    if not len(drives):
+        return ""
+    known = known_of(compiled, state)
+    work = work_from(model, known)
+    work.state.time[...] = t
+    given = compiled.placed if state is None else checked(compiled, state)
+    given = assembled(compiled, work, given, known)
+    rates = []
+    for velocity in (np.zeros_like(given.u), given.u):
+        set_iterate(work, State(given.r, given.p, given.q, velocity), w=start_unknowns(model, known))
+        linearized(model, work, 1.0, 0.0, 0.0)
+        rates.append(np.abs(rates_of_constraints(model, work)[0][drives]))
+    wanted, off = rates
+    is_length = is_held_length(model.rows.kind)[drives]
+    way = h * off / np.where(is_length, compiled.length, 1.0)
+    k = int(np.argmax(way))
+    if not way[k] > FITS:
+        return ""
+    unit = f"{system.units.length_symbol if is_length[k] else 'rad'}/{system.units.time_symbol}"
+    return (
+        f"{drive_name(compiled, int(drives[k]))} begins at t = {t:g} with {wanted[k]:.4g} {unit}, {off[k]:.4g} {unit} "
+        "from what its bodies as given have: all begin with consistent velocities, which acts as an impulse on elastic "
+        "parts; begin it gradually (cycloidal_spin_up), give the bodies consistent velocities, or resolve the impulse "
+        "with a smaller h"
+    )
