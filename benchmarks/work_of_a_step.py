@@ -86,18 +86,18 @@ def counts(cases):
     from floatframe import GeneralizedAlpha
     from floatframe.engine.compiling.system import compiled_system
     from floatframe.engine.kernels import entry
-    from floatframe.engine.kernels.records import filled
+    from floatframe.engine.kernels.records import filled, zeros
     from floatframe.engine.kernels.work import new_work
 
-    def call(model, work, memory, rows, **order):
-        records = model, work, memory, rows, filled(entry.Order(), **(entry.NOTHING._asdict() | order))
+    def call(kernels, model, work, memory=entry.NO_MEMORY, rows=entry.NO_ROWS, **order):
+        records = model, work, memory, rows, filled(entry.Order(), **(zeros(entry.Order(), {})._asdict() | order))
         counted = [of_counted(record) for record in records]
-        outcome = entry.Outcome(*entry.run(*counted))
+        outcome = entry.Outcome(*kernels.compiled(*counted))
         for record, each in zip(records[1:4], counted[1:4], strict=True):
             put_back(record, each)
         return outcome
 
-    entry.call = call
+    entry.CompiledEntry.__call__ = call
     for name in ("as_model", "as_work", "as_memory", "as_rows", "as_order"):
         setattr(entry, name, lambda record: record)
     told = []

@@ -17,7 +17,7 @@ SHARED = set(
     """
     Balance Block BodySection Box BoxSection Bracket Branch Builder Carrier Case Column Columns Connections
     Coordinates Counted Coupling Cut Cylinder DampingSection Drawing Element Elements End Entry
-    Equations Evaluated Evaluation Family Frame FrequencyResponse FullModel Functions Graph Held Kept Kind
+    Equations Evaluated Family Frame FrequencyResponse FullModel Functions Graph Held Kept Kind
     Layout Limits Line Lines Link Load Loads MassSection MaterialSection Mesh MeshError Modes Motion Named
     Observed Output OutputSection Parameter ParameterSection Part Picture Place Placed Places Plane Point
     Progress Quantity Recovery Reference Request Rod RodSection Rows Run Search Section Selection
@@ -49,7 +49,6 @@ cms/assessment/compare/mode_selection.py words
 cms/assessment/compare/pulse.py words
 cms/assessment/compare/subsets.py kept
 cms/assessment/correlation/update.py least
-cms/assessment/quality/of_body/told.py told
 cms/assessment/report/charts.py shown
 cms/assessment/report/html.py words
 cms/assessment/report/words.py words

@@ -15,9 +15,9 @@ def observed_state(
     compiled: CompiledSystem, work: Work, state: State, u_dot: Array, w: Array, t: float
 ) -> tuple[Rows, Array]:
     """Return the row of results at a state of the engine, and the power of loads and of dampers, (2,)."""
-    from floatframe.engine.kernels.entry import observe_state
+    from floatframe.engine.kernels.entry import absolute_kernels
 
     work.state.time[...] = t
     memory = memory_at(state, u_dot, w)
-    rows = observe_state(compiled.model, work, memory, t)
+    rows = absolute_kernels.observe(compiled.model, work, memory=memory, t=t)
     return rows, np.array([memory.power_given, memory.power_taken])

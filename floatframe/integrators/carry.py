@@ -304,10 +304,10 @@ def observed_unless_stopped(system: System, t: float, carry: Carry, work: Work) 
 
 def observed(system: System, t: float, carry: Carry, work: Work) -> tuple[Array, Rows]:
     """Return the power, (2,), and the results at the carried state."""
-    from floatframe.engine.kernels.entry import observe_state
+    from floatframe.engine.kernels.entry import absolute_kernels
 
     memory = memory_of(carry)
-    rows = observe_state(compiled_system(system).model, work, memory, t)
+    rows = absolute_kernels.observe(compiled_system(system).model, work, memory=memory, t=t)
     return np.array([memory.power_given, memory.power_taken]), rows
 
 

@@ -11,7 +11,7 @@ from floatframe.engine.initial_conditions.initial import (
     with_compatible_velocities,
 )
 from floatframe.engine.kernels.entry import Outcome
-from floatframe.engine.kernels.memory import Rows, new_rows
+from floatframe.engine.kernels.memory import Rows
 from floatframe.engine.kernels.work import Work
 from floatframe.engine.structure_preserving.compiled import kept_of
 from floatframe.engine.structure_preserving.system import discrete_system
@@ -89,7 +89,7 @@ class DiscreteScheme:
     ) -> tuple[Carry, Rows, int, Failure | None]:
         """Advance by n_steps of size h, the first of them number `first` from t0; see `carry.Integrator`."""
         from floatframe.engine.structure_preserving.kernels.newton import NO_ACCELERATION
-        from floatframe.engine.structure_preserving.kernels.steps import advance_discrete_steps
+        from floatframe.engine.structure_preserving.kernels.steps import discrete_kernels
 
         compiled = compiled_system(system)
         model = compiled.model
@@ -100,12 +100,10 @@ class DiscreteScheme:
         kept.go_on_from(carry, carry.a, is_anew=bool(work.solver.c_k == 0.0))
         work.solver.c_k[...] = 1.0
         memory = memory_of(carry)
-        rows = new_rows(model, (first + n_steps) // every - first // every)
         iterations = int(step.n_iterations)
-        outcome = advance_discrete_steps(
-            model, work, kept.discrete, step, memory, rows, t0=t0, h=h, first=first, n_steps=n_steps, every=every,
-            tolerance=self.tolerance, max_iterations=self.max_iterations, length=ds.length,
-            h_min=least,
+        rows, outcome = discrete_kernels.advance(
+            model, work, kept.discrete, step, memory=memory, t0=t0, h=h, first=first, n_steps=n_steps, every=every,
+            tolerance=self.tolerance, max_iterations=self.max_iterations, length=ds.length, h_min=least,
         )  # fmt: skip
         if outcome.status == NO_ACCELERATION:  # the memory is beyond the last good step: repeat the good steps
             # explained first, because the repeated steps overwrite what it needs
@@ -117,7 +115,6 @@ class DiscreteScheme:
         n_iterations = carry.n_iterations + int(step.n_iterations) - iterations
         after = replace(carry_of(memory, n_iterations), a=step.f_kept.copy(), power=carry.power)
         kept.after = after
-        rows = Rows(*(array[: outcome.n_rows] for array in rows))
         return after, rows, outcome.n_steps, explained(compiled, work, outcome, self.max_iterations, least)
 
 

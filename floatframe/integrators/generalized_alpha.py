@@ -28,7 +28,7 @@ from floatframe.engine.initial_conditions.step_filter import (
     spin_of,
     step_filter,
 )
-from floatframe.engine.kernels.memory import Rows, new_rows
+from floatframe.engine.kernels.memory import Rows
 from floatframe.engine.kernels.model import COUPLER, JOINT, MASS, Model
 from floatframe.engine.kernels.work import Work
 from floatframe.errors import ModelError
@@ -192,37 +192,31 @@ class GeneralizedAlpha:
 
         `work` holds the factors of the last Newton matrix, which serve until they are too old.
         """
-        from floatframe.engine.kernels.entry import advance_steps
+        from floatframe.engine.kernels.entry import absolute_kernels
 
         compiled = compiled_system(system)
         carry = self.prepared(system, carry, h, t0 + first * h)
         memory = memory_of(carry)
         memory.a[:] = carry.a
-        n_rows = (first + n_steps) // every - first // every
-        rows = new_rows(compiled.model, n_rows)
         iterations = int(work.counted.iterations)
-        outcome = advance_steps(
-            compiled.model,
-            work,
-            memory,
-            rows,
-            t0=t0,
-            h=h,
-            first=first,
-            n_steps=n_steps,
-            every=every,
-            coefficients=self.coefficients,
-            tolerance=self.tolerance,
-            max_iterations=self.max_iterations,
-            length=compiled.length,
-            most_error=self.error_tolerance or 0.0,
-            h_min=self.least_step(h, compiled),
-            stabilized=self.stabilized,
-        )
+        rows, outcome = absolute_kernels.advance(
+            compiled.model, work, memory=memory,
+            t0=t0, h=h, first=first, n_steps=n_steps, every=every, **self.numbers(compiled, h),
+        )  # fmt: skip
         after = carry_of(memory, carry.n_iterations + int(work.counted.iterations) - iterations)
-        rows = Rows(*(array[: outcome.n_rows] for array in rows))
         failure = None if outcome.status == 0 else self.explain(system, work, outcome, after.state.u, h)
         return after, rows, outcome.n_steps, failure
+
+    def numbers(self, compiled: CompiledSystem, h: float) -> dict[str, float]:
+        """Return the numbers of the method for steps of size h, by their names in an order of the kernels."""
+        return dict(zip(("alpha_m", "alpha_f", "beta", "gamma"), self.coefficients, strict=True)) | {
+            "tolerance": self.tolerance,
+            "max_iterations": self.max_iterations,
+            "length": compiled.length,
+            "most_error": self.error_tolerance or 0.0,
+            "h_min": self.least_step(h, compiled),
+            "stabilized": int(self.stabilized),
+        }
 
     def least_step(self, h: float, compiled: CompiledSystem) -> float:
         """Return the smallest part of a divided step of size h; 0 if it may not be divided."""

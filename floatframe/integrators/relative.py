@@ -14,7 +14,7 @@ from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.initial_conditions.initial import work_from
 from floatframe.engine.initial_conditions.newton_equations import displaced, set_iterate
 from floatframe.engine.initial_conditions.step_filter import Beginning, Spin
-from floatframe.engine.kernels.memory import Rows, new_rows
+from floatframe.engine.kernels.memory import Rows
 from floatframe.engine.kernels.model import Model
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.engine.tree.formulation import is_relative
@@ -90,18 +90,18 @@ class RelativeGeneralizedAlpha:
 
     def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
         """Return the results at the carried state, and store the power there in the carry."""
-        from floatframe.engine.tree.kernels.entry import observe_tree
+        from floatframe.engine.tree.kernels.entry import NO_TANGENT, joint_kernels
 
         model, tree = compiled_system(system).model, tree_of(system).tree
         memory = memory_of(carry)
-        rows = observe_tree(model, work, tree, new_joint_work(model, tree), memory, t)
+        rows = joint_kernels.observe(model, work, tree, new_joint_work(model, tree), NO_TANGENT, memory=memory, t=t)
         return replace(carry, power=np.array([memory.power_given, memory.power_taken])), rows
 
     def advance(
         self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
     ) -> tuple[Carry, Rows, int, Failure | None]:
         """Advance by n_steps of size h, the first of them number `first` from t0; see `carry.Integrator`."""
-        from floatframe.engine.tree.kernels.entry import advance_tree_steps
+        from floatframe.engine.tree.kernels.entry import joint_kernels
 
         compiled, tree = compiled_system(system), tree_of(system).tree
         model, kept = compiled.model, kept_of(work, compiled.model, tree)
@@ -113,18 +113,13 @@ class RelativeGeneralizedAlpha:
         carry = begun
         memory = memory_of(carry)
         memory.a[:] = carry.a
-        rows = new_rows(model, (first + n_steps) // every - first // every)
         iterations = int(work.counted.iterations)
-        outcome = advance_tree_steps(
-            model, work, tree, kept.joints, kept.tangent, memory, rows,
-            coefficients=self.absolute.coefficients, t0=t0, h=h, first=first, n_steps=n_steps, every=every,
-            tolerance=self.tolerance, max_iterations=self.max_iterations, length=compiled.length,
-            most_error=self.error_tolerance or 0.0, h_min=self.absolute.least_step(h, compiled),
-            stabilized=int(self.stabilized),
+        rows, outcome = joint_kernels.advance(
+            model, work, tree, kept.joints, kept.tangent, memory=memory,
+            t0=t0, h=h, first=first, n_steps=n_steps, every=every, **self.absolute.numbers(compiled, h),
         )  # fmt: skip
         after = carry_of(memory, carry.n_iterations + int(work.counted.iterations) - iterations)
         kept.after = after
-        rows = Rows(*(array[: outcome.n_rows] for array in rows))
         return after, rows, outcome.n_steps, self.explain(system, work, outcome, after.state.u, h)
 
     def prepared(self, system: System, carry: Carry, h: float, t: float) -> Carry:

@@ -15,57 +15,7 @@ from floatframe.engine.open_equations.rows import Structure, row_parts
 from floatframe.model.rotations import rotation_matrix
 from floatframe.model.state import State
 
-__all__ = ["Evaluation", "Point", "PointTangents", "evaluation_of", "in_blocks", "parameter_residuals", "tangents_at"]
-
-
-# repeated evaluations with reused address tables for the kernels
-# -------------------------------------------------------- A call of the kernels makes a table of addresses for each
-# record it is handed and an order of some twenty arrays, which takes longer than a small system does. Here they are
-# made once for a system and its working arrays; an evaluation writes three numbers and runs.
-
-
-KEPT = 4  #: number of systems whose evaluations are kept
-
-
-class Evaluation:
-    """Residuals and derivatives of a system at the iterate in its working arrays."""
-
-    def __init__(self, model: Model, work: Work) -> None:
-        from floatframe.engine.kernels import entry
-        from floatframe.engine.kernels.compiler.structure import table_of
-        from floatframe.engine.kernels.records import filled
-
-        if not entry.run.signatures:
-            entry.prepare()
-        self.run, self.model, self.work = entry.run, model, work
-        self.order = filled(entry.Order(), **(entry.NOTHING._asdict() | {"what": entry.LINEARIZE}))
-        self.memory = entry.no_memory()
-        # these records must live as long as this object
-        records = (model, work, self.memory, entry.NO_ROWS, self.order)
-        self.tables = tuple(table_of(record) for record in records)
-
-    def evaluate(self, c_m: float, c_d: float, c_k: float) -> None:
-        """Write residuals and derivatives, as `floatframe.engine.kernels.entry.evaluate_and_linearize` does."""
-        order = self.order
-        order.c_m[...], order.c_d[...], order.c_k[...] = c_m, c_d, c_k
-        self.run(*self.tables)
-
-
-kept: list[Evaluation] = []
-
-
-def evaluation_of(model: Model, work: Work) -> Evaluation:
-    """Return the evaluation of a system with its working arrays; recent ones are reused."""
-    for known in kept:
-        if known.model is model and known.work is work:
-            return known
-    made = Evaluation(model, work)
-    kept.insert(0, made)
-    del kept[KEPT:]
-    return made
-
-
-# tangents -------------------------------------------------------------------------------------------------------------
+__all__ = ["Point", "PointTangents", "in_blocks", "parameter_residuals", "tangents_at"]
 
 
 BLOCK = 100  #: number of points whose derivatives by parameters are stored at once
@@ -113,12 +63,13 @@ class PointTangents:
 
 def tangents_at(structure: Structure, model: Model, work: Work, point: Point, c_k: float = 1.0) -> PointTangents:
     """Return the matrices at a point that satisfies the equations of motion."""
-    evaluation = evaluation_of(model, work)
+    from floatframe.engine.kernels.entry import evaluate_and_linearize
+
     point.write(work)
     n_u, n_w = structure.n_u, len(structure.holds)
     H, G = [], []
     for weights in ((c_k, 0.0, 0.0), (0.0, c_k, c_k), (0.0, 0.0, c_k)):
-        evaluation.evaluate(*weights)
+        evaluate_and_linearize(model, work, *weights)
         H.append(body_matrix(model, work))
         if weights[0] == 0.0:
             rows = row_parts(structure, model, work)
@@ -155,10 +106,11 @@ def whole(structure: Structure, parts: tuple[Array, ...], n_w: int) -> Array:
 
 def residuals_of(neighbour: Neighbour, point: Point, c_k: float) -> Array:
     """Return c_k times the residual of the bodies (ground axes), followed by the residual of the rows, (n_u + n_w,)."""
+    from floatframe.engine.kernels.entry import evaluate_and_linearize
+
     work, model = neighbour.work, neighbour.compiled.model
-    evaluation = evaluation_of(model, work)
     point.write(work)
-    evaluation.evaluate(0.0, 0.0, c_k)
+    evaluate_and_linearize(model, work, 0.0, 0.0, c_k)
     own = c_k * work.bodies.residual
     at = model.bodies.u0[:-1, None] + np.arange(3)
     own[at] = (work.state.R @ own[at][:, :, None])[:, :, 0]

@@ -15,7 +15,7 @@ from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.newton_equations import set_iterate
 from floatframe.engine.kernels.model import Model
 from floatframe.engine.kernels.work import new_work
-from floatframe.engine.tree.kernels.entry import motion_of_joints, mover
+from floatframe.engine.tree.kernels.entry import motion_of_joints, moved
 from floatframe.engine.tree.kernels.tree import JointWork, Tree, new_joint_work
 from floatframe.engine.tree.topology import SystemTree, tree_of
 from floatframe.errors import ModelError
@@ -111,7 +111,7 @@ def motion_of_tree(
     """Return the motion of a tree, or of what cut loops leave, by all its coordinates."""
     compiled = compiled_system(system)
     model, work, joints = compiled.model, new_work(compiled.model), joints_as_placed(system)
-    move, start = mover(model, work, tree, joints), distances(tree, joints)
+    start = distances(tree, joints)
     n, n_c, n_b = len(x), len(tree.side), len(tree.parent)
     r, R = np.empty((n, n_b, 3)), np.empty((n, n_b, 3, 3))
     u, u_dot = np.empty((n, n_b, 6)), np.empty((n, n_b, 6))
@@ -119,8 +119,7 @@ def motion_of_tree(
     markers = [int(tree.near[i] if tree.is_reversed[i] else tree.far[i]) for i in range(n_b)]
     for s in range(n):
         joints.rate[:], joints.acceleration[:] = rate[s], acceleration[s]
-        joints.x[:] = x[s] - start
-        move()
+        moved(model, work, tree, joints, x[s] - start)
         r[s], R[s], t[s], turn[s] = work.state.r, work.state.R, joints.t, joints.a
         u[s], u_dot[s] = work.state.u.reshape(n_b, 6), work.state.u_dot.reshape(n_b, 6)
     for k, i in enumerate(owners(tree)):

@@ -1,11 +1,12 @@
-"""The compiled entry, and a plain function for each of its tasks.
+"""The way into compiled code; that of absolute coordinates, and a plain function for each of its tasks.
 
 One entry, since numba compiles and links everything below an entry once more for each of them.
 """
 
 import logging
 import time
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 from numba import types
 
@@ -13,7 +14,7 @@ from fe_models.foundation.arrays import Array, IntArray
 from floatframe.engine.kernels.compiler.choice import is_lean, words
 from floatframe.engine.kernels.compiler.compilation import kept_entry
 from floatframe.engine.kernels.compiler.sources import source_digest
-from floatframe.engine.kernels.compiler.structure import converter, kept_table_of, table_of, table_of_numbers
+from floatframe.engine.kernels.compiler.structure import converter, table_of_numbers
 from floatframe.engine.kernels.connections.connection import constraint_rates
 from floatframe.engine.kernels.diagnostics import power
 from floatframe.engine.kernels.evaluation import evaluate, linearize
@@ -33,14 +34,15 @@ from floatframe.engine.kernels.turns import count_turns
 from floatframe.engine.kernels.work import Work
 
 __all__ = [
+    "ADVANCE",
+    "OBSERVE",
+    "CompiledEntry",
     "Order",
     "Outcome",
-    "advance_steps",
+    "absolute_kernels",
     "count_angles",
     "evaluate_and_linearize",
     "newton_correction",
-    "no_memory",
-    "observe_state",
     "prepare",
     "rates_of_constraints",
 ]
@@ -125,94 +127,86 @@ def make_entry(digest):
     return kept_entry(run)
 
 
-run = make_entry(source_digest(__name__, "lean" if is_lean else "plain"))
-
-SIGNATURE = (types.Array(types.int64, 1, "C"),) * 5
-
 NO_SIZES = dict.fromkeys(("n_t", "n_b", "n_c", "n_q", "n_u", "n_w", "angles", "loads", "body loads"), 0)
-ORDER, NOTHING = Order(), zeros(Order(), {})
-NO_ROWS = zeros(Rows(), NO_SIZES)
+ORDER, NO_MEMORY, NO_ROWS = Order(), zeros(Memory(), NO_SIZES), zeros(Rows(), NO_SIZES)
+
+
+class CompiledEntry:
+    """A compiled function of records and a request, the only way from Python into a time loop.
+
+    Its arguments are the tables of the records of a formulation (model and working arrays first), of the memory, of
+    the rows of results, and of the order.
+    """
+
+    def __init__(self, make: Callable[[int], Any], module: str, n_records: int) -> None:
+        self.compiled = make(source_digest(module, "lean" if is_lean else "plain"))
+        self.signature = (types.Array(types.int64, 1, "C"),) * (n_records + 3)
+
+    def prepare(self) -> bool:
+        """Load the kernels from the cache, or compile them; return whether they were compiled in this call.
+
+        Otherwise this happens with the first call. Calls after it find everything ready.
+        """
+        before = sum(self.compiled.stats.cache_misses.values())
+        self.compiled.compile(self.signature)
+        return sum(self.compiled.stats.cache_misses.values()) > before
+
+    def __call__(self, *records: Any, memory: Any = NO_MEMORY, rows: Any = NO_ROWS, **order: float) -> Outcome:
+        """Carry out a request; unnamed fields of the order are zero, and all arrays live until it returns."""
+        if not self.compiled.signatures:
+            began = time.perf_counter()
+            if self.prepare():
+                level = logging.INFO if is_lean else logging.WARNING  # plain numba is unusual: the user should see it
+                passed = time.perf_counter() - began
+                log.log(level, "compiled the code of the motion in %.0f s, once: %s", passed, words())
+        ordered, numbers = table_of_numbers(ORDER, order)
+        outcome = self.compiled(*(record.table for record in (*records, memory, rows)), ordered)
+        del numbers  # not before
+        return Outcome(*outcome)
+
+    def observe(self, *records: Any, memory: Memory, t: float) -> Rows:
+        """Return the results at the state in the memory, and store the power at this state in the memory."""
+        rows = new_rows(records[0], 1)
+        self(*records, memory=memory, rows=rows, what=OBSERVE, t0=t)
+        return rows
+
+    def advance(
+        self, *records: Any, memory: Memory, h: float, first: int, n_steps: int, every: int, **order: float
+    ) -> tuple[Rows, Outcome]:
+        """Advance the memory by n_steps of size h, and return the results after every `every`-th, and the report.
+
+        order: time of step 0, and numbers of the method; see `kernels.generalized_alpha.time_loop`.
+        """
+        rows = new_rows(records[0], (first + n_steps) // every - first // every)
+        steps = {"h": h, "first": first, "n_steps": n_steps, "every": every}
+        outcome = self(*records, memory=memory, rows=rows, what=ADVANCE, **steps, **order)
+        return Rows(*(array[: outcome.n_rows] for array in rows)), outcome
+
+
+absolute_kernels = CompiledEntry(make_entry, __name__, n_records=2)
 
 
 def prepare() -> bool:
-    """Load the kernels from the cache, or compile them; return whether they were compiled in this call.
-
-    Otherwise this happens with the first call. Calls after it find everything ready.
-    """
-    before = sum(run.stats.cache_misses.values())
-    run.compile(SIGNATURE)
-    return sum(run.stats.cache_misses.values()) > before
-
-
-def call(model: Model, work: Work, memory: Memory, rows: Rows, **order: float) -> Outcome:
-    """Run the entry with a request; unnamed fields are zero, and all arrays live until it returns."""
-    if not run.signatures:
-        began = time.perf_counter()
-        if prepare():
-            level = logging.INFO if is_lean else logging.WARNING  # plain numba is unusual, so the user should see it
-            log.log(level, "compiled the code of the motion in %.0f s, once: %s", time.perf_counter() - began, words())
-    ordered, numbers = table_of_numbers(ORDER, order)
-    outcome = run(kept_table_of(model), kept_table_of(work), table_of(memory), table_of(rows), ordered)
-    del numbers  # not before
-    return Outcome(*outcome)
-
-
-def no_memory() -> Memory:
-    """Return an empty memory, for tasks that need none."""
-    return zeros(Memory(), NO_SIZES)
+    """Make the kernels of absolute coordinates ready, see `CompiledEntry.prepare`."""
+    return absolute_kernels.prepare()
 
 
 def evaluate_and_linearize(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> None:
     """Write residuals and derivatives for the iterate in `work`; rows of wrenches weighted by c_k if above 0."""
-    call(model, work, no_memory(), NO_ROWS, what=LINEARIZE, c_m=c_m, c_d=c_d, c_k=c_k)
+    absolute_kernels(model, work, what=LINEARIZE, c_m=c_m, c_d=c_d, c_k=c_k)
 
 
 def rates_of_constraints(model: Model, work: Work) -> tuple[Array, Array]:
     """Return for every row the rate of the held quantity, and its second rate at zero u_dot, both (n_w,)."""
-    call(model, work, no_memory(), NO_ROWS, what=RATES)
+    absolute_kernels(model, work, what=RATES)
     return work.connections.rate.copy(), work.connections.bias.copy()
 
 
 def newton_correction(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> Outcome:
     """Write the Newton correction (y, mu) for the iterate in `work`."""
-    return call(model, work, no_memory(), NO_ROWS, what=CORRECT, c_m=c_m, c_d=c_d, c_k=c_k)
-
-
-def observe_state(model: Model, work: Work, memory: Memory, t: float) -> Rows:
-    """Return the results at the state in the memory, and store the power at this state in the memory."""
-    rows = new_rows(model, 1)
-    call(model, work, memory, rows, what=OBSERVE, t0=t)
-    return rows
+    return absolute_kernels(model, work, what=CORRECT, c_m=c_m, c_d=c_d, c_k=c_k)
 
 
 def count_angles(model: Model, work: Work, memory: Memory, h: float) -> None:
     """Store the angles of the state in the memory, a step of size h after the stored ones."""
-    call(model, work, memory, NO_ROWS, what=COUNT, h=h)
-
-
-def advance_steps(
-    model: Model,
-    work: Work,
-    memory: Memory,
-    rows: Rows,
-    *,
-    t0: float,
-    h: float,
-    first: int,
-    n_steps: int,
-    every: int,
-    coefficients: tuple[float, float, float, float],
-    tolerance: float,
-    max_iterations: int,
-    length: float,
-    most_error: float,
-    h_min: float,
-    stabilized: bool,
-) -> Outcome:
-    """Advance the memory by n_steps of the generalized-alpha method; see `kernels.generalized_alpha.advance`."""
-    alpha_m, alpha_f, beta, gamma = coefficients
-    return call(
-        model, work, memory, rows, what=ADVANCE, t0=t0, h=h, first=first, n_steps=n_steps, every=every,
-        alpha_m=alpha_m, alpha_f=alpha_f, beta=beta, gamma=gamma, tolerance=tolerance, max_iterations=max_iterations,
-        length=length, most_error=most_error, h_min=h_min, stabilized=int(stabilized),
-    )  # fmt: skip
+    absolute_kernels(model, work, memory=memory, what=COUNT, h=h)

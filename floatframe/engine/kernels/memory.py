@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.engine.kernels.model import Model, n_angles, n_b, n_body_loads, n_c, n_loads, n_w
-from floatframe.engine.kernels.records import Size, integer, real, zeros
+from floatframe.engine.kernels.records import Size, integer, real, tabled, zeros
 from floatframe.engine.kernels.work import n_q, n_u, state_sizes
 from floatframe.model.state import State
 
@@ -39,6 +39,7 @@ OF_DISTANCES, OF_ANGLES, OF_DISTANCE_RATES, OF_ANGLE_RATES = range(N_DRIFTS)  #:
 n_t = Size("n_t")
 
 
+@tabled
 class Memory(NamedTuple):
     """The memory of an integrator after a step, which the next step overwrites."""
 
@@ -61,6 +62,7 @@ class Memory(NamedTuple):
     angle_rate: Array = real(n_angles, unit="rad/s")
 
 
+@tabled
 class Rows(NamedTuple):
     """Results of consecutive output times."""
 

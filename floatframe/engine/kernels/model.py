@@ -9,7 +9,7 @@ an item begins, and have one entry more for the end.
 from typing import NamedTuple
 
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.engine.kernels.records import Size, integer, real
+from floatframe.engine.kernels.records import Size, integer, real, tabled
 
 __all__ = [
     "BUSHING",
@@ -360,6 +360,7 @@ class Angles(NamedTuple):
     part: IntArray = integer(n_angles)
 
 
+@tabled
 class Model(NamedTuple):
     """A compiled system."""
 

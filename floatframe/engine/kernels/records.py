@@ -8,19 +8,52 @@ A record is a named tuple of arrays and of other records. Made without values it
     of_items(Springs(), items)   arrays made of items with one entry for each array
     measured(Model(), model)     the sizes of given arrays, which must be what is declared
     leaves(model)                the arrays in their order; kernels find them in it (compiler/structure.py)
+
+Records that Python hands to kernels are `tabled`: `model.table` holds addresses and shapes of all arrays.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, IntArray
 
-__all__ = ["Declared", "Size", "filled", "flat", "integer", "leaves", "measured", "of_items", "real", "zeros"]
+__all__ = ["Declared", "Size", "filled", "flat", "integer", "leaves", "measured", "of_items", "real", "tabled", "zeros"]
 
 Record = TypeVar("Record", bound=NamedTuple)
+
+
+class Tabled:
+    """What a record has beside its arrays; it lives and ends with the record."""
+
+    @cached_property
+    def table(self) -> IntArray:
+        """Address and shape of each array in its order, as kernels read them.
+
+        Made once, since making it takes as long as a step.
+        """
+        words: list[int] = []
+        for _, array in leaves(self):
+            words.append(array.__array_interface__["data"][0])
+            words += array.shape
+        return np.array(words, np.int64)
+
+    @cached_property
+    def sizes(self) -> dict[str, int]:
+        """The sizes of the arrays by name, see `measured`."""
+        return measured(type(self)(), self)  # type: ignore[type-var]
+
+    def __reduce__(self) -> tuple[Any, ...]:  # a copy has arrays, and so a table, of its own
+        return type(self), tuple(self)  # type: ignore[arg-type]
+
+
+def tabled(record: type[Record]) -> type[Record]:
+    """Return the class of a record with `Tabled`."""
+    names = {name: getattr(record, name) for name in ("__doc__", "__module__", "__qualname__")}
+    return type(record.__name__, (Tabled, record), names)
 
 
 @dataclass(frozen=True)

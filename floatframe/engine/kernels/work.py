@@ -4,13 +4,13 @@ Sizes as in `kernels.model`, and n_most: most modes of a body, most_rows: most r
 over the ends of connections. Vectors are in ground axes where nothing else is said.
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.engine.kernels.model import Model, n_angles, n_b, n_c, n_gaps, n_lines, n_m, n_pairs, n_states, n_w
-from floatframe.engine.kernels.records import Size, integer, measured, real, zeros
+from floatframe.engine.kernels.records import Size, Tabled, integer, real, tabled, zeros
 
 __all__ = [
     "BodyWork",
@@ -288,6 +288,7 @@ class Past(NamedTuple):
     counts: IntArray = integer(n_past, 3)  #: steps accepted and rejected, iterations
 
 
+@tabled
 class Work(NamedTuple):
     """The working arrays of a system."""
 
@@ -323,7 +324,7 @@ def sizes_of(model: Model) -> dict[str, int]:
     n_coordinates = np.diff(model.elements.coordinate0)[len(model.elements.core) - len(users.n_states) :]
     n_in, n_out = 1 + 2 * n_coordinates + users.n_states, users.n_forces + users.n_states
     return (
-        measured(Model(), model)
+        cast(Tabled, model).sizes
         | state_sizes(model)
         | {
             "n_x": int(sum(6 + bodies.n_q[markers.body[is_end]])),
@@ -364,24 +365,9 @@ def acceleration_sizes(model: Model) -> dict[str, int]:
     }
 
 
-KEPT = 4  # number of models whose sizes are cached
-kept: list[tuple[Model, dict[str, int]]] = []
-
-
-def kept_sizes_of(model: Model) -> dict[str, int]:
-    """Return `sizes_of` for a model that is used repeatedly, from a cache; the sizes of a model are constant."""
-    for known, sizes in kept:
-        if known is model:
-            return sizes
-    sizes = sizes_of(model)
-    kept.insert(0, (model, sizes))
-    del kept[KEPT:]
-    return sizes
-
-
 def new_work(model: Model, n_past: int = 0) -> Work:
     """Return working arrays for a compiled system, with room for the memories after n_past steps of a call."""
-    sizes = kept_sizes_of(model)
+    sizes = sizes_of(model)
     remembered = max(sizes["n_u"], sizes["n_w"])
     work = zeros(Work(), sizes | {"n_past": n_past, "n_remembered": remembered})
     work.markers.psi[:] = model.markers.psi

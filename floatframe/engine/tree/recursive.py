@@ -7,16 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import quoted
 from floatframe.engine.compiling.file_frames import state_of_engine, state_of_file
 from floatframe.engine.compiling.markers import find_marker
-from floatframe.engine.kernels.compiler.structure import table_of
 from floatframe.engine.kernels.work import Work, new_work
-from floatframe.engine.tree.recursion.entry import FORWARD, INVERSE, MASS, PLACE, SOLVE, TANGENTS, Prepared, prepared
-from floatframe.engine.tree.recursion.expansion import Expansion, expansion_of
+from floatframe.engine.tree.recursion.entry import FORWARD, INVERSE, MASS, PLACE, SOLVE, TANGENTS, Prepared
+from floatframe.engine.tree.recursion.expansion import Expansion, expansion_of, positions_of_state
 from floatframe.engine.tree.recursion.nodes import ROTATION, Dense, NodeWork, new_dense, new_node_work
-from floatframe.engine.tree.recursion.positions import positions_of_state
 from floatframe.engine.tree.topology import tree_of
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
@@ -218,7 +216,7 @@ class RelativeModel:
             raise ModelError(f"solve: right: expected {n} finite rows, got shape {columns.shape}")
         rows = np.ascontiguousarray(columns.reshape(n, -1).T)
         dense = self.none._replace(columns=rows.copy())
-        self.require(self.ready.run(SOLVE, table_of(dense)))
+        self.require(self.ready.run(SOLVE, dense))
         return np.asarray(dense.columns.T.reshape(columns.shape))
 
     def derivatives(self, z: Array, z_dot: Array, z_ddot: Array) -> "ForceDerivatives":
@@ -368,20 +366,9 @@ class RelativeModel:
         """Matrices over the rates."""
         return new_dense(self.expansion.nodes, self.n_rates, 0, is_whole=True)
 
-    @cached_property
-    def none_table(self) -> IntArray:
-        """Table of `none`."""
-        return table_of(self.none)
-
-    @cached_property
-    def dense_table(self) -> IntArray:
-        """Table of `dense`."""
-        return table_of(self.dense)
-
     def run(self, what: int, times: int = 1) -> None:
         """Run the kernels; `ModelError` if there is no inertia along a coordinate."""
-        table = self.dense_table if what in (MASS, TANGENTS) else self.none_table
-        self.require(self.ready.run(what, table, times))
+        self.require(self.ready.run(what, self.dense if what in (MASS, TANGENTS) else self.none, times))
 
     def require(self, node: int) -> None:
         """Raise `ModelError` if a node has no inertia along its rates."""
@@ -438,4 +425,4 @@ def relative_model(system: System) -> RelativeModel:
     work, marker_work = new_node_work(expansion.nodes, expansion.n_x, expansion.n_v), new_work(model)
     work.gravity[:] = model.gravity
     marker_work.state.R[:] = np.eye(3)
-    return RelativeModel(expansion, work, marker_work, prepared(expansion.nodes, work, model, marker_work))
+    return RelativeModel(expansion, work, marker_work, Prepared(expansion.nodes, work, model, marker_work))

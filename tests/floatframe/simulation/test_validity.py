@@ -29,7 +29,7 @@ from floatframe import (
 from floatframe.cli.app import app
 from floatframe.components.mechanisms import slider_crank, spin_up_beam, spinning_shaft
 from floatframe.engine.compiling.system import compiled_system
-from floatframe.engine.kernels.entry import observe_state
+from floatframe.engine.kernels.entry import absolute_kernels
 from floatframe.engine.kernels.memory import memory_at
 from floatframe.engine.kernels.work import new_work
 from floatframe.model.functions.time_functions import polynomial_of_time
@@ -49,7 +49,7 @@ def rows_of(system, q, u, u_dot, p=None):
     placed = compiled_system(system).placed
     p = placed.p if p is None else p
     memory = memory_at(State(placed.r, p, q, u), u_dot, np.zeros(int(model.connections.w0[-1])))
-    return observe_state(model, new_work(model), memory, 0.5)
+    return absolute_kernels.observe(model, new_work(model), memory=memory, t=0.5)
 
 
 @pytest.mark.parametrize("stiffening", [True, False])

@@ -20,9 +20,9 @@ from floatframe import (
     joint_coordinate,
 )
 from floatframe.engine.compiling.system import compiled_system
-from floatframe.engine.kernels.compiler.structure import table_of, table_of_numbers
-from floatframe.engine.kernels.entry import NOTHING, Order
-from floatframe.engine.kernels.records import filled
+from floatframe.engine.kernels.compiler.structure import n_words, table_of_numbers
+from floatframe.engine.kernels.entry import Order
+from floatframe.engine.kernels.records import filled, zeros
 from floatframe.engine.kernels.work import new_work
 from floatframe.integrators.carry import carry_of_past
 from floatframe.integrators.relative import RelativeGeneralizedAlpha
@@ -82,8 +82,8 @@ def test_a_memory_of_the_past_is_that_of_a_run_that_ends_there(method):
 def test_a_table_of_numbers_is_that_of_their_arrays():
     values = {"what": 4, "h": 0.25, "n_steps": 17, "h_min": -3.5}
     table, numbers = table_of_numbers(Order(), values)
-    expected = filled(Order(), **(NOTHING._asdict() | values))
-    assert len(table) == len(table_of(expected))
+    expected = filled(Order(), **(zeros(Order(), {})._asdict() | values))
+    assert len(table) == n_words(Order())
     assert_array_equal(table, numbers.ctypes.data + 8 * np.arange(len(table)))
     for k, array in enumerate(expected):
         assert numbers[k : k + 1].view(array.dtype)[0] == array

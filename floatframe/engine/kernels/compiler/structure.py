@@ -1,13 +1,13 @@
 """Records of arrays in the kernels: each is one pointer to a table of addresses and shapes.
 
-A table has for each array of a record, in its order, the address and then the shape; a record in a record has its part
-of the table. A kernel that reads `work.markers.r` gets the array back from there; one number (declared without a shape)
-is read and written as such, `work.counted.iterations += 1`. Tables and arrays belong to Python, so that the kernels
-count no references; numbers in a table do not change while a kernel runs, so that they may be kept in registers.
+The table of a record (`records.tabled`) has for each array, in its order, the address and then the shape; a record in
+a record has its part of the table. A kernel that reads `work.markers.r` gets the array back from there; one number
+(declared without a shape) is read and written as such, `work.counted.iterations += 1`. Tables and arrays belong to
+Python, so that the kernels count no references; numbers in a table do not change while a kernel runs, so that they may
+be kept in registers.
 """
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from llvmlite import ir
@@ -22,7 +22,7 @@ from fe_models.foundation.arrays import Array, IntArray
 from floatframe.engine.kernels.compiler.compilation import array_type, array_value
 from floatframe.engine.kernels.records import Declared
 
-__all__ = ["Structure", "converter", "kept_table_of", "n_words", "table_of", "table_of_numbers"]
+__all__ = ["Structure", "converter", "n_words", "table_of_numbers"]
 
 WORD = ir.IntType(64)
 
@@ -116,23 +116,6 @@ def converter(declaration):
     return convert
 
 
-def add_words(record, words: list[int]) -> None:
-    """Add addresses and shapes of the arrays of a record to the words of a table."""
-    for each in record:
-        if isinstance(each, np.ndarray):
-            words.append(each.__array_interface__["data"][0])
-            words += each.shape
-        else:
-            add_words(each, words)
-
-
-def table_of(record) -> IntArray:
-    """Return addresses and shapes of the arrays, which the caller keeps alive."""
-    words: list[int] = []
-    add_words(record, words)
-    return np.array(words, np.int64)
-
-
 def table_of_numbers(declaration, values: Mapping[str, float]) -> tuple[IntArray, Array]:
     """Return the table of a record of numbers (zero if not given) and the numbers, which the caller keeps alive."""
     reals = np.zeros(len(declaration))
@@ -146,21 +129,3 @@ def table_of_numbers(declaration, values: Mapping[str, float]) -> tuple[IntArray
         unknown = ", ".join(name for name in values if name not in declaration._fields)
         raise TypeError(f"{type(declaration).__name__} has no numbers {unknown}")
     return reals.__array_interface__["data"][0] + reals.itemsize * np.arange(len(declaration)), reals
-
-
-KEPT = 4  # number of records whose tables are cached
-kept: list[tuple[Any, IntArray]] = []
-
-
-def kept_table_of(record) -> IntArray:
-    """Return `table_of` for a record that is used repeatedly, from a cache, since making it takes as long as a step.
-
-    A record that is kept stays alive, so that what is found belongs to this very record.
-    """
-    for known, table in kept:
-        if known is record:
-            return table
-    table = table_of(record)
-    kept.insert(0, (record, table))
-    del kept[KEPT:]
-    return table

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.engine.kernels.model import n_angles, n_b, n_c, n_lines, n_m, n_stations, n_t, n_w
-from floatframe.engine.kernels.records import Size, integer, real
+from floatframe.engine.kernels.records import Size, integer, real, tabled
 from floatframe.engine.kernels.work import n_most, n_q, n_u
 
 __all__ = [
@@ -42,6 +42,7 @@ class Pattern(NamedTuple):
     above: IntArray = integer()  #: and after it
 
 
+@tabled
 class Discrete(NamedTuple):
     """A system in the arrays of the steps."""
 
@@ -69,6 +70,7 @@ class Discrete(NamedTuple):
     pattern: Pattern = Pattern()
 
 
+@tabled
 class StepWork(NamedTuple):
     """Working arrays of a step, ground axes where nothing else is said; 0 at its beginning, 1 at its end."""
 

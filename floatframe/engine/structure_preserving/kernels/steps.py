@@ -5,15 +5,11 @@ Described in `floatframe.integrators.energy_momentum`, `floatframe.integrators.v
 
 import math
 
-from numba import types
-
 from floatframe.engine.kernels.body import block
-from floatframe.engine.kernels.compiler.choice import is_lean
 from floatframe.engine.kernels.compiler.compilation import inner, kept_entry
-from floatframe.engine.kernels.compiler.sources import source_digest
-from floatframe.engine.kernels.compiler.structure import converter, kept_table_of, table_of, table_of_numbers
+from floatframe.engine.kernels.compiler.structure import converter
 from floatframe.engine.kernels.connections.gap import next_step, step_before_contact
-from floatframe.engine.kernels.entry import Order, Outcome
+from floatframe.engine.kernels.entry import CompiledEntry, Order
 from floatframe.engine.kernels.generalized_alpha import load_state
 from floatframe.engine.kernels.memory import Memory, Rows
 from floatframe.engine.kernels.model import Model
@@ -46,7 +42,7 @@ from floatframe.engine.structure_preserving.kernels.newton import (
 from floatframe.engine.structure_preserving.kernels.observation import observe
 from floatframe.engine.structure_preserving.kernels.records import CONSERVING, DAMPING, Discrete, StepWork
 
-__all__ = ["advance", "advance_discrete_steps"]
+__all__ = ["advance", "discrete_kernels"]
 
 
 # steps ----------------------------------------------------------------------------------------------------------------
@@ -397,19 +393,4 @@ def make_entry(digest):
     return kept_entry(run)
 
 
-run = make_entry(source_digest(__name__, "lean" if is_lean else "plain"))
-SIGNATURE = (types.Array(types.int64, 1, "C"),) * 7
-ORDER = Order()
-
-
-def advance_discrete_steps(
-    model: Model, work: Work, discrete: Discrete, step: StepWork, memory: Memory, rows: Rows, **order: float
-) -> Outcome:
-    """Advance the memory by steps of the scheme; see `kernels.steps.advance`."""
-    if not run.signatures:
-        run.compile(SIGNATURE)
-    ordered, numbers = table_of_numbers(ORDER, order)
-    kept = (kept_table_of(record) for record in (model, work, discrete, step))
-    outcome = run(*kept, table_of(memory), table_of(rows), ordered)
-    del numbers  # not before
-    return Outcome(*outcome)
+discrete_kernels = CompiledEntry(make_entry, __name__, n_records=4)

@@ -1,22 +1,16 @@
 """The compiled entry of relative coordinates, and a plain function for each thing it does."""
 
-from dataclasses import dataclass
-from typing import NamedTuple
-
 import numpy as np
-from numba import types
 
-from fe_models.foundation.arrays import Array, IntArray
-from floatframe.engine.kernels.compiler.choice import is_lean
+from fe_models.foundation.arrays import Array
 from floatframe.engine.kernels.compiler.compilation import kept_entry
-from floatframe.engine.kernels.compiler.sources import source_digest
-from floatframe.engine.kernels.compiler.structure import converter, kept_table_of, table_of
+from floatframe.engine.kernels.compiler.structure import converter
 from floatframe.engine.kernels.diagnostics import power
-from floatframe.engine.kernels.entry import NO_ROWS, Order, Outcome, no_memory
+from floatframe.engine.kernels.entry import ADVANCE, OBSERVE, CompiledEntry, Order, Outcome
 from floatframe.engine.kernels.generalized_alpha import DONE
-from floatframe.engine.kernels.memory import Memory, Rows, new_rows
+from floatframe.engine.kernels.memory import Memory, Rows
 from floatframe.engine.kernels.model import Model
-from floatframe.engine.kernels.records import filled, zeros
+from floatframe.engine.kernels.records import zeros
 from floatframe.engine.kernels.work import Work
 from floatframe.engine.tree.kernels.accelerations import accelerate, constrain
 from floatframe.engine.tree.kernels.evaluation import evaluate_tree
@@ -27,20 +21,20 @@ from floatframe.engine.tree.kernels.tangent import assemble, write_tangent
 from floatframe.engine.tree.kernels.tree import JointWork, TangentWork, Tree, new_tangent_work
 
 __all__ = [
+    "NO_TANGENT",
     "accelerations",
-    "advance_tree_steps",
     "constraints",
+    "joint_kernels",
     "motion_of_bodies",
     "motion_of_joints",
     "moved",
-    "mover",
     "newton_matrix",
     "newton_step",
-    "observe_tree",
     "projected",
 ]
 
-MOTION_OF_JOINTS, MOTION_OF_BODIES, MOVE, PROJECT, TANGENT, OBSERVE, ADVANCE, CORRECT, CONSTRAIN, ACCELERATE = range(10)
+# further tasks of an `Order`
+MOTION_OF_JOINTS, MOTION_OF_BODIES, MOVE, PROJECT, TANGENT, CORRECT, CONSTRAIN, ACCELERATE = range(10, 18)
 
 
 as_model, as_work, as_tree = converter(Model()), converter(Work()), converter(Tree())
@@ -97,11 +91,6 @@ def make_entry(digest):
     return kept_entry(run)
 
 
-run = make_entry(source_digest(__name__, "lean" if is_lean else "plain"))
-SIGNATURE = (types.Array(types.int64, 1, "C"),) * 8
-NOTHING = zeros(Order(), {})
-
-
 NO_TANGENT = zeros(
     TangentWork(),
     dict.fromkeys(
@@ -122,23 +111,14 @@ NO_TANGENT = zeros(
 )
 
 
+joint_kernels = CompiledEntry(make_entry, __name__, n_records=5)
+
+
 def call(
-    model: Model,
-    work: Work,
-    tree: Tree,
-    joints: JointWork,
-    tangent: TangentWork = NO_TANGENT,
-    memory: Memory | None = None,
-    rows: Rows = NO_ROWS,
-    **order: float,
+    model: Model, work: Work, tree: Tree, joints: JointWork, tangent: TangentWork = NO_TANGENT, **order: float
 ) -> Outcome:
-    """Run the entry with a request; unnamed fields are zero, and all arrays live until it returns."""
-    if not run.signatures:
-        run.compile(SIGNATURE)
-    ordered = filled(Order(), **(NOTHING._asdict() | order))
-    kept = (kept_table_of(record) for record in (model, work, tree, joints))
-    others = (tangent, no_memory() if memory is None else memory, rows, ordered)
-    return Outcome(*run(*kept, *(table_of(record) for record in others)))
+    """Carry out a request that needs neither memory nor rows of results."""
+    return joint_kernels(model, work, tree, joints, tangent, **order)
 
 
 def motion_of_joints(model: Model, work: Work, tree: Tree, joints: JointWork) -> None:
@@ -155,27 +135,6 @@ def moved(model: Model, work: Work, tree: Tree, joints: JointWork, x: Array) -> 
     """Write the absolute iterate with joints moved by x, (n_columns,), from d_start, Q_start."""
     joints.x[:] = np.asarray(x)
     call(model, work, tree, joints, what=MOVE)
-
-
-@dataclass(frozen=True, eq=False)
-class Mover:
-    """The same as `moved` for the increments in `joints.x`, for motions at many instants."""
-
-    records: tuple[NamedTuple, ...]  #: arguments of the entry, kept alive
-    tables: tuple[IntArray, ...]  #: their addresses, found once, because finding them takes longer than a motion
-
-    def __call__(self) -> None:
-        """Write the absolute iterate."""
-        run(*self.tables)
-
-
-def mover(model: Model, work: Work, tree: Tree, joints: JointWork) -> Mover:
-    """Return a function that does the same as `moved` for the increments in `joints.x`."""
-    if not run.signatures:
-        run.compile(SIGNATURE)
-    ordered = filled(Order(), **(NOTHING._asdict() | {"what": MOVE}))
-    records = (model, work, tree, joints, NO_TANGENT, no_memory(), NO_ROWS, ordered)
-    return Mover(records, tuple(table_of(record) for record in records))
 
 
 def projected(model: Model, work: Work, tree: Tree, joints: JointWork, c_k: float = 1.0) -> Array:
@@ -230,30 +189,3 @@ def accelerations(model: Model, work: Work, tree: Tree, joints: JointWork, tange
     Joints are moved by `joints.x`, which is zero after it.
     """
     return call(model, work, tree, joints, tangent, what=ACCELERATE).status == DONE
-
-
-def observe_tree(model: Model, work: Work, tree: Tree, joints: JointWork, memory: Memory, t: float) -> Rows:
-    """Return the results at the state in the memory, and store the power at this state in the memory."""
-    rows = new_rows(model, 1)
-    call(model, work, tree, joints, NO_TANGENT, memory, rows, what=OBSERVE, t0=t)
-    return rows
-
-
-def advance_tree_steps(
-    model: Model,
-    work: Work,
-    tree: Tree,
-    joints: JointWork,
-    tangent: TangentWork,
-    memory: Memory,
-    rows: Rows,
-    *,
-    coefficients: tuple[float, float, float, float],
-    **order: float,
-) -> Outcome:
-    """Advance the memory by steps of the generalized-alpha method in relative coordinates."""
-    alpha_m, alpha_f, beta, gamma = coefficients
-    return call(
-        model, work, tree, joints, tangent, memory, rows, what=ADVANCE, alpha_m=alpha_m, alpha_f=alpha_f, beta=beta,
-        gamma=gamma, **order,
-    )  # fmt: skip

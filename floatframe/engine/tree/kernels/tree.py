@@ -18,7 +18,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.engine.kernels.model import Model, n_b, n_c, n_w
-from floatframe.engine.kernels.records import Size, integer, real, zeros
+from floatframe.engine.kernels.records import Size, integer, real, tabled, zeros
 
 __all__ = ["COLUMN", "FAR_MODE", "NEAR_MODE", "JointWork", "TangentWork", "Tree", "new_joint_work", "new_tangent_work"]
 
@@ -29,6 +29,7 @@ n_k, n_s, n_kept, n_j, n_rows, n_l = (
 )
 
 
+@tabled
 class Tree(NamedTuple):
     """Bodies, and the joints between them whose coordinates are unknowns."""
 
@@ -73,6 +74,7 @@ class Tree(NamedTuple):
     front0: IntArray = integer(n_b + 1)  #: index of its front in a flat store, see kernels/kept_factors.py
 
 
+@tabled
 class JointWork(NamedTuple):
     """Joints of the tree in a step; overwritten by every evaluation."""
 
@@ -95,6 +97,7 @@ class JointWork(NamedTuple):
     own: Array = real(Size("n_u"), unit="N, N m")  #: residual of the bodies without the joints of the tree
 
 
+@tabled
 class TangentWork(NamedTuple):
     """The Newton matrix in relative coordinates, see kernels/tangent.py; spatial vectors about the point `origin`."""
 

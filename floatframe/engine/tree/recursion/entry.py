@@ -1,17 +1,17 @@
 """The compiled entry of the recursive equations, and a plain function for each thing it does."""
 
 import math
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 from fe_models.foundation.arrays import IntArray
 from floatframe.engine.kernels.compiler.choice import is_lean
 from floatframe.engine.kernels.compiler.compilation import inner, kept_entry, loops, small
 from floatframe.engine.kernels.compiler.sources import source_digest
-from floatframe.engine.kernels.compiler.structure import converter, table_of
+from floatframe.engine.kernels.compiler.structure import converter
 from floatframe.engine.kernels.marker import elastic_motion
 from floatframe.engine.kernels.model import Model
-from floatframe.engine.kernels.records import integer, zeros
+from floatframe.engine.kernels.records import integer, tabled, zeros
 from floatframe.engine.kernels.rotation import exp_matrix, matrix_of_euler_parameters
 from floatframe.engine.kernels.vector import (
     add,
@@ -46,7 +46,6 @@ __all__ = [
     "own_marker",
     "place_in_ground",
     "place_in_parent",
-    "prepared",
     "set_modes",
 ]
 
@@ -156,6 +155,7 @@ def place_in_ground(nodes, work):
 PLACE, INVERSE, MASS, FORWARD, SOLVE, TANGENTS = range(6)  #: values of `Task.what`
 
 
+@tabled
 class Task(NamedTuple):
     """A request to the entry."""
 
@@ -219,22 +219,17 @@ run = make_entry(source_digest(__name__, "lean" if is_lean else "plain"))
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """The records of a tree with their tables, whose construction takes longer than the evaluation of a short chain."""
+    """The records of a tree."""
 
-    records: tuple[Nodes, NodeWork, Model, Work]  #: kept alive
-    tables: tuple[IntArray, ...]
-    task: Task
-    task_table: IntArray
+    nodes: Nodes
+    work: NodeWork
+    model: Model
+    marker_work: Work
+    task: Task = field(default_factory=lambda: zeros(Task(), {}))
 
-    def run(self, what: int, dense_table: IntArray, times: int = 1) -> int:
+    def run(self, what: int, dense: Dense, times: int = 1) -> int:
         """Execute a request with the numbers in the records; return -1, or the node whose matrix is singular."""
         self.task.what[...] = what
         self.task.times[...] = times
-        nodes, work, model, marker_work = self.tables
-        return int(run(nodes, work, dense_table, model, marker_work, self.task_table))
-
-
-def prepared(nodes: Nodes, work: NodeWork, model: Model, marker_work: Work) -> Prepared:
-    """Return the records of a tree, ready to run."""
-    records, task = (nodes, work, model, marker_work), zeros(Task(), {})
-    return Prepared(records, tuple(table_of(each) for each in records), task, table_of(task))
+        records: Any = (self.nodes, self.work, dense, self.model, self.marker_work, self.task)
+        return int(run(*(record.table for record in records)))

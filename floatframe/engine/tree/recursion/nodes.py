@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.engine.kernels.records import Size, integer, real, zeros
+from floatframe.engine.kernels.records import Size, integer, real, tabled, zeros
 
 __all__ = [
     "FIXED",
@@ -37,6 +37,7 @@ n_d, n_dn = Size("rates of matrices"), Size("nodes of matrices")
 n_n, n_b, n_v, n_x, n_above = (Size(name) for name in ("nodes", "n_b", "rates", "positions", "columns above"))
 
 
+@tabled
 class Nodes(NamedTuple):
     """Nodes, parents before children."""
 
@@ -67,6 +68,7 @@ class Nodes(NamedTuple):
     c0: IntArray = integer(n_n + 1)  #: of the columns of the modes of a flexible parent
 
 
+@tabled
 class NodeWork(NamedTuple):
     """The results of the recursions, in the frame of the node unless stated otherwise."""
 
@@ -112,6 +114,7 @@ class NodeWork(NamedTuple):
     motion: Array = real(n_n, 6, unit="m/s², rad/s²")  #: acceleration of a node, at its origin
 
 
+@tabled
 class Dense(NamedTuple):
     """Arrays whose size grows with the square of the rates, and those for derivatives; empty if not requested.
 

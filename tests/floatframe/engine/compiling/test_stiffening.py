@@ -12,7 +12,7 @@ from floatframe.analyses.snapshot import snapshot
 from floatframe.cli.analyses import read_in_formulation
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.newton_equations import displaced, linearized, set_iterate
-from floatframe.engine.kernels.entry import evaluate_and_linearize, observe_state, rates_of_constraints
+from floatframe.engine.kernels.entry import absolute_kernels, evaluate_and_linearize, rates_of_constraints
 from floatframe.engine.kernels.memory import memory_at
 from floatframe.engine.kernels.work import new_work
 from floatframe.errors import ModelError, SystemFileError
@@ -142,9 +142,8 @@ def test_equations_of_motion_are_lagranges_of_the_kinetic_energy_to_second_order
 
 def observed(system, state):
     memory = memory_at(state, np.zeros(len(state.u)), np.zeros(int(compiled_system(system).model.connections.w0[-1])))
-    return observe_state(
-        compiled_system(system).model, new_work(compiled_system(system).model), memory, 0.0
-    ).diagnostics[0]
+    model = compiled_system(system).model
+    return absolute_kernels.observe(model, new_work(model), memory=memory, t=0.0).diagnostics[0]
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -21,8 +21,8 @@ from floatframe.engine.kernels.compiler.compilation import (
     matrix_loops,
     small,
 )
-from floatframe.engine.kernels.compiler.structure import Structure, n_words, table_of
-from floatframe.engine.kernels.entry import no_memory, prepare, run
+from floatframe.engine.kernels.compiler.structure import Structure, n_words
+from floatframe.engine.kernels.entry import NO_MEMORY, absolute_kernels, prepare
 from floatframe.engine.kernels.memory import Memory, Rows, new_rows
 from floatframe.engine.kernels.model import JointRows, Model
 from floatframe.engine.kernels.records import leaves, measured
@@ -45,12 +45,12 @@ def places(structure, first=0, within=""):
 
 @pytest.mark.parametrize(
     ("declaration", "data"),
-    [(Model(), MODEL), (Work(), new_work(MODEL)), (Memory(), no_memory()), (Rows(), new_rows(MODEL, 3))],
+    [(Model(), MODEL), (Work(), new_work(MODEL)), (Memory(), NO_MEMORY), (Rows(), new_rows(MODEL, 3))],
     ids=["Model", "Work", "Memory", "Rows"],
 )
 def test_arrays_are_what_the_kernels_take_them_for(declaration, data):
     """Number, dimensions and order of every array; its address and shape where the kernels look for them."""
-    found, table = places(Structure(declaration)), table_of(data)
+    found, table = places(Structure(declaration)), data.table
     arrays = dict(leaves(data))
     assert list(arrays) == list(found)
     assert len(table) == n_words(declaration)
@@ -93,7 +93,7 @@ def as_block(_, array):
 def test_there_is_one_compilation_for_all_systems():
     prepare()
     assert not prepare()
-    assert len(run.signatures) == 1
+    assert len(absolute_kernels.compiled.signatures) == 1
 
 
 def test_kernels_come_from_the_cache_in_the_next_process():

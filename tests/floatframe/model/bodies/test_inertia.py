@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.newton_equations import set_iterate
-from floatframe.engine.kernels.entry import evaluate_and_linearize, observe_state
+from floatframe.engine.kernels.entry import absolute_kernels, evaluate_and_linearize
 from floatframe.engine.kernels.memory import memory_at
 from floatframe.engine.kernels.work import new_work
 from floatframe.model.bodies.flexible_body import FlexibleBody
@@ -65,9 +65,8 @@ def test_equations_of_motion_are_the_sums_over_the_particles(case, seed):
 def observed(system, state):
     """Return the row of results at a state."""
     memory = memory_at(state, np.zeros(len(state.u)), np.zeros(int(compiled_system(system).model.connections.w0[-1])))
-    return observe_state(
-        compiled_system(system).model, new_work(compiled_system(system).model), memory, 0.0
-    ).diagnostics[0]
+    model = compiled_system(system).model
+    return absolute_kernels.observe(model, new_work(model), memory=memory, t=0.0).diagnostics[0]
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -28,7 +28,6 @@ from floatframe import (
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.newton_equations import displaced
 from floatframe.engine.kernels.compiler.compilation import entry
-from floatframe.engine.kernels.compiler.structure import kept_table_of
 from floatframe.engine.kernels.connections.connection import write_held_rates
 from floatframe.engine.kernels.entry import as_model, as_work, rates_of_constraints
 from floatframe.model.functions.time_functions import harmonic, polynomial_of_time
@@ -279,7 +278,7 @@ def test_cheap_rates_of_held_positions_are_their_rates(make):
     iterate.residual(np.zeros_like(iterate.u), np.zeros_like(iterate.w))
     rate, _ = rates_of_constraints(model, work)
     work.connections.rate[:] = np.nan
-    compiled_cheap_rates(kept_table_of(model), kept_table_of(work))
+    compiled_cheap_rates(model.table, work.table)
     rows = is_held_position(model.rows.kind)
     assert np.abs(rate[rows]).min() > 1e-3
     assert_allclose(work.connections.rate[rows], rate[rows], rtol=0, atol=1e-12 * np.abs(rate).max())
