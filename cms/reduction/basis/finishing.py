@@ -51,6 +51,7 @@ class FinishedBasis:
     dropped: tuple[str, ...]  #: labels of redundant columns
     n_rigid: int  #: number of independent rigid-body motions in the span of the columns
     free_omega2: Array  #: squared elastic frequencies of the unsupported reduced body, ascending
+    A: Array | None = None  #: coordinates of the shapes in the columns of the mode set, (n_columns, n_q), if known
 
 
 def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedBasis:
@@ -84,7 +85,7 @@ def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedB
         found = elastic_pencil(where, body, Q, products, condition, omega2_1)
     X, Z, is_massive, omega2 = found.X, found.Z, found.is_massive, diagonal_within(Q.G_K, found.Z)
     defect, Phi = found.defect, combined(X, Q.Z @ Z)
-    if defect > ORTHONORMAL_DEFECT:
+    if max(defect, found.rounding) > ORTHONORMAL_DEFECT:
         again, defect = normalised_again(Phi, is_massive, products)
         Z, Phi = Z @ again, combined(Phi, again)
         G_K, own = gram_in_blocks(Phi, products.K), np.ix_(is_massive, is_massive)
@@ -118,11 +119,19 @@ def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedB
         Phi=Phi,
         M=np.diag(is_massive.astype(float)),
         K=np.diag(omega2),
-        columns=source_columns(modes.labels, modes.groups, A, V_K @ A),
+        columns=source_columns(modes.labels, modes.groups, A, forces_on_columns(V, V_K, A, Q, Phi, products)),
         dropped=tuple(modes.labels[k] for k in redundant),
         n_rigid=found.elastic.shape[0] - found.elastic.shape[1],
         free_omega2=found.free_omega2,
+        A=A,
     )
+
+
+def forces_on_columns(V: Array, V_K: Array, A: Array, Q: Basis, Phi: Array, products: Products) -> Array:
+    """Return Vᵀ K Phi, (n_columns, n_q); the terms of VᵀKV A cancel where columns are nearly dependent."""
+    if not Q.is_formed:
+        return np.asarray(V_K @ A)
+    return np.hstack([inner(V, products.K @ Phi[:, k : k + 16]) for k in range(0, A.shape[1], 16)])
 
 
 def normalised_again(Phi: Array, is_massive: np.ndarray, products: Products) -> tuple[Array, float]:
@@ -211,7 +220,8 @@ def first_elastic(where: str, body: FEBody, V: Array, G_K: Array, G_M: Array, co
     """Estimate omega_1² of the free body: the smallest Rayleigh quotient of a column without its rigid part [1/s²].
 
     Each quotient is an upper bound. The smallest is accurate enough to scale a norm. Columns whose energy is rounding,
-    such as those of parts without a connection, are left out.
+    such as those of parts without a connection, are left out. It is rounded to a power of two, so that the norm is the
+    same in every frame: rounding would otherwise decide which of two nearly dependent columns is redundant.
     """
     rigid = inner(condition.M_Psi_R, V)
     stiffness, mass = np.diag(G_K), np.diag(G_M)
@@ -223,7 +233,8 @@ def first_elastic(where: str, body: FEBody, V: Array, G_K: Array, G_M: Array, co
     is_certain = is_elastic & (stiffness > SUSPECT_ENERGY * rounding)
     if not is_certain.any():
         is_certain, stiffness = is_elastic, np.maximum(stiffness, rounding)
-    return float((stiffness[is_certain] / elastic_mass[is_certain]).min())
+    smallest = (stiffness[is_certain] / elastic_mass[is_certain]).min()
+    return float(np.exp2(np.round(np.log2(smallest))))
 
 
 def elastic_part(body: FEBody, Q: Basis, condition: FrameCondition, omega2_1: float) -> Array:

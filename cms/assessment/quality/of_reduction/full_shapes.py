@@ -12,7 +12,7 @@ from typing import cast
 import numpy as np
 
 from cms.assessment.quality.record import QualityRecord, judge
-from cms.assessment.quality.reference.free_basis import FreeBasis
+from cms.assessment.quality.reference.free_basis import FreeBasis, ShapeRounding
 from cms.assessment.quality.reference.free_pencil import frequency_distance
 from cms.assessment.quality.reference.ports import Ports
 from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
@@ -30,15 +30,22 @@ WELL_DETERMINED = 1e-7  #: smallest over largest singular value of the nodal row
 ONE_FREQUENCY = 1e-6  #: relative difference of two stiffnesses, below which their modes may be combined
 
 
+KNOWN_MASS = 1e-6  #: rounding of the modal mass above which the record says so
+ROUNDING_MARGIN = 10.0  #: factor on the rounding of the columns of a set that a comparison with it allows
+
+
 @dataclass(frozen=True, eq=False)
 class FullShapes:
     """Modes of a file over all dofs, mesh axes."""
 
     Phi: Array  #: (n_dof, n_q)
-    misfit: float  #: largest distance at the kept nodes and interfaces, over a mode's largest displacement
+    Z: Array  #: their coordinates in the elastic shapes of the mode set, (n, n_q)
+    #: largest distance at the kept nodes and interfaces beyond rounding of the set, over a mode's largest displacement
+    misfit: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "Phi", frozen(self.Phi))
+        for name in ("Phi", "Z"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
 
 
 def full_shapes(body: FEBody, basis: FreeBasis, reduced: ReducedBody) -> FullShapes | None:
@@ -49,31 +56,44 @@ def full_shapes(body: FEBody, basis: FreeBasis, reduced: ReducedBody) -> FullSha
     wanted = np.vstack([reduced.Phi.reshape(-1, reduced.n_q), *(i.Psi for i in known_interfaces(body, reduced))])
     wanted = motion_scale(body, reduced)[:, None] * wanted
     rows = kept_motion(body, reduced, X)
-    found = determined(X, rows, wanted)
-    if found is None and reduced.kept is not None:
-        turns = body.length * kept_turns(body, reduced, X)
-        own = body.length * reduced.kept.rotation.reshape(-1, reduced.n_q)
-        found = determined(X, np.vstack([rows, turns]), np.vstack([wanted, own]))
-    if found is not None:
-        return found
+    x = determined(rows, wanted)
+    if x is None and reduced.kept is not None:
+        rows = np.vstack([rows, body.length * kept_turns(body, reduced, X)])
+        wanted = np.vstack([wanted, body.length * reduced.kept.rotation.reshape(-1, reduced.n_q)])
+        x = determined(rows, wanted)
+    if x is not None:
+        Z = x[basis.N.shape[1] :]
+        return FullShapes(X @ x, Z, misfit(rows @ x, wanted, rounding_of(basis, Z)))
     try:
-        again = finished_in(body, basis, named_frame(reduced.frame)).Phi
+        again = finished_in(body, basis, named_frame(reduced.frame))
     except (BodyError, ModeSetError):
         return None
-    if again.shape[1] != reduced.n_q:
+    assert again.A is not None
+    if again.Phi.shape[1] != reduced.n_q:
         return None
-    again = again @ turned_onto(kept_motion(body, reduced, again), wanted, np.diag(reduced.K))
-    return FullShapes(again, misfit(kept_motion(body, reduced, again), wanted))
+    own = kept_motion(body, reduced, again.Phi)
+    wanted = wanted[: len(own)]
+    turn = turned_onto(own, wanted, np.diag(reduced.K))
+    Z = again.A @ turn
+    return FullShapes(again.Phi @ turn, Z, misfit(own @ turn, wanted, rounding_of(basis, Z)))
 
 
-def determined(X: Array, rows: Array, wanted: Array) -> FullShapes | None:
-    """Return X x of the x nearest to rows x = wanted; None where the rows do not determine it."""
+def determined(rows: Array, wanted: Array) -> Array | None:
+    """Return the x nearest to rows x = wanted; None where the rows do not determine it."""
     size = np.linalg.norm(rows, axis=0)
     size = np.where(size > 0, size, 1.0)
     x, _, rank, singular = np.linalg.lstsq(rows / size, wanted, rcond=None)
-    if rank < X.shape[1] or not singular[-1] > WELL_DETERMINED * singular[0]:
+    if rank < rows.shape[1] or not singular[-1] > WELL_DETERMINED * singular[0]:
         return None
-    return FullShapes(X @ (x / size[:, None]), misfit(rows / size @ x, wanted))
+    return np.asarray(x / size[:, None])
+
+
+def rounding_of(basis: FreeBasis, Z: Array) -> ShapeRounding:
+    """Return the rounding that a comparison allows of shapes with coordinates Z in those of a mode set."""
+    if basis.rounding is None:
+        none = np.zeros(Z.shape[1])
+        return ShapeRounding(none, none, none)
+    return basis.rounding.of_combinations(ROUNDING_MARGIN * Z)
 
 
 def kept_turns(body: FEBody, reduced: ReducedBody, X: Array) -> Array:
@@ -123,10 +143,16 @@ def motion_scale(body: FEBody, reduced: ReducedBody) -> Array:
     return np.concatenate([np.ones(3 * len(reduced.nodes)), *ports])
 
 
-def misfit(found: Array, wanted: Array) -> float:
-    """Largest distance over the largest motion of each mode."""
+def misfit(found: Array, wanted: Array, rounding: ShapeRounding) -> float:
+    """Return the largest distance beyond rounding, over the largest motion of each mode."""
     largest = np.abs(wanted).max(axis=0, initial=0.0)
-    return float((np.abs(found - wanted).max(axis=0) / np.where(largest > 0, largest, 1.0)).max(initial=0.0))
+    distance = beyond(np.abs(found - wanted).max(axis=0, initial=0.0), rounding.motion)
+    return float((distance / np.where(largest > 0, largest, 1.0)).max(initial=0.0))
+
+
+def beyond(difference: Array, rounding: Array) -> Array:
+    """Return the part of differences that rounding does not explain."""
+    return np.maximum(np.abs(difference) - rounding, 0.0)
 
 
 def finished_in(body: FEBody, basis: FreeBasis, frame: Frame | HeldFrame) -> FinishedBasis:
@@ -151,24 +177,40 @@ def named_frame(frame: BodyFrame) -> Frame | HeldFrame:
 
 
 def same_body_record(body: FEBody, basis: FreeBasis, reduced: ReducedBody, shapes: FullShapes | None) -> QualityRecord:
-    """Record "same-body": free-free frequencies of the file are those of the set, its modes lie in the set's span."""
+    """Record "same-body": free-free frequencies of the file are those of the set, its modes lie in the set's span.
+
+    Only the part of a difference counts that rounding of the columns of the set does not explain. A change e of a shape
+    changes Phiᵀ M Phi by Phiᵀ M e + eᵀ M Phi + eᵀ M e, and Phiᵀ K Phi likewise. Modes of light nodes are combinations
+    of nearly dependent columns in which motions of heavy nodes cancel: little of the mass of the columns is left.
+    """
     own = basis.frequencies()
     stored = reduced.free_frequencies
     try:
-        distance = float(frequency_distance(stored, own).max(initial=0.0))
+        distance = frequency_distance(stored, own)
     except ValueError:
         reason = f"the mode set gives {len(own)} elastic free-free modes, the file holds {len(stored)}"
         return judge("same-body", np.inf, reason, {"set": own, "file": stored})
-    reason = f"free-free frequencies of file and mode set differ by {distance:.1e}"
+    allowed = rounding_of(basis, np.eye(len(basis.omega2))[:, basis.is_massive][:, : len(distance)])
+    omega = np.sqrt(basis.omega2[basis.is_massive][: len(distance)])
+    frequencies = float(beyond(distance, allowed.mass + allowed.stiffness / omega).max(initial=0.0))
+    reason = f"free-free frequencies of file and mode set differ by {frequencies:.1e}"
     if shapes is None:
         reason += "; its kept nodes do not determine the modes over the whole body"
-        return judge("same-body", distance, reason, {"set": own, "file": stored})
-    K = shapes.Phi.T @ (body.K @ shapes.Phi)
-    stiff = np.sqrt(np.outer(np.diag(reduced.K), np.diag(reduced.K)))
-    defect = float((np.abs(K - reduced.K) / np.where(stiff > 0, stiff, 1.0)).max(initial=0.0))
-    mass = float(np.abs(shapes.Phi.T @ (body.M @ shapes.Phi) - reduced.M).max(initial=0.0))
-    reason += f", modes at its nodes by {shapes.misfit:.1e}, Phiᵀ K Phi by {defect:.1e}, Phiᵀ M Phi by {mass:.1e}"
+        return judge("same-body", frequencies, reason, {"set": own, "file": stored})
+    allowed = rounding_of(basis, shapes.Z)
+    stiff = np.sqrt(np.diag(reduced.K))
+    stiff = np.where(stiff > 0, stiff, 1.0)
+    K = (shapes.Phi.T @ (body.K @ shapes.Phi) - reduced.K) / np.outer(stiff, stiff)
+    M = shapes.Phi.T @ (body.M @ shapes.Phi) - reduced.M
+    stiffness, mass = (
+        float(beyond(difference, each[:, None] + each + np.outer(each, each)).max(initial=0.0))
+        for difference, each in ((K, allowed.stiffness / stiff), (M, allowed.mass))
+    )
+    reason += f", modes at its nodes by {shapes.misfit:.1e}, Phiᵀ K Phi by {stiffness:.1e}, Phiᵀ M Phi by {mass:.1e}"
+    lost = allowed.mass.max(initial=0.0)
+    if lost > KNOWN_MASS:
+        reason += f"; rounding of the columns hides differences of Phiᵀ M Phi up to {2 * lost:.1e}"
     return judge(
-        "same-body", max(distance, shapes.misfit, defect, mass), reason,
-        {"frequencies": distance, "misfit": shapes.misfit, "stiffness": defect, "mass": mass},
+        "same-body", max(frequencies, shapes.misfit, stiffness, mass), reason,
+        {"frequencies": frequencies, "misfit": shapes.misfit, "stiffness": stiffness, "mass": mass},
     )  # fmt: skip

@@ -7,7 +7,7 @@ import scipy.linalg as la
 
 from cms.body.reduced_body import BodyFrame
 from cms.linear_algebra.independent import Products, gram, gram_in_blocks, independent_basis
-from cms.linear_algebra.solvers.tall import combine, inner
+from cms.linear_algebra.solvers.tall import combine, inner, squares
 from cms.modes.families.families import Families
 from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.finishing import finish
@@ -16,9 +16,38 @@ from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.tall.on_disk import of_this_process
 
-__all__ = ["FreeBasis", "free_basis", "ritz_basis"]
+__all__ = ["FreeBasis", "ShapeRounding", "free_basis", "ritz_basis", "shape_rounding"]
 
 MASSLESS = 1e-12  #: modal mass times omega_1² of a shape of unit W-length, below which it is static
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeRounding:
+    """Size of the change of shapes by rounding in the columns of their mode set, in three norms.
+
+    A shape phi = sum_k a_k v_k is known to sum_k |a_k| eps |v_k|. Nearly dependent columns have large coefficients a_k,
+    and the span of such a set is known less well.
+    """
+
+    motion: Array  #: norm of the displacement, rotations times the length of the body, (n,)
+    mass: Array  #: norm by the diagonal of M, (n,)
+    stiffness: Array  #: norm by the diagonal of K, (n,)
+
+    def __post_init__(self) -> None:
+        for name in ("motion", "mass", "stiffness"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    def of_combinations(self, Z: Array) -> "ShapeRounding":
+        """Return the rounding of the shapes Phi Z."""
+        return ShapeRounding(*(np.abs(Z).T @ each for each in (self.motion, self.mass, self.stiffness)))
+
+
+def shape_rounding(body: FEBody, V: Array, A: Array) -> ShapeRounding:
+    """Return the rounding of the shapes V A."""
+    motion = np.where(body.dofs[:, 1] < 3, 1.0, (body.length or 1.0) ** 2)
+    diagonals = (motion, np.abs(body.M.diagonal()), np.abs(body.K.diagonal()))
+    of_columns = ShapeRounding(*(np.finfo(float).eps * np.sqrt(squares(each, V)) for each in diagonals))
+    return of_columns.of_combinations(A)
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +59,7 @@ class FreeBasis:
     is_massive: np.ndarray  #: Phiᵀ M Phi = 1 there, 0 elsewhere, (n,) bool
     N: Array  #: M-orthonormal rigid-body motions, (n_dof, n_r)
     dropped: tuple[str, ...] = ()  #: labels of redundant columns
+    rounding: ShapeRounding | None = None  #: of Phi, if the columns are known
 
     def __post_init__(self) -> None:
         for name in ("Phi", "omega2", "N"):
@@ -71,7 +101,9 @@ def free_basis(body: FEBody, modes: ModeSet, families: Families) -> FreeBasis:
     is_massive = np.diag(finished.M) > 0.5
     order = np.lexsort((np.diag(finished.K), np.logical_not(is_massive)))
     Phi = of_this_process(finished.Phi[:, order])
-    return FreeBasis(Phi, np.diag(finished.K)[order], is_massive[order], N, dropped=finished.dropped)
+    assert finished.A is not None
+    rounding = shape_rounding(body, modes.columns, finished.A[:, order])
+    return FreeBasis(Phi, np.diag(finished.K)[order], is_massive[order], N, dropped=finished.dropped, rounding=rounding)
 
 
 def ritz_basis(body: FEBody, X: Array, N: Array) -> FreeBasis:

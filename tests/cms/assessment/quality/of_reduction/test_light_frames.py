@@ -4,11 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 import cms
 import fe_models as fm
+from cms.assessment.quality.of_reduction.contents import CONTENTS
 from cms.assessment.quality.reduction_check import check_reduction
+from cms.assessment.quality.reference.free_basis import shape_rounding
 from fe_models.foundation.units import unit_system
 
 UNITS = unit_system("mm-t-s")
@@ -44,6 +47,52 @@ def test_modes_of_almost_no_mass_raise_no_alarm(seed, density, name):
         "same-body": "pass",
         "free-frequencies": "pass",
     }
+
+
+@pytest.mark.parametrize(("seed", "density"), [(35, 1e-6), (54, 1e-6), (33, 1e-6), (26, 1e-3)])
+@pytest.mark.parametrize("name", SETS)
+def test_sets_with_nearly_dependent_columns_raise_no_alarm(seed, density, name):
+    """Light nodes move in differences of columns; of seed 54 two columns are redundant, but not both."""
+    body = light_frame(seed, density)
+    modes = SETS[name](body, 2)
+    found = verdicts(body, modes, cms.reduce(body, modes))
+    judged = ("same-body", "free-frequencies", "modal-mass", *CONTENTS)
+    assert [key for key in judged if found.get(key) in ("warn", "fail")] == []
+
+
+@pytest.mark.parametrize(("seed", "density"), [(35, 1e-3), (30, 1e-6), (11, 1e-6)])
+def test_a_file_of_a_set_with_other_rounding_raises_no_alarm(seed, density):
+    """Columns of another machine differ in their last digit, which such a set amplifies."""
+    body = light_frame(seed, density)
+    modes = cms.herting(body, 2)
+    last_digit = 1 + np.finfo(float).eps * np.random.default_rng(seed).normal(size=modes.columns.shape)
+    elsewhere = replace(modes, columns=np.asarray(modes.columns) * last_digit)
+    assert verdicts(body, modes, cms.reduce(body, elsewhere))["same-body"] == "pass"
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_wrong_mass_of_a_mode_of_such_a_set_is_found(name):
+    body = light_frame(35, 1e-3)
+    modes = SETS[name](body, 2)
+    reduced = cms.reduce(body, modes)
+    for k in range(5):  # rounding hides up to 3e-3 of the mass of stiffer ones
+        heavier = np.diag(np.where(np.arange(reduced.n_q) == k, 1.0001, 1.0)) @ reduced.M
+        assert verdicts(body, modes, replace(reduced, M=heavier))["same-body"] == "fail", k
+
+
+def test_rounding_of_a_shape_is_that_of_its_columns():
+    """Two almost equal columns and their difference over its size: eps of the columns over that size."""
+    body = light_frame(22, 1e-6)
+    v = np.random.default_rng(0).normal(size=(body.n_dof, 1))
+    V = np.hstack([v, (1 + 1e-6) * v])
+    found = shape_rounding(body, V, np.array([[1.0, -1e6], [0.0, 1e6]]))
+    length = np.where(body.dofs[:, 1] < 3, 1.0, body.length)
+    sizes = [np.linalg.norm(length * v[:, 0]), *(np.sqrt(A.diagonal() @ v[:, 0] ** 2) for A in (body.M, body.K))]
+    eps = np.finfo(float).eps
+    for got, size in zip((found.motion, found.mass, found.stiffness), sizes, strict=True):
+        assert_allclose(got, eps * size * np.array([1.0, 2e6 + 1]), rtol=1e-12, atol=0)
+    turned = found.of_combinations(np.array([[0.0], [-2.0]]))
+    assert_allclose(turned.mass, 2 * found.mass[1:], rtol=1e-12, atol=0)
 
 
 def test_a_wrong_stiffness_or_frequency_among_them_is_found():
