@@ -207,6 +207,11 @@ def spin_products(omega: Array) -> Array:
     """Return amplitudes of the loads "spin xx yy zz xy yz zx", (..., 6), for angular velocities, (..., 3) [rad/s].
 
     The amplitudes are omega_a omega_b; those of two different axes are doubled, because each stands for both orders.
+
+    Parameters
+    ----------
+    omega
+        Angular velocities in axes of B, (..., 3) [rad/s].
     """
     omega = np.asarray(omega)
     return np.stack([(1.0 if a == b else 2.0) * omega[..., a] * omega[..., b] for a, b in SPIN_PAIRS], axis=-1)

@@ -127,6 +127,11 @@ def read_mesh(path: str | Path) -> Mesh:
 def read_geometry(path: str | Path) -> Mesh | NodeCloud:
     """Read nodes, numbers and groups from a deck or mesh beside matrices, by the readers of meshes and whole decks.
 
+    Parameters
+    ----------
+    path
+        A mesh file of a known format, or a complete deck.
+
     Returns
     -------
     Mesh or NodeCloud

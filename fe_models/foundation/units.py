@@ -49,6 +49,11 @@ UNIT_SYSTEMS = {
 def unit_system(name: str) -> Units:
     """Return the unit system of that name.
 
+    Parameters
+    ----------
+    name
+        Name of a coherent unit system, such as "m-kg-s" or "mm-t-s".
+
     Raises
     ------
     UnitsError

@@ -54,6 +54,11 @@ def boundary_facets(mesh: Mesh) -> Mapping[str, IntArray]:
 
     Facets are compared by their corner nodes. Rows are complete faces in meshio order (corners, middles, centre). The
     result is cached as long as the mesh exists.
+
+    Parameters
+    ----------
+    mesh
+        A solid mesh.
     """
     return _boundary(mesh)[0]
 
@@ -126,7 +131,13 @@ def boundary_nodes(mesh: Mesh) -> IntArray:
 
 
 def boundary_triangles(mesh: Mesh) -> IntArray:
-    """Return flat triangles over all nodes of the surface, for drawing, (n_tri, 3), oriented outward."""
+    """Return flat triangles over all nodes of the surface, for drawing, (n_tri, 3), oriented outward.
+
+    Parameters
+    ----------
+    mesh
+        A solid mesh.
+    """
     return face_triangles(boundary_facets(mesh))
 
 

@@ -132,5 +132,17 @@ def mapped_shell(
 
 
 def flat_plate(a: float, b: float, n_a: int, n_b: int, *, kind: str = "quad", name: str = "shell") -> ShellMesh:
-    """Return the mesh of a rectangle 0..a × 0..b in the x-y plane, normal z; see `mapped_shell`."""
+    """Return the mesh of a rectangle 0..a × 0..b in the x-y plane, normal z; see `mapped_shell`.
+
+    Parameters
+    ----------
+    a, b
+        Lengths of the sides along x and y [m].
+    n_a, n_b
+        Numbers of cells along x and y.
+    kind
+        "quad" or "triangle".
+    name
+        Name of the group of cells.
+    """
     return mapped_shell(lambda u, v: np.stack([a * u, b * v, 0 * u], axis=1), n_a, n_b, kind=kind, name=name)

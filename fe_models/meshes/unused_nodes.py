@@ -23,6 +23,11 @@ def drop_unused_nodes(mesh: Mesh) -> Mesh:
 
     Faces with such a node are dropped too; groups that become empty are kept. `Mesh.notes` reports the numbers. A mesh
     without unused nodes is returned unchanged.
+
+    Parameters
+    ----------
+    mesh
+        A solid mesh.
     """
     used = used_nodes(mesh)
     n_unused = int((~used).sum())

@@ -55,6 +55,15 @@ def check_element(system: System, name: str, state: State | None = None) -> Elem
     (4) the derivatives used by the engine agree with finite differences
     (5) position constraints depend only on positions and time, velocity constraints not on multipliers
 
+    Parameters
+    ----------
+    system
+        The system with the element.
+    name
+        Name of the element.
+    state
+        State at which the law is checked; None: as assembled.
+
     Raises
     ------
     ResultsError

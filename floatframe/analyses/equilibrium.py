@@ -199,7 +199,18 @@ def static_equilibrium(
 ) -> Equilibrium:
     """Return the equilibrium at rest near a state (default: the assembled bodies), under all forces of the system.
 
-    formulation: "absolute", or "relative" for joint coordinates, in which the joints of the tree are satisfied exactly.
+    Parameters
+    ----------
+    system
+        The system.
+    state
+        State near the equilibrium, from which the search begins; None: the assembled bodies.
+    tolerance
+        Largest unbalanced force, relative to the acting forces.
+    max_iterations
+        Largest number of steps; fewer are made if there is no progress.
+    formulation
+        "absolute", or "relative" for joint coordinates, in which the joints of the tree are satisfied exactly.
 
     Raises
     ------

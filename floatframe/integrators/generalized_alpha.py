@@ -379,6 +379,11 @@ def trapezoidal(**options: float) -> GeneralizedAlpha:
     """Return the trapezoidal rule, `newmark(1/4, 1/2)`: no numerical damping at all.
 
     In linear systems without joints it keeps the energy; reactions of joints oscillate by O(h) for good.
+
+    Parameters
+    ----------
+    options
+        As of `GeneralizedAlpha`.
     """
     return newmark(0.25, 0.5, **options)
 

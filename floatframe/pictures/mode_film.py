@@ -82,7 +82,21 @@ def draw_mode(
     *,
     color: BodyColor = DISPLACEMENT,
 ) -> Drawing:
-    """Draw a system mode at its largest displacement into a picture (.png); parameters as `animate_mode`."""
+    """Draw a system mode at its largest displacement into a picture (.png).
+
+    Parameters
+    ----------
+    system, about
+        The system and the equilibrium (or steady rotation) to which the modes belong.
+    modes
+        Modes from `system_modes(linearize(system, about))`.
+    number
+        Number of the mode, from 1.
+    path
+        File whose name ends in .png.
+    color
+        What the colours show, as for `animate_mode`.
+    """
     return render_picture(mode_scene(system, about, modes, number, np.ones(1, complex), color=color), path)
 
 

@@ -40,6 +40,15 @@ class UserForceMotion:
 def user_force_motion(system: System, trajectory: Trajectory, name: str) -> UserForceMotion:
     """Return coordinates, forces and states of a user force during a motion of the system.
 
+    Parameters
+    ----------
+    system
+        The system that moved.
+    trajectory
+        Its motion.
+    name
+        Name of the user force.
+
     Raises
     ------
     ResultsError
@@ -73,6 +82,15 @@ def unknowns(system: System, trajectory: Trajectory) -> Array:
 
 def coupler_motion(system: System, trajectory: Trajectory, name: str) -> CouplerMotion:
     """Return the coordinates and forces of a coupler during a motion of the system.
+
+    Parameters
+    ----------
+    system
+        The system that moved.
+    trajectory
+        Its motion.
+    name
+        Name of the coupler.
 
     Raises
     ------

@@ -49,6 +49,15 @@ def element_motion(system: System, trajectory: Trajectory, name: str) -> Element
     States and multipliers are taken from the motion. Outputs and wrenches are evaluated by the law of the element from
     these and the motion of the markers; while events have switched the element off, by its `off` law.
 
+    Parameters
+    ----------
+    system
+        The system that moved.
+    trajectory
+        Its motion.
+    name
+        Name of the element.
+
     Raises
     ------
     ResultsError

@@ -91,6 +91,19 @@ def export_csv(
     """Write `motion_table` as comma-separated values with 17 digits, so that every number is read back exactly.
 
     With `chosen`, only the time and these measurements are written.
+
+    Parameters
+    ----------
+    trajectory
+        The motion.
+    path
+        Name of the file.
+    bodies
+        Reduced bodies by name, whose interfaces get columns; None: none.
+    system
+        The system that moved, for joint coordinates and sensors; None: neither.
+    chosen
+        Measurements to write beside the time, in place of all columns.
     """
     table = motion_table(trajectory, bodies, system) if chosen is None else sensor_table(trajectory, chosen)
     names = [f'"{name}"' if "," in name else name for name in table]
@@ -114,6 +127,10 @@ def export_vtk(
 
     Parameters
     ----------
+    trajectory
+        The motion.
+    bodies
+        Reduced bodies by name.
     path
         Name that ends in .pvd; the .vtu files go into a folder with the same name without the ending.
     every

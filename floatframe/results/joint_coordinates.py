@@ -140,7 +140,15 @@ class CoordinateMotion:
 
 
 def joint_coordinates(system: System, trajectory: Trajectory) -> dict[str, CoordinateMotion]:
-    """Return all coordinates of all joints, by name "joint.coordinate"."""
+    """Return all coordinates of all joints, by name "joint.coordinate".
+
+    Parameters
+    ----------
+    system
+        The system that moved.
+    trajectory
+        Its motion.
+    """
     return {
         f"{joint.name}.{name}": joint_coordinate(system, trajectory, joint.name, name)
         for joint in system.joints
@@ -150,6 +158,17 @@ def joint_coordinates(system: System, trajectory: Trajectory) -> dict[str, Coord
 
 def joint_coordinate(system: System, trajectory: Trajectory, joint: str, coordinate: str) -> CoordinateMotion:
     """Return a joint coordinate during a motion of the system.
+
+    Parameters
+    ----------
+    system
+        The system that moved.
+    trajectory
+        Its motion.
+    joint
+        Name of the joint.
+    coordinate
+        Name of one of its coordinates, such as "angle".
 
     Raises
     ------

@@ -61,6 +61,17 @@ class PlaceMotion:
 def interface_motion(trajectory: Trajectory, body: str, reduced: ReducedBody, interface: str) -> PlaceMotion:
     """Return the motion of the reference point of an interface, with its axes.
 
+    Parameters
+    ----------
+    trajectory
+        The motion.
+    body
+        Name of a flexible body in it.
+    reduced
+        The reduced body of that flexible body.
+    interface
+        Name of one of its interfaces.
+
     Raises
     ------
     ResultsError
@@ -218,6 +229,17 @@ def nodal_stress(trajectory: Trajectory, body: str, reduced: ReducedBody, i_time
     All modes including static ones contribute; stresses due to interface loads are exact if the mode set is statically
     complete.
 
+    Parameters
+    ----------
+    trajectory
+        The motion.
+    body
+        Name of a flexible body in it.
+    reduced
+        The reduced body of that flexible body, with stress modes.
+    i_time
+        Index of the output time.
+
     Raises
     ------
     ResultsError
@@ -234,6 +256,12 @@ def largest_von_mises(
 
     Parameters
     ----------
+    trajectory
+        The motion.
+    body
+        Name of a flexible body in it.
+    reduced
+        The reduced body of that flexible body, with stress modes.
     rows
         Rows of the nodes to consider, (n,); None: all.
     """

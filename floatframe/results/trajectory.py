@@ -185,6 +185,11 @@ class Trajectory:
 def read_results(path: str | os.PathLike[str]) -> Trajectory:
     """Return the trajectory in a results file, or the part left by a killed run (with `is_complete` False).
 
+    Parameters
+    ----------
+    path
+        Name of the results file.
+
     Raises
     ------
     ResultsError

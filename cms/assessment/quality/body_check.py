@@ -67,6 +67,11 @@ BODY_CHECKS = (
 def check_body(reduced: ReducedBody) -> tuple[QualityRecord, ...]:
     """Check a reduced body on its own: whether its data are consistent, and what it requires of its user.
 
+    Parameters
+    ----------
+    reduced
+        The reduced body, from a reduction or a file.
+
     Returns
     -------
     tuple of QualityRecord

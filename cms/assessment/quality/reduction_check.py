@@ -51,6 +51,10 @@ def check_reduction(
     ----------
     body
         The coupled body that `modes` and `reduced` were made from.
+    modes
+        The mode set of the reduction.
+    reduced
+        The reduced body that was made from them.
     reference
         The full model up to a band, to share it between mode sets; by default it is made here, for the band that
         custom allows the mode set (`usable_band`).

@@ -22,6 +22,13 @@ KIND = Kind(FORMAT, VERSION, ModalFileError, "`cms reduce` or `cms.write`")
 def write(reduced: ReducedBody, path: str | os.PathLike[str]) -> None:
     """Write a reduced body to a modal file. An existing file is replaced in one step or stays unchanged.
 
+    Parameters
+    ----------
+    reduced
+        The body to write.
+    path
+        Name of the modal file, usually with the ending .h5.
+
     Raises
     ------
     ModalFileError
@@ -85,6 +92,13 @@ def convert_units(reduced: ReducedBody, units: Units | str) -> ReducedBody:
 
     q has the unit mass^(1/2) length, so modal coordinates, such as initial values, are different numbers in other
     units.
+
+    Parameters
+    ----------
+    reduced
+        The body to convert.
+    units
+        A unit system or its name.
 
     Raises
     ------

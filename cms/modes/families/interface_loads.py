@@ -52,6 +52,8 @@ def point_load(
 
     Parameters
     ----------
+    interface
+        Name of the interface.
     mass
         Mass [kg].
     inertia

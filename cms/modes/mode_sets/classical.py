@@ -97,7 +97,15 @@ def unrestrained_attachment(
     """Unrestrained attachment mode set: [Psi_R, Psi_U, free modes]; spans Rubin's set.
 
     Psi_U is the response to a unit force on each boundary dof of the free body, in equilibrium with its rigid-body
-    acceleration. Parameters and errors are those of `attachment`, with the elastic modes of the free body.
+    acceleration.
+    Errors are those of `attachment`.
+
+    Parameters
+    ----------
+    body
+        A coupled body with at least one interface, or its `Families`, which several sets can share.
+    n_modes
+        Number of elastic modes of the free body, or a `ModeCount`, as for `attachment`.
     """
     with families_of(body) as families:
         body, wanted = families.body, mode_count(n_modes)
@@ -305,7 +313,18 @@ def craig_bampton_ir(
 
     Psi_H holds the static responses to rigid-body accelerations with the boundary dofs B held. They make the set
     statically complete: exact for gravity and for every static interface load of the accelerated body, for any number
-    of modes. Parameters and errors are those of `craig_bampton`.
+    of modes.
+    Errors are those of `craig_bampton`.
+
+    Parameters
+    ----------
+    body
+        A coupled body with at least one interface, or its `Families`, which several sets can share.
+    n_modes
+        Number of fixed-interface modes. A `ModeCount` gives a cutoff frequency instead, and whether to prove that no
+        mode was missed.
+    free
+        Mixed boundary conditions of the vibration modes, as for `craig_bampton`.
 
     References
     ----------
@@ -321,6 +340,11 @@ def craig_bampton_ir(
 
 def guyan(body: FEBody | Families) -> ModeSet:
     """Guyan-Irons static condensation: constraint modes only (Craig-Bampton with n_modes = 0) [1]_.
+
+    Parameters
+    ----------
+    body
+        A coupled body with at least one interface, or its `Families`, which several sets can share.
 
     References
     ----------

@@ -75,6 +75,13 @@ def with_centrifugal(modes: ModeSet, body: FEBody | Families) -> ModeSet:
     >>> body = replace(body, load_cases=(*body.load_cases, *centrifugal_loads(body)))  # doctest: +SKIP
     >>> modes = with_centrifugal(modes, couple(body))                                  # doctest: +SKIP
 
+    Parameters
+    ----------
+    modes
+        A mode set of the body.
+    body
+        The coupled body, or its `Families`.
+
     Raises
     ------
     ModeSetError

@@ -66,8 +66,16 @@ def rubin(
     (1) K phi = omega² M phi of the free body
     (2) residual attachment: Psi_U - Phi Lambda⁻¹ Phi_Bᵀ, the static contribution of the neglected modes
 
-    The set is statically complete, and at the interfaces exact to order omega² near zero frequency. Parameters and
-    errors are those of `normal_modes`, but the body needs an interface. n_modes = 0 gives [Psi_R, Psi_U].
+    The set is statically complete, and at the interfaces exact to order omega² near zero frequency.
+    Errors are those of `normal_modes`; in addition the body needs an interface.
+
+    Parameters
+    ----------
+    body
+        A coupled body with at least one interface, or its `Families`, which several sets can share.
+    n_modes
+        Number of elastic free modes; 0 gives [Psi_R, Psi_U]. A `ModeCount` gives a cutoff frequency instead, and
+        whether to prove that no mode was missed.
 
     References
     ----------
@@ -88,7 +96,15 @@ def macneal(
     """MacNeal's span, equal to that of `rubin`; his reduction only differs in the pencil (no residual inertia) [1]_.
 
     A floating frame needs the inertia of every shape, so it is kept here. `reduced_pencil.macneal_pencil` gives
-    MacNeal's pencil for comparison. Parameters and errors are those of `rubin`.
+    MacNeal's pencil for comparison.
+    Errors are those of `rubin`.
+
+    Parameters
+    ----------
+    body
+        A coupled body with at least one interface, or its `Families`, which several sets can share.
+    n_modes
+        Number of elastic free modes, or a `ModeCount`, as for `normal_modes`.
 
     References
     ----------
@@ -105,7 +121,15 @@ def dual_craig_bampton(
     """Dual Craig-Bampton span, equal to that of `rubin`; the dual method differs in its unknown interface forces [1]_.
 
     A floating frame needs displacements. `reduced_pencil.dual_craig_bampton_pencil` gives the dual pencil for
-    comparison. Parameters and errors are those of `rubin`.
+    comparison.
+    Errors are those of `rubin`.
+
+    Parameters
+    ----------
+    body
+        A coupled body with at least one interface, or its `Families`, which several sets can share.
+    n_modes
+        Number of elastic free modes, or a `ModeCount`, as for `normal_modes`.
 
     References
     ----------
@@ -128,7 +152,15 @@ def craig_chang(
     (2) free columns Phi - Psi_d G_d⁻¹ Phi_B, which vanish on the boundary
 
     If so many modes are kept that G_d is singular, its pseudo-inverse is used. Nothing is lost, because a force without
-    residual displacement at the interfaces has none anywhere. Parameters and errors are those of `rubin`.
+    residual displacement at the interfaces has none anywhere.
+    Errors are those of `rubin`.
+
+    Parameters
+    ----------
+    body
+        A coupled body with at least one interface, or its `Families`, which several sets can share.
+    n_modes
+        Number of elastic free modes, or a `ModeCount`, as for `normal_modes`.
 
     References
     ----------
@@ -156,7 +188,15 @@ def herting(
     """Herting mode set: [Psi_C, Psi_H, phi - Psi_C phi_B] with free modes phi [1]_.
 
     The set is statically complete like Craig-Bampton with inertia relief, and also contains the exact modes of the free
-    body. Parameters and errors are those of `rubin`.
+    body.
+    Errors are those of `rubin`.
+
+    Parameters
+    ----------
+    body
+        A coupled body with at least one interface, or its `Families`, which several sets can share.
+    n_modes
+        Number of elastic free modes, or a `ModeCount`, as for `normal_modes`.
 
     References
     ----------

@@ -34,6 +34,8 @@ def coupled_field(body: FEBody, u_mesh: Array) -> CoupledField:
 
     Parameters
     ----------
+    body
+        The coupled body.
     u_mesh
         Columns over the dofs of the uncoupled body, (n_mesh_dof, k).
     """

@@ -411,6 +411,8 @@ def craig_bampton_matrices(body: ReducedBody, *, about: tuple[float, float, floa
 
     Parameters
     ----------
+    body
+        The reduced body.
     about
         Reference point of the rigid motions, mesh coordinates [m].
 

@@ -50,6 +50,13 @@ def recovery_matrices(
     of displacement and stress that the modes lack is missing. `reduce(..., recovery=requests)` adds it, and offers the
     other quantities.
 
+    Parameters
+    ----------
+    body
+        The reduced body.
+    requests
+        The requested rows; each request becomes one table.
+
     Raises
     ------
     RecoveryError

@@ -32,6 +32,11 @@ def couple(body: FEBody) -> FEBody:
     The dofs of the result are, in this order: the mesh dofs that stay; for each rigid or distributing interface the six
     dofs of its reference node (a new node at the end of `nodes`, mesh axes); and the multipliers.
 
+    Parameters
+    ----------
+    body
+        A body with interfaces, not coupled before.
+
     Raises
     ------
     BodyError

@@ -19,6 +19,13 @@ def link_rigidly(body: FEBody, links: Iterable[RigidLink]) -> FEBody:
 
     A leader may itself follow another link. The chain is then resolved to its first leader.
 
+    Parameters
+    ----------
+    body
+        The body before coupling; each leader and follower is one of its nodes.
+    links
+        The rigid links, each with a leader and its followers.
+
     Raises
     ------
     BeamError

@@ -174,7 +174,13 @@ AnyShellProperty = ShellProperty | LaminateProperty | StiffnessProperty
 
 
 def symmetric(layers: Sequence[Layer]) -> tuple[Layer, ...]:
-    """Return the layers, bottom to middle, followed by their mirror image: [0, 90] gives [0, 90, 90, 0]."""
+    """Return the layers, bottom to middle, followed by their mirror image: [0, 90] gives [0, 90, 90, 0].
+
+    Parameters
+    ----------
+    layers
+        Half of the layup, from the bottom to the middle surface.
+    """
     return (*layers, *reversed(layers))
 
 

@@ -126,7 +126,12 @@ def nodes_interface(
 def check_overlap(interfaces: Sequence[Interface], *, numbers: IntArray | None = None) -> None:
     """Raise `InterfaceError` if two interfaces have the same name or share nodes; the message names pairs and counts.
 
-    numbers: user's numbers of the nodes, (n_nodes,); None or empty: the messages use indices.
+    Parameters
+    ----------
+    interfaces
+        All interfaces of one body.
+    numbers
+        The user's numbers of the nodes for the message, (n_nodes,); None or empty: the message uses indices.
     """
     shared = []
     for first, second in combinations(interfaces, 2):

@@ -131,6 +131,8 @@ def body_from_matrices(
         Whether to set slightly negative eigenvalues of M, as some programs write them, to zero (`positive_mass`).
     accept
         Findings to accept: "units" accepts an implausible size, density or wave speed.
+    numbering
+        The user's numbers of nodes and elements, for messages and results; None: indices.
 
     Raises
     ------

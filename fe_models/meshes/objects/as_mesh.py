@@ -106,14 +106,26 @@ def selectable(mesh_like: Any) -> Mesh | ShellMesh | LineMesh | NodeCloud:
 
 
 def as_shell_mesh(mesh_like: Any) -> ShellMesh:
-    """Return the mesh of all triangles and quads of an object, as `as_mesh`; `MeshTri1`, `MeshQuad1` lie at z = 0."""
+    """Return the mesh of all triangles and quads of an object, as `as_mesh`; `MeshTri1`, `MeshQuad1` lie at z = 0.
+
+    Parameters
+    ----------
+    mesh_like
+        A `ShellMesh`, or an object of another library as for `as_mesh`, with at least one triangle or quad.
+    """
     if isinstance(mesh_like, ShellMesh):
         return mesh_like
     return shell_mesh_from_raw(*_said(mesh_like), None, ())
 
 
 def as_line_mesh(mesh_like: Any) -> LineMesh:
-    """Return the mesh of all lines of an object, as `as_mesh`."""
+    """Return the mesh of all lines of an object, as `as_mesh`.
+
+    Parameters
+    ----------
+    mesh_like
+        A `LineMesh`, or an object of another library as for `as_mesh`, with at least one line.
+    """
     if isinstance(mesh_like, LineMesh):
         return mesh_like
     return line_mesh_from_raw(*_said(mesh_like), None)

@@ -72,7 +72,19 @@ def rigid_columns(compiled: CompiledSystem) -> np.ndarray:
 
 
 def frozen_bodies(compiled: CompiledSystem, work: Work, state: State, t: float) -> Instant:
-    """Return the motion with constant modal coordinates, by steps (1)-(4)."""
+    """Return the motion with constant modal coordinates, by steps (1)-(4).
+
+    Parameters
+    ----------
+    compiled
+        The compiled system.
+    work
+        Its working arrays, which are overwritten.
+    state
+        State near the solution, from which Newton's method begins.
+    t
+        Time [s].
+    """
     from floatframe.engine.kernels.entry import rates_of_constraints
 
     model, rigid = compiled.model, rigid_columns(compiled)
@@ -104,7 +116,19 @@ def frozen_bodies(compiled: CompiledSystem, work: Work, state: State, t: float) 
 
 
 def quasi_static_bodies(compiled: CompiledSystem, work: Work, state: State, t: float) -> Instant:
-    """Return the motion with modes that balance their loads at every instant, by steps (1)-(5)."""
+    """Return the motion with modes that balance their loads at every instant, by steps (1)-(5).
+
+    Parameters
+    ----------
+    compiled
+        The compiled system.
+    work
+        Its working arrays, which are overwritten.
+    state
+        State near the solution, from which Newton's method begins.
+    t
+        Time [s].
+    """
     model, rigid = compiled.model, rigid_columns(compiled)
     now = frozen_bodies(compiled, work, state, t)
     if rigid.all():

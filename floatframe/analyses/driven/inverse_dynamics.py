@@ -65,7 +65,15 @@ def inverse_dynamics(
 
 
 def drive_forces(system: System, motion: Trajectory) -> dict[str, CoordinateMotion]:
-    """Return value, rate and force of all driven coordinates during any motion of the system, by "joint.coordinate"."""
+    """Return value, rate and force of all driven coordinates during any motion of the system, by "joint.coordinate".
+
+    Parameters
+    ----------
+    system
+        The system with the prescribed motions.
+    motion
+        Any motion of this system.
+    """
     found = {}
     for name in driven_coordinates(system):
         joint, _, coordinate = name.rpartition(".")
@@ -75,6 +83,13 @@ def drive_forces(system: System, motion: Trajectory) -> dict[str, CoordinateMoti
 
 def with_motors(system: System, drives: Mapping[str, CoordinateMotion]) -> System:
     """Return the system with motors instead of these drives; their forces are cubic splines over time.
+
+    Parameters
+    ----------
+    system
+        The system with prescribed motions.
+    drives
+        Motion and force of each drive to replace, by "joint.coordinate", as `drive_forces` returns them.
 
     Raises
     ------

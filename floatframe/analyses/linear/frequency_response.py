@@ -72,6 +72,15 @@ def frequency_response(linear: LinearSystem, frequencies: Array) -> FrequencyRes
 def resolved_frequencies(linear: LinearSystem, first: float, last: float, *, n: int = 400) -> Array:
     """Return logarithmically spaced frequencies with additional ones around each resonance in the band, (n_f,).
 
+    Parameters
+    ----------
+    linear
+        The linearised system, whose modes give the resonances.
+    first, last
+        Ends of the band [Hz], 0 < first < last.
+    n
+        Number of logarithmically spaced frequencies.
+
     Raises
     ------
     ModelError

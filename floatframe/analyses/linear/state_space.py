@@ -81,6 +81,11 @@ def named_state_space(linear: LinearSystem) -> NamedStateSpace:
     (3) the states are the chosen motions, their rates, the states of elements and user forces, and the integrals of
         inputs that are velocities or accelerations
 
+    Parameters
+    ----------
+    linear
+        A linearised system from `linearize`.
+
     Raises
     ------
     ModelError

@@ -62,6 +62,11 @@ def system_modes(linear: LinearSystem) -> SystemModes:
 
     Without damping, gyroscopic and circulatory terms, the symmetric pencil (K, M) is solved, which gives real
     frequencies. Otherwise, the first-order pencil of (z, z_dot) is solved.
+
+    Parameters
+    ----------
+    linear
+        A linearised system from `linearize`.
     """
     system, _ = linear.with_mass()
     n = system.n_z

@@ -44,6 +44,11 @@ def barycentric_parameters(form: LinearForm) -> BarycentricParameters:
 
     Bodies on joints that rotate about one point have nine parameters, S' and K about it; others have ten, with the
     mass.
+
+    Parameters
+    ----------
+    form
+        The linear form of a tree of rigid bodies.
     """
     tree = rigid_tree(form.system, f"system {form.system.name!r}: barycentric parameters").tree
     n_b, n_c = len(tree.parent), len(tree.side)

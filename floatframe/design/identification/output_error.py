@@ -252,6 +252,21 @@ def computed_outputs(
 ) -> MeasuredOutputs:  # fmt: skip
     """Return the outputs that sensors would measure during a motion, without noise; see `fit_outputs`.
 
+    Parameters
+    ----------
+    system
+        The system, with its sensors.
+    time
+        Output times at equal distances, (n_t,) [s].
+    outputs
+        Names of sensor columns or coordinates, as for `fit_outputs`.
+    h
+        Step of the run [s], the distance of the times divided by a whole number; None: that distance.
+    integrator
+        As for `integrate`; None: generalized-alpha with a tight tolerance.
+    state
+        State at which the motion begins; None: as assembled.
+
     Raises
     ------
     ModelError

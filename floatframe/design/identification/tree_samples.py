@@ -88,6 +88,8 @@ def tree_samples(system: System, x: Array, rate: Array, acceleration: Array) -> 
 
     Parameters
     ----------
+    system
+        A tree of rigid bodies.
     x, rate, acceleration
         Of each coordinate of `tree_of(system).columns` at each instant, (n, n_c). As in results, angles are zero as
         the system is placed, distances where the points of the markers coincide. The rotation of a spherical joint or

@@ -46,7 +46,21 @@ def grid(
     stiffening: Sequence[bool] = (True,),
     parts: Sequence[int] = (1,),
 ) -> tuple[Case, ...]:
-    """Return all combinations, with the number of modes varying fastest; several parts always have mean axes."""
+    """Return all combinations, with the number of modes varying fastest; several parts always have mean axes.
+
+    Parameters
+    ----------
+    mode_sets
+        Names of mode sets, as in a job.
+    n_modes
+        Numbers of vibration modes of each part.
+    frames
+        "tisserand", "buckens" or "nodal:INTERFACE".
+    stiffening
+        Whether geometric stiffness is included.
+    parts
+        Numbers of parts of equal length.
+    """
     made = [
         Case(mode_set, n, frame if k == 1 else "tisserand", stiff, k)
         for mode_set, frame, stiff, k, n in itertools.product(mode_sets, frames, stiffening, parts, n_modes)

@@ -166,6 +166,14 @@ def study(
         Name of that flexible body.
     job
         Job file it is reduced by; mode set, number of modes and frame come from the cases.
+    cases
+        The descriptions of the body to compare.
+    integrator
+        Integrator of all runs.
+    t_end
+        End of the motion [s].
+    h
+        Step of all runs [s].
     reference
         A case that is finer than the others, the whole finite element model, geometrically exact beams (a body of
         lines), or columns from elsewhere.
@@ -174,6 +182,8 @@ def study(
     cut
         Interfaces at the cuts of parts, "rigid" or "distributing"; rigid ones keep sections plane and undistorted, so
         that parts of a solid are somewhat stiffer than the whole.
+    stages
+        Shows the progress of each case and records its duration; None: a new one is made.
     on_case
         Called with each result, for progress.
 

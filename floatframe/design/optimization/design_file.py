@@ -244,6 +244,11 @@ def existing(value: Any, info: ValidationInfo, what: str) -> Path:
 def read_design(path: str | os.PathLike[str]) -> Design:
     """Read and check a design file.
 
+    Parameters
+    ----------
+    path
+        Name of the design file (TOML).
+
     Raises
     ------
     SystemFileError

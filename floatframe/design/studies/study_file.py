@@ -179,6 +179,11 @@ class Study:
 def read_study(path: str | os.PathLike[str]) -> Study:
     """Read and check a study file.
 
+    Parameters
+    ----------
+    path
+        Name of the study file (TOML).
+
     Raises
     ------
     SystemFileError

@@ -62,6 +62,13 @@ class Assessment:
 def assess(given: FatigueFile, *, progress: Progress | None = None) -> Assessment:
     """Return the damage for a fatigue file.
 
+    Parameters
+    ----------
+    given
+        The checked content of a fatigue file, from `read_fatigue`.
+    progress
+        Called with the fraction of the work done, 0 to 1.
+
     Raises
     ------
     FatigueError, ResultsError, BodyError
@@ -285,6 +292,8 @@ def equivalent_repeats(measured: Array, simulated: Array, slope: float) -> float
     ----------
     measured, simulated
         Histories of the same quantity, (n_t,), in one unit.
+    slope
+        Exponent of the pseudo-damage, at least 1.
 
     Raises
     ------
@@ -406,8 +415,26 @@ def shaken_damage(
     ----------
     body
         The body that was shaken.
+    model
+        The shaken structure, of which the body is a part.
+    test
+        The random test.
+    runs
+        Its runs, one for each direction.
+    curve
+        S-N curve in stress units of the body; amplitudes, not ranges.
     duration
         Of each run [s]; None: that of the test.
+    method
+        One of `SPECTRAL_METHODS`.
+    criterion
+        Scalar that is counted at a place, from the stress there.
+    mean_stress
+        Correction for the static mean stress.
+    extrapolate
+        As for `spectral_damage`.
+    nodes
+        Kept nodes to look at; None: all on the surface.
 
     Raises
     ------

@@ -505,6 +505,11 @@ class FatigueFile(Table):
 def read_fatigue(path: str | os.PathLike[str]) -> FatigueFile:
     """Read and check a fatigue file.
 
+    Parameters
+    ----------
+    path
+        Name of the fatigue file (TOML).
+
     Raises
     ------
     FatigueError

@@ -86,8 +86,20 @@ def block_of_results(
 
     Parameters
     ----------
+    trajectory
+        The motion.
+    body_name
+        Name of a flexible body in it.
+    name
+        Name of the block in reports.
+    repeats
+        How often the block occurs in one pass through the programme.
+    scale
+        Factor on the loads, and so on all modal coordinates.
     times
         Part of the motion, from and to [s]; None: all of it.
+    has_gaps
+        Whether time steps that are much longer than the others are intended; else they are refused.
 
     Raises
     ------

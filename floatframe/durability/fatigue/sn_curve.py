@@ -146,10 +146,14 @@ def basquin_curve(
     ----------
     amplitude, cycles
         The knee [Pa].
+    slope
+        Exponent k above the knee, positive.
     second_slope
         Slope below the knee, which goes on without end; then `below` is not looked at.
     below
         One of `BELOW`.
+    stress_ratio
+        Ratio R of the smallest to the largest stress in the tests of the curve.
     least_cycles
         Where the curve begins; cycles of greater amplitude are out of its range.
 
@@ -190,6 +194,10 @@ def table_curve(
         Ascending, (n_points,).
     amplitudes
         Descending, half the ranges, (n_points,) [Pa].
+    below
+        One of `BELOW`: how the curve continues below its last point.
+    stress_ratio
+        Ratio R of the smallest to the largest stress in the tests of the curve.
 
     Raises
     ------

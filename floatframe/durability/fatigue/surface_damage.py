@@ -133,11 +133,19 @@ def history_damage(
 
     Parameters
     ----------
+    body
+        The reduced body, with the stress of its modes.
+    blocks
+        Modal histories of the body, each with its repeats.
     curve
         In stress units of the body; amplitudes, not ranges. None: only places that `others` name are looked at.
     others
         Materials of the places that they name, in place of `curve` and `mean_stress`; one without places is that of
         the rest, in place of `curve`.
+    criterion
+        Scalar that is counted at a place, from the stress there.
+    mean_stress
+        Correction for the mean stress of a cycle.
     residue
         "repeat": a block follows itself without end; "half": what is left counts as half cycles (ASTM E1049).
     negligible
@@ -148,6 +156,8 @@ def history_damage(
         Kept nodes to look at; None: all on the surface.
     points
         Stress points to look at; None: all, none if `nodes` are given.
+    progress
+        Called with the fraction of the work done, 0 to 1.
 
     Raises
     ------
@@ -207,17 +217,35 @@ def spectral_damage(
     stress: Array | None = None,
     progress: Progress | None = None,
 ) -> FatigueResult:
-    """Return the damage of places of a body by a spectral method; other parameters as for `history_damage`.
+    """Return the damage of places of a body by a spectral method.
 
     Parameters
     ----------
+    body
+        The reduced body, with the stress of its modes.
+    spectra
+        Cross spectra of its modal coordinates, each with its duration.
+    curve
+        As for `history_damage`.
+    others
+        As for `history_damage`.
     method
         One of `SPECTRAL_METHODS`.
+    criterion
+        Scalar that is counted at a place, from the stress there.
+    mean_stress
+        Correction for the static mean stress.
     extrapolate
         Whether damage beyond the greatest amplitude of the curve may be more than a hundredth of all.
+    nodes
+        Kept nodes to look at; None: all on the surface.
+    points
+        Stress points to look at; None: all, none if `nodes` are given.
     stress
         Stress at the kept nodes, then at the stress points if these are looked at, in axes of B over the coordinates
         of the spectra, (n, 6, n_q) [Pa per unit]; None: of the modes of the body.
+    progress
+        Called with the fraction of the work done, 0 to 1.
     """
     materials = all_materials(curve, mean_stress, others)
     places = assessed_places(body, materials, nodes, points, criterion)

@@ -112,6 +112,11 @@ def effective_masses(model: ShakenModel) -> EffectiveMasses:
 def shake(job: ShakeJob) -> ShakeResult:
     """Return the responses of a structure on its bases to all tests of a job.
 
+    Parameters
+    ----------
+    job
+        The checked content of a shake file, from `read_shake`.
+
     Raises
     ------
     ModelError

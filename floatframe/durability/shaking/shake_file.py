@@ -322,6 +322,11 @@ class ShakeFile(Table):
 def read_shake(path: str | os.PathLike[str]) -> ShakeJob:
     """Read and check a shake file.
 
+    Parameters
+    ----------
+    path
+        Name of the shake file (TOML).
+
     Raises
     ------
     SystemFileError

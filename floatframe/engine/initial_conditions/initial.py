@@ -78,6 +78,11 @@ ALLOWED = 1e-10
 def mobility(system: System) -> Mobility:
     """Return the mobility of a system in its assembled position, after closing its joints.
 
+    Parameters
+    ----------
+    system
+        The system.
+
     Raises
     ------
     ModelError
@@ -102,8 +107,17 @@ def consistent_state(
 ) -> ConsistentState:
     """Return a consistent state near a given state or the assembled bodies, for prescribed motions at time t.
 
-    known: wrenches and other unknowns from a motion before, (n_w,), whose turned angles of couplers and states of user
-    forces go on.
+    Parameters
+    ----------
+    system
+        The system.
+    state
+        Positions and velocities to start from; None: the assembled bodies.
+    t
+        Time at which prescribed motions are evaluated [s].
+    known
+        Wrenches and other unknowns of an earlier motion, (n_w,). Counted angles of couplers and states of user forces
+        continue from them; None: they begin anew.
 
     Raises
     ------

@@ -399,6 +399,11 @@ def relative_model(system: System) -> RelativeModel:
 
     Of forces, gravity counts; others are given to the calls (`force`, `wrenches`).
 
+    Parameters
+    ----------
+    system
+        A tree of bodies on joints, with gravity as its only force.
+
     Raises
     ------
     ModelError

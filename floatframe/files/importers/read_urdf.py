@@ -133,6 +133,11 @@ TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 def read_urdf(path: str | os.PathLike[str]) -> Robot:
     """Read a URDF file.
 
+    Parameters
+    ----------
+    path
+        Name of the URDF file.
+
     Raises
     ------
     UrdfError

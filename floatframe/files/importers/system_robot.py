@@ -358,6 +358,13 @@ TENSOR = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1,
 def write_urdf(robot: Robot, path: str | os.PathLike[str]) -> None:
     """Write a robot; an existing file is replaced completely or not at all.
 
+    Parameters
+    ----------
+    robot
+        The robot.
+    path
+        Name of the URDF file.
+
     Raises
     ------
     UrdfError

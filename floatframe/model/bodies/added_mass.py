@@ -72,6 +72,13 @@ def with_masses(body: ReducedBody, masses: Sequence[AddedMass]) -> ReducedBody:
     stiffness of its inertia loads are increased. The modes are then no longer vibration modes of the free body, and its
     frame is no longer a Tisserand frame; the equations of motion require neither.
 
+    Parameters
+    ----------
+    body
+        The reduced body.
+    masses
+        Small rigid masses, each at an interface of the body.
+
     Raises
     ------
     ModelError

@@ -94,6 +94,15 @@ SENSORS: dict[str, type[Sensor]] = {
 def measured(system: System, trajectory: Trajectory, sensors: Sequence[Sensor] | None = None) -> dict[str, Measurement]:
     """Return the measurements of sensors during a motion of the system, by name; by default of all its sensors.
 
+    Parameters
+    ----------
+    system
+        The system that moved.
+    trajectory
+        Its motion.
+    sensors
+        The sensors to evaluate; None: all sensors of the system.
+
     Raises
     ------
     ModelError

@@ -34,6 +34,11 @@ def critical_loads(reduced: ReducedBody) -> tuple[CriticalLoad, ...]:
     speed of steady rotation; softening by the centrifugal force itself is counted. All are upper bounds, as close as
     the modes come to the buckling shapes.
 
+    Parameters
+    ----------
+    reduced
+        A reduced body; without geometric stiffness it has no critical loads.
+
     Returns
     -------
     tuple of CriticalLoad

@@ -97,6 +97,8 @@ def spectra_of_history(
 
     Parameters
     ----------
+    name
+        Name of the spectra in reports.
     t, q
         Times at equal steps, (n_t,) [s], and modal coordinates, (n_t, n_q); their mean goes into `mean`.
     n_segment

@@ -45,6 +45,10 @@ def pulse(kind: str, amplitude: float, duration: float, *, edge: float = EDGE) -
     ----------
     kind
         One of PULSES.
+    amplitude
+        Largest acceleration, in any unit; the result has the same unit.
+    duration
+        Duration of the pulse [s].
     edge
         Rise and fall of a trapezoid over its duration, up to 0.5.
     """

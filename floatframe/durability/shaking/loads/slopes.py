@@ -33,6 +33,15 @@ def level_of_bands(bands: Sequence[Band], unit: str, where: str) -> Level:
         s/20 of an amplitude
     (3) a slope between two levels must meet both within 0.5 dB; then the straight line through both is taken
 
+    Parameters
+    ----------
+    bands
+        First and last frequency [Hz], and a level in `unit` or a slope in dB per octave, in ascending order.
+    unit
+        Unit of the levels; it says whether they are densities or amplitudes.
+    where
+        Place of the bands in the file, for messages.
+
     Raises
     ------
     ModelError
