@@ -1,0 +1,31 @@
+"""Every parameter of a public function is documented in the section Parameters of its docstring."""
+
+import importlib
+import inspect
+import re
+from typing import Any
+
+import pytest
+
+PACKAGES = ("fe_models", "cms", "floatframe")
+
+
+def documented(function: Any) -> set[str]:
+    """Return the names that the section Parameters of a docstring explains."""
+    sections = re.split(r"\n([A-Z][A-Za-z ]+)\n-{3,}\n", f"\n{inspect.getdoc(function) or ''}\n")
+    body = dict(zip(sections[1::2], sections[2::2], strict=True)).get("Parameters", "")
+    heads = [line for line in body.splitlines() if line and not line.startswith(" ")]
+    return {name.strip(" *") for head in heads for name in head.split(",")}
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_public_functions_document_every_parameter(package):
+    module = importlib.import_module(package)
+    functions = {name: getattr(module, name) for name in module.__all__ if inspect.isfunction(getattr(module, name))}
+    assert len(functions) > 30
+    missing = {
+        name: left
+        for name, function in functions.items()
+        if (left := set(inspect.signature(function).parameters) - documented(function))
+    }
+    assert missing == {}, "expected these parameters in the section Parameters, with shape and unit"
