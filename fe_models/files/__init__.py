@@ -1,4 +1,7 @@
-"""Meshes from files: one function, which reads exactly or explains why it cannot."""
+"""Files of other programs: meshes (`read_mesh`), whole decks (`decks`), matrices, CAD.
+
+A reader reads exactly, or explains why it cannot.
+"""
 
 from fe_models.files.read_mesh import MESH_FORMATS, read_mesh
 

@@ -1,4 +1,7 @@
-"""Integrators: one file each; frozen, with `start` and `step` and all memory in a carry; `integrate` owns the loop."""
+"""Integrators, one file each. The time loop is `floatframe.simulation.integrate`.
+
+An integrator is a frozen object with the functions `start` and `step`; all its memory between steps is in a carry.
+"""
 
 from collections.abc import Callable
 

@@ -1,1 +1,1 @@
-"""The time loop: steps, events, restart, and the watch over the range of linear frames."""
+"""The time loop (`integrate`), and what it calls: events, restart, and the watches over steps and linear frames."""

@@ -1,1 +1,1 @@
-"""The modal file: a reduced body as self-describing HDF5."""
+"""The modal file, a reduced body as self-describing HDF5; `file` writes and reads it."""

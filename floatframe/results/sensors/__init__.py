@@ -1,4 +1,7 @@
-"""Named sensors, which measure a motion, in Python and in the tables [sensors.NAME] of a system file."""
+"""Named sensors, which measure a motion, in Python and in the tables [sensors.NAME] of a system file.
+
+`SENSORS` is the registry; a new sensor is a class with `measure` and `linear`, and its line there.
+"""
 
 from collections.abc import Sequence
 from dataclasses import fields

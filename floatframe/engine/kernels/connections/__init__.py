@@ -1,1 +1,4 @@
-"""Kernels of connections between markers: joints, springs, bushings, contacts, couplers, user forces."""
+"""The laws of connections between markers in a step: springs, bushings, contacts, couplers, user forces.
+
+`connection` evaluates a connection of any kind; joints have their rows in `floatframe.engine.kernels.joints`.
+"""
