@@ -58,22 +58,46 @@ def lu_factor(A, pivot):
 
 @matrix_loops
 def lu_solve(A, pivot, b):
-    """Overwrite b, (n,), with A⁻¹ b by the factors of `lu_factor`."""
+    """Overwrite b, (n,), with A⁻¹ b by the factors of `lu_factor`.
+
+    Four rows at once: their sums do not wait for each other.
+    """
     n = A.shape[0]
     for k in range(n):
         row = pivot[k]
         if row != k:
             b[k], b[row] = b[row], b[k]
-    for i in range(1, n):
+    for i in range(0, n - 3, 4):
+        r0, r1, r2, r3 = A[i], A[i + 1], A[i + 2], A[i + 3]
+        b0, b1, b2, b3 = b[i], b[i + 1], b[i + 2], b[i + 3]
+        for j in range(i):
+            x = b[j]
+            b0, b1, b2, b3 = b0 - r0[j] * x, b1 - r1[j] * x, b2 - r2[j] * x, b3 - r3[j] * x
+        b1 -= r1[i] * b0
+        b2 -= r2[i] * b0 + r2[i + 1] * b1
+        b3 -= r3[i] * b0 + r3[i + 1] * b1 + r3[i + 2] * b2
+        b[i], b[i + 1], b[i + 2], b[i + 3] = b0, b1, b2, b3
+    for i in range(n - n % 4, n):
         total = b[i]
         for j in range(i):
             total -= A[i, j] * b[j]
         b[i] = total
-    for i in range(n - 1, -1, -1):
+    for i in range(n - 1, n - 1 - n % 4, -1):
         total = b[i]
         for j in range(i + 1, n):
             total -= A[i, j] * b[j]
         b[i] = total * A[i, i]
+    for i in range(n - n % 4 - 4, -1, -4):
+        r0, r1, r2, r3 = A[i], A[i + 1], A[i + 2], A[i + 3]
+        b0, b1, b2, b3 = b[i], b[i + 1], b[i + 2], b[i + 3]
+        for j in range(i + 4, n):
+            x = b[j]
+            b0, b1, b2, b3 = b0 - r0[j] * x, b1 - r1[j] * x, b2 - r2[j] * x, b3 - r3[j] * x
+        b3 *= r3[i + 3]
+        b2 = (b2 - r2[i + 3] * b3) * r2[i + 2]
+        b1 = (b1 - r1[i + 2] * b2 - r1[i + 3] * b3) * r1[i + 1]
+        b0 = (b0 - r0[i + 1] * b1 - r0[i + 2] * b2 - r0[i + 3] * b3) * r0[i]
+        b[i], b[i + 1], b[i + 2], b[i + 3] = b0, b1, b2, b3
 
 
 @matrix_loops

@@ -342,28 +342,40 @@ def hold_velocities(model, work, c_k):
 
 
 @inner
+def largest(x):
+    """Return the largest absolute value."""
+    most = 0.0
+    for k in range(x.shape[0]):
+        most = max(most, abs(x[k]))
+    return most
+
+
+@inner
 def expect_late_gaps(solver):
     """Add to the gaps in mu what the first iteration is expected to leave open; return the largest of them.
 
     Rates of what is held change with the positions. The gap that is late changes as it did over the step before.
     """
-    largest = 0.0
+    most = 0.0
     for k in range(solver.mu.shape[0]):
         if solver.has_late_gaps == 0:
             solver.late_gap[k], solver.late_gap_change[k] = 0.0, 0.0
         solver.mu[k] += solver.late_gap[k] + solver.late_gap_change[k]
-        largest = max(largest, abs(solver.mu[k]))
-    return largest
+        most = max(most, abs(solver.mu[k]))
+    return most
 
 
 @inner
 def keep_late_gaps(solver):
-    """Remember what the first iteration has left open: what was expected, and the gaps in mu."""
+    """Remember what the first iteration has left open, what was expected and the gaps in mu; return the largest gap."""
+    most = 0.0
     for k in range(solver.mu.shape[0]):
+        most = max(most, abs(solver.mu[k]))
         gap = solver.late_gap[k] + solver.late_gap_change[k] + solver.mu[k]
         solver.late_gap_change[k] = gap - solver.late_gap[k] if solver.has_late_gaps != 0 else 0.0
         solver.late_gap[k] = gap
     solver.has_late_gaps = 1
+    return most
 
 
 @inner
@@ -553,11 +565,13 @@ def one_step(model, work, memory, order, h):
             return SINGULAR_CONNECTION, connection, excess, -1.0
         of_rates, is_held = 0.0, False
         if holds:
-            gap = velocity_gaps(model, work, c_d / c_k)
+            velocity_gaps(model, work, c_d / c_k)
             if iteration == 0:
                 gap = expect_late_gaps(work.solver)
             elif iteration == 1:
-                keep_late_gaps(work.solver)
+                gap = keep_late_gaps(work.solver)
+            else:
+                gap = largest(work.solver.mu)
             is_held = gap > least_gap
         if is_held:
             of_rates = hold_velocities(model, work, c_k)

@@ -9,17 +9,16 @@ and Z do not turn with the body, so that they can serve for many steps; P, R and
 
 import math
 
-from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.compiler.compilation import inner, small
 from floatframe.engine.kernels.connections.connection import (
     connection_derivatives,
     constraint_rates,
-    has_cheap_rate,
-    write_held_rates,
+    write_velocity_gaps,
 )
 from floatframe.engine.kernels.dense import lu_factor, lu_solve, lu_solve_columns
 from floatframe.engine.kernels.evaluation import linearize
 from floatframe.engine.kernels.model import MASS, STIFFNESS
-from floatframe.engine.kernels.vector import add, put, put_sum, scaled, sub, turned, turned_back, vector
+from floatframe.engine.kernels.vector import add, dot, put, put_sum, scaled, sub, turned, turned_back, vector
 from floatframe.model.joints.rows.kinds import NOTHING
 
 __all__ = [
@@ -35,7 +34,6 @@ __all__ = [
     "settle_accelerations",
     "share_reactions",
     "velocity_gaps",
-    "write_rates_to_close",
 ]
 
 SOFTER = 1e3  # s of `share_reactions`: well above the rounding errors of A
@@ -291,6 +289,15 @@ def close_connections(model, work):
     add_wrenches(model, work)
 
 
+@small
+def three_products(a, b, c, y):
+    """Return the products of three rows with y, whose sums do not wait for each other."""
+    first, second, third = 0.0, 0.0, 0.0
+    for k in range(y.shape[0]):
+        first, second, third = first + a[k] * y[k], second + b[k] * y[k], third + c[k] * y[k]
+    return first, second, third
+
+
 @inner
 def take_motions(model, work):
     """Subtract the effect of the motion y of the bodies on the rows of connections from mu."""
@@ -303,13 +310,10 @@ def take_motions(model, work):
             c = markers.connection[m]
             o, w0 = markers.x0[m], connections.w0[c]
             n_motion = 12 if connections.has_rates[c] else 6
-            for r in range(n_motion):
-                total = 0.0
-                for k in range(n):
-                    total += solver.J_row[12 * o + r * n + k] * y[u0 + k]
-                motion[r] = total
+            row = solver.J_row[12 * o : 12 * (o + n)].reshape((12, n))
             for part in range(0, n_motion, 3):
-                put(motion, part, turned(R, motion[part:]))
+                x = three_products(row[part], row[part + 1], row[part + 2], y[u0 : u0 + n])
+                put(motion, part, turned(R, x))
             for r in range(connections.size[c]):
                 total = 0.0
                 for k in range(n_motion):
@@ -321,17 +325,13 @@ def take_motions(model, work):
 
 @inner
 def velocity_gaps(model, work, by_rate):
-    """Write into mu the difference between held positions and their rates in the correction, and return the largest.
+    """Write into mu the difference between held positions and their rates in the correction.
 
     In unknowns: y by_rate is the change of velocities. The positions will be closed by a `correction`, which changes
     their rates by -by_rate g. Rows of positions that have no cheap rate, and all others, have no gap.
     """
-    mu, largest = work.solver.mu, 0.0
     for c in range(model.connections.size.shape[0]):
-        write_rates_to_close(model, work, c, by_rate)
-    for k in range(mu.shape[0]):
-        largest = max(largest, abs(mu[k]))
-    return largest
+        write_velocity_gaps(model, work, c, 1.0 / by_rate, work.solver.mu)
 
 
 @inner
@@ -355,15 +355,6 @@ def close_velocities(model, work):
 
 
 @inner
-def write_rates_to_close(model, work, c, by_rate):
-    """Write into `solver.mu` the velocity gaps of the held positions of connection c, divided by by_rate."""
-    mu, g = work.solver.mu, work.connections.g
-    write_held_rates(model, work, c, mu)
-    for k in range(model.connections.w0[c], model.connections.w0[c + 1]):
-        mu[k] = g[k] - mu[k] / by_rate if has_cheap_rate(model, c, k) else 0.0
-
-
-@inner
 def add_wrenches(model, work):
     """Add the motion X mu of the bodies due to the wrenches mu to y."""
     bodies, markers, connections, solver = model.bodies, model.markers, model.connections, work.solver
@@ -374,19 +365,14 @@ def add_wrenches(model, work):
             m = bodies.ends[e]
             c = markers.connection[m]
             o, w0, sign = markers.x0[m], connections.w0[c], markers.sign[m]
-            size = 3 if markers.moment[m] < 0 else 6
-            wrench = solver.wrench  # wrench of the correction on the marker, body axes
-            for part in range(0, size, 3):
-                w_part = markers.force[m] if part == 0 else markers.moment[m]
-                if w_part >= 0:
-                    put(wrench, part, scaled(sign, turned_back(R, mu[w0 + w_part :])))
-                else:
-                    put(wrench, part, (0.0, 0.0, 0.0))
+            force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)  # of the correction on the marker, body axes
+            if markers.force[m] >= 0:
+                force = scaled(sign, turned_back(R, mu[w0 + markers.force[m] :]))
+            if markers.moment[m] >= 0:
+                moment = scaled(sign, turned_back(R, mu[w0 + markers.moment[m] :]))
+            X = solver.X[6 * o : 6 * (o + n)].reshape((n, 6))
             for r in range(n):
-                total = 0.0
-                for k in range(size):
-                    total += solver.X[6 * o + r * 6 + k] * wrench[k]
-                y[u0 + r] += total
+                y[u0 + r] += dot(vector(X[r]), force) + dot(vector(X[r, 3:]), moment)
 
 
 @inner

@@ -247,7 +247,6 @@ class Solver(NamedTuple):
     weight: Array = real(n_u, unit="kg, kg m²")  #: of the norm of corrections
     motion: Array = real(12)  #: correction of the motion of one marker
     row: Array = real(12)  #: one row of P in body axes
-    wrench: Array = real(6)  #: correction of the wrench on one marker, body axes
     c_m: Array = real()  #: coefficients for which H was factorised, zero if never
     c_d: Array = real(unit="s")
     c_k: Array = real(unit="s²")

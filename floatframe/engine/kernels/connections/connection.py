@@ -34,9 +34,8 @@ __all__ = [
     "connection_derivatives",
     "connection_rows",
     "constraint_rates",
-    "has_cheap_rate",
     "row_rates",
-    "write_held_rates",
+    "write_velocity_gaps",
 ]
 
 
@@ -139,39 +138,44 @@ def joint_row_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
         put_sum(V[r], model.rows.part[k], scaled(-soft, m_b))
 
 
-@small
-def has_cheap_rate(model, c, k):
-    """Whether row k of connection c holds a position whose rate can be computed without its second rate.
+@inner
+def write_velocity_gaps(model, work, c, factor, gap):
+    """Write g - factor dg/dt of the held positions of joint or coupler c into gap, (n_w,), and zero for its other rows.
 
-    Not of elements: theirs asks for the law many times.
+    Zero for elements, too: their rates ask for the law many times.
     """
-    law = model.connections.law[c]
-    return model.rows.holds[k] == POSITION and (law == JOINT or law == COUPLER)
+    law, g, w0, end = model.connections.law[c], work.connections.g, model.connections.w0[c], model.connections.w0[c + 1]
+    if law != JOINT:
+        for k in range(w0, end):
+            gap[k] = 0.0
+        if law == COUPLER:
+            k = model.elements.core[model.connections.item[c]]
+            if model.rows.holds[k] == POSITION:
+                gap[k] = g[k] - factor * coupler_rate(model, work, c)
+        return
+    a, b, markers = model.connections.a[c], model.connections.b[c], work.markers
+    v = relative_velocity(markers, a, b)
+    omega = sub(vector(markers.omega[b]), vector(markers.omega[a]))
+    for k in range(w0, end):
+        kind = model.rows.kind[k]
+        if kind == POINT:
+            gap[k] = g[k] + factor * dot(vector(model.rows.x[k]), v)
+        elif kind == DOT:  # E · D, which a rotation about E × D changes
+            E, D = direction(markers, a, model.rows.x[k]), direction(markers, b, model.rows.y[k])
+            gap[k] = g[k] + factor * dot(cross(E, D), omega)
+        elif model.rows.holds[k] == POSITION:
+            gap[k] = g[k] - factor * held_rate(model, work, k, a, b, v)
+        else:
+            gap[k] = 0.0
 
 
 @inner
-def write_held_rates(model, work, c, rate):
-    """Write the rates of the held positions of joint or coupler c, if `has_cheap_rate`."""
-    law, a, b, markers = model.connections.law[c], model.connections.a[c], model.connections.b[c], work.markers
-    if law == COUPLER:
-        rate[model.elements.core[model.connections.item[c]]] = coupler_rate(model, work, c)
-        return
-    if law != JOINT:
-        return
-    v = relative_velocity(markers, a, b)
-    omega = sub(vector(markers.omega[b]), vector(markers.omega[a]))
-    for k in range(model.connections.w0[c], model.connections.w0[c + 1]):
-        kind = model.rows.kind[k]
-        if kind == POINT:
-            rate[k] = -dot(vector(model.rows.x[k]), v)
-        elif kind == DOT:  # E · D, which a rotation about E × D changes
-            E, D = direction(markers, a, model.rows.x[k]), direction(markers, b, model.rows.y[k])
-            rate[k] = -dot(cross(E, D), omega)
-        elif model.rows.holds[k] == POSITION:
-            _, n, m_a, m_b = held_value(kind, model, work, k, a, b)
-            first, _ = held_rates(kind, model, work, k, a, b)
-            first += dot(n, v) + dot(m_a, vector(markers.omega[a]))
-            rate[k] = first + dot(m_b, vector(markers.omega[b]))
+def held_rate(model, work, k, a, b, v):
+    """Return the rate of the position that row k of a joint holds; v: relative velocity of its markers."""
+    kind, markers = model.rows.kind[k], work.markers
+    _, n, m_a, m_b = held_value(kind, model, work, k, a, b)
+    rate, _ = held_rates(kind, model, work, k, a, b)
+    return rate + dot(n, v) + dot(m_a, vector(markers.omega[a])) + dot(m_b, vector(markers.omega[b]))
 
 
 @inner

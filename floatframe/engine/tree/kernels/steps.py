@@ -9,6 +9,7 @@ Described in `floatframe.integrators.relative`.
 import math
 
 from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.connections.connection import write_velocity_gaps
 from floatframe.engine.kernels.connections.user_force import resize_states
 from floatframe.engine.kernels.generalized_alpha import (
     DIVERGED,
@@ -37,7 +38,6 @@ from floatframe.engine.kernels.generalized_alpha import (
     time_loop,
     write_row,
 )
-from floatframe.engine.kernels.schur import write_rates_to_close
 from floatframe.engine.kernels.step_start import hold_states
 from floatframe.engine.kernels.vector import add, cross, dot, norm, put, put_sum, scaled, sub, turned, vector
 from floatframe.engine.tree.kernels.accelerations import accelerate
@@ -194,7 +194,7 @@ def hold_velocities(model, work, tree, joints, tangent, by_rate, by_acceleration
         tangent.mu[r] = 0.0
     for e in range(tree.held.shape[0]):
         c = tree.held[e]
-        write_rates_to_close(model, work, c, by_rate)
+        write_velocity_gaps(model, work, c, 1.0 / by_rate, mu)
         for k in range(model.connections.w0[c], model.connections.w0[c + 1]):
             tangent.mu[tree.kept_row[k]] = mu[k]
     solve_wrenches(tangent)
