@@ -1,9 +1,9 @@
 """Random legal .cdb files of ANSYS beside an assembler of this file.
 
-A block of straight cells of SOLID185 (bricks with incompatible modes, wedges, tetrahedra), of curved bricks (SOLID186,
-reduced or full) or of tetrahedra (SOLID187, or SOLID186 with equal nodes), some of them left out, of isotropic and
-orthotropic materials by major or minor ratios, blank constants, tables over temperature, element types by number or
-name, gaps in numbers, several widths of fields, two EBLOCKs.
+A block of straight cells of SOLID185 (bricks with incompatible modes, wedges, pyramids, tetrahedra), of curved bricks
+(SOLID186, reduced or full) or of tetrahedra (SOLID187, or SOLID186 with equal nodes), some of them left out, of
+isotropic and orthotropic materials by major or minor ratios, blank constants, tables over temperature, element types
+by number or name, gaps in numbers, several widths of fields, two EBLOCKs.
 """
 
 from itertools import product
@@ -94,11 +94,15 @@ def matrices(shapes, nodes, C, rho, stiff, massive):
 
 
 def linear_shapes(n: int):
-    """Return the functions of a brick (8 nodes), a wedge (6) or a tetrahedron (4) of first order."""
+    """Return the functions of a brick (8 nodes), a wedge (6), a pyramid (5) or a tetrahedron (4) of first order.
+
+    Those of a pyramid are those of a brick whose last four nodes are one, as SOLID185 has them.
+    """
 
     def shapes(x: np.ndarray) -> np.ndarray:
-        if n == 8:
-            return (1 + CORNERS * x).prod(axis=1) / 8
+        if n in (5, 8):
+            brick = (1 + CORNERS * x).prod(axis=1) / 8
+            return brick if n == 8 else np.append(brick[:4], brick[4:].sum())
         L = np.array([1 - x[0] - x[1], x[0], x[1]])
         return np.array([*(L * (1 - x[2]) / 2), *(L * (1 + x[2]) / 2)]) if n == 6 else np.array([1 - x.sum(), *x])
 
@@ -112,7 +116,7 @@ def linear_rule(n: int) -> list[tuple[np.ndarray, float]]:
             (np.array([(1 + x[0]) / 2, (1 + x[1]) / 2 * (1 - x[0]) / 2, x[2]]), w / 4 * (1 - x[0]) / 2)
             for x, w in gauss(3)
         ]
-    return gauss(2) if n == 8 else tet_rule(3)
+    return gauss({8: 2, 5: 4}[n]) if n in (5, 8) else tet_rule(3)
 
 
 def with_modes(nodes: np.ndarray, C: np.ndarray) -> np.ndarray:
@@ -130,8 +134,14 @@ def with_modes(nodes: np.ndarray, C: np.ndarray) -> np.ndarray:
     return K[:24, :24] - K[:24, 24:] @ np.linalg.solve(K[24:, 24:], K[24:, :24])
 
 
-#: SOLID185: nodes of a cell -> the cells that a brick is cut into, by its corners
-CUTS = {8: [tuple(range(8))], 6: [(0, 1, 2, 4, 5, 6), (0, 2, 3, 4, 6, 7)], 4: TETS}
+#: SOLID185: nodes of a cell -> the cells that a brick is cut into, by its corners and its centre
+PYRAMIDS = [(0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (3, 2, 6, 7), (0, 3, 7, 4), (1, 5, 6, 2)]
+CUTS = {
+    8: [tuple(range(8))],
+    5: [(*base, 8) for base in PYRAMIDS],
+    6: [(0, 1, 2, 4, 5, 6), (0, 2, 3, 4, 6, 7)],
+    4: TETS,
+}
 
 
 class AnsysDeck:
@@ -145,7 +155,7 @@ class AnsysDeck:
         self.kind = 186 if self.is_brick or rng.random() < 0.5 else 187
         self.corners = 0
         if rng.random() < 0.35:
-            self.kind, self.corners, self.is_full = 185, int(rng.choice([8, 6, 4])), False
+            self.kind, self.corners, self.is_full = 185, int(rng.choice([8, 6, 5, 4])), False
         self.nodes: list[np.ndarray] = []
         self.place: dict[tuple[float, ...], int] = {}
         self.elements: list[tuple[int, list[int]]] = []  #: material, nodes
@@ -159,7 +169,8 @@ class AnsysDeck:
             pieces = [corners] if self.is_brick else [corners[list(tet)] for tet in TETS]
             edges = EDGES if self.is_brick else TET_EDGES
             if self.corners:
-                pieces, edges = [corners[list(cut)] for cut in CUTS[self.corners]], []
+                points = np.vstack([corners, corners.mean(axis=0)])
+                pieces, edges = [points[list(cut)] for cut in CUTS[self.corners]], []
             for piece in pieces:
                 all_points = [*piece, *((piece[a] + piece[b]) / 2 for a, b in edges)]
                 self.elements.append((int(rng.integers(1, 3)), [self.node(x) for x in all_points]))
@@ -265,6 +276,8 @@ class AnsysDeck:
                 if self.corners == 6:
                     i, j, k, m, n, o = named
                     named = [i, j, k, k, m, n, o, o]
+                elif self.corners == 5:
+                    named = [*named, *3 * named[4:]]
                 elif self.corners == 4:
                     i, j, k, m = named
                     named = [i, j, k, k, m, m, m, m]
