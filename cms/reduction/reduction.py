@@ -47,6 +47,7 @@ from cms.reduction.recovery.request import RecoveryRequest
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.kept_nodes import keep_nodes
 from fe_models.body.load_cases import LoadCase, ReducedLoadCase
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.ranks.spread_columns import SpreadColumns
 from fe_models.foundation.tall.on_disk import in_memory, release, zeros_like
@@ -255,15 +256,15 @@ def with_near_second_moment(gram: Array, body: FEBody, frame: BodyFrame) -> Arra
     """Return the Gram matrix with first and second moment about the origin of B where that is far from the mesh origin.
 
     About the mesh origin R has a relative error of eps (distance / size)². A unit rotation about the origin of B moves
-    a point by the coordinates that are needed: e_z × c has c_x along y. The given array is overwritten if the rotations
-    differ from the positions by rounding only; a held or planar body lacks some rotations, and keeps its array.
+    a point by the coordinates that are needed: e_z × c has c_x along y. All dofs of the mesh take part, also those that
+    are held. The given array is overwritten if the rotations differ from the positions by rounding only.
     """
     assert body.element_model is not None
     own, far = float(np.trace(gram[1:4, 1:4])), float(gram[0, 0] * (frame.origin @ frame.origin))
     if not far > FAR**2 * own:
         return gram
-    turns = geometric_rigid_modes(body, origin=frame.origin)[:, 3:]
-    near = body.element_model.mass_gram(body.mesh_displacement(turns))
+    turns = rigid_motion_of_dofs(body.nodes, body.to_mesh.dofs, frame.origin)[:, 3:]
+    near = body.element_model.mass_gram(turns)
     of = [0, 4 + 3 + 2, 4 + 6 + 0, 4 + 0 + 1]  # mass, y of the third column, z of the first, x of the second
     near = near[np.ix_(of, of)]
     near[1:] = frame.axes.T @ near[1:]
