@@ -296,6 +296,7 @@ def elastic_parts(graph: Graph, expansion: Expansion, k: int, length: float) -> 
         F, origin = frame_in_body(expansion, i, length)
         A, r = F.T @ A, F.T @ (r - origin)
         parts["above"] = marker(i, int(nodes.above[k]))
+        r = r if parts["above"] is None else np.zeros(3)  # the marker has the place
     return parts | {"A": terms(graph, whole(A)), "r": terms(graph, without_rounding(r, length))}
 
 

@@ -1,35 +1,32 @@
-"""The recursions of a tree as terms; every sum and product is simplified when it is created.
+"""The recursions of the engine with terms; every sum and product is simplified when it is created.
 
-Frames are those of docs/recursive.md: A, r for the inner frame of a joint in the parent, and E, d for its outer frame
-in the inner one. A vector is transformed by A and E separately, because A mostly only exchanges axes; it is transformed
-by their product if A contains more than one angle.
+Positions, motions and forces come from the kernels of engine/tree/recursion, which are called with terms (tracing.py).
+Only what flexible bodies and their markers do is written here anew (elastic.py), because it needs fewer products
+without tables and without branches.
 
-With the second moment P = ∫ c cᵀ dm and U = alpha~ + omega~ omega~, all points of a body have c_ddot = U c. Its force
-and moment are
-
-    f = m a + U s,    t = s × a + the axial vector of U P - (U P)ᵀ
-
-These need fewer products than J alpha + omega × J omega.
+A node of the engine turns by A E, where A mostly only exchanges axes. Terms go through A and E in two nodes, of which
+the first is fixed and carries nothing, and through a marker that moves with modes in a node before them; they go
+through A E in one node if A contains more than one angle.
 """
 
-from collections.abc import Sequence
+from collections import defaultdict
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
 from floatframe.design.generation.elastic import MarkerPlace, MarkerRates, ModalForces, ModalMoments, cross
-from floatframe.design.generation.graph import Graph, Scalar, Terms, terms
+from floatframe.design.generation.graph import Scalar, Terms, terms
 from floatframe.design.generation.links import Link, TreeTerms
-from floatframe.engine.tree.recursion.nodes import ROTATION, SCREW, TRANSLATION
+from floatframe.design.generation.tracing import Traced
+from floatframe.engine.kernels.records import zeros
+from floatframe.engine.tree.recursion import entry, newton_euler
+from floatframe.engine.tree.recursion.nodes import FIXED, ROTATION, SCREW, NodeWork
 
-__all__ = ["Joint", "forward_dynamics", "inverse_dynamics", "joints_of", "mass_matrix", "solved"]
-
+__all__ = ["Recursion", "forward_dynamics", "inverse_dynamics", "mass_matrix", "shifted_moments", "turned_moment"]
 
 DENSE = 6  #: largest number of products of two matrices that are applied one after the other
-
-
-def is_vanishing(values: Terms) -> bool:
-    """Return whether all values are zero."""
-    return all(value.is_constant(0.0) for value in values.ravel())
 
 
 def n_products(R: Terms) -> int:
@@ -37,189 +34,158 @@ def n_products(R: Terms) -> int:
     return sum(not any(value.is_constant(whole) for whole in (0.0, 1.0, -1.0)) for value in R.ravel())
 
 
-class Joint:
-    """The position of a joint: A, E, (3, 3), d, (3,), and its motion S per rate in the outer frame.
+def divided(tree: TreeTerms, is_divided: bool) -> tuple[list[Link], list[int]]:
+    """Return the nodes of a tree divided for terms, and the last one of each node before."""
+    graph, one, zero = tree.graph, terms(tree.graph, np.eye(3)), terms(tree.graph, np.zeros(3))
+    links: list[Link] = []
+    last: list[int] = []
+    for link in tree.links:
+        parent = -1 if link.parent < 0 else last[link.parent]
+        fixed = replace(
+            link, kind=FIXED, n_z=0, mass=graph.zero, s=zero, P=terms(graph, np.zeros((3, 3))), modes=None,
+            own=None,
+        )  # fmt: skip
+        if link.above is not None:
+            links.append(replace(fixed, parent=parent, A=one))
+            parent, fixed = len(links) - 1, replace(fixed, above=None)
+        turns = link.kind == ROTATION or (link.kind == SCREW and link.slide.is_constant(0.0))
+        if is_divided or parent < 0 or not turns or n_products(link.A) <= DENSE:
+            links.append(replace(fixed, parent=parent))
+            link, parent = replace(link, A=one, r=zero), len(links) - 1
+        last.append(len(links))
+        links.append(replace(link, parent=parent, above=None))
+    return links, last
 
-    The frame of a round link stays with the inner one. Where asked (is_whole), A that is not sparse is one with E, and
-    an identity beside it: for many vectors that go through both.
+
+class Recursion:
+    """The nodes of a tree at its positions, and its motions and forces.
+
+    is_divided: whether vectors always go through A and E one after the other, because few of them do.
     """
 
-    def __init__(self, tree: TreeTerms, link: Link, is_whole: bool) -> None:
-        graph = tree.graph
-        self.E, self.d = terms(graph, np.eye(3)), terms(graph, np.zeros(3))
-        x = tree.x[link.x0 :]
-        if link.kind == SCREW:
-            if not link.is_round:
-                angle = link.turn * x[0]
-                c, s = graph.cos(angle), graph.sin(angle)
-                self.E = terms(graph, [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-            self.d = terms(graph, [0.0, 0.0, link.slide * x[0]])
-        elif link.kind == ROTATION:
-            self.E = rotation_of(graph, x[:4])
-            if link.is_near:
-                self.E = self.E.T
-        elif link.kind == TRANSLATION:
-            self.d = link.slide * x[:3]
-        self.columns = joint_columns(graph, link, self.E)
-        self.A = link.A
-        if is_whole and link.n_z and is_vanishing(self.d) and n_products(link.A) > DENSE:
-            self.A, self.E = terms(graph, np.eye(3)), link.A @ self.E
-        #: where the markers at the joint stand in the parent and in the body, moments of that as it is deformed
-        self.above = None if link.above is None else MarkerPlace(graph, link.above, tree.x)
-        self.own = None if link.own is None else MarkerPlace(graph, link.own, tree.x)
-        self.moments = None if link.modes is None else ModalMoments.of(graph, link.modes, tree.x)
-        self.s, self.P = link.s, link.P
-        if self.moments is not None:
-            self.s, self.P = link.s + self.moments.s, link.P + self.moments.second
+    def __init__(self, tree: TreeTerms, *, is_divided: bool = False) -> None:
+        graph = self.graph = tree.graph
+        self.tree = tree
+        self.links, self.last = links, _ = divided(tree, is_divided)
+        self.x, self.places, self.moments = tree.x.copy(), {}, {}
+        sizes = [0 if link.modes is None else 6 + link.modes.n for link in links]
+        n, fields = len(links), "parent kind is_near n_z x0 v0 slide turn A r mass s P".split()
+        self.nodes = SimpleNamespace(
+            **{name: np.array([getattr(link, name) for link in links]) for name in fields}, F=self.ones(),
+            body=np.arange(n), n_q=np.maximum(np.array(sizes) - 6, 0), u0=np.cumsum([0, *sizes]),
+            vq=[link.modes.v0 if link.modes else 0 for link in links], above=np.full(n, -1), own=np.full(n, -1),
+        )  # fmt: skip
+        for k, link in enumerate(links):
+            if link.is_round and link.slide.is_constant(0.0):
+                self.x[link.x0] = graph.zero  # no force depends on this angle
+            for m, marker, of in ((2 * k, link.above, self.nodes.above), (2 * k + 1, link.own, self.nodes.own)):
+                if marker is not None:
+                    of[k], self.places[m] = m, MarkerPlace(graph, marker, tree.x)
+            if link.modes is not None:
+                self.moments[k] = found = ModalMoments.of(graph, link.modes, tree.x)
+                self.nodes.s[k], self.nodes.P[k] = link.s + found.s, link.P + found.second
+        self.call = Traced(graph, {name: getattr(self, name) for name in (
+            "own_marker", "marker_acceleration", "add_modal_forces", "flexible_wrench",
+            "matrix_of_euler_parameters")})  # fmt: skip
+        rest = self.zeros(len(tree.v))
+        self.placed = self.arguments(rest, rest, tree.gravity)
+        self.call(entry.place_in_parent)(*self.placed)
+
+    def zeros(self, *shape: int) -> Terms:
+        """Return an array of zeros."""
+        return np.full(shape, self.graph.zero, dtype=object)
+
+    def ones(self) -> Any:
+        """Return an identity for each node."""
+        return terms(self.graph, np.tile(np.eye(3), (len(self.links), 1, 1)))
+
+    def arguments(self, v: Terms, a: Terms, gravity: Terms) -> tuple[Any, Any, None, Any]:
+        """Return arguments of kernels: nodes and working arrays."""
+        sizes = defaultdict(int, {"nodes": len(self.links), "rates": len(v)})
+        arrays: Any = (self.zeros(*each.shape) for each in zeros(NodeWork(), sizes))
+        given: Any = {"x": self.x, "v": v, "a": a, "gravity": gravity}
+        work = NodeWork(*arrays)._replace(A=self.nodes.A.copy(), rho=self.nodes.r.copy(), R_own=self.ones(), **given)
+        fields = "rho", "rho_dot", "spin", "rho_ddot", "nu_dot"
+        markers = {name: self.zeros(2 * len(self.links), 3) for name in fields}
+        for m, place in self.places.items():
+            markers["rho"][m] = place.rho
+        bodies = SimpleNamespace(residual=self.zeros(self.nodes.u0[-1]))
+        return self.nodes, work, None, SimpleNamespace(markers=SimpleNamespace(**markers), bodies=bodies)
+
+    def motion(self, v: Terms, a: Terms, gravity: Terms) -> tuple[Any, Any, None, Any]:
+        """Return arguments of kernels for a motion of the placed nodes, with that of the markers."""
+        nodes, work, _, marker_work = self.at_rest(v, a, gravity)
+        for m, place in self.places.items():
+            rates, markers = MarkerRates(place, v, a), marker_work.markers
+            markers.rho_dot[m], markers.spin[m] = rates.d_dot, rates.nu
+            markers.rho_ddot[m], markers.nu_dot[m] = rates.d_ddot, rates.nu_dot
+        return nodes, work, None, marker_work
+
+    def at_rest(self, v: Terms, a: Terms, gravity: Terms) -> tuple[Any, Any, None, Any]:
+        """Return arguments of kernels for a motion of the placed nodes, without that of the markers."""
+        nodes, work, _, marker_work = self.arguments(v, a, gravity)
+        placed = {name: getattr(self.placed[1], name) for name in ("A", "rho", "R", "p", "R_own")}
+        return nodes, work._replace(**placed), None, marker_work
+
+    def moved_by(self, rate: int, k: int) -> Any:
+        """Return the working arrays after node k alone has moved, by a unit acceleration of one of its rates."""
+        a = self.zeros(len(self.tree.v))
+        a[rate] = self.graph.one
+        made = self.at_rest(self.zeros(len(a)), a, self.zeros(3))
+        self.call(newton_euler.move_node)(*made, k)
+        return made[1]
+
+    def forces_of(self, k: int, wrench: tuple[Terms, Terms]) -> Terms:
+        """Return the forces along all rates for a wrench that node k alone needs."""
+        rest = self.zeros(len(self.tree.v))
+        made = self.at_rest(rest, rest, self.zeros(3))
+        made[1].f[k], made[1].t[k] = wrench
+        while k >= 0:
+            self.call(newton_euler.pass_to_parent)(*made, k)
+            k = self.links[k].parent
+        return made[1].force
+
+    # kernels that are replaced
+
+    def matrix_of_euler_parameters(self, p: Terms) -> Terms:
+        """Return the rotation matrix of Euler parameters of length one."""
+        w, x, y, z = p[:4]
+        X, Y, Z = 2.0 * x, 2.0 * y, 2.0 * z
+        return terms(self.graph, [
+            [1.0 - (Y * y + Z * z), X * y - Z * w, X * z + Y * w],
+            [X * y + Z * w, 1.0 - (X * x + Z * z), Y * z - X * w],
+            [X * z - Y * w, Y * z + X * w, 1.0 - (X * x + Y * y)],
+        ])  # fmt: skip
+
+    def own_marker(self, model: None, marker_work: Any, m: int) -> Terms:
+        """Return the rotation of a marker."""
+        return self.places[m].E
+
+    def marker_acceleration(self, model: None, marker_work: Any, m: int) -> tuple[Terms, Terms]:
+        """Return rho_ddot and nu_dot of a marker."""
+        return marker_work.markers.rho_ddot[m], marker_work.markers.nu_dot[m]
+
+    def add_modal_forces(
+        self, model: None, marker_work: Any, m: int, f: Terms, t: Terms, sign: float, out: Terms
+    ) -> None:  # fmt: skip
+        """Add sign times the modal forces of a wrench on a marker."""
+        out += sign * self.places[m].modal_forces(np.array(f), np.array(t))
+
+    def flexible_wrench(self, nodes: Any, work: Any, model: None, marker_work: Any, k: int) -> tuple[Terms, Terms]:
+        """Return force and moment of a flexible body, and write its modal forces."""
+        modes, u0 = self.links[k].modes, nodes.u0[k] + 6
+        assert modes is not None
+        forces = ModalForces(modes, self.moments[k], work.x, work.v, work.a)
+        (f, t), (f_q, t_q) = self.call(newton_euler.rigid_wrench)(nodes, work, k), forces.wrench(work.omega[k])
+        marker_work.bodies.residual[u0 : u0 + modes.n] = forces.modal(work.acc[k], work.omega[k], work.U_spin[k])
+        return f + f_q, t + t_q
 
 
-def rotation_of(graph: Graph, p: Terms) -> Terms:
-    """Return the rotation matrix of Euler parameters with length one."""
-    w, x, y, z = p
-    X, Y, Z = 2.0 * x, 2.0 * y, 2.0 * z
-    return terms(graph, [
-        [1.0 - (Y * y + Z * z), X * y - Z * w, X * z + Y * w],
-        [X * y + Z * w, 1.0 - (X * x + Z * z), Y * z - X * w],
-        [X * z - Y * w, Y * z + X * w, 1.0 - (X * x + Y * y)],
-    ])  # fmt: skip
-
-
-def joint_columns(graph: Graph, link: Link, E: Terms) -> Terms:
-    """Return the motion (translation, rotation) of the outer frame per rate, in its axes, (n_z, 6)."""
-    columns = terms(graph, np.zeros((link.n_z, 6)))
-    if link.kind == SCREW:
-        columns[0, 2], columns[0, 5] = link.slide, link.turn
-    elif link.kind == TRANSLATION:
-        columns[:, :3] = terms(graph, np.eye(3)) * link.slide
-    elif link.kind == ROTATION:
-        columns[:, 3:] = -E if link.is_near else terms(graph, np.eye(3))
-    return columns
-
-
-def joints_of(tree: TreeTerms, *, is_whole: bool = True) -> list[Joint]:
-    """Return where all joints stand; is_whole: through which many vectors go."""
-    return [Joint(tree, link, is_whole) for link in tree.links]
-
-
-def spin_terms(omega: Terms, alpha: Terms) -> Terms:
-    """Return U = alpha~ + omega~ omega~, (3, 3)."""
-    x, y, z = omega
-    xx, yy, zz, xy, xz, yz = x * x, y * y, z * z, x * y, x * z, y * z
-    return np.array([
-        [-(yy + zz), xy - alpha[2], xz + alpha[1]],
-        [xy + alpha[2], -(xx + zz), yz - alpha[0]],
-        [xz - alpha[1], yz + alpha[0], -(xx + yy)],
-    ], dtype=object)  # fmt: skip
-
-
-def axial_of_product(U: Terms, P: Terms) -> Terms:
-    """Return the axial vector of U P - (U P)ᵀ for a symmetric P, (3,)."""
-    t = []
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        t.append(P[i, j] * U[k, i] - P[i, k] * U[j, i] + P[j, k] * (U[k, k] - U[j, j]) + P[j, j] * U[k, j]
-                 - P[k, k] * U[j, k])  # fmt: skip
-    return np.array(t, dtype=object)
-
-
-def motion_through(link: Link, joint: Joint, v: Terms, a: Terms, omega: Terms, alpha: Terms, acc: Terms) -> tuple:
-    """Return omega, alpha, a of the outer frame of a joint from those of the inner frame at the same point."""
-    E = joint.E.T
-    acc = acc + spin_terms(omega, alpha) @ joint.d
-    omega, alpha, acc = E @ omega, E @ alpha, E @ acc
-    S = joint.columns
-    if not link.n_z:
-        return omega, alpha, acc
-    rate, second = v[link.v0 : link.v0 + link.n_z], a[link.v0 : link.v0 + link.n_z]
-    slid, turned = rate @ S[:, :3], rate @ S[:, 3:]
-    acc = acc + 2.0 * cross(omega, slid) + second @ S[:, :3]
-    alpha = alpha + cross(omega, turned) + second @ S[:, 3:]
-    return omega + turned, alpha, acc
-
-
-def inverse_dynamics(tree: TreeTerms, v: Terms, a: Terms, joints: Sequence[Joint]) -> Terms:
-    """Return the forces along all rates for a motion, (n,), by recursive Newton-Euler (docs/recursive.md §2).
-
-    (1) forward   omega, alpha and a minus gravity of each node, from A, r, d, E
-    (2) body      f = m a + U s, t = s × a + axial(U P)
-    (3) backward  the wrench is projected on the rates of the joint, and transferred to the parent
-    """
-    n, zero = len(tree.links), terms(tree.graph, np.zeros(3))
-    base = (zero, zero, -tree.gravity, spin_terms(zero, zero))
-    motions: list[tuple] = []
-    f, t = [zero] * n, [zero] * n
-    force = np.full(len(v), tree.graph.zero, dtype=object)
-    for k, (link, joint) in enumerate(zip(tree.links, joints, strict=True)):
-        motion = inner_motion(link, joint, v, a, base if link.parent < 0 else motions[link.parent])
-        motion = motion_through(link, joint, v, a, *motion)
-        if joint.own is not None:
-            motion = motion_of_body(joint.own, MarkerRates(joint.own, v, a), *motion)
-        omega, alpha, acc = motion
-        U = spin_terms(omega, alpha)
-        motions.append((omega, alpha, acc, U))
-        if link.has_moments or link.modes is not None:
-            f[k] = link.mass * acc + U @ joint.s
-            t[k] = cross(joint.s, acc) + axial_of_product(U, joint.P)
-        if link.modes is not None and joint.moments is not None:
-            forces = ModalForces(link.modes, joint.moments, tree.x, v, a)
-            f_q, t_q = forces.wrench(omega)
-            f[k], t[k] = f[k] + f_q, t[k] + t_q
-            force[link.modes.rates] = forces.modal(acc, omega, U)
-    for k in range(n - 1, -1, -1):
-        link, joint = tree.links[k], joints[k]
-        f_Q, t_Q = along_joint(link, joint, f[k], t[k], force)
-        if link.parent >= 0:
-            f_P, t_P = to_parent(link, joint, f_Q, t_Q, force)
-            f[link.parent], t[link.parent] = f[link.parent] + f_P, t[link.parent] + t_P
-    return force
-
-
-def inner_motion(link: Link, joint: Joint, v: Terms, a: Terms, above: tuple) -> tuple[Terms, Terms, Terms]:
-    """Return omega, alpha, a of the inner frame of a joint from those of the parent, and its U."""
-    (omega, alpha, acc, U), A = above, joint.A.T
-    if joint.above is None:
-        return A @ omega, A @ alpha, A @ (acc + U @ link.r)
-    place, rates = joint.above, MarkerRates(joint.above, v, a)
-    acc = acc + U @ place.rho + 2.0 * cross(omega, rates.d_dot) + rates.d_ddot
-    alpha = alpha + cross(omega, rates.nu) + rates.nu_dot
-    E = place.E.T
-    return A @ (E @ (omega + rates.nu)), A @ (E @ alpha), A @ (E @ acc)
-
-
-def motion_of_body(
-    place: MarkerPlace, rates: MarkerRates, omega: Terms, alpha: Terms, acc: Terms
-) -> tuple[Terms, Terms, Terms]:
-    """Return omega, alpha, a of a flexible body from those of its marker at the joint, in the axes of the marker."""
-    omega, alpha, acc = place.E @ omega - rates.nu, place.E @ alpha - rates.nu_dot, place.E @ acc
-    alpha = alpha - cross(omega, rates.nu)
-    acc = acc - (spin_terms(omega, alpha) @ place.d + 2.0 * cross(omega, rates.d_dot) + rates.d_ddot)
-    return omega, alpha, acc
-
-
-def along_joint(link: Link, joint: Joint, f: Terms, t: Terms, force: Terms) -> tuple[Terms, Terms]:
-    """Add the forces of a wrench (node frame) along the rates of the joint; return the wrench in the outer frame.
-
-    The wrench also acts on the modes of the body, through the marker at the joint.
-    """
-    if joint.own is not None:
-        own = joint.own
-        t = t - cross(own.d, f)
-        force[own.rates] = force[own.rates] - own.modal_forces(f, t)
-        f, t = own.E.T @ f, own.E.T @ t
-    for j in range(link.n_z):
-        force[link.v0 + j] = joint.columns[j, :3] @ f + joint.columns[j, 3:] @ t
-    return f, t
-
-
-def to_parent(link: Link, joint: Joint, f: Terms, t: Terms, force: Terms) -> tuple[Terms, Terms]:
-    """Return a wrench (outer frame of a joint) in the parent, and add its modal forces on the parent."""
-    f, t = joint.E @ f, joint.E @ t
-    f, t = joint.A @ f, joint.A @ (t + cross(joint.d, f))
-    if joint.above is None:
-        return f, t + cross(link.r, f)
-    above = joint.above
-    f, t = above.E @ f, above.E @ t
-    force[above.rates] = force[above.rates] + above.modal_forces(f, t)
-    return f, t + cross(above.rho, f)
+def inverse_dynamics(recursion: Recursion, v: Terms, a: Terms) -> Terms:
+    """Return the forces along all rates for a motion, (n,), by recursive Newton-Euler (docs/recursive.md §2)."""
+    made = recursion.motion(v, a, recursion.tree.gravity)
+    recursion.call(newton_euler.newton_euler)(*made)
+    return made[1].force
 
 
 def turned_moment(R: Terms, P: Terms) -> Terms:
@@ -242,57 +208,47 @@ def shifted_moments(m: Scalar, s: Terms, P: Terms, r: Terms) -> tuple[Terms, Ter
     return s_r, out
 
 
-def mass_matrix(tree: TreeTerms, joints: Sequence[Joint]) -> Terms:
+def mass_matrix(recursion: Recursion) -> Terms:
     """Return the mass matrix, (n, n), by composite bodies (docs/recursive.md §3), in node frames.
 
     (1) m, s, P of each subtree; for a flexible body also the wrench of each mode and the modal mass matrix of the
         subtree
-    (2) the wrench of each rate, f = m v + w × s, t = s × v + (tr P) w - P w, projected on the rates of its node
-    (3) the same wrench, projected on the rates of all nodes above
+    (2) the wrench of each rate, f = m a + alpha × s, t = s × a + (tr P) alpha - P alpha, where the kernel moves the
+        node by the rate alone
+    (3) the forces of that wrench along the rates of the node and all above, by the kernel that passes it on
     """
-    links, n = tree.links, len(tree.v)
-    bodies = [Composite(link, joint) for link, joint in zip(links, joints, strict=True)]
-    M = np.full((n, n), tree.graph.zero, dtype=object)
+    links, n = recursion.links, len(recursion.tree.v)
+    bodies = [Composite(recursion, k) for k in range(len(links))]
+    M = recursion.zeros(n, n)
     for k in range(len(links) - 1, -1, -1):
-        link, joint, body = links[k], joints[k], bodies[k]
-        rows = [(link.v0 + j, body.wrench(*motion_of_rate(joint, j))) for j in range(link.n_z)]
+        link, body, modes, rows = links[k], bodies[k], links[k].modes, []
+        for row in range(link.v0, link.v0 + link.n_z):
+            work = recursion.moved_by(row, k)
+            rows.append((row, body.wrench(work.acc[k], work.alpha[k])))
         held = range(0)
-        if link.modes is not None:
-            held = range(link.modes.v0, link.modes.v0 + link.modes.n)
-            M[link.modes.rates, link.modes.rates], wrenches = body.modal_block(joint)
+        if modes is not None:
+            held = range(modes.v0, modes.v0 + modes.n)
+            M[modes.rates, modes.rates], wrenches = body.modal_block(recursion.places.get(2 * k + 1))
             rows += zip(held, wrenches, strict=True)
-        for row, (f, t) in rows:
-            force, at = np.full(n, tree.graph.zero, dtype=object), k
-            while at >= 0:
-                f, t = along_joint(links[at], joints[at], f, t, force)
-                if links[at].parent >= 0:
-                    f, t = to_parent(links[at], joints[at], f, t, force)
-                at = links[at].parent
+        for row, wrench in rows:
+            force = recursion.forces_of(k, wrench)
             for column in range(n):
                 if column not in held and M[row, column].is_constant(0.0):
                     M[row, column] = M[column, row] = force[column]
         if link.parent >= 0:
-            bodies[link.parent].carry(link, joint, body)
+            bodies[link.parent].carry(recursion, k, body)
     return M
-
-
-def motion_of_rate(joint: Joint, j: int) -> tuple[Terms, Terms]:
-    """Return the translation and rotation of the frame of a node per rate j of its joint."""
-    v, w = joint.columns[j, :3], joint.columns[j, 3:]
-    if joint.own is None:
-        return v, w
-    w = joint.own.E @ w
-    return joint.own.E @ v - cross(w, joint.own.d), w
 
 
 class Composite:
     """Mass, first and second moment of a subtree in the node frame; for a flexible body also those of its modes."""
 
-    def __init__(self, link: Link, joint: Joint) -> None:
-        self.m, self.s, self.P = link.mass, joint.s, joint.P
-        if link.modes is not None and joint.moments is not None:
-            self.H = link.modes.M  #: by modes, the frame held, (n, n)
-            self.f, self.t = joint.moments.first, joint.moments.B  #: wrench by each, (n, 3)
+    def __init__(self, recursion: Recursion, k: int) -> None:
+        nodes, modes = recursion.nodes, recursion.links[k].modes
+        self.m, self.s, self.P = nodes.mass[k], nodes.s[k], nodes.P[k]
+        if modes is not None:
+            self.H = modes.M  #: by modes, the frame held, (n, n)
+            self.f, self.t = recursion.moments[k].first, recursion.moments[k].B  #: wrench by each, (n, 3)
 
     def wrench(self, v: Terms, w: Terms) -> tuple[Terms, Terms]:
         """Return the wrench of an acceleration."""
@@ -300,12 +256,12 @@ class Composite:
         t = cross(self.s, v) + (P[0, 0] + P[1, 1] + P[2, 2]) * w - P @ w
         return self.m * v + cross(w, self.s), t
 
-    def modal_block(self, joint: Joint) -> tuple[Terms, list[tuple[Terms, Terms]]]:
-        """Return the modal mass matrix with the joint fixed, and the wrench of each mode."""
-        if joint.own is None:
+    def modal_block(self, own: MarkerPlace | None) -> tuple[Terms, list[tuple[Terms, Terms]]]:
+        """Return the modal mass matrix with the joint fixed at the marker, and the wrench of each mode."""
+        if own is None:
             return self.H, list(zip(self.f, self.t, strict=True))
-        shift, turn = joint.own.columns()
-        back = [(cross(w, joint.own.d) - v, -w) for v, w in zip(shift, turn, strict=True)]
+        shift, turn = own.columns()
+        back = [(cross(w, own.d) - v, -w) for v, w in zip(shift, turn, strict=True)]
         wrenches = []
         for (v, w), f, t in zip(back, self.f, self.t, strict=True):
             f_own, t_own = self.wrench(v, w)
@@ -316,18 +272,17 @@ class Composite:
                 H[i, j] = H[j, i] = H[i, j] + v @ f + w @ t + back[i][0] @ self.f[j] + back[i][1] @ self.t[j]
         return H, wrenches
 
-    def carry(self, link: Link, joint: Joint, body: "Composite") -> None:
-        """Add the subtree of a child."""
+    def carry(self, recursion: Recursion, k: int, body: "Composite") -> None:
+        """Add the subtree of child k."""
+        nodes, (_, work, _, marker_work) = recursion.nodes, recursion.placed
         m, s, P = body.m, body.s, body.P
-        if joint.own is not None:
-            s, P = shifted_moments(m, s, P, -joint.own.d)
-            s, P = joint.own.E.T @ s, turned_moment(joint.own.E.T, P)
-        s, P = shifted_moments(m, joint.E @ s, turned_moment(joint.E, P), joint.d)
-        s, P, r = joint.A @ s, turned_moment(joint.A, P), link.r
-        if joint.above is not None:
-            s, P, r = joint.above.E @ s, turned_moment(joint.above.E, P), joint.above.rho
-            self.carry_on_modes(joint.above, m, s, P)
-        s, P = shifted_moments(m, s, P, r)
+        if nodes.own[k] >= 0:
+            s, P = shifted_moments(m, s, P, -marker_work.markers.rho[nodes.own[k]])
+            s, P = work.R_own[k].T @ s, turned_moment(work.R_own[k].T, P)
+        s, P = work.R[k] @ s, turned_moment(work.R[k], P)
+        if nodes.above[k] >= 0:
+            self.carry_on_modes(recursion.places[nodes.above[k]], m, s, P)
+        s, P = shifted_moments(m, s, P, work.p[k])
         self.m, self.s, self.P = self.m + m, self.s + s, self.P + P
 
     def carry_on_modes(self, place: MarkerPlace, m: Scalar, s: Terms, P: Terms) -> None:
@@ -372,8 +327,8 @@ def solved(tree: TreeTerms, M: Terms, right: Terms) -> Terms:
     return y
 
 
-def forward_dynamics(tree: TreeTerms, force: Terms, joints: Sequence[Joint]) -> Terms:
+def forward_dynamics(recursion: Recursion, force: Terms) -> Terms:
     """Return the accelerations under forces along the rates, (n,)."""
-    rest = np.full(len(tree.v), tree.graph.zero, dtype=object)
-    h = inverse_dynamics(tree, tree.v, rest, joints)
-    return solved(tree, mass_matrix(tree, joints), force - h)
+    tree = recursion.tree
+    h = inverse_dynamics(recursion, tree.v, recursion.zeros(len(tree.v)))
+    return solved(tree, mass_matrix(recursion), force - h)

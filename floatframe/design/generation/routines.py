@@ -29,15 +29,15 @@ from floatframe.design.generation.joint_forces import spring_forces
 from floatframe.design.generation.links import ROUNDING, Frame, Link, TreeTerms, symbols_of, without_rounding
 from floatframe.design.generation.modes import ElasticMarker
 from floatframe.design.generation.recursions import (
-    Joint,
+    Recursion,
     forward_dynamics,
     inverse_dynamics,
-    joints_of,
     mass_matrix,
     shifted_moments,
     turned_moment,
 )
 from floatframe.design.generation.rotation_series import expanded
+from floatframe.engine.tree.recursion import newton_euler
 from floatframe.engine.tree.recursion.nodes import FIXED, ROTATION, SCREW
 
 __all__ = [
@@ -167,49 +167,50 @@ def force_output(name: str, values: Terms) -> Output:
     return Output(name, values, "forces along the rates [N, N m]")
 
 
-def needed_forces(tree: TreeTerms, joints: Sequence[Joint]) -> Terms:
+def needed_forces(recursion: Recursion) -> Terms:
     """Return the forces along the rates for a motion, without those of springs and dampers, (n,)."""
-    return np.asarray(inverse_dynamics(tree, tree.v, tree.a, joints) - spring_forces(tree))
+    tree = recursion.tree
+    return np.asarray(inverse_dynamics(recursion, tree.v, tree.a) - spring_forces(tree))
 
 
 def inverse(tree: TreeTerms) -> list[Output]:
     """Return the forces for a motion."""
-    return [force_output("force", needed_forces(tree, joints_of(tree)))]
+    return [force_output("force", needed_forces(Recursion(tree)))]
 
 
 def residual(tree: TreeTerms) -> list[Output]:
     """Return the residual of the equations of motion."""
     given = symbols_of(tree.graph, "force", len(tree.v))
-    force = needed_forces(tree, joints_of(tree))
+    force = needed_forces(Recursion(tree))
     return [Output("residual", force - given, "M z_ddot + h - force [N, N m]")]
 
 
 def mass(tree: TreeTerms) -> list[Output]:
     """Return the mass matrix."""
-    return [Output("mass_matrix", mass_matrix(tree, joints_of(tree)), "M, symmetric [kg, kg m, kg m2]")]
+    return [Output("mass_matrix", mass_matrix(Recursion(tree)), "M, symmetric [kg, kg m, kg m2]")]
 
 
 def forward(tree: TreeTerms) -> list[Output]:
     """Return the accelerations under forces."""
     given = symbols_of(tree.graph, "force", len(tree.v))
-    acceleration = forward_dynamics(tree, given + spring_forces(tree), joints_of(tree))
+    acceleration = forward_dynamics(Recursion(tree), given + spring_forces(tree))
     return [Output("acceleration", acceleration, "z_ddot [m/s2, rad/s2]")]
 
 
 def derivatives(tree: TreeTerms) -> list[Output]:
     """Return the derivatives, by the motion, of the forces for a motion."""
-    joints = joints_of(tree)
-    force = needed_forces(tree, joints)
+    recursion = Recursion(tree)
+    force = needed_forces(recursion)
     return [
         Output("by_z", jacobian(tree.graph, force, position_seeds(tree)), "force by z along the rates"),
         Output("by_z_dot", jacobian(tree.graph, force, seeds_of(tree.graph, list(tree.v))), "force by z_dot"),
-        Output("by_z_ddot", mass_matrix(tree, joints), "force by z_ddot: the mass matrix"),
+        Output("by_z_ddot", mass_matrix(recursion), "force by z_ddot: the mass matrix"),
     ]
 
 
 def sensitivity(tree: TreeTerms) -> list[Output]:
     """Return the derivatives, by parameters, of the forces for a motion."""
-    force = needed_forces(tree, joints_of(tree))
+    force = needed_forces(Recursion(tree))
     by = jacobian(tree.graph, force, seeds_of(tree.graph, tree.parameters))
     return [Output("by_parameters", by, "force by parameters, (rates, parameters)")]
 
@@ -225,37 +226,29 @@ def carried(graph: Graph, tree: TreeTerms, motion: Motion, marker: ElasticMarker
     return r + p, R @ place.E, v + cross(omega, p) + R @ rates.d_dot, omega + R @ rates.nu
 
 
-def taken_back(motion: Motion, place: MarkerPlace, rates: MarkerRates) -> Motion:
-    """Return the motion of a flexible body from the motion of its marker at the joint."""
-    r, R, v, omega = motion
-    R = R @ place.E.T
-    p, omega = R @ place.d, omega - R @ rates.nu
-    return r - p, R, v - cross(omega, p) - R @ rates.d_dot, omega
-
-
-def placed_nodes(tree: TreeTerms, joints: Sequence[Joint]) -> list[Motion]:
+def placed_nodes(recursion: Recursion) -> list[Motion]:
     """Return the motions of all node frames."""
-    graph, zero = tree.graph, terms(tree.graph, np.zeros(3))
-    placed: list[Motion] = []
-    for link, joint in zip(tree.links, joints, strict=True):
-        motion = (zero, terms(graph, np.eye(3)), zero, zero) if link.parent < 0 else placed[link.parent]
-        place = link.r
-        if link.above is not None:
-            motion, place = carried(graph, tree, motion, link.above), zero
-        r, R, v, omega = motion
-        R_in = R @ joint.A
-        p = R @ place + R_in @ joint.d
-        R = R_in @ joint.E
-        v = v + cross(omega, p)
-        if link.n_z:
-            rate = tree.v[link.v0 : link.v0 + link.n_z]
-            v, omega = v + R @ (rate @ joint.columns[:, :3]), omega + R @ (rate @ joint.columns[:, 3:])
-        motion = r + p, R, v, omega
-        if joint.own is not None:
-            rest = np.full(len(tree.v), graph.zero, dtype=object)
-            motion = taken_back(motion, joint.own, MarkerRates(joint.own, tree.v, rest))
-        placed.append(motion)
-    return placed
+    tree, zero = recursion.tree, recursion.zeros(3)
+    nodes, work, _, marker_work = recursion.motion(tree.v, recursion.zeros(len(tree.v)), zero)
+    markers, started = marker_work.markers, recursion.at_rest(recursion.zeros(len(tree.v)), tree.v, zero)[1]
+    ground = zero, terms(tree.graph, np.eye(3)), zero, zero
+    placed: list[tuple[Motion, Terms]] = []  # with the arm from the point that moves so to the origin of the node
+    for k, link in enumerate(recursion.links):
+        (r, R, v, omega), arm = placed[link.parent] if link.parent >= 0 else (ground, zero)
+        arm, m = arm + R @ work.p[k], nodes.above[k]
+        if m >= 0 or k in recursion.last:
+            r, v, arm = r + arm, v + cross(omega, arm), zero
+        if m >= 0:
+            v, omega = v + R @ markers.rho_dot[m], omega + R @ markers.spin[m]
+        R, m = R @ work.R[k], nodes.own[k]
+        _, turned, slid = recursion.call(newton_euler.joint_motion)(nodes, started, k, zero, zero, zero)
+        v, omega = v + R @ slid, omega + R @ turned
+        if m >= 0:
+            R = R @ work.R_own[k].T
+            p, omega = R @ markers.rho[m], omega - R @ markers.spin[m]
+            r, v = r - p, v - cross(omega, p) - R @ markers.rho_dot[m]
+        placed.append(((r, R, v, omega), arm))
+    return [placed[k][0] for k in recursion.last]
 
 
 def placed_frame(tree: TreeTerms, frame: Frame, placed: Sequence[Motion]) -> Motion:
@@ -270,7 +263,7 @@ def placed_frame(tree: TreeTerms, frame: Frame, placed: Sequence[Motion]) -> Mot
 
 def kinematics(tree: TreeTerms) -> list[Output]:
     """Return positions, axes and velocities of the frames of all bodies, in ground axes."""
-    placed = placed_nodes(tree, joints_of(tree, is_whole=False))
+    placed = placed_nodes(Recursion(tree, is_divided=True))
     meanings = {
         "position": "origins of the body frames, (bodies, 3) [m]",
         "axes": "R_GB of the bodies, (bodies, 3, 3)",

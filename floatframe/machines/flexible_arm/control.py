@@ -15,7 +15,7 @@ import numpy as np
 
 from floatframe.design.generation.graph import ADD, CONSTANT, COS, DIV, MUL, NEG, SIN, SUB, SYMBOL, Scalar, Terms, terms
 from floatframe.design.generation.links import tree_terms
-from floatframe.design.generation.recursions import inverse_dynamics, joints_of
+from floatframe.design.generation.recursions import Recursion, inverse_dynamics
 from floatframe.engine.tree.recursive import relative_model
 from floatframe.errors import ModelError
 from floatframe.machines.flexible_arm.collocation import OptimalMove
@@ -66,7 +66,7 @@ def rigid_torques(rigid: System, accelerations: Mapping[str, str], *, is_turning
     names: dict[str, str] = {}
     for k, joint in enumerate(joints):
         names |= {f"z[{k}]": joint, f"z_dot[{k}]": f"{joint}_dot", f"z_ddot[{k}]": f"({accelerations[joint]})"}
-    force = inverse_dynamics(tree, rates, tree.a, joints_of(tree))
+    force = inverse_dynamics(Recursion(tree), rates, tree.a)
     return {joint: expression(term, names) for joint, term in zip(joints, force, strict=True)}
 
 

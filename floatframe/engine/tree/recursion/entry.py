@@ -51,12 +51,12 @@ __all__ = [
 
 
 # poses of nodes in their parents and in the ground (docs/recursive.md §1) --------------------------------
-# The frame of a node in that of its parent is R, p: of a rigid body, joined to a rigid one,
+# The outer frame of a joint in the frame of the parent is R, p, and that of a rigid body; of one joined to a rigid one,
 #
 #     R = A E,  p = r + A d        with A, r of the joint in the parent and E, d of the joint alone
 #
-# An elastic parent moves A and r with its modes: A = exp(th) A, r = rho; an elastic body lies in the outer frame of its
-# joint by its own marker, axes R_own = exp(th) F at rho: R = A E R_ownᵀ, p = r + A d - R rho.
+# An elastic parent moves A and r with its modes: A = exp(th) A, r = rho. An elastic body lies in the outer frame of its
+# joint by its own marker, axes R_own = exp(th) F at rho: its axes are R R_ownᵀ, its origin is p - R R_ownᵀ rho.
 
 
 @inner
@@ -129,24 +129,24 @@ def place_in_parent(nodes, work, model, marker_work):
             m = nodes.own[k]
             own = product(own_marker(model, marker_work, m), nodes.F[k])
             put_matrix(work.R_own[k], own)
-            R = product(R, transposed(own))
-            p = sub(p, turned(R, vector(marker_work.markers.rho[m])))
         put_matrix(work.R[k], R)
         put(work.p[k], 0, p)
 
 
 @loops
-def place_in_ground(nodes, work):
-    """Write R_G, r_G of all nodes."""
+def place_in_ground(nodes, work, marker_work):
+    """Write R_G, r_G of all nodes, whose joints are placed in their parents."""
     for k in range(nodes.parent.shape[0]):
-        above = nodes.parent[k]
-        if above < 0:
-            put_matrix(work.R_G[k], matrix(work.R[k]))
-            put(work.r_G[k], 0, vector(work.p[k]))
-        else:
-            R = matrix(work.R_G[above])
-            put_matrix(work.R_G[k], product(R, work.R[k]))
-            put(work.r_G[k], 0, add(vector(work.r_G[above]), turned(R, vector(work.p[k]))))
+        above, m = nodes.parent[k], nodes.own[k]
+        R, r = matrix(work.R[k]), vector(work.p[k])
+        if above >= 0:
+            R_P = matrix(work.R_G[above])
+            R, r = product(R_P, R), add(vector(work.r_G[above]), turned(R_P, r))
+        if m >= 0:
+            R = product(R, transposed(work.R_own[k]))
+            r = sub(r, turned(R, vector(marker_work.markers.rho[m])))
+        put_matrix(work.R_G[k], R)
+        put(work.r_G[k], 0, r)
 
 
 # entry ----------------------------------------------------------------------------------------------------------------
@@ -191,7 +191,7 @@ def make_entry(digest):
                         work.right[j] = work.force_given[j] - work.force[j]
                 elif what == MASS or what == SOLVE:
                     evaluate_flexible(nodes, model, marker_work)
-                place_in_ground(nodes, work)
+                place_in_ground(nodes, work, marker_work)
                 rate_columns(nodes, work, model, marker_work)
                 if what == PLACE:
                     motion_in_ground(nodes, work)

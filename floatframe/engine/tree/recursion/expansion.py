@@ -182,6 +182,7 @@ def expansion_of(system: System) -> Expansion:
                     "mass": 0.0,
                     "s": ZERO,
                     "J": np.zeros((3, 3)),
+                    "P": np.zeros((3, 3)),
                 }
             )
             n_z = N_RATES[each.kind]
@@ -284,7 +285,9 @@ def carried(model: Model, i: int, F: Array, origin: Array) -> dict:
     t = int(bodies.kind[i])
     m, S, J0 = float(types.mass[t]), types.S[t], types.J0[t]
     moved = J0 - about(S, origin) - about(origin, S) + m * about(origin, origin)
-    return numbers | {"F": F, "mass": m, "s": F.T @ (S - m * origin), "J": F.T @ moved @ F}
+    J = F.T @ moved @ F
+    P = 0.5 * np.trace(J) * np.eye(3) - J
+    return numbers | {"F": F, "mass": m, "s": F.T @ (S - m * origin), "J": J, "P": P}
 
 
 def about(a: Array, b: Array) -> Array:

@@ -63,6 +63,7 @@ class Nodes(NamedTuple):
     mass: Array = real(n_n, unit="kg")  #: of a rigid body, frame of the node
     s: Array = real(n_n, 3, unit="kg m")  #: first moment
     J: Array = real(n_n, 3, 3, unit="kg m²")  #: inertia about the origin
+    P: Array = real(n_n, 3, 3, unit="kg m²")  #: second moment about the origin, the integral of c cᵀ over mass
     h0: IntArray = integer(n_n + 1)  #: of a flexible body: its matrices begin here in stores of (6 + n)²
     g0: IntArray = integer(n_n + 1)  #: of its joint and modes, (n_z + n)²
     c0: IntArray = integer(n_n + 1)  #: of the columns of the modes of a flexible parent
@@ -78,11 +79,12 @@ class NodeWork(NamedTuple):
     force: Array = real(n_v)  #: generalised forces
     force_given: Array = real(n_v)  #: force applied along the rates
     gravity: Array = real(3, unit="m/s²")  #: ground axes
-    R: Array = real(n_n, 3, 3)  #: axes in those of the parent
-    p: Array = real(n_n, 3, unit="m")  #: origin from that of the parent, its axes
+    R: Array = real(n_n, 3, 3)  #: outer frame of the joint in the frame of the parent
+    p: Array = real(n_n, 3, unit="m")  #: its origin from that of the parent, axes of the parent
     omega: Array = real(n_n, 3, unit="rad/s")
     alpha: Array = real(n_n, 3, unit="rad/s²")
     acc: Array = real(n_n, 3, unit="m/s²")  #: acceleration of the origin minus gravity
+    U_spin: Array = real(n_n, 3, 3, unit="rad²/s²")  #: acceleration of a point of the body, less that, by its place
     f: Array = real(n_n, 3, unit="N")  #: force required by the subtree
     t: Array = real(n_n, 3, unit="N m")  #: moment about the origin
     reaction: Array = real(n_n, 6, unit="N, N m")  #: wrench of the joint on its outer frame, axes and point of that

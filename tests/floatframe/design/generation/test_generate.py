@@ -1,6 +1,7 @@
 """Generated code against the recursive model: the same numbers to rounding, from every language."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from floatframe.design.generation.generate import LANGUAGES, generate
 from floatframe.design.generation.links import GRAVITY, tree_terms
 from floatframe.design.generation.routines import ROUTINES, carried_inwards
 from floatframe.design.identification.inertial_parameters import parameters_of, point_mass, system_with
+from floatframe.engine.tree.recursion import newton_euler
 from floatframe.errors import ModelError
 from floatframe.model.functions.time_functions import harmonic
 from tests.floatframe.design.generation.calls import (
@@ -65,6 +67,19 @@ def test_every_routine_is_the_same_in_every_language(few_case, what, language, t
                 width = shape[-1] if len(shape) > 1 else 1
                 assert np.shape(one) == (other.size // width, width)
             near(np.reshape(one, shape), other)
+
+
+def test_generated_forces_come_from_the_source_of_the_engine(monkeypatch):
+    """A law of joints that is changed in the kernels changes in the code: here all forces of hinges turn their sign."""
+
+    def joint_forces(nodes, work, k, f, t):
+        work.force[nodes.v0[k]] = -t[2]
+
+    case = Case(puma())
+    forces = [python_function(case.system, "inverse")(case.z, case.z_dot, case.z_ddot)]
+    monkeypatch.setattr(newton_euler, "joint_forces", SimpleNamespace(py_func=joint_forces))
+    forces += [python_function(case.system, "inverse")(case.z, case.z_dot, case.z_ddot)]
+    assert_allclose(forces[1], -forces[0], rtol=1e-14, atol=0)
 
 
 def test_many_motions_at_once_are_those_one_by_one():
