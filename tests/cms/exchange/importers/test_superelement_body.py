@@ -14,7 +14,12 @@ import fe_models
 from cms.errors import BodyError, ForeignBodyError
 from cms.exchange.importers.inertia import FullMass, MeshMass, NodalMasses
 from cms.exchange.importers.superelement import RecoveryRows, Superelement
-from cms.exchange.importers.superelement_body import ImportOptions, body_of_superelement, known_moments
+from cms.exchange.importers.superelement_body import (
+    ImportOptions,
+    body_of_superelement,
+    fe_body_of_superelement,
+    known_moments,
+)
 from cms.reduction.basis.finishing import finish
 from cms.reduction.basis.frames import frame_condition
 from fe_models.body.loads import interface_load
@@ -335,3 +340,12 @@ def test_moments_of_a_mass_matrix_are_the_integrals_of_its_elements():
     for name in ("m", "S", "R", "C1", "C2"):
         own = np.asarray(getattr(expected, name))
         assert_allclose(getattr(found, name), own, rtol=0, atol=1e-9 * np.abs(own).max(), err_msg=name)
+
+
+def test_damping_is_carried_to_the_coordinates_in_which_static_parts_are_taken_out(element):
+    """D = 0.3 M + 1e-5 K of the matrices is 0.3 M + 1e-5 K of the body."""
+    damped = replace(element, D=0.3 * element.M + 1e-5 * element.K)
+    body = fe_body_of_superelement(damped, options())
+    assert body.D is not None
+    expected = (0.3 * body.M + 1e-5 * body.K).toarray()
+    assert_allclose(body.D.toarray(), expected, rtol=0, atol=1e-10 * np.abs(expected).max())

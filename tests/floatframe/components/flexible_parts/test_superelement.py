@@ -183,6 +183,13 @@ def test_small_deflection_moves_as_floating_frames_do():
     assert_allclose(found, end, rtol=0, atol=2e-5 * LENGTH)
 
 
+def test_damping_is_proportional_to_the_stiffness_between_the_nodes():
+    part = corotational("part", beam(), damping=0.02)
+    (element,) = part.forces
+    assert np.abs(element.stiffness).max() > 0
+    assert_allclose(element.damping, 0.02 * np.asarray(element.stiffness), rtol=1e-15, atol=0)
+
+
 def test_a_body_without_flexibility_between_its_nodes_is_refused():
     with pytest.raises(ModelError, match="no flexibility between 'start' and 'end'"):
         corotational("part", frozen_to_rigid(beam()))

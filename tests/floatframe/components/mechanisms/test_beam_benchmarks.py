@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import cms
 from benchmarks.field_beams import UNITS, exact, marker_of, parts, path, segments, superelements
@@ -114,6 +115,17 @@ def test_a_shaft_in_two_parts_bends_as_the_exact_beam_through_its_critical_speed
     largest = np.linalg.norm(found["exact"], axis=1).max()
     assert largest > 0.1
     assert np.linalg.norm(found["exact"] - found["parts"], axis=1).max() < 0.02 * largest
+
+
+def test_the_disk_of_the_shaft_is_a_solid_cylinder():
+    """m r²/2 about its axis and m (3 r² + h²)/12 across it; its centre is 50 mm above the middle of the shaft."""
+    system = unbalanced_shaft(exact(2), turn=shaft_turn())
+    disk = next(body for body in system.bodies if body.name == "disk")
+    m, r, h = disk.mass, 0.24, 0.05
+    assert_allclose(m, 7800 * np.pi * r**2 * h, rtol=1e-4, atol=0)
+    across = m * (3 * r**2 + h**2) / 12
+    assert_allclose(disk.inertia, np.diag([m * r**2 / 2, across, across]), rtol=1e-12, atol=0)
+    assert_allclose(disk.position, [SHAFT_LINE.length / 2, 0, 0.05], rtol=1e-12, atol=0)
 
 
 def test_a_thin_beam_buckles_sideways():

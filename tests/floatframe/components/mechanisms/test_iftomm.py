@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
 from scipy.special import ellipj, ellipk
 
 from floatframe import GeneralizedAlpha, integrate
@@ -13,6 +14,7 @@ from floatframe.components.mechanisms import (
     n_four_bar,
     point_pendulum,
 )
+from floatframe.components.mechanisms.iftomm import ANDREWS_START
 from floatframe.errors import ModelError
 from floatframe.results.energy_balance import balance_defect
 from floatframe.results.place_motion import point_motion
@@ -77,3 +79,31 @@ def test_impossible_starts_are_refused():
         point_pendulum(x=2.0)
     with pytest.raises(ModelError, match="n: expected at least 1, got 0"):
         n_four_bar(0)
+
+
+def test_andrews_mechanism_is_closed_at_the_published_angles():
+    """Both markers of every joint are at one place; the spring of 0.07785 m is nearly at its free length."""
+    system = andrews_mechanism()
+    bodies = {body.name: body for body in system.bodies}
+
+    def place(marker):
+        if marker.body not in bodies:
+            return marker.position
+        body = bodies[marker.body]
+        w, *v = body.orientation
+        return body.position + Rotation.from_quat([*v, w]).as_matrix() @ marker.position
+
+    gaps = [np.linalg.norm(place(joint.marker_a) - place(joint.marker_b)) for joint in system.joints]
+    assert len(gaps) == 10
+    assert_allclose(gaps, 0.0, rtol=0, atol=1e-12)
+    angle = {name: 2 * np.arctan2(body.orientation[3], body.orientation[0]) for name, body in bodies.items()}
+    beta, theta, gamma, phi, delta, omega, epsilon = ANDREWS_START
+    expected = {"OF": beta, "FE": beta + theta, "BDE": gamma, "GE": phi + delta, "AG": delta, "HE": omega + epsilon}
+    for name, value in (expected | {"AH": epsilon}).items():
+        assert_allclose(np.exp(1j * angle[name]), np.exp(1j * value), rtol=0, atol=1e-12, err_msg=name)
+    spring = system.forces[0]
+    C = place(spring.marker_a)
+    assert_allclose(C, [0.014, 0.072, 0.0], rtol=0, atol=0)
+    c, s = np.cos(gamma), np.sin(gamma)
+    D = [-0.03635 + 0.02 * c + 0.018 * s, 0.03273 + 0.02 * s - 0.018 * c, 0.0]
+    assert_allclose(place(spring.marker_b), D, rtol=0, atol=1e-15)

@@ -116,14 +116,14 @@ def test_at_a_standstill_the_tread_is_a_spring_that_does_not_leak(make):
 
 @pytest.mark.parametrize("make", [linear, brush])
 def test_a_tyre_that_slides_sideways_without_rolling_is_not_stretched_without_end(make):
-    """Integrate the tread alone at V_x = 0, V_y = 1 m/s: it settles within twice the slip of sliding."""
+    """Integrate the tread alone at V_x = 0, V_y = 1 m/s: it settles at twice the slip of sliding."""
     law = make(relaxation_x=0.2, relaxation_y=0.4).law(placed())
     x, z = motion(0.28, v=(0, 1.0, 0)), np.zeros(2)
     slip = (0.9 if make is brush else 1.0) * F0 * (3 / 6e4 if make is brush else 1 / 6e4)
     for _ in range(4000):
         z = z + 2e-4 * answer(law, x, z)[2]
     seen, _, z_dot = answer(law, x, z)
-    assert slip < z[1] / 0.4 <= 2.001 * slip
+    assert_allclose(z[1] / 0.4, 2 * slip, rtol=1e-3)
     assert abs(z_dot[1]) < 1e-3
     assert_allclose(-seen["Fy"], (0.9 if make is brush else 1.0) * seen["Fz"], rtol=1e-9)
 

@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 
 from floatframe import SignalError
 from floatframe.files.signals import Signal, angle_of_speed, frequency_map, order_cut, order_map
+from floatframe.files.signals.analysis import rotation_of
 
 RATE = 2048.0
 t = np.arange(int(6 * RATE)) / RATE
@@ -21,6 +22,22 @@ def run_up():
 
 def test_the_integral_of_a_speed_is_its_angle():
     assert_allclose(angle_of_speed(t, SPEED), ANGLE, rtol=0, atol=1e-9 * ANGLE[-1])
+
+
+@pytest.mark.parametrize(
+    ("unit", "values"),
+    [
+        ("rad/s", SPEED),
+        ("rpm", SPEED * 30 / np.pi),
+        ("Hz", SPEED / (2 * np.pi)),
+        ("rad", ANGLE),
+        ("deg", np.rad2deg(ANGLE)),
+    ],
+)
+def test_a_rotation_is_given_by_its_angle_or_its_speed(unit, values):
+    speed, angle = rotation_of(Signal("housing", t, t, ""), Signal("shaft", t, values, unit))
+    assert_allclose(speed[1:-1], SPEED[1:-1], rtol=1e-5, atol=0)
+    assert_allclose(angle, ANGLE, rtol=0, atol=1e-8 * ANGLE[-1])
 
 
 @pytest.mark.parametrize("is_rms", [False, True])

@@ -65,6 +65,16 @@ def test_gaps_are_refused_with_their_line_and_filled_up_to_a_length(tmp_path):
         assert any(words in note for note in filled.notes)
 
 
+def test_the_note_of_filled_gaps_counts_them_and_names_the_longest(tmp_path):
+    """From the last sample before a gap to the first one behind it: 2 ms, 4 ms and 3 ms."""
+    t = [f"{k / 1000:.3f}" for k in range(60)]
+    values = np.arange(60.0).astype(str)
+    values[[10, 20, 21, 22, 40, 41]] = "NaN"
+    filled = read_signals(written(tmp_path, rows(t, values)), fill=0.0041)
+    assert "channel a: 6 samples in 3 gaps filled by interpolation, the longest 0.004 s" in filled.notes
+    assert_allclose(filled.values[:, 0], np.arange(60.0), rtol=1e-12, atol=0)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -190,6 +200,22 @@ def test_numbers_that_do_not_fill_their_dimensions_are_found_before_the_reader(t
     altered = whole[:place] + np.array([1, 39], dtype="<i4").tobytes() + whole[place + 8 :]
     with pytest.raises(SignalError, match=r"a.mat: array 'x': its numbers do not fill \(1, 39\); the file is damaged"):
         sound_variables("a.mat", altered)
+
+
+def test_an_array_that_claims_more_than_deflate_can_hold_is_refused_before_it_is_read(tmp_path):
+    """1024 numbers of 8 bytes without a stored byte claim 8192 bytes, more than 1100; 128 of them do not."""
+    h5py = pytest.importorskip("h5py")
+    for n, is_sound in ((128, True), (1024, False)):
+        with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
+            file.create_dataset("t", data=np.arange(n) / 100.0)
+            file.create_dataset("x", shape=(n,), dtype=float, chunks=(n,))  # no chunk is written
+        image = (tmp_path / "a.mat").read_bytes()
+        (tmp_path / "a.mat").write_bytes(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + image[128:])
+        if is_sound:
+            assert len(read_signals(tmp_path / "a.mat").time) == n
+        else:
+            with pytest.raises(SignalError, match="x claims 8192 bytes and has 0; the file is damaged"):
+                read_signals(tmp_path / "a.mat")
 
 
 def test_a_gap_of_no_end_is_refused(tmp_path):

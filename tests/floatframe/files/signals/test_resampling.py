@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.interpolate import PchipInterpolator
 
 from floatframe import SignalError
 from floatframe.files.signals import Signal, filtered, integrated_twice, resampled, without_drift
@@ -72,6 +73,17 @@ def test_uneven_times_become_even_and_that_is_said():
     assert found.step is not None
     assert_allclose(found.values, np.sin(20 * found.time), rtol=0, atol=2e-3)
     assert "made even along the monotone cubic" in found.notes[0]
+
+
+@pytest.mark.parametrize(("rate", "even"), [(20.0, 20.0), (10.0, 10.0), (5.0, 10.0)])
+def test_uneven_times_are_made_even_at_their_mean_rate_or_the_new_one(rate, even):
+    """Eleven samples in a second have a mean rate of 10 Hz. Samples at that rate lie on the monotone cubic."""
+    uneven = np.linspace(0, 1, 11) ** 1.2
+    signal = Signal("road", uneven, np.sin(5 * uneven), "m")
+    found, _ = resampled(signal, rate, anti_alias=False)
+    exact = PchipInterpolator(uneven, signal.values)(np.arange(int(even) + 1) / even)
+    assert_allclose(found.time, np.arange(int(rate) + 1) / rate, rtol=0, atol=1e-12)
+    assert_allclose(found.values, exact[:: int(even / rate)], rtol=0, atol=1e-12)
 
 
 def test_the_report_of_uneven_times_is_that_of_even_ones():

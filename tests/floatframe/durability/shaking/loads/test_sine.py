@@ -86,6 +86,16 @@ def test_a_slow_sweep_is_steady_and_a_fast_one_is_not():
     assert_allclose(np.abs(half[:, ACCELERATION]).max(), fast.swept_peaks[ACCELERATION], rtol=1e-3)
 
 
+def test_a_slow_sweep_takes_static_modes_as_springs():
+    """The displacement has the mode at 80 Hz as a spring, x = -P a / omega²: it adds with the sign of the load."""
+    model = masses([20.0, 80.0], [0.02, 0.02], [1.0, 2.0])
+    model = replace(model, n_residual=1, E=np.where(np.arange(3)[:, None, None] == 0, 1.0, model.E))
+    f, swept = sweep_envelope(model, 2, SineTest("s", Level.of([(1.0, 1.0), (2.0, 1.0)]), ("z",), 0.4), step=0.025)
+    w, omega = 2 * np.pi * f, 2 * np.pi * np.array([20.0, 80.0])
+    steady = -G / (omega[0] ** 2 - w**2 + 2j * 0.02 * omega[0] * w) - 2 * G / omega[1] ** 2
+    assert_allclose(swept[:, DISPLACEMENT], steady, rtol=1e-4, atol=0)
+
+
 def test_uncertain_frequencies_widen_a_peak_and_factors_raise_it():
     model = masses([20.0], 0.02)
     run = sine_run(model, SineTest("s", LEVEL, ("z",)), "z", Uncertainty(1.2, 0.1))

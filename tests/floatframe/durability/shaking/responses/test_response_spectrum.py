@@ -5,7 +5,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from floatframe.durability.shaking.loads.pulses import pulse
-from floatframe.durability.shaking.responses.response_spectrum import octave_frequencies, shock_response_spectrum
+from floatframe.durability.shaking.responses.response_spectrum import (
+    POINTS_A_CYCLE,
+    octave_frequencies,
+    refined,
+    shock_response_spectrum,
+)
 from floatframe.errors import ModelError
 
 H = 1e-4
@@ -61,3 +66,17 @@ def test_what_comes_after_the_last_sample_counts():
 def test_unknown_kinds_and_amplifications_are_refused(given, words):
     with pytest.raises(ModelError, match=words):
         shock_response_spectrum(np.ones(5), H, np.array([10.0]), **given)
+
+
+def test_points_between_lie_on_the_lines_between_samples_and_end_with_the_last_one():
+    """Straight lines are divided so that a cycle has enough points."""
+    a = np.array([1.0, -3.0, 0.5, 2.0])
+    n = int(np.ceil(POINTS_A_CYCLE * 1000.0 * H))
+    found, step = refined(a, H, 1000.0)
+    assert n > 1
+    assert_allclose(step, H / n, rtol=1e-15)
+    assert found.shape == (3 * n + 1,)
+    share = np.arange(n) / n
+    for k in range(3):
+        assert_allclose(found[k * n : (k + 1) * n], (1 - share) * a[k] + share * a[k + 1], rtol=0, atol=1e-14)
+    assert found[-1] == a[-1]
