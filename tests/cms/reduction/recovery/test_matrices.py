@@ -168,6 +168,19 @@ def test_net_forces_are_the_rates_of_momentum_and_the_sum_of_the_interfaces():
     assert_allclose(y[rows[6:]], expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 
 
+def test_net_forces_of_interfaces_under_other_loads_are_the_sum_of_the_interfaces():
+    """Gravity, for one: what the interfaces carry besides the motion, about the point of the rows."""
+    table = reduced("craig-bampton", "nodal").recovery["all"]
+    forces, rows = table.rows("interface force"), table.rows("net force")[6:]
+    by_hand = np.zeros((6, len(table.loads)))
+    for k, name in enumerate(("left", "right")):
+        f, m = table.static[forces[6 * k : 6 * k + 3]], table.static[forces[6 * k + 3 : 6 * k + 6]]
+        arm = full().interface(name).reference - np.array(POINT)
+        by_hand += np.concatenate([f, m + np.cross(arm, f, axis=0)])
+    assert np.abs(by_hand).max() > 1e-3
+    assert_allclose(table.static[rows], by_hand, rtol=0, atol=1e-12 * np.abs(by_hand).max())
+
+
 def test_net_forces_of_a_rigid_acceleration_are_mass_times_acceleration():
     """Bar of steel: m and J about its centre by hand; about a point by the parallel axes."""
     body = reduced("craig-bampton", "turned")

@@ -87,6 +87,17 @@ def test_rocker_follows_the_loop_equation():
     assert_allclose(tip[:, :2], exact, rtol=0, atol=1e-8)
 
 
+def test_bars_of_a_four_bar_linkage_have_the_mass_of_their_length():
+    lengths = {"crank": 0.3, "coupler": 0.9, "rocker": 0.7}
+    system = four_bar(**lengths, mass_per_length=1.7)
+    assert len(system.bodies) == 3
+    for body in system.bodies:
+        m, length = 1.7 * lengths[body.name], lengths[body.name]
+        assert_allclose(body.mass, m, rtol=1e-14)
+        assert_allclose(body.center_of_mass, [length / 2, 0, 0], rtol=1e-14)
+        assert_allclose(np.diag(body.inertia)[1:], m * length**2 / 12, rtol=1e-3)
+
+
 def test_bars_that_do_not_close_are_refused():
     with pytest.raises(ModelError, match="do not close"):
         four_bar(ground=3.0, crank=0.3, coupler=0.9, rocker=0.7)

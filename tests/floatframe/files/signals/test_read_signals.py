@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 
 from floatframe import SignalError
 from floatframe.files.signals import read_signals
-from floatframe.files.signals.mat_file import sound_variables
+from floatframe.files.signals.mat_file import elements, sound_variables
 
 
 def written(tmp_path, text, name="a.csv"):
@@ -200,6 +200,17 @@ def test_numbers_that_do_not_fill_their_dimensions_are_found_before_the_reader(t
     altered = whole[:place] + np.array([1, 39], dtype="<i4").tobytes() + whole[place + 8 :]
     with pytest.raises(SignalError, match=r"a.mat: array 'x': its numbers do not fill \(1, 39\); the file is damaged"):
         sound_variables("a.mat", altered)
+
+
+def test_an_element_that_ends_beyond_its_file_is_refused():
+    """A tag of 8 bytes and 16 bytes of data; with 17 claimed one is missing."""
+    for size, is_sound in ((16, True), (17, False)):
+        data = np.array([9, size], dtype="<u4").tobytes() + bytes(16)
+        if is_sound:
+            assert list(elements("a.mat", data, 0, len(data), "<")) == [(9, 8, 24)]
+        else:
+            with pytest.raises(SignalError, match="an element of 17 bytes at byte 0, where 16 are left"):
+                list(elements("a.mat", data, 0, len(data), "<"))
 
 
 def test_an_array_that_claims_more_than_deflate_can_hold_is_refused_before_it_is_read(tmp_path):
