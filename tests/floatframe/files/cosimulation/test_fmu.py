@@ -167,6 +167,44 @@ def test_units_in_si(words, expected):
         assert_allclose(found.factor, expected.factor, rtol=1e-12)
 
 
+PENDULUM = """
+[system]
+units = "{units}"
+gravity = [0, {gravity}, 0]
+[bodies.arm]
+mass = 2.0
+inertia = [[{J}, 0, 0], [0, {J}, 0], [0, 0, {J}]]
+position = [{half}, 0, 0]
+[joints.hinge]
+type = "revolute"
+body_a = "ground"
+body_b = "arm"
+marker_a = [0, 0, 0]
+marker_b = [{behind}, 0, 0]
+axis = [0, 0, 1]
+[run]
+t_end = {t_end}
+h = {h}
+"""
+
+
+def test_time_is_in_seconds_whatever_the_units_of_the_system(tmp_path):
+    """The same pendulum in metres and seconds, and in millimetres and milliseconds."""
+    scales = {"m-kg-s": (1.0, 1.0), "mm-kg-ms": (1e3, 1e3)}  # lengths and times
+    angles = []
+    for units, (L, T) in scales.items():
+        numbers = {"gravity": -9.81 * L / T**2, "J": 0.2 * L**2, "half": 0.5 * L, "behind": -0.5 * L}
+        path = tmp_path / f"{units}.toml"
+        path.write_text(PENDULUM.format(units=units, t_end=0.5 * T, h=1e-3 * T, **numbers))
+        write_fmu(path, path.with_suffix(".fmu"), fmi=2, outputs=["hinge.angle"])
+        unit = str(path.with_suffix(".fmu"))
+        assert float(fmpy.read_model_description(unit).defaultExperiment.stopTime) == pytest.approx(0.5, rel=1e-12)
+        found = fmpy.simulate_fmu(unit, stop_time=0.3, step_size=0.01, output_interval=0.01)
+        angles.append(found["hinge.angle"])
+    assert np.abs(angles[0]).max() > 0.5
+    assert_allclose(angles[1], angles[0], rtol=0, atol=1e-10)
+
+
 def test_the_command_writes_what_fmpy_runs(arm, tmp_path):
     path = tmp_path / "arm.fmu"
     words = ["fmu", arm, "-o", path, "--fmi", 3, "--input", MOTOR, "--out", "hinge.angle", "-p", "m=bodies.arm.mass"]
