@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -23,6 +24,9 @@ __all__ = ["Locus", "campbell", "root_locus"]
 LIKE = 0.5  #: smallest squared cosine between the shapes of one mode at neighbouring values
 SAME = 1e-2  #: relative difference below which eigenvalues count as equal, so that their shapes mix
 CLOSE = 0.1  #: weight of the distance between eigenvalues, relative to the distance between shapes
+ALIKE = 0.25  #: difference between the distances of shapes below which eigenvalues decide which mode continues which
+CLEAR = 0.5  #: largest change of eigenvalues for which they decide, relative to that of the other choice
+ROUNDING = float(np.sqrt(np.finfo(float).eps))  #: error of a double eigenvalue, relative to the largest eigenvalue
 MOST_HALVINGS = 3  #: largest number of halvings of a step between values in which a mode is lost
 
 
@@ -59,9 +63,11 @@ def root_locus(
 ) -> Locus:
     """Follow the modes of a system while a parameter changes.
 
-    Two modes at neighbouring values are the same mode if their shapes share more than half of their kinetic energy. If
-    a mode is lost in a step, the step is halved, up to three times. After that, its column ends. A new mode begins a
-    new column.
+    Two modes at neighbouring values are the same mode if their shapes share more than half of their kinetic energy. A
+    mode whose frequency passes zero, such as a whirl seen from axes that turn with a rotor at its critical speed,
+    continues in the conjugate of a mode. Where shapes are alike, as those of both whirls above that speed, eigenvalues
+    decide, if they change little against their difference. If a mode is lost or undecided in a step, the step is
+    halved, up to three times. After that, its column ends. A new mode begins a new column.
 
     Parameters
     ----------
@@ -117,22 +123,37 @@ class Branch:
     modes: Modes
     number: int
     at: float | None = None  #: last value of the parameter at which the mode was found
+    is_conjugate: bool = False  #: whether the followed mode is the conjugate, with a frequency below zero
     shape: Array = field(init=False)  #: shape of length one, separated from other modes with the same eigenvalue
 
     def __post_init__(self) -> None:
         self.shape = self.modes.shapes[:, self.number]
 
-    def meet(self, modes: Modes, number: int, value: float) -> None:
+    def meet(self, modes: Modes, number: int, is_conjugate: bool, value: float) -> None:
         """Continue with a mode at a value; if several modes have its eigenvalue, project the last shape onto them."""
-        Q = of_same(modes, number)
-        own = Q @ (Q.conj().T @ self.shape) if Q.shape[1] > 1 else modes.shapes[:, number]
+        Q, own = of_same(modes, number), modes.shapes[:, number]
+        if is_conjugate:
+            Q, own = Q.conj(), own.conj()
+        if Q.shape[1] > 1:
+            own = Q @ (Q.conj().T @ self.shape)
         self.shape = own / np.linalg.norm(own)
-        self.modes, self.number, self.at = modes, number, value
+        self.modes, self.number, self.is_conjugate, self.at = modes, number, is_conjugate, value
 
     @property
     def eigenvalue(self) -> complex:
-        """The eigenvalue at the last value."""
+        """The eigenvalue at the last value, with a frequency of at least zero."""
         return complex(self.modes.eigenvalues[self.number])
+
+    @property
+    def followed_eigenvalue(self) -> complex:
+        """The eigenvalue of the followed mode, whose frequency may be below zero."""
+        return self.eigenvalue.conjugate() if self.is_conjugate else self.eigenvalue
+
+    @property
+    def space(self) -> Array:
+        """Orthonormal basis of the shapes with the same eigenvalue."""
+        Q = of_same(self.modes, self.number)
+        return Q.conj() if self.is_conjugate else Q
 
 
 def modes_at(linear: LinearSystem) -> Modes:
@@ -163,41 +184,86 @@ def follow(
         middle = 0.5 * (before + value)
         follow(build, followed, before, middle, n_halvings - 1)
         return follow(build, followed, middle, value, n_halvings - 1)
-    for branch, number in pairs:
-        branch.meet(now, number, value)
+    for branch, number, is_conjugate in pairs:
+        branch.meet(now, number, is_conjugate, value)
     for branch in followed:
         if branch.at is None:
             branch.at = before
     return now
 
 
-def matches(followed: list[Branch], now: Modes, before: float) -> list[tuple[Branch, int]]:
-    """Return pairs of a branch found at the last value and its mode at this value; lost branches are left out.
+def matches(followed: list[Branch], now: Modes, before: float) -> list[tuple[Branch, int, bool]]:
+    """Return branches found at the last value, their modes at this value, and whether these are conjugate.
 
-    A branch may continue in a mode if more than half of the mode's shape lies in the shape of the branch, or in the
-    space of all shapes with the same eigenvalue. Shapes mix where eigenvalues cross or are double, as for a rotor at
-    rest.
+    A branch may continue in a mode, or in its conjugate, if more than half of the mode's shape lies in the shape of the
+    branch, or in the space of all shapes with the same eigenvalue. Shapes mix where eigenvalues cross or are double, as
+    for a rotor at rest. Lost and undecided branches are left out.
     """
     alive = [branch for branch in followed if branch.at in (None, before)]
     if not alive or not len(now.eigenvalues):
         return []
-    last = np.array([branch.eigenvalue for branch in alive])
-    shapes = np.stack([branch.shape for branch in alive], axis=1)
-    like = np.array([part_within(of_same(branch.modes, branch.number), now.shapes) for branch in alive])
-    back = np.array([part_within(of_same(now, k), shapes) for k in range(len(now.eigenvalues))])
+    as_found, conjugate = distances(alive, now, is_conjugate=False), distances(alive, now, is_conjugate=True)
+    is_conjugate = conjugate.apart < as_found.apart
+    d = Distances(*(np.where(is_conjugate, b, a) for a, b in zip(as_found, conjugate, strict=True)))
+    rows, columns = linear_sum_assignment(d.apart)
+    last = np.array([branch.followed_eigenvalue for branch in alive])
+    values = now.eigenvalues[columns]
+    values = np.where(is_conjugate[rows, columns], values.conj(), values)
+    joined = (d.like[rows, columns] >= LIKE) & ~undecided(d, rows, columns, last[rows], values)
+    return [
+        (alive[i], int(j), bool(is_conjugate[i, j]))
+        for i, j, is_joined in zip(rows, columns, joined, strict=True)
+        if is_joined
+    ]
+
+
+class Distances(NamedTuple):
+    """How well each mode continues each branch, all (n_branches, n_modes)."""
+
+    like: Array  #: part of the shape that lies in the space of the other
+    shapes: Array  #: distance between shapes, 0 to 1
+    values: Array  #: distance between eigenvalues, 0 to 1
+    apart: Array  #: weighted sum of both distances
+
+
+def distances(alive: list[Branch], now: Modes, *, is_conjugate: bool) -> Distances:
+    """Return distances of branches from modes, or from the conjugates of modes."""
+    modes = replace(now, eigenvalues=now.eigenvalues.conj(), shapes=now.shapes.conj()) if is_conjugate else now
+    last = np.array([branch.followed_eigenvalue for branch in alive])
+    own = np.stack([branch.shape for branch in alive], axis=1)
+    like = np.array([part_within(branch.space, modes.shapes) for branch in alive])
+    back = np.array([part_within(of_same(modes, k), own) for k in range(len(modes.eigenvalues))])
     like = np.maximum(like, back.T)
-    alone = np.abs(shapes.conj().T @ now.shapes) ** 2
-    apart = 1 - 0.5 * (like + alone) + CLOSE * far(last, now.eigenvalues)
-    if now.has_states:  # shapes of decaying modes, and of modes that consist of states, identify a mode poorly
-        apart = apart + far(last, now.eigenvalues)
-    rows, columns = linear_sum_assignment(apart)
-    return [(alive[i], int(j)) for i, j in zip(rows, columns, strict=True) if like[i, j] >= LIKE]
+    alone = np.abs(own.conj().T @ modes.shapes) ** 2
+    shapes, values = 1 - 0.5 * (like + alone), far(last, modes.eigenvalues)
+    # shapes of decaying modes, and of modes that consist of states, identify a mode poorly
+    return Distances(like, shapes, values, shapes + (CLOSE + (1.0 if modes.has_states else 0.0)) * values)
+
+
+def undecided(d: Distances, rows: Array, columns: Array, last: Array, values: Array) -> Array:
+    """Return which joined pairs of branch and mode could as well be joined otherwise, (n_pairs,).
+
+    Two pairs could be exchanged if their shapes are alike, their eigenvalues differ, and the eigenvalues that belong
+    together are not clearly closer to each other than to the others.
+    """
+    like, shapes = d.like[np.ix_(rows, columns)], d.shapes[np.ix_(rows, columns)]
+    kept, moves, moves_exchanged = np.diag(shapes), np.abs(last - values), np.abs(last[:, None] - values)
+    exchange = (like >= LIKE) & (like.T >= LIKE) & differ(last, last) & differ(values, values)
+    exchange &= shapes + shapes.T - kept[:, None] - kept < ALIKE
+    exchange &= moves[:, None] + moves > CLEAR * (moves_exchanged + moves_exchanged.T)
+    return np.asarray(exchange.any(axis=1))
+
+
+def differ(eigenvalues: Array, others: Array) -> Array:
+    """Return whether eigenvalues are not equal to others within their accuracy, (n, n_others)."""
+    size = np.abs(eigenvalues)[:, None] + np.abs(others)
+    return np.asarray(np.abs(eigenvalues[:, None] - others) > SAME * size + ROUNDING * size.max(initial=0.0))
 
 
 def of_same(modes: Modes, number: int) -> Array:
     """Return an orthonormal basis of the shapes with the same eigenvalue as a mode."""
-    own = modes.eigenvalues[number]
-    Q, _ = np.linalg.qr(modes.shapes[:, np.abs(modes.eigenvalues - own) <= SAME * np.abs(own)])
+    own, size = modes.eigenvalues[number], np.abs(modes.eigenvalues)
+    Q, _ = np.linalg.qr(modes.shapes[:, np.abs(modes.eigenvalues - own) <= SAME * abs(own) + ROUNDING * size.max()])
     return np.asarray(Q)
 
 

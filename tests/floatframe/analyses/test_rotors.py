@@ -24,6 +24,7 @@ from floatframe import (
     static_equilibrium,
     steady_rotation,
 )
+from floatframe.analyses.linear import parameter_study
 from floatframe.design.gradients.parameters import value_at, with_value
 from floatframe.model.elements.expressions import ExpressionElement
 from floatframe.model.functions.time_functions import polynomial_of_time
@@ -58,6 +59,28 @@ def test_a_campbell_diagram_has_a_line_for_each_mode(drive, mm):
     assert found.shape[1] == len(lines)
     apart = [min(np.abs(column - line).max() for line in lines) for column in found.T]
     assert_allclose(apart, 0.0, rtol=0, atol=1e-6 * OMEGA)
+
+
+@pytest.mark.parametrize("damping", [0.0, 20.0])
+@pytest.mark.parametrize("n_speeds", [4, 7, 18])
+def test_whirls_keep_their_lines_beyond_the_critical_speed(n_speeds, damping):
+    """Seen from turning axes the forward whirl stands still at W = OMEGA; beyond it both whirls have one shape."""
+    speeds = np.linspace(0.0, 280.0, n_speeds)
+    locus = campbell(disc(drive=7.0, damping=damping), speeds)
+    found = 2 * np.pi * locus.frequencies
+    lines = [OMEGA + speeds, np.abs(OMEGA - speeds), np.full(n_speeds, np.sqrt(1e5 / 0.2))]
+    assert found.shape[1] == len(lines)
+    apart = [min(np.abs(column - line).max() for line in lines) for column in found.T]
+    assert_allclose(apart, 0.0, rtol=0, atol=2e-4 * OMEGA)
+
+
+def test_whirls_that_speeds_far_apart_leave_undecided_are_not_joined(monkeypatch):
+    """From W = 150 to 280 each whirl changes by more than the two differ: without steps between, their lines end."""
+    monkeypatch.setattr(parameter_study, "MOST_HALVINGS", 0)
+    found = campbell(disc(drive=7.0), [150.0, 280.0]).eigenvalues
+    joined = np.isfinite(found).all(axis=0)
+    assert joined.sum() == 1
+    assert_allclose(found[:, joined].imag, np.sqrt(1e5 / 0.2), rtol=1e-9)
 
 
 def test_a_mode_that_is_not_met_again_ends_its_line():

@@ -1,4 +1,4 @@
-"""Cables and lifting surfaces in closed form; tyres of property files beside themselves.
+"""Cables, lifting surfaces and expressions in closed form; tyres of property files beside themselves.
 
 What these compute has its own oracle, `tests.floatframe.components.wheels.magic_formula_oracle`; here each number has
 to matter.
@@ -7,6 +7,7 @@ to matter.
 from math import atan2
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from floatframe.components import wheels
 from floatframe.components.aerodynamics import LiftingSurface
@@ -14,9 +15,10 @@ from floatframe.components.cables import Cable
 from floatframe.components.wheels import magic_formula as formula
 from floatframe.components.wheels.contact import SIGMA_X, SIGMA_Y, STIFFNESS
 from floatframe.model.bodies.markers import Marker
+from floatframe.model.elements.expressions import ExpressionElement
 from tests.floatframe.element_laws import evaluate, placed
 from tests.floatframe.laws.contacts import rolling
-from tests.floatframe.laws.form import AXIS, A, B, Form, State, pair, plain, wave, wave_at
+from tests.floatframe.laws.form import AXIS, A, B, Form, Pair, State, pair, plain, wave, wave_at
 
 __all__ = ["FORMS"]
 
@@ -77,6 +79,46 @@ def lifting_surface():
     return Form(element, pair(9)[1:], tuple(states), closed, functions=(element.factor, element.zero_lift))
 
 
+def expressions():
+    """Return an element of expressions: every operation and condition, a function, a term, a state, all loads."""
+    k, c, curve = 3.1, 0.7, wave(1.3)
+    element = ExpressionElement(
+        "e", {"a": A, "b": B}, parameters={"k": k, "c": c}, functions={"f": curve}, states={"s": 0.3},
+        terms={"length": "sqrt(b_x^2 + b_y^2 + b_z^2)", "bent": "length*0.37 + f(b_vx) - 1/(2 + b_vz**2)"},
+        forces={"b_Fx": "-k*b_x/length - c*b_vx + sin(t)*s", "b_Fy": "max(b_vy, 0.3) - 2.3*min(b_wx, -0.2)",
+                "b_Fz": "atan2(b_y, b_x)*tanh(0.3*b_wz)", "b_Mx": "exp(-b_x^2)*cosh(s*0.4) + sign(b_vz)*abs(b_wy)",
+                "b_My": "k*b_rx + c*b_ry + 5*b_rz", "b_Mz": "bent*(0.4 if b_vx < 0.1 else 1.7)"},
+        rates={"s": "-2.5*s + cos(3*t) + bent"},
+        outputs={"first": "log(length) + sinh(0.2*b_rz) + asin(0.3*tanh(b_x))",
+                 "second": "acos(0.3*tanh(b_y)) + atan(b_z) + tan(0.1*b_wx) + length^1.5"},
+    )  # fmt: skip
+
+    def closed(state):
+        two, t, s = Pair(state.x), state.t, state.z["s"]
+        first, second = two.axes
+        x, y, z = first.T @ two.line
+        turn = state.x[1, 15:] - state.x[0, 15:]
+        vx, vy, vz = first.T @ (state.x[1, 12:15] - state.x[0, 12:15] - np.cross(state.x[0, 15:], two.line))
+        wx, wy, wz = first.T @ turn
+        rx, ry, rz = Rotation.from_matrix(first.T @ second).as_rotvec()
+        length = np.linalg.norm(two.line)
+        bent = 0.37 * length + wave_at(1.3, vx) - 1 / (2 + vz**2)
+        F = first @ [-k * x / length - c * vx + np.sin(t) * s, max(vy, 0.3) - 2.3 * min(wx, -0.2),
+                     np.arctan2(y, x) * np.tanh(0.3 * wz)]  # fmt: skip
+        M = first @ [np.exp(-(x**2)) * np.cosh(0.4 * s) + np.sign(vz) * abs(wy), k * rx + c * ry + 5 * rz,
+                     bent * (0.4 if vx < 0.1 else 1.7)]  # fmt: skip
+        wrench = np.array([[*-F, *(-M - np.cross(two.line, F))], [*F, *M]])
+        seen = {"first": np.log(length) + np.sinh(0.2 * rz) + np.arcsin(0.3 * np.tanh(x)),
+                "second": np.arccos(0.3 * np.tanh(y)) + np.arctan(z) + np.tan(0.1 * wx) + length**1.5}  # fmt: skip
+        return wrench, {"s": -2.5 * s + np.cos(3 * t) + bent}, seen
+
+    speeds = [(0.15, 0.5, -0.3), (0.05, 0.1, 0.4), (0.6, 0.4, 0.8), (-0.3, -0.2, -0.5)]
+    states = [State(pair(seed, angle=0.3 * seed - 0.7, relative=speed), {"s": 0.5 * seed - 0.6})
+              for seed, speed in enumerate(speeds)]  # fmt: skip
+    silent = {0: "room for the results"}
+    return Form(element, pair(9), tuple(states), closed, silent, (curve,))
+
+
 def itself(element, start, states, silent):
     """Return an element beside its own law, unchanged."""
     law = element.law(placed(start, (False,) * len(start)))
@@ -123,4 +165,5 @@ FORMS = {
     "cable": cable(by_length=False),
     "cable of a length": cable(by_length=True),
     "lifting surface": lifting_surface(),
+    "expressions": expressions(),
 }

@@ -1,5 +1,6 @@
 """Every number of a law counts: one that is twice as large differs from the closed form of the law."""
 
+from collections.abc import Mapping
 from dataclasses import MISSING, fields, is_dataclass, replace
 from importlib import import_module
 from pkgutil import iter_modules
@@ -9,6 +10,7 @@ from numpy.testing import assert_array_equal
 
 import floatframe.components
 import floatframe.model
+from fe_models.foundation.units import Quantity
 from floatframe.components.aerodynamics import LiftingSurface
 from floatframe.components.bearings import Bearing
 from floatframe.components.cables import Cable
@@ -21,24 +23,22 @@ from floatframe.components.hydraulics import (
     Cylinder,
     DirectionalValve,
     Fluid,
+    Node,
     OleoStrut,
     Orifice,
     Pipe,
     Pump,
     ReliefValve,
 )
+from floatframe.components.rails import ContactLaws, Pair, Track, WheelOnRail, Wheelset
+from floatframe.components.rails.profile import Profile
 from floatframe.components.wheels import BrushTyre, LinearTyre, MagicFormulaTyre
+from floatframe.model.bodies.markers import Marker
 from floatframe.model.elements.registry import element_class
-from tests.floatframe.laws import contacts, drives, hydraulics, others
+from tests.floatframe.laws import contacts, drives, hydraulics, others, rails
 from tests.floatframe.laws.form import CLOSE, differences, expected, silent_numbers
 
-FORMS = drives.FORMS | hydraulics.FORMS | contacts.FORMS | others.FORMS
-#: elements whose numbers are tables, with the rooms of their own oracles
-ELSEWHERE = {
-    "elements.expressions": "tests/floatframe/model/elements/test_expression_element.py",
-    "rails.wheelset": "tests/floatframe/components/rails/test_law.py",
-    "rails.wheel-on-rail": "tests/floatframe/components/rails/test_law.py",
-}
+FORMS = drives.FORMS | hydraulics.FORMS | contacts.FORMS | others.FORMS | rails.FORMS
 CONTACT = {"exponent": 1.0, "damping": 0.0, "friction": 0.0, "friction_speed": 1e-3, "radius": 0.0}
 TYRE = {"friction": 1.0, "damping": 0.0, "relaxation_x": 0.0, "relaxation_y": 0.0, "rolling_resistance": 0.0,
         "flattening": 1 / 3, "low_speed": 1.0, "settling_time": 0.02}  # fmt: skip
@@ -65,21 +65,35 @@ DEFAULTS = {
     PidDrive: {"time_constant": 0.0},
     SpeedControl: {"rate_time": 0.0, "speed": 0.0},
     TorqueMap: {"time_constant": 0.0, "ratio": 1.0},
+    Wheelset: {"spin_inertia": 0.0, "spin": 0.0},
+    WheelOnRail: {"spin_inertia": 0.0, "spin": 0.0},
     # parts of elements
     Accumulator: {"exponent": 1.4},
     CheckValve: VALVE,
+    ContactLaws: {"friction": 0.3, "shear_modulus": 8.2e10, "poisson": 0.28, "smoothing": 2e-5, "damping": 0.0,
+                  "low_speed": 0.05, "strips": 12},
     Cylinder: {"rod_area": 0.0, "head_dead_volume": 0.0, "rod_dead_volume": 0.0, "leakage": 0.0, "friction": 0.0,
                "friction_speed": 1e-3, "damping": 0.0, "stop_stiffness": 0.0, "stop_damping": 0.0},
     DirectionalValve: {"opening": 0.0, "time_constant": 0.0, "overlap": 0.0, "discharge": 0.7, "leakage": 0.0},
     Fluid: {"air": 0.0, "air_exponent": 1.4, "vapour_pressure": 0.0},
+    Node: {"volume": 0.0},
     Orifice: {"discharge": 0.7},
+    Pair: {"radius": 0.46, "running_circles": 1.5, "gauge": 1.435, "inclination": 1 / 40},
     Pid: {"ki": 0.0, "kd": 0.0, "integral": 0.0},
     Pipe: {"segments": 1, "friction_factor": 0.0, "flow": 0.0},
     Pump: {"leakage": 0.0, "drag": 0.0},
     ReliefValve: VALVE,
+    Track: {"heading": 0.0},
 }  # fmt: skip
-NEEDED = {("Cylinder", "rod_area"), ("Cylinder", "head_dead_volume"), ("Cylinder", "rod_dead_volume"), ("Pid", "ki"),
-          ("Pid", "kd")}  #: by a node at that side, or another number of the form  # fmt: skip
+NEEDED = {
+    ("Cylinder", "rod_area"),
+    ("Cylinder", "head_dead_volume"),
+    ("Cylinder", "rod_dead_volume"),
+    ("Pid", "ki"),
+    ("Pid", "kd"),
+    ("Node", "volume"),
+    ("Track", "heading"),
+}  #: by a part beside it, or where markers are placed
 
 
 def kinds():
@@ -93,7 +107,7 @@ def kinds():
 
 def numeric_defaults(cls):
     """Return the fields of a class that are a number where it is not given."""
-    return {each.name for each in fields(cls) if type(each.default) in (int, float)}
+    return {each.name for each in fields(cls) if type(each.default) in (int, float, Quantity)}
 
 
 @pytest.mark.parametrize("name", FORMS)
@@ -109,8 +123,25 @@ def test_no_constant_can_be_twice_as_large_unnoticed(name):
 
 def test_every_element_has_a_form():
     assert "wheels.linear-tyre" in kinds()
-    missing = {element_class(kind) for kind in kinds() if kind not in ELSEWHERE}
-    assert missing == {type(form.element) for form in FORMS.values()}
+    assert {element_class(kind) for kind in kinds()} == {type(form.element) for form in FORMS.values()}
+
+
+def test_every_part_of_an_element_with_defaults_is_listed():
+    kinds_of_parts = {type(part) for form in FORMS.values() for part in parts_of(form.element)}
+    assert {each for each in kinds_of_parts if numeric_defaults(each)} - {Marker, Profile} <= set(DEFAULTS)
+
+
+def parts_of(part):
+    """Yield a dataclass and all dataclasses in it."""
+    if isinstance(part, tuple | list):
+        for each in part:
+            yield from parts_of(each)
+    elif isinstance(part, Mapping):
+        yield from parts_of(tuple(part.values()))
+    elif is_dataclass(part) and not isinstance(part, type):
+        yield part
+        for each in fields(part):
+            yield from parts_of(getattr(part, each.name))
 
 
 @pytest.mark.parametrize("cls", DEFAULTS)
