@@ -10,6 +10,7 @@ from fe_models.foundation.units import unit_system
 from floatframe.components import wheels
 from floatframe.components.wheels import magic_formula
 from floatframe.components.wheels.coefficients import COEFFICIENTS, ONLY_52, ONLY_61, SCALES
+from floatframe.components.wheels.contact import LOW_SPEED
 from floatframe.components.wheels.magic_formula import SIDE, SIGN, forces_and_moments
 from floatframe.components.wheels.outputs import OUTPUTS
 from floatframe.errors import ModelError
@@ -175,6 +176,27 @@ def test_below_the_lowest_load_forces_fall_in_proportion(tyres):
     assert 0 < seen[1]["Fz"] < 100
     for key in ("Fx", "Fy", "Mx"):
         assert_allclose(seen[1][key] / seen[1]["Fz"], seen[0][key] / seen[0]["Fz"], rtol=1e-9)
+
+
+def test_relaxation_lengths_of_the_element_stand_in_place_of_those_of_the_file(tyres):
+    """u_dot = -V u/sigma_x and v_dot = -V v/sigma_y, beside what slips."""
+    law, V = element(tyres[52], relaxation_x=0.3, relaxation_y=0.5).law(placed(HEIGHT)), 20.0
+    rolling = motion(HEIGHT, v=(V, 0, 0), omega=(0, 66, 0))
+    moving, still = (answer(law, rolling, z)[2] for z in ([1e-3, 1e-3], [0.0, 0.0]))
+    assert_allclose(-V * 1e-3 / (moving - still), [0.3, 0.5], rtol=1e-9)
+
+
+def test_a_wheel_that_sinks_is_held_by_the_damping_of_the_file(tyres):
+    law = element(tyres[52]).law(placed(HEIGHT))
+    sinking, still = (answer(law, motion(HEIGHT, v=(0, 0, w)))[0]["Fz"] for w in (-0.2, 0.0))
+    assert_allclose(sinking - still, 150.0 * 0.2, rtol=1e-9)  # VERTICAL_DAMPING
+
+
+def test_the_low_speed_is_that_of_the_element_or_the_file_or_one_metre_a_second(tyres):
+    given = replace(tyres[52], low_speed=3.0)
+    for tyre, options, low in ((given, {"low_speed": 2.5}, 2.5), (given, {}, 3.0),
+                               (replace(given, low_speed=None), {}, 1.0)):  # fmt: skip
+        assert element(tyre, **options).law(placed(HEIGHT)).data[LOW_SPEED] == low
 
 
 def test_relaxation_lengths_come_from_the_file(tyres):
