@@ -209,7 +209,7 @@ def matches(followed: list[Branch], now: Modes, before: float) -> list[tuple[Bra
     last = np.array([branch.followed_eigenvalue for branch in alive])
     values = now.eigenvalues[columns]
     values = np.where(is_conjugate[rows, columns], values.conj(), values)
-    joined = (d.like[rows, columns] >= LIKE) & ~undecided(d, rows, columns, last[rows], values)
+    joined = (d.like[rows, columns] >= LIKE) & np.logical_not(undecided(d, rows, columns, last[rows], values))
     return [
         (alive[i], int(j), bool(is_conjugate[i, j]))
         for i, j, is_joined in zip(rows, columns, joined, strict=True)
