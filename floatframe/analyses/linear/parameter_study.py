@@ -207,9 +207,10 @@ def matches(followed: list[Branch], now: Modes, before: float) -> list[tuple[Bra
     d = Distances(*(np.where(is_conjugate, b, a) for a, b in zip(as_found, conjugate, strict=True)))
     rows, columns = linear_sum_assignment(d.apart)
     last = np.array([branch.followed_eigenvalue for branch in alive])
-    values = now.eigenvalues[columns]
-    values = np.where(is_conjugate[rows, columns], values.conj(), values)
-    joined = (d.like[rows, columns] >= LIKE) & np.logical_not(undecided(d, rows, columns, last[rows], values))
+    values = np.where(is_conjugate, now.eigenvalues.conj(), now.eigenvalues)
+    pairs = np.ix_(rows, columns)
+    is_open = undecided(d.like[pairs], d.shapes[pairs], last[rows], values[pairs])
+    joined = (d.like[rows, columns] >= LIKE) & np.logical_not(is_open)
     return [
         (alive[i], int(j), bool(is_conjugate[i, j]))
         for i, j, is_joined in zip(rows, columns, joined, strict=True)
@@ -240,17 +241,19 @@ def distances(alive: list[Branch], now: Modes, *, is_conjugate: bool) -> Distanc
     return Distances(like, shapes, values, shapes + (CLOSE + (1.0 if modes.has_states else 0.0)) * values)
 
 
-def undecided(d: Distances, rows: Array, columns: Array, last: Array, values: Array) -> Array:
+def undecided(like: Array, shapes: Array, last: Array, values: Array) -> Array:
     """Return which joined pairs of branch and mode could as well be joined otherwise, (n_pairs,).
 
     Two pairs could be exchanged if their shapes are alike, their eigenvalues differ, and the eigenvalues that belong
-    together are not clearly closer to each other than to the others.
+    together are not clearly closer to each other than to the others. `values`: the eigenvalue of the mode of pair k, or
+    its conjugate, as it would continue the branch of pair i, (n_pairs, n_pairs).
     """
-    like, shapes = d.like[np.ix_(rows, columns)], d.shapes[np.ix_(rows, columns)]
-    kept, moves, moves_exchanged = np.diag(shapes), np.abs(last - values), np.abs(last[:, None] - values)
-    exchange = (like >= LIKE) & (like.T >= LIKE) & differ(last, last) & differ(values, values)
+    kept, found = np.diag(shapes), np.diag(values)
+    moves = np.abs(last[:, None] - values)
+    own = np.diag(moves)
+    exchange = (like >= LIKE) & (like.T >= LIKE) & differ(last, last) & differ(found, found)
     exchange &= shapes + shapes.T - kept[:, None] - kept < ALIKE
-    exchange &= moves[:, None] + moves > CLEAR * (moves_exchanged + moves_exchanged.T)
+    exchange &= own[:, None] + own > CLEAR * (moves + moves.T)
     return np.asarray(exchange.any(axis=1))
 
 
