@@ -91,7 +91,7 @@ def accepted(value: Any) -> tuple[str, ...]:
     return words
 
 
-def kept(value: Any) -> tuple[Any, ...]:
+def nodes_to_keep(value: Any) -> tuple[Any, ...]:
     """Return the list of nodes to keep: node numbers, names of sets, and positions."""
     if not isinstance(value, list):
         raise ValueError("expected a list of node numbers, names of sets, and positions [x, y, z]")
@@ -116,7 +116,7 @@ def elements_named(value: Any) -> tuple[Any, ...]:
     return tuple(entries)
 
 
-Keep = Annotated[tuple[Any, ...], BeforeValidator(kept)]
+Keep = Annotated[tuple[Any, ...], BeforeValidator(nodes_to_keep)]
 StressPoints = Annotated[tuple[Any, ...], BeforeValidator(elements_named)]
 Names = Annotated[tuple[str, ...], BeforeValidator(names)]
 Nodes = Annotated[Name | tuple[int, ...], BeforeValidator(node_names)]

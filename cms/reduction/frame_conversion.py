@@ -118,7 +118,7 @@ def condition_of(reduced: ReducedBody, frame: Frame) -> tuple[Array, BodyFrame]:
         c = moments.center_of_mass
         J_c = moments.J0 - moments.m * (c @ c * np.eye(3) - np.outer(c, c))
         cholesky_of_inertia(reduced.name, J_c)
-        return least(moments.m, c, J_c, moments.C1, moments.C2), placed("tisserand", frame, center)
+        return closest_rigid_motions(moments.m, c, J_c, moments.C1, moments.C2), placed("tisserand", frame, center)
     if isinstance(frame, BuckensFrame):
         sums = reduced.nodal_sums
         if sums is None:
@@ -129,13 +129,15 @@ def condition_of(reduced: ReducedBody, frame: Frame) -> tuple[Array, BodyFrame]:
         c = sums.S / sums.w
         R_c = sums.R - sums.w * np.outer(c, c)
         N_c = np.trace(R_c) * np.eye(3) - R_c
-        return least(sums.w, c, N_c, sums.U1, sums.U2), placed("buckens", frame, in_mesh(reduced.frame, c))
+        return closest_rigid_motions(sums.w, c, N_c, sums.U1, sums.U2), placed(
+            "buckens", frame, in_mesh(reduced.frame, c)
+        )
     rows, u, held = nodal_condition(reduced, frame)
     default = center if frame.at is None else in_mesh(reduced.frame, reduced.interface(frame.at).position)
     return np.asarray(np.linalg.solve(rows, u)), placed("nodal", frame, default, held)
 
 
-def least(weight: float, c: Array, N_c: Array, U1: Array, U2: Array) -> Array:
+def closest_rigid_motions(weight: float, c: Array, N_c: Array, U1: Array, U2: Array) -> Array:
     """Return the rigid motions that fit the shapes best in a weighted norm, about the origin, (6, n_q).
 
     About the weighted centre c the norm splits into translation and rotation: d_c = U1/w, N_c theta = U2 - c × U1.

@@ -148,7 +148,7 @@ def join(
     dofs, S, dof_of = _shared_dofs(parts, place, leaders)
     bodies = [part.body for part in parts]
     whole = _side_by_side(name, bodies, S, dofs, np.concatenate([b.nodes for b in bodies] + [points[added]]))
-    kept = np.concatenate([_kept(part, begin, place) for part, begin in zip(parts, first_node, strict=False)])
+    kept = np.concatenate([_retained_nodes(part, begin, place) for part, begin in zip(parts, first_node, strict=False)])
     whole = replace(whole, numbering=_numbering(parts, added, numbers, node_sets or {}), kept=kept)
     slaves, T_s = eliminated(constraints, points, dof_of, whole.n_dof)
     to_mesh = whole.to_mesh.matrix
@@ -178,7 +178,7 @@ def _mean_nodes(
     return tuple(made)
 
 
-def _kept(part: Part, begin: int, place: IntArray) -> IntArray:
+def _retained_nodes(part: Part, begin: int, place: IntArray) -> IntArray:
     """Return the nodes that a part keeps, as nodes of the joined body; shared nodes have one copy."""
     kept = part.body.kept
     is_shared = kept < len(part.nodes)

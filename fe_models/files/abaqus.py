@@ -368,7 +368,7 @@ def _set_entries(here: str, block: DeckBlock) -> Iterator[_Entry]:
                 raise MeshError(f"{here}, GENERATE: expected first, last, increment, got {line!r}")
             yield np.arange(limits[0], limits[1] + 1, limits[2] if len(limits) == 3 else 1)
         return
-    words = block.words
+    words = block.tokens
     numeric = [word for word in words if word.lstrip("+").isdigit()]
     if numeric:
         yield np.array(numeric, dtype=np.int64)

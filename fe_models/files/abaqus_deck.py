@@ -40,7 +40,7 @@ class DeckBlock:
         return f"{self.file}, line {self.line_number}" if self.file else f"line {self.line_number}"
 
     @property
-    def words(self) -> list[str]:
+    def tokens(self) -> list[str]:
         """All data fields in sequence."""
         return [word for line in self.lines for word in (w.strip() for w in line.split(",")) if word]
 

@@ -153,7 +153,7 @@ class StatesAtRest:
         is_long = self.last_step >= min(LONG_STEP * self.first_step, LONGEST_STEP) > 0
         return is_long and float(self.change.max()) <= tolerance
 
-    def words(self, tolerance: float) -> str:
+    def description(self, tolerance: float) -> str:
         """Return a description of a state that does not come to rest; empty if all do."""
         if not len(self.sizes) or self.change.max() <= tolerance:
             return ""
@@ -165,14 +165,14 @@ class Progress:
     """Minima of the decreasing quantities on the way to an equilibrium, and when they last halved."""
 
     #: least forces, constraint errors and changes of states
-    least: Array = field(default_factory=lambda: np.full(3, np.inf))
+    smallest: Array = field(default_factory=lambda: np.full(3, np.inf))
     iteration: int = 0
 
     def has_ended(self, iteration: int, values: tuple[float, float, float]) -> bool:
         """Record the values after an iteration; return whether none has fallen to half its least value for too long."""
-        falls = np.array(values) < 0.5 * self.least
+        falls = np.array(values) < 0.5 * self.smallest
         if falls.any():
-            self.least[falls] = np.array(values)[falls]
+            self.smallest[falls] = np.array(values)[falls]
             self.iteration = iteration
         return iteration - self.iteration >= PATIENCE
 
@@ -387,8 +387,8 @@ def steady_rotation(
         f"loads at or above buckling deform it too far, or the equilibrium is far away; {indefinite_mass_words(lost)}"
         if lost
         else f"forces are out of balance by {found.error:.2g} of the acting forces, most at body "
-        f"{worst_body(compiled, found.W, found.forces)!r}{states.words(tolerance)}; hold what can fall or drift, start "
-        "nearer (from the state under a part of the loads), or add damping and integrate until it rests"
+        f"{worst_body(compiled, found.W, found.forces)!r}{states.description(tolerance)}; hold what can fall or drift, "
+        "start nearer (from the state under a part of the loads), or add damping and integrate until it rests"
     )
     stood = f", without progress in the last {PATIENCE}" if found.has_stood else ""
     words = f"no equilibrium found in {found.iteration} steps{stood}{tried}: {why}"

@@ -28,6 +28,7 @@ __all__ = [
     "left_jacobian",
     "quotients",
     "right_jacobian",
+    "rotated",
     "rotation_exp",
     "rotation_log",
     "rotation_matrix",
@@ -35,7 +36,6 @@ __all__ = [
     "rotations_between",
     "spin_rate",
     "tilde",
-    "turned",
 ]
 
 SERIES_BELOW = 0.25  #: limit of the squared angle
@@ -59,7 +59,7 @@ def dot(a: Array, b: Array) -> Array:
     return (a * b).sum(axis=-1)
 
 
-def turned(R: Array, a: Array) -> Array:
+def rotated(R: Array, a: Array) -> Array:
     """Return R a for stacks of matrices and vectors."""
     return (R @ a[..., None])[..., 0]
 
@@ -206,7 +206,9 @@ def spin_rate(theta: Array, rate: Array, second: Array) -> Array:
     da, db = rates_of_quotients(x)
     turn = cross(theta, rate)
     along = da[..., None] * turn + db[..., None] * cross(theta, turn)
-    return turned(left_jacobian(theta), second) + dot(theta, rate)[..., None] * along + b[..., None] * cross(rate, turn)
+    return (
+        rotated(left_jacobian(theta), second) + dot(theta, rate)[..., None] * along + b[..., None] * cross(rate, turn)
+    )
 
 
 def rotation_log(R: Array) -> Array:

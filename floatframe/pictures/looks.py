@@ -7,7 +7,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.bodies.marker_shape import MarkerShape, interface_shape
-from floatframe.model.rotations import rotation_exp, turned
+from floatframe.model.rotations import rotated, rotation_exp
 from floatframe.model.shapes import Piece
 from floatframe.model.shapes.shape import Shape
 from floatframe.model.system import Body
@@ -52,4 +52,4 @@ def places_over(look: Look, r: Array, R: Array, q: Array, magnification: float =
     d = magnification * look.carrier.deformation(q)
     axes = rotation_exp(d[:, 3:]) @ look.carrier.triad
     local = (look.carrier.position + d[:, :3])[:, None] + np.einsum("tab,nb->tna", axes, look.piece.nodes)
-    return np.asarray(r[:, None] + turned(R[:, None], local))
+    return np.asarray(r[:, None] + rotated(R[:, None], local))

@@ -17,7 +17,7 @@ from floatframe.model.bodies.markers import body_name
 from floatframe.model.joints import Joint
 from floatframe.model.joints.rows import MOMENT, SPAN, TWIST_B, RelativePlace, RowCoordinate
 from floatframe.model.joints.sliding import SlidingJoint, line_triad
-from floatframe.model.rotations import cross, dot, left_jacobian, rotation_matrix, turned
+from floatframe.model.rotations import cross, dot, left_jacobian, rotated, rotation_matrix
 from floatframe.model.system import System
 from floatframe.results.full_turns import through_turns
 from floatframe.results.place_motion import PlaceMotion, as_moved, shape_motion, still_place
@@ -58,8 +58,8 @@ def sliding_place(system: System, trajectory: Trajectory, joint: SlidingJoint, e
     deformed = [shape.deformation(motion.q) for shape in shapes]
     rates = [shape.rates(motion.q, motion.q_dot, motion.q_ddot)[0] for shape in shapes]
     R = rotation_matrix(motion.p)
-    x = turned(np.swapaxes(R, 1, 2), end.position - motion.r)
-    v = turned(np.swapaxes(R, 1, 2), end.velocity - motion.v) - cross(motion.omega_B, x)
+    x = rotated(np.swapaxes(R, 1, 2), end.position - motion.r)
+    v = rotated(np.swapaxes(R, 1, 2), end.velocity - motion.v) - cross(motion.omega_B, x)
     line = Line(places, e, np.array(deformed), np.array(rates))
     s = (x - points[0]) @ e
     for _ in range(MOST):
@@ -73,9 +73,9 @@ def sliding_place(system: System, trajectory: Trajectory, joint: SlidingJoint, e
     t = e + line.displacement(s, 1)
     size = np.linalg.norm(t, axis=1)
     rate = dot(t, v - line.displacement(s, 0, of_rates=True)) / size**2
-    tangent = turned(R, t / size[:, None])
+    tangent = rotated(R, t / size[:, None])
     angle, by_s = line.rotation(s)
-    turning = turned(R @ left_jacobian(angle), by_s)
+    turning = rotated(R @ left_jacobian(angle), by_s)
     return SlidingPlace(s, rate, tangent, turning / size[:, None])
 
 
@@ -241,11 +241,11 @@ def force_rows(small: SmallMotions, joint: str, coordinate: str) -> Rows | None:
     w = np.sum([factor * small.work.state.w[place] for place, factor in loads], axis=0)
     rows = small.by_motion(np.zeros((1, small.n_x)))
     for place, factor in loads:
-        rows = rows - small.by_wrench(place, factor).turned(E)
+        rows = rows - small.by_wrench(place, factor).mapped(E)
     if own.kind == SPAN:
-        return rows - (b.moved - a.moved).turned((w - (w @ E) * E) / np.linalg.norm(d))
+        return rows - (b.moved - a.moved).mapped((w - (w @ E) * E) / np.linalg.norm(d))
     holder = b if own.kind == TWIST_B else a
-    return rows - holder.turned.turned(np.cross(E, w))
+    return rows - holder.rotation.mapped(np.cross(E, w))
 
 
 def sliding_motion(

@@ -6,7 +6,7 @@ from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.errors import ResultsError
 from floatframe.model.bodies.marker_shape import interface_shape
-from floatframe.model.rotations import rotation_matrix, turned
+from floatframe.model.rotations import rotated, rotation_matrix
 from floatframe.results.trajectory import Trajectory
 
 __all__ = [
@@ -63,7 +63,7 @@ def interface_positions(trajectory: Trajectory, body_name: str, reduced: Reduced
     require_same_modes(trajectory, body_name, reduced)
     motion = trajectory.body(body_name)
     d = elastic_displacements(trajectory, body_name, reduced, interface)
-    return motion.r + turned(rotation_matrix(motion.p), reduced.interface(interface).position + d)
+    return motion.r + rotated(rotation_matrix(motion.p), reduced.interface(interface).position + d)
 
 
 def elastic_displacements(trajectory: Trajectory, body_name: str, reduced: ReducedBody, interface: str) -> Array:

@@ -31,7 +31,7 @@ def column_subset(modes: ModeSet, at_b: Array, n_modes: int) -> tuple[Array, tup
     labels
         One per column, (k,).
     """
-    kept = _kept(modes, n_modes)
+    kept = _retained_columns(modes, n_modes)
     return np.eye(len(modes.labels))[:, kept], tuple(modes.labels[k] for k in kept)
 
 
@@ -41,7 +41,7 @@ def residual_subset(modes: ModeSet, at_b: Array, n_modes: int) -> tuple[Array, t
     residual_n = Psi_U - Phi_n Lambda_n⁻¹ Phi_n,Bᵀ = residual_N + sum over n < k <= N of phi_k omega_k⁻² phi_k,Bᵀ, for
     M-orthonormal phi_k; parameters and returns as `column_subset`.
     """
-    kept = _kept(modes, n_modes)
+    kept = _retained_columns(modes, n_modes)
     C = np.eye(len(modes.labels))
     gone = np.setdiff1d(np.arange(len(modes.labels)), kept)
     residual = np.flatnonzero([group.startswith("residual") for group in modes.groups])
@@ -61,7 +61,7 @@ def whole_set(modes: ModeSet, at_b: Array, n_modes: int) -> tuple[Array, tuple[s
     return np.eye(len(modes.labels)), modes.labels
 
 
-def _kept(modes: ModeSet, n_modes: int) -> IntArray:
+def _retained_columns(modes: ModeSet, n_modes: int) -> IntArray:
     vibration = np.flatnonzero(~modes.is_static)[:n_modes]
     return np.sort(np.concatenate([np.flatnonzero(modes.is_static), vibration])).astype(np.int64)
 

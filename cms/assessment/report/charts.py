@@ -8,8 +8,8 @@ import numpy as np
 from cms.assessment.compare.comparison import Comparison, Point, SetResult
 from cms.assessment.quality.limits import LIMITS
 from cms.assessment.quality.record import plain
+from cms.assessment.report.formatting import share
 from cms.assessment.report.palette import FULL_MODEL, style_of
-from cms.assessment.report.words import share
 from fe_models.foundation.arrays import Array
 
 __all__ = [
@@ -71,7 +71,7 @@ def response_chart(comparison: Comparison) -> Chart:
         *[
             line(full.response_hz, point.record("frequency-response").data["drawn"], legend(result, point),
                  style_of(k).color, dash=style_of(k).dash, hover="%{y:.3g}")
-            for k, result, point in shown(comparison)
+            for k, result, point in detailed_sets(comparison)
         ],
     ]  # fmt: skip
     layout = base_layout("frequency [Hz]", f"displacement / force [{units.length_symbol}/{units.force_symbol}]")
@@ -86,7 +86,7 @@ def response_error_chart(comparison: Comparison) -> Chart:
     traces = [
         line(comparison.full.response_hz, np.maximum(point.record("frequency-response").data["error"], FLOOR),
              legend(result, point), style_of(k).color, dash=style_of(k).dash, hover="%{y:.2g}")
-        for k, result, point in shown(comparison)
+        for k, result, point in detailed_sets(comparison)
     ]  # fmt: skip
     layout = base_layout("frequency [Hz]", "relative error [-]")
     layout["xaxis"] |= {"exponentformat": "none"}
@@ -105,7 +105,7 @@ def deformation_chart(comparison: Comparison, norm: str = "K") -> Chart:
     traces = [
         line(full.t * 1e3, np.maximum(point.record("deformation-error").data["error"][norm], FLOOR),
              legend(result, point), style_of(k).color, dash=style_of(k).dash, hover="%{y:.2g}")
-        for k, result, point in shown(comparison)
+        for k, result, point in detailed_sets(comparison)
     ]  # fmt: skip
     tolerance = LIMITS["deformation-error"].tolerance
     layout = base_layout("time [ms]", "deformation error \u03b5(t) [-]")
@@ -126,7 +126,7 @@ def deformation_chart(comparison: Comparison, norm: str = "K") -> Chart:
 def effective_mass_chart(comparison: Comparison) -> Chart:
     """Return the share of effective mass in every set with its interfaces held, by direction."""
     traces = []
-    for k, result, point in shown(comparison):
+    for k, result, point in detailed_sets(comparison):
         remainder = np.asarray(point.record("effective-mass").data["remainder"], dtype=float)
         traces.append(
             {
@@ -176,7 +176,7 @@ def dtick(n: int) -> int:
 # Parts ----------------------------------------------------------------------------------------------------------------
 
 
-def shown(comparison: Comparison) -> list[tuple[int, SetResult, Point]]:
+def detailed_sets(comparison: Comparison) -> list[tuple[int, SetResult, Point]]:
     """Return the sets with a shown point, with their index (which gives the style)."""
     return [(k, result, result.detail) for k, result in enumerate(comparison.sets) if result.detail is not None]
 

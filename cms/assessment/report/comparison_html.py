@@ -17,6 +17,7 @@ from cms.assessment.report.charts import (
     response_chart,
     response_error_chart,
 )
+from cms.assessment.report.formatting import count, factor, hertz, seconds, share, signed_percent
 from cms.assessment.report.html import Cell, Section, figure, page, table, text
 from cms.assessment.report.parts import (
     COLUMNS,
@@ -29,7 +30,6 @@ from cms.assessment.report.parts import (
     verdict_cell,
 )
 from cms.assessment.report.shapes import shapes_json, still_pictures
-from cms.assessment.report.words import count, factor, hertz, seconds, share, signed_percent
 
 __all__ = [
     "columns_section",

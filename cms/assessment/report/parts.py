@@ -3,9 +3,9 @@
 from cms.assessment.compare.comparison import Comparison
 from cms.assessment.quality.limits import LIMITS
 from cms.assessment.quality.record import QualityRecord
+from cms.assessment.report.formatting import share
 from cms.assessment.report.html import Cell, text
 from cms.assessment.report.palette import style_of
-from cms.assessment.report.words import share
 
 __all__ = [
     "COLUMNS",

@@ -196,7 +196,7 @@ def known_invariants(missing: tuple[str, ...]) -> tuple[str, ...]:
 def body_of(content: Content) -> ReducedBody:
     """Return the body that a file describes; data that older versions lack are None or empty."""
     contents = Contents(content)
-    array, words, attribute = contents.array, contents.words, contents.attribute
+    array, strings, attribute = contents.array, contents.strings, contents.attribute
     is_1 = content.version < 2  # version 1 stored neither dofs nor whether an interface has a rotation
     moments, units = moments_of(contents), units_of(contents)
     return ReducedBody(
@@ -210,8 +210,8 @@ def body_of(content: Content) -> ReducedBody:
             dofs=np.zeros((0, 2), np.int64) if is_1 else array("/frame/dofs"),
         ),
         **contents.arrays("/modes", "M", "K", "D", "free_frequencies", "energy_shares"),
-        labels=words("/modes/labels"),
-        sources=words("/modes/sources"),
+        labels=strings("/modes/labels"),
+        sources=strings("/modes/sources"),
         moments=moments,
         nodes=array("/nodes/position"),
         node_ids=array("/nodes/id"),
@@ -230,7 +230,7 @@ def body_of(content: Content) -> ReducedBody:
         ),
         stress=array("/stress/nodal") if contents.has("/stress", "has_nodal") else None,
         point_stress=PointStress(
-            words("/stress/points/names"), array("/stress/points/position"), array("/stress/points/modes")
+            strings("/stress/points/names"), array("/stress/points/position"), array("/stress/points/modes")
         )
         if contents.has("/stress", "has_points")
         else None,
@@ -250,13 +250,13 @@ def numbering_of(contents: Contents) -> Numbering:
     for group in contents.numbered("/sets"):
         name, kind, size = (contents.attribute(group, key, what) for key, what in SET_KEYS.items())
         sets.append(NamedSet(name, kind, contents.array(f"{group}/members"), size))
-    instances = contents.words("/instances/names") if contents.has("/instances") else ()
+    instances = contents.strings("/instances/names") if contents.has("/instances") else ()
     return Numbering(**arrays, instances=instances, sets=tuple(sets))
 
 
 def kept_of(contents: Contents) -> KeptPoints:
     """Return the points with rotations."""
-    return KeptPoints(contents.array("/kept/nodes"), contents.array("/kept/rotation"), contents.words("/kept/source"))
+    return KeptPoints(contents.array("/kept/nodes"), contents.array("/kept/rotation"), contents.strings("/kept/source"))
 
 
 def moments_of(contents: Contents) -> Moments:
@@ -295,7 +295,7 @@ def interface_of(contents: Contents, group: str) -> ReducedInterface:
 def columns_of(contents: Contents) -> SourceColumns:
     """Return the columns of the mode set."""
     arrays = contents.arrays("/columns", "A", "F")
-    return SourceColumns(contents.words("/columns/labels"), contents.words("/columns/groups"), **arrays)
+    return SourceColumns(contents.strings("/columns/labels"), contents.strings("/columns/groups"), **arrays)
 
 
 def nodal_sums_of(contents: Contents) -> NodalSums:

@@ -34,7 +34,7 @@ class Contents:
         """Return the arrays of some datasets of a group, by name."""
         return {name: self.array(f"{group}/{name}") for name in names}
 
-    def words(self, path: str) -> tuple[str, ...]:
+    def strings(self, path: str) -> tuple[str, ...]:
         """Return the strings of a dataset."""
         values = self._values(path)
         if not isinstance(values, tuple):

@@ -55,7 +55,7 @@ def recovery_of(contents: "Contents", units: Units) -> dict[str, RecoveryTable]:
             raise ModalFileError(f"{group}: a second recovery table has the name {name!r}")
         arrays = contents.arrays(group, *ARRAYS)
         texts: dict[str, Any] = {
-            each: contents.words(f"{group}/{each}") if each != "loads" or arrays["load_dimensions"].size else ()
+            each: contents.strings(f"{group}/{each}") if each != "loads" or arrays["load_dimensions"].size else ()
             for each in TEXTS
         }
         table = RecoveryTable(
@@ -63,7 +63,7 @@ def recovery_of(contents: "Contents", units: Units) -> dict[str, RecoveryTable]:
         )
         for each in UNITS:
             own = getattr(table, each)
-            if own and contents.words(f"{group}/{each}") != own:
+            if own and contents.strings(f"{group}/{each}") != own:
                 raise ModalFileError(
                     f"dataset {group}/{each} does not follow from the dimensions of the rows; the file was written "
                     "by a faulty writer"

@@ -261,8 +261,8 @@ def write_report(folder: Path, comparison: "Comparison", stills: int) -> list[Pa
 def print_comparison(comparison: "Comparison") -> None:
     """Print the answer, the verdicts with their numbers, and the reasons."""
     from cms.assessment.compare.verdicts import DECIDING
+    from cms.assessment.report.formatting import hertz, seconds, share
     from cms.assessment.report.parts import MARKS
-    from cms.assessment.report.words import hertz, seconds, share
 
     full = comparison.full
     say(f"{comparison.sentence}\n")

@@ -11,9 +11,9 @@ from cms.assessment.quality.body_record import body_record, body_size
 from cms.assessment.quality.of_body.effective_mass import DIRECTIONS, EffectiveMass
 from cms.assessment.quality.record import QualityRecord
 from cms.assessment.rendering import Scene, Surface, Triad, render_picture
+from cms.assessment.report.formatting import hertz
 from cms.assessment.report.png import png_of
 from cms.assessment.report.view import view_axes
-from cms.assessment.report.words import hertz
 from cms.body.reduced_body import ReducedBody
 from cms.jobs.acceptance.acceptance import VERDICT_WORDS, Acceptance
 from cms.jobs.acceptance.origin import origin_groups

@@ -8,8 +8,8 @@ from cms.assessment.correlation.correlate import Correlation
 from cms.assessment.correlation.update import Update
 from cms.assessment.quality.record import plain
 from cms.assessment.report.charts import Chart, base_layout, dtick
+from cms.assessment.report.formatting import hertz, signed_percent
 from cms.assessment.report.html import Cell, Section, figure, page, table, text
-from cms.assessment.report.words import hertz, signed_percent
 from cms.jobs.studies.correlation_file import CorrelationResult
 
 __all__ = ["correlation_page"]

@@ -20,7 +20,7 @@ def places(value: Any) -> tuple[str | int, ...]:
     return tuple(values)
 
 
-def words(value: Any) -> tuple[str, ...]:
+def component_names(value: Any) -> tuple[str, ...]:
     """Return names of components as a tuple."""
     values = value if isinstance(value, list) else [value]
     if not values or any(not isinstance(v, str) for v in values):
@@ -38,7 +38,7 @@ class RowsSection(Table):
         description=f"kind of the rows, one of {', '.join(QUANTITIES)}"
     )
     at: Places = Field((), description="numbers or names of nodes, elements, sets, interfaces; default: all there are")
-    components: Annotated[tuple[str, ...], BeforeValidator(words)] = Field(
+    components: Annotated[tuple[str, ...], BeforeValidator(component_names)] = Field(
         (), description="names of components, such as uz or xx; default: all"
     )
     about: Vector3 | None = Field(None, description="of net forces: the point [x, y, z]")

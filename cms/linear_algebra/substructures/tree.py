@@ -38,7 +38,7 @@ class SubstructureTree:
         self.description = f"tree of {len(substructures)} substructures (dense Cholesky; {n_threads()} threads)"
 
     @property
-    def words(self) -> str:
+    def division(self) -> str:
         """Description of the division of the body."""
         levels = np.zeros(self.dissection.n, dtype=int)
         for t in range(self.dissection.n - 2, -1, -1):

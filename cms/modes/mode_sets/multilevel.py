@@ -106,7 +106,7 @@ def multilevel(
             [*blocks, vibration_block("fixed-interface", modes)],
             modes=modes,
             wanted=wanted,
-            options=_words(results[-1], tolerance) if results else None,
+            options=_provenance(results[-1], tolerance) if results else None,
             data={"frequency error": np.concatenate([np.full(n_static, np.nan), errors])} if results else None,
         )
         return made
@@ -135,12 +135,12 @@ def _modes_of(
     return found
 
 
-def _words(result: MultilevelResult, tolerance: float) -> dict[str, str]:
+def _provenance(result: MultilevelResult, tolerance: float) -> dict[str, str]:
     """Describe the method and the remaining error, for the provenance."""
     above = np.flatnonzero(result.errors > tolerance) + 1
     return {
         "cutoff factor": f"{result.cutoff_factor:g}",
-        "substructures": result.tree.words,
+        "substructures": result.tree.division,
         "tolerance": f"{tolerance:g}",
         "largest frequency error": f"{result.errors.max(initial=0.0):.1e} (estimate)",
         "above tolerance": ", ".join(map(str, above)) if len(above) else "none",

@@ -28,7 +28,9 @@ def raw_from_skfem(mesh: Any) -> RawMesh:
     name = mesh.elem.__name__
     if name not in SOLID_KINDS | FLAT_KINDS:
         known = ", ".join([*SOLID_KINDS, *FLAT_KINDS])
-        raise MeshError(f"{_words(mesh)}: expected cells of {known}, got {name}; convert the mesh, or pass the basis")
+        raise MeshError(
+            f"{_description(mesh)}: expected cells of {known}, got {name}; convert the mesh, or pass the basis"
+        )
     nodes = np.asarray(mesh.doflocs, dtype=float).T
     if nodes.shape[1] < 3:
         nodes = np.hstack([nodes, np.zeros((len(nodes), 3 - nodes.shape[1]))])
@@ -90,5 +92,5 @@ def _faces(nodes: Array, facets: IntArray) -> dict[str, IntArray]:
     return found
 
 
-def _words(mesh: Any) -> str:
+def _description(mesh: Any) -> str:
     return f"scikit-fem mesh {type(mesh).__name__}"

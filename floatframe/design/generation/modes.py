@@ -121,22 +121,22 @@ def modes_of(graph: Graph, expansion: Expansion, i: int, frame: tuple[Array, Arr
     spread = np.sqrt(0.5 * max(float(np.trace(J)), float(np.trace(moved))))  # radius of gyration about either frame
     stiff, damped = (np.sqrt(np.abs(np.diag(each))) for each in (K, D))
 
-    def kept(x: Array, bound: Array) -> Terms:
+    def significant(x: Array, bound: Array) -> Terms:
         return terms(graph, without_noise(x, bound))
 
     return Modes(
         n=n,
         x0=expansion.xq_of[i].start,
         v0=expansion.vq_of[i].start,
-        C1=kept(C1_k @ F, np.sqrt(mass) * size[:, None]),
-        X=kept(X, spread * size[:, None, None]),
-        S=kept(S_kl, pair[..., None, None]),
-        C4=kept(C4_kl @ F, pair[..., None]),
-        M=kept(M, pair),
-        K=kept(K, stiff[:, None] * stiff),
-        D=kept(D, damped[:, None] * damped),
-        K_t=kept(Kt_kl @ F, pair[..., None]),
-        K_r=kept(Kr_kl, pair[..., None]),
+        C1=significant(C1_k @ F, np.sqrt(mass) * size[:, None]),
+        X=significant(X, spread * size[:, None, None]),
+        S=significant(S_kl, pair[..., None, None]),
+        C4=significant(C4_kl @ F, pair[..., None]),
+        M=significant(M, pair),
+        K=significant(K, stiff[:, None] * stiff),
+        D=significant(D, damped[:, None] * damped),
+        K_t=significant(Kt_kl @ F, pair[..., None]),
+        K_r=significant(Kr_kl, pair[..., None]),
     )
 
 

@@ -28,7 +28,7 @@ from cms.reduction.basis.node_motion import are_spread
 from fe_models.body.couplings.couplings import mean_motion
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.copies import frozen_copies
-from floatframe.model.rotations import cross, left_jacobian, rotation_exp, spin_rate, tilde, turned
+from floatframe.model.rotations import cross, left_jacobian, rotated, rotation_exp, spin_rate, tilde
 
 __all__ = [
     "BodyFrameMotion",
@@ -65,15 +65,15 @@ class MarkerShape:
         """Return displacement and rotation vector, (..., 6)."""
         if self.psi is None:
             return np.zeros((*q.shape[:-1], 6))
-        return turned(self.psi if self.bend is None else self.psi - 0.5 * bent(self.bend, q), q)
+        return rotated(self.psi if self.bend is None else self.psi - 0.5 * bent(self.bend, q), q)
 
     def rates(self, q: Array, q_dot: Array, q_ddot: Array) -> tuple[Array, Array]:
         """Return first and second rate of `deformation`, (..., 6) each."""
         shapes = self.shapes(q)
-        second = turned(shapes, q_ddot)
+        second = rotated(shapes, q_ddot)
         if self.bend is not None:
-            second = second - turned(bent(self.bend, q_dot), q_dot)
-        return turned(shapes, q_dot), second
+            second = second - rotated(bent(self.bend, q_dot), q_dot)
+        return rotated(shapes, q_dot), second
 
     def pose(self, q: Array) -> tuple[Array, Array]:
         """Return rho, (..., 3), and axes, (..., 3, 3), in the body."""
@@ -171,7 +171,7 @@ def motion_in_body(shape: MarkerShape, q: Array, q_dot: Array, q_ddot: Array) ->
     if shape.psi is None:
         return MotionInBody(rho + zero, zero, zero, np.broadcast_to(axes, (*q.shape[:-1], 3, 3)), zero, zero)
     theta = shape.deformation(q)[..., 3:]
-    spin = turned(left_jacobian(theta), rate[..., 3:])
+    spin = rotated(left_jacobian(theta), rate[..., 3:])
     return MotionInBody(
         rho, rate[..., :3], second[..., :3], axes, spin, spin_rate(theta, rate[..., 3:], second[..., 3:])
     )
@@ -205,10 +205,10 @@ def marker_motion(body: BodyFrameMotion, own: MotionInBody) -> MarkerMotion:
     arm = cross(omega, own.rho)
     relative = cross(alpha, own.rho) + cross(omega, arm) + 2 * cross(omega, own.rho_dot) + own.rho_ddot
     return MarkerMotion(
-        position=body.r + turned(R, own.rho),
-        velocity=body.v + turned(R, arm + own.rho_dot),
-        acceleration=body.v_dot + turned(R, relative),
+        position=body.r + rotated(R, own.rho),
+        velocity=body.v + rotated(R, arm + own.rho_dot),
+        acceleration=body.v_dot + rotated(R, relative),
         axes=R @ own.axes,
-        omega=turned(R, omega + own.spin),
-        alpha=turned(R, alpha + cross(omega, own.spin) + own.spin_dot),
+        omega=rotated(R, omega + own.spin),
+        alpha=rotated(R, alpha + cross(omega, own.spin) + own.spin_dot),
     )

@@ -34,9 +34,9 @@ from floatframe.model.rotations import (
     cross,
     euler_parameter_product,
     euler_parameters_of_rotation_vector,
+    rotated,
     rotation_matrix,
     tilde,
-    turned,
 )
 
 __all__ = ["FrameMotion", "MeanAxes", "mean_axes"]
@@ -85,16 +85,16 @@ class MeanAxes:
         own = motion_in_body(self.frame, q, motion.q_dot, motion.q_ddot)
         at = marker_motion(motion.of_frame, own)
         back = np.swapaxes(at.axes, -1, -2)
-        omega, omega_dot, c = turned(back, at.omega), turned(back, at.alpha), self.point
+        omega, omega_dot, c = rotated(back, at.omega), rotated(back, at.alpha), self.point
         theta = self.frame.deformation(q)[..., 3:]
         return FrameMotion(
             r=at.position - at.axes @ c,
             p=euler_parameter_product(motion.p, euler_parameters_of_rotation_vector(theta)),
             q=q @ self.Z.T,
-            v=at.velocity - turned(at.axes, cross(omega, c)),
+            v=at.velocity - rotated(at.axes, cross(omega, c)),
             omega=omega,
             q_dot=motion.q_dot @ self.Z.T,
-            v_dot=at.acceleration - turned(at.axes, cross(omega_dot, c) + cross(omega, cross(omega, c))),
+            v_dot=at.acceleration - rotated(at.axes, cross(omega_dot, c) + cross(omega, cross(omega, c))),
             omega_dot=omega_dot,
             q_ddot=motion.q_ddot @ self.Z.T,
         )
@@ -106,18 +106,18 @@ class MeanAxes:
         at = marker_motion(motion.of_frame, motion_in_body(MarkerShape(self.point, np.eye(3)), q, q_dot, q_ddot))
         R = at.axes @ np.swapaxes(own.axes, -1, -2)
         back = np.swapaxes(R, -1, -2)
-        omega = turned(back, at.omega) - own.spin
-        omega_dot = turned(back, at.alpha) - cross(omega, own.spin) - own.spin_dot
+        omega = rotated(back, at.omega) - own.spin
+        omega_dot = rotated(back, at.alpha) - cross(omega, own.spin) - own.spin_dot
         theta = self.frame.deformation(q)[..., 3:]
         swing = cross(omega_dot, own.rho) + cross(omega, cross(omega, own.rho))
         return FrameMotion(
-            r=at.position - turned(R, own.rho),
+            r=at.position - rotated(R, own.rho),
             p=euler_parameter_product(motion.p, euler_parameters_of_rotation_vector(-theta)),
             q=q,
-            v=at.velocity - turned(R, cross(omega, own.rho) + own.rho_dot),
+            v=at.velocity - rotated(R, cross(omega, own.rho) + own.rho_dot),
             omega=omega,
             q_dot=q_dot,
-            v_dot=at.acceleration - turned(R, swing + 2 * cross(omega, own.rho_dot) + own.rho_ddot),
+            v_dot=at.acceleration - rotated(R, swing + 2 * cross(omega, own.rho_dot) + own.rho_ddot),
             omega_dot=omega_dot,
             q_ddot=q_ddot,
         )

@@ -9,7 +9,7 @@ from floatframe.engine.compiling.markers import MarkerData
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.bodies.marker_shape import MarkerShape, interface_shape
 from floatframe.model.bodies.markers import Marker
-from floatframe.model.rotations import rotation_log, rotation_matrix, turned
+from floatframe.model.rotations import rotated, rotation_log, rotation_matrix
 from floatframe.model.system import System
 from floatframe.results.joint_coordinates import end_motion
 from floatframe.results.trajectory import Trajectory
@@ -77,7 +77,7 @@ class Carriers:
             motion = self.trajectory.body(self.trajectory.body_names[end.body])
             place, R = end_motion(self.system, self.trajectory, end), rotation_matrix(motion.p[self.rows])
             back = np.swapaxes(R, -1, -2)
-            rho = turned(back, place.position[self.rows] - motion.r[self.rows])
+            rho = rotated(back, place.position[self.rows] - motion.r[self.rows])
             axes = back @ place.axes[self.rows]
             theta = np.array([rotation_log(A @ axes[0].T) for A in axes])
             self.add(key, Carrier(end.body, rho[0], axes[0], np.concatenate([rho - rho[0], theta], axis=1)))

@@ -136,7 +136,7 @@ def interface_load_rows(small: SmallMotions, body: FlexibleBody) -> list[Rows]:
         if load.force.is_follower:  # it rotates with its marker
             six = small.now.source.read("load")[0, load.number]
             place = small.place(find_marker(small.system, f"force {load.force.name!r}", load.force.marker))
-            turned = [place.turned.turned(-tilde(part)) for part in (six[:3], six[3:])]
+            turned = [place.rotation.mapped(-tilde(part)) for part in (six[:3], six[3:])]
             found[load.interface] = found[load.interface] + joined(turned)
     return found
 
@@ -184,7 +184,7 @@ class InterfaceForceSensor:
         for first, key in ((0, "force"), (3, "moment")):
             value, part = np.array([now[f"{key} {axis}"][0] for axis in "xyz"]), rows[first : first + 3]
             if self.axes == "body":
-                part = (part + frame.turned.turned(tilde(frame.axes @ value))).turned(frame.axes.T)
+                part = (part + frame.rotation.mapped(tilde(frame.axes @ value))).mapped(frame.axes.T)
             unit = unit_words(small.system.units, key)
             found.append(vector_linear(part, value, unit, prefix=f"{key} ", least=ROUNDING * small.largest_wrench))
         force, moment = found
@@ -232,8 +232,8 @@ class SpringSensor:
         if length == 0.0:
             why = "a line of length zero has no direction"
             return LinearColumns({}, self.units(small.system), dict.fromkeys(("length", "rate", "tension"), why))
-        row, first = (b.moved - a.moved).turned(d / length), small.wrench(self.of).start
-        tension = small.by_wrench(slice(first, first + 3)).turned(d / length)
+        row, first = (b.moved - a.moved).mapped(d / length), small.wrench(self.of).start
+        tension = small.by_wrench(slice(first, first + 3)).mapped(d / length)
         return scalar_columns({"length": row, "rate": row.rate, "tension": tension}, self.units(small.system))
 
     def ends(self, system: System) -> list[MarkerData]:
@@ -293,29 +293,29 @@ class RecoverySensor:
         z, R = small.of_file(body.name)
         frame = small.frame_place(body.name)
         places, rates = self.places_and_rates(small, z)
-        y = places.turned(table.dynamic[0][rows]) + rates.turned(table.dynamic[1][rows])
-        y = y + z.rate.rate.turned(table.dynamic[2][rows])
-        turning = frame.turned
+        y = places.mapped(table.dynamic[0][rows]) + rates.mapped(table.dynamic[1][rows])
+        y = y + z.rate.rate.mapped(table.dynamic[2][rows])
+        turning = frame.rotation
         on_interfaces, now = interface_load_rows(small, body), interface_loads(small.system, small.now, body)[:, 0]
         for column, load in enumerate(table.loads):
             factor = table.static[rows, column][:, None]
             name, _, component = load.rpartition(" ")
             if name == "gravity":
                 g = gravity_of(small.system)
-                y = y + turning.turned(tilde(g)).turned(R.T)[axis_of(component)].turned(factor)
+                y = y + turning.mapped(tilde(g)).mapped(R.T)[axis_of(component)].mapped(factor)
             elif component in SIX and name in interface_names(body):
                 k, j = interface_names(body).index(name), SIX.index(component)
                 first = 3 * (j // 3)
                 value = R @ now[k, first : first + 3]
-                part = on_interfaces[k][first : first + 3] + turning.turned(tilde(value))
-                y = y + part.turned(R.T)[j % 3].turned(factor)
+                part = on_interfaces[k][first : first + 3] + turning.mapped(tilde(value))
+                y = y + part.mapped(R.T)[j % 3].mapped(factor)
             elif load.startswith("load case "):
                 x = np.zeros((1, small.n_x))
                 for k, forces in enumerate(small.forces):
                     x[0, small.n_u + k] = sum(
                         push.body == body.name and load == f"load case {push.load_case}" for push in forces
                     )
-                y = y + small.by_motion(x).turned(factor)
+                y = y + small.by_motion(x).mapped(factor)
         return LinearColumns({table.labels[row]: y[k] for k, row in enumerate(rows)}, units, {})
 
     def found(self, system: System) -> tuple[FlexibleBody, RecoveryTable, IntArray]:

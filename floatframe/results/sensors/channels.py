@@ -87,7 +87,7 @@ class Channel:
         rows = small.by_motion(np.zeros((1, small.n_x)))
         for sign, marker in self.markers:
             place = self.place(small, marker)
-            rows = rows + (place.moved if self.quantity == "translation" else place.turned).turned(
+            rows = rows + (place.moved if self.quantity == "translation" else place.rotation).mapped(
                 sign * self.direction
             )
         for _ in range(self.rate):

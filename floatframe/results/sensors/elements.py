@@ -54,12 +54,12 @@ def output_rows(placed: PlacedLaw, small: SmallMotions) -> Rows:
     parts = []
     for marker in placed.markers:
         place = small.place(marker, placed.element.name)
-        parts += [place.moved, place.turned, small.velocity(place.moved), small.velocity(place.turned)]
+        parts += [place.moved, place.rotation, small.velocity(place.moved), small.velocity(place.rotation)]
         if placed.law.accelerations:
-            parts += [small.acceleration(place.moved), small.acceleration(place.turned)]
+            parts += [small.acceleration(place.moved), small.acceleration(place.rotation)]
     if unknown:
         parts.append(small.by_wrench(unknown))
-    return joined(parts).turned(slopes)
+    return joined(parts).mapped(slopes)
 
 
 # sensors of couplers and user forces: their coordinates, rates, forces and states -------------------------------------
@@ -280,10 +280,10 @@ class BushingSensor:
         C = a.axes @ Rotation.from_rotvec(share * theta).as_matrix()
         e = C.T @ (b.position - a.position)
         alpha, beta, tau = (float(x[0]) for x in scalars(np.array([theta @ theta]), share))
-        u = (b.turned - a.turned).turned(C.T)
-        dc = a.turned.turned((1 - share) * C.T) + b.turned.turned(share * C.T) - u.turned(tau * tilde(theta))
-        de = (b.moved - a.moved).turned(C.T) + dc.turned(tilde(e))
-        turning = u.turned(alpha * np.eye(3) + beta * np.outer(theta, theta) + (share - 0.5) * tilde(theta))
+        u = (b.rotation - a.rotation).mapped(C.T)
+        dc = a.rotation.mapped((1 - share) * C.T) + b.rotation.mapped(share * C.T) - u.mapped(tau * tilde(theta))
+        de = (b.moved - a.moved).mapped(C.T) + dc.mapped(tilde(e))
+        turning = u.mapped(alpha * np.eye(3) + beta * np.outer(theta, theta) + (share - 0.5) * tilde(theta))
         rows = [*(de[k] for k in range(3)), *(turning[k] for k in range(3))]
         rows += [row.rate for row in rows]
         return scalar_columns(dict(zip(NAMES, rows, strict=True)), self.units(small.system))

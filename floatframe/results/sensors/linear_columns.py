@@ -20,7 +20,7 @@ def vector_linear(rows: Rows, value: Array, unit: str, *, prefix: str = "", leas
     size = float(np.linalg.norm(value))
     if size <= least:
         return LinearColumns(columns, units, {f"{prefix}size": NO_SIZE})
-    return LinearColumns(columns | {f"{prefix}size": rows.turned(value / size)}, units, {})
+    return LinearColumns(columns | {f"{prefix}size": rows.mapped(value / size)}, units, {})
 
 
 def scalar_columns(columns: dict[str, Rows], units: dict[str, str]) -> LinearColumns:

@@ -72,7 +72,7 @@ class ReactionSensor:
                 rows = small.by_wrench(slice(own.start + first, own.start + first + 3))
             if self.axes == "marker":
                 place = small.place(self.end_a(small.system), self.of)
-                rows = (rows + place.turned.turned(tilde(value))).turned(place.axes.T)
+                rows = (rows + place.rotation.mapped(tilde(value))).mapped(place.axes.T)
                 value = place.axes.T @ value
             unit = unit_words(small.system.units, key.strip())
             found.append(vector_linear(rows, value, unit, prefix=key, least=ROUNDING * small.largest_wrench))

@@ -91,7 +91,7 @@ def small_place(small: SmallMotions, where: str, marker: Marker) -> SmallPlace:
     seen = node_shape(body.reduced, found.rows, is_stiffened=body.is_stiffened)
     axes = frame.axes @ seen.pose(small.now.body(body.name).q[0])[1]
     turns = is_turning(body.reduced, found.rows)
-    return SmallPlace(place.position, axes, place.moved, place.turned if turns else frame.turned)
+    return SmallPlace(place.position, axes, place.moved, place.rotation if turns else frame.rotation)
 
 
 def is_at_node(system: System, marker: Marker) -> bool:
@@ -217,9 +217,9 @@ class PlaceSensor:
 def absolute_rows(small: SmallMotions, place: SmallPlace, quantity: str) -> Rows:
     """Return three rows of a quantity of a point, in axes that rotate with the steady motion."""
     if quantity == "rotation-vector":
-        return place.turned.turned(inverse_left_jacobian(place.axes))
+        return place.rotation.mapped(inverse_left_jacobian(place.axes))
     if quantity == "angular-velocity":
-        return place.turned.rate
+        return place.rotation.rate
     rows = place.moved
     if quantity in ("velocity", "acceleration"):
         rows = small.velocity(rows)
@@ -238,10 +238,10 @@ def relative_rows(place: SmallPlace, other: SmallPlace, quantity: str) -> Rows:
     """
     back = other.axes.T
     if quantity in TURNING:
-        turn = (place.turned - other.turned).turned(back)
-        return turn.rate if quantity == "angular-velocity" else turn.turned(inverse_left_jacobian(back @ place.axes))
+        turn = (place.rotation - other.rotation).mapped(back)
+        return turn.rate if quantity == "angular-velocity" else turn.mapped(inverse_left_jacobian(back @ place.axes))
     arm = tilde(place.position - other.position)
-    rows = (place.moved - other.moved + other.turned.turned(arm)).turned(back)
+    rows = (place.moved - other.moved + other.rotation.mapped(arm)).mapped(back)
     for _ in range(("position", "velocity", "acceleration").index(quantity)):
         rows = rows.rate
     return rows
@@ -327,7 +327,7 @@ class AngleSensor:
         X, Y, D = a.axes @ x, a.axes @ y, b.axes @ x
         C, S = X @ D, Y @ D
         across = np.cross(D, C * Y - S * X) / (C**2 + S**2)
-        return scalar_columns({"angle": (b.turned - a.turned).turned(across)}, {"angle": "rad"})
+        return scalar_columns({"angle": (b.rotation - a.rotation).mapped(across)}, {"angle": "rad"})
 
     def counted_angle(self, system: System) -> CountedAngle:
         """Return the angle whose turns a run counts, for the undeformed bodies."""
@@ -361,7 +361,7 @@ class DisplacementSensor:
         """Return x, y, z and size as functions of small motions."""
         body, shape = self.shape_of(small.system)
         q = small.now.body(body.name).q[0]
-        rows = small.coordinates(body.name).turned(shape.shapes(q)[:3])
+        rows = small.coordinates(body.name).mapped(shape.shapes(q)[:3])
         least = ROUNDING_OF_MOTION * small.compiled.length
         return vector_linear(rows, shape.deformation(q)[:3], small.system.units.length_symbol, least=least)
 

@@ -105,7 +105,7 @@ def von_mises_rows(modes: Array, q: Array, coordinates: Rows) -> Rows | None:
     if value <= ROUNDING * float(np.linalg.norm(modes) * np.linalg.norm(q)):
         return None
     by_stress = np.concatenate([MISES @ stress[:3], 3 * stress[3:]]) / value
-    return coordinates.turned(by_stress @ modes)
+    return coordinates.mapped(by_stress @ modes)
 
 
 @frozen_copies
@@ -158,7 +158,7 @@ class StressSensor:
         """Return the components as functions of small motions, and the von Mises stress if the stress is not zero."""
         body = flexible_body(small.system, self.name, self.body)
         (modes, _), q = self.modes_of(body, small.now), small.coordinates(self.body)
-        rows = q.turned(modes)
+        rows = q.mapped(modes)
         columns = {component: rows[k] for k, component in enumerate(STRESS_COMPONENTS)}
         units = dict.fromkeys((*columns, "von Mises"), small.system.units.stress_symbol)
         sum_of_all = von_mises_rows(modes, small.now.body(self.body).q[0], q)
@@ -271,7 +271,7 @@ class StrainGauge:
     def linear(self, small: SmallMotions) -> LinearColumns:
         """Return the strain as a function of small motions."""
         body = flexible_body(small.system, self.name, self.body)
-        row = small.coordinates(self.body).turned(self.strain_modes(body))
+        row = small.coordinates(self.body).mapped(self.strain_modes(body))
         return scalar_columns({"strain": row}, {"strain": "-"})
 
 
@@ -332,5 +332,5 @@ class ElongationSensor:
         """Return the strain as a function of small motions."""
         body = flexible_body(small.system, self.name, self.body)
         d, by_q = self.line(body)
-        row = small.coordinates(self.body).turned(d @ by_q / (d @ d))
+        row = small.coordinates(self.body).mapped(d @ by_q / (d @ d))
         return scalar_columns({"strain": row}, {"strain": "-"})

@@ -42,7 +42,7 @@ class Rows:
         part = slice(chosen, chosen + 1) if isinstance(chosen, int) else chosen
         return Rows(self.x[part], self.v[part], self.a[part], self.w[part])
 
-    def turned(self, A: Array) -> "Rows":
+    def mapped(self, A: Array) -> "Rows":
         """Return A times the rows, (len(A), ...)."""
         A = np.atleast_2d(A)
         return Rows(A @ self.x, A @ self.v, A @ self.a, A @ self.w)

@@ -64,7 +64,7 @@ class SmallPlace:
     position: Array  #: ground axes, (3,)
     axes: Array  #: columns, (3, 3)
     moved: Rows  #: its translation, as three rows
-    turned: Rows  #: rotation of its axes in ground axes, as three rows
+    rotation: Rows  #: rotation of its axes in ground axes, as three rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +121,7 @@ class SmallMotions:
 
     def velocity(self, rows: Rows) -> Rows:
         """Return rows of the absolute velocity of a point from rows of its translation."""
-        return rows.rate + rows.turned(tilde(self.omega))
+        return rows.rate + rows.mapped(tilde(self.omega))
 
     def acceleration(self, rows: Rows) -> Rows:
         """Return rows of the absolute acceleration of a point from rows of its translation."""
@@ -163,7 +163,7 @@ class SmallMotions:
     def frame_place(self, name: str) -> SmallPlace:
         """Return the frame of a body's file with its linearised motion."""
         rows, R = self.of_file(name)
-        return SmallPlace(self.now.body(name).r[0], R, rows[:3].turned(R), rows[3:6].turned(R))
+        return SmallPlace(self.now.body(name).r[0], R, rows[:3].mapped(R), rows[3:6].mapped(R))
 
     def joint_coordinate(self, joint: str, coordinate: str, where: str) -> Rows:
         """Return one row of the change of a joint coordinate; `ModelError` with the nearest name if there is none."""

@@ -62,7 +62,7 @@ def read_element(here: str, block: DeckBlock, draft: Draft) -> None:
     name = block.parameters["TYPE"].upper()
     if name in _POINTS:
         n = _POINTS[name]
-        words = [int(word) for word in block.words]
+        words = [int(word) for word in block.tokens]
         if len(words) % (n + 1):
             raise MeshError(f"{here}: {name} elements have {n} nodes: expected a multiple of {n + 1} numbers below")
         rows = np.array(words, dtype=np.int64).reshape(-1, n + 1).tolist()

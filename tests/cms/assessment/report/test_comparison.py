@@ -19,8 +19,8 @@ from cms.assessment.compare.verdicts import DECIDING, crossings
 from cms.assessment.quality.limits import LIMITS
 from cms.assessment.report import comparison_csv, comparison_html, comparison_json
 from cms.assessment.report.charts import convergence_chart, deformation_chart, mac_chart, response_chart
+from cms.assessment.report.formatting import factor, share, signed_percent
 from cms.assessment.report.palette import COLORS, style_of
-from cms.assessment.report.words import factor, share, signed_percent
 from tests.bodies import bar, beam
 from tests.cms.browser import browser, opened
 

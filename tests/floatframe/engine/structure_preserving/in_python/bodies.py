@@ -10,7 +10,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.engine.kernels.model import Model
 from floatframe.engine.structure_preserving.bodies import CentralBody
-from floatframe.model.rotations import cross, dot, rotation_matrix, tilde, turned
+from floatframe.model.rotations import cross, dot, rotated, rotation_matrix, tilde
 from floatframe.model.state import State
 from tests.floatframe.engine.structure_preserving.in_python.rotation import cayley, cayley_parameters
 
@@ -20,7 +20,7 @@ class Body(CentralBody):
 
     def center(self, q: Array) -> Array:
         """Return s(q), from the frame origin to the centre of mass, body axes, (..., 3)."""
-        return self.S + 0.5 * turned(self.C1 + self.shapes(q), q)
+        return self.S + 0.5 * rotated(self.C1 + self.shapes(q), q)
 
     def shapes(self, q: Array) -> Array:
         """Return 1C(q) = ds/dq, (..., 3, n)."""
@@ -28,7 +28,7 @@ class Body(CentralBody):
 
     def drift(self, q: Array, omega: Array, q_dot: Array) -> Array:
         """Return a, the velocity of the centre of mass against the frame origin, body axes, (..., 3)."""
-        return cross(omega, self.center(q)) + turned(self.shapes(q), q_dot)
+        return cross(omega, self.center(q)) + rotated(self.shapes(q), q_dot)
 
     def products(self, q: Array) -> Array:
         """Return V_ab,k = Σ_l S_ab,kl q_l, (..., 3, 3, n)."""
@@ -49,9 +49,9 @@ class Body(CentralBody):
         """Return Pi, (..., 3), and Y, (..., n)."""
         V = self.products(q)
         B, s, C = self.coupling(V), self.center(q), self.shapes(q)
-        a = self.m * (cross(omega, s) + turned(C, q_dot))
-        Pi = turned(self.inertia(q, V), omega) + turned(B, q_dot) - cross(s, a)
-        return Pi, turned(np.swapaxes(B, -1, -2), omega) + q_dot @ self.M - turned(np.swapaxes(C, -1, -2), a)
+        a = self.m * (cross(omega, s) + rotated(C, q_dot))
+        Pi = rotated(self.inertia(q, V), omega) + rotated(B, q_dot) - cross(s, a)
+        return Pi, rotated(np.swapaxes(B, -1, -2), omega) + q_dot @ self.M - rotated(np.swapaxes(C, -1, -2), a)
 
     def mass_matrix_at(self, q: Array) -> Array:
         """Return M_c(q), (3 + n, 3 + n), for one q."""
@@ -79,9 +79,9 @@ class Body(CentralBody):
             total = total + np.einsum("...a,...ak->...k", omega, change)
             # the mean of one a, times the derivative of the other by q_k: omega × 1C_k + (K_t q_dot)_k
             a = 0.5 * self.m * (self.drift(q_0, omega, rate) + self.drift(q_1, omega, rate))
-            total = total - turned(np.swapaxes(C, -1, -2), cross(a, other))
+            total = total - rotated(np.swapaxes(C, -1, -2), cross(a, other))
             if self.K_t is not None:
-                total = total - turned(np.swapaxes(bent(self.K_t, other_rate, 3), -1, -2), a)
+                total = total - rotated(np.swapaxes(bent(self.K_t, other_rate, 3), -1, -2), a)
         return 0.5 * total
 
 

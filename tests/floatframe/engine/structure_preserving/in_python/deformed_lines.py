@@ -11,7 +11,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.engine.kernels.model import Model
 from floatframe.model.joints.rows import LINE_TURN
-from floatframe.model.rotations import cross, dot, rotation_exp, turned
+from floatframe.model.rotations import cross, dot, rotated, rotation_exp
 from tests.floatframe.engine.structure_preserving.in_python.bodies import BodyStep
 from tests.floatframe.engine.structure_preserving.in_python.constraints import Loads, Pair, Span, add_product
 from tests.floatframe.engine.structure_preserving.in_python.coordinates import add_pair
@@ -131,7 +131,7 @@ def slid(
             t = span.t_force if is_still else (span.t_0, span.t_1)[k]
             places.append(np.array(value_of(model, int(model.rows.motion[line.row]), t)[0]))
             continue
-        x = turned(np.swapaxes(R, -1, -2), x_b - c) + centers[k] - line.position
+        x = rotated(np.swapaxes(R, -1, -2), x_b - c) + centers[k] - line.position
         places.append(place_of(line, dot(x, line.e), x, d, th))
     s_0, s_1 = places
 
@@ -153,14 +153,14 @@ def slid(
     T = line.e + combined(line.e, a_1, b_1, d, th)
     twist = dot((linear[..., None] * th).sum(axis=-2), line.e)[..., None] * line.e
     T_r = cross(line.e, combined(line.e, a_2, b_2, d, th)) + twist
-    arm_0, arm_1 = turned(step.R_0, sigma_0), turned(step.R_1, sigma_1)
+    arm_0, arm_1 = rotated(step.R_0, sigma_0), rotated(step.R_1, sigma_1)
     lever, Gamma = 0.5 * (arm_0 + arm_1), mean_jacobian(angle_0, angle_1)
     made = MarkerStep(
         marker, step, step.c_0 + arm_0, step.c_1 + arm_1, lever,
-        step.d + cross(step.theta_G, lever) + turned(step.R_m, turned(Psi_sigma, step.dq)),
-        rotation_exp(angle_0), rotation_exp(angle_1), Gamma, turned(Gamma, turned(Psi_r, step.dq)), Psi_sigma, Psi_r,
+        step.d + cross(step.theta_G, lever) + rotated(step.R_m, rotated(Psi_sigma, step.dq)),
+        rotation_exp(angle_0), rotation_exp(angle_1), Gamma, rotated(Gamma, rotated(Psi_r, step.dq)), Psi_sigma, Psi_r,
     )  # fmt: skip
-    return made, Slide(line, turned(step.R_m, T), turned(Gamma, T_r), turned(step.R_1, tangent))
+    return made, Slide(line, rotated(step.R_m, T), rotated(Gamma, T_r), rotated(step.R_1, tangent))
 
 
 def shapes(line: DeformedLine, s_0: Array, s_1: Array, q: Array) -> tuple[Array, Array]:
@@ -204,7 +204,7 @@ def turn_by_place(model: Model, k: int, pair: Pair, slide: Slide) -> Array:
     a, b = pair
     assert a.step is not None
     D_0, D_1 = b.ends(model.rows.y[k])
-    by_s = turned(a.step.R_m, cross(slide.kappa, a.eps_mean(model.rows.x[k])))
+    by_s = rotated(a.step.R_m, cross(slide.kappa, a.eps_mean(model.rows.x[k])))
     return dot(0.5 * (D_0 + D_1), by_s)
 
 

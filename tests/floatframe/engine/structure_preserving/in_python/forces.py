@@ -16,7 +16,7 @@ from floatframe.engine.kernels.model import Model
 from floatframe.engine.structure_preserving.system import coordinates_of, element_of, state_rows
 from floatframe.model.functions import expressions as ex
 from floatframe.model.joints.rows import kind_of
-from floatframe.model.rotations import continued_rotation, cross, dot, rotation_exp, tilde, turned
+from floatframe.model.rotations import continued_rotation, cross, dot, rotated, rotation_exp, tilde
 from tests.floatframe.engine.structure_preserving.in_python.bodies import Body, BodyStep
 from tests.floatframe.engine.structure_preserving.in_python.constraints import Loads, Pair, Span, arctan2
 from tests.floatframe.engine.structure_preserving.in_python.coordinates import (
@@ -198,7 +198,7 @@ def bushing_load(model: Model, c: int, pair: Pair, loads: Loads, span: Span) -> 
     (a, b), i = pair, int(model.connections.item[c])
     (A_0, A_1), (B_0, B_1) = axes(a), axes(b)
     A, B, d = 0.5 * (A_0 + A_1), 0.5 * (B_0 + B_1), b.x_mean - a.x_mean
-    s_0, s_1 = turned(transposed(A_0), b.x_0 - a.x_0), turned(transposed(A_1), b.x_1 - a.x_1)
+    s_0, s_1 = rotated(transposed(A_0), b.x_0 - a.x_0), rotated(transposed(A_1), b.x_1 - a.x_1)
     R_0 = transposed(A_0) @ B_0
     share = float(model.bushings.share[i])
     th_0, th_1 = rotation_vector(R_0), rotation_vector(transposed(A_1) @ B_1)
@@ -208,19 +208,19 @@ def bushing_load(model: Model, c: int, pair: Pair, loads: Loads, span: Span) -> 
     Gamma, part = mean_jacobian(th_0, th_1), mean_jacobian(-share * th_0, -share * th_1)
     P = R_0 + 0.5 * tilde(relative_cayley(th_0, th_1)) @ R_0
     Q_0, Q_1 = rotation_exp(-share * th_0), rotation_exp(-share * th_1)
-    Q, arm = 0.5 * (Q_0 + Q_1), turned(0.5 * (Q_0 + Q_1), 0.5 * (s_0 + s_1))
+    Q, arm = 0.5 * (Q_0 + Q_1), rotated(0.5 * (Q_0 + Q_1), 0.5 * (s_0 + s_1))
     # change of the deformations due to the motion over the step
     dA, dB = axes_change(a, A), axes_change(b, B)
     psi = axial((transposed(dA) @ B + transposed(A) @ dB) @ transposed(P))
     dtheta = solved(Gamma, psi)
-    ds = turned(transposed(dA), d) + turned(transposed(A), b.dx - a.dx)
-    de = turned(Q, ds) + cross(-share * turned(part, dtheta), arm)
+    ds = rotated(transposed(dA), d) + rotated(transposed(A), b.dx - a.dx)
+    de = rotated(Q, ds) + cross(-share * rotated(part, dtheta), arm)
     change = np.concatenate(np.broadcast_arrays(de, dtheta), axis=-1)
-    e_mean = 0.5 * (turned(Q_0, s_0) + turned(Q_1, s_1))
+    e_mean = 0.5 * (rotated(Q_0, s_0) + rotated(Q_1, s_1))
     mean = np.concatenate(np.broadcast_arrays(e_mean, 0.5 * (th_0 + th_1)), axis=-1)
     law = model.bushings
-    damping = turned(law.damping[i], change / span.h)
-    force = turned(law.stiffness[i], mean) + law.preload[i] + damping
+    damping = rotated(law.damping[i], change / span.h)
+    force = rotated(law.stiffness[i], mean) + law.preload[i] + damping
     given = np.zeros(np.shape(change)[:-1], change.dtype)
     for r in range(6):
         if law.table[i, r] >= 0:
@@ -228,14 +228,14 @@ def bushing_load(model: Model, c: int, pair: Pair, loads: Loads, span: Span) -> 
             force = force + value[..., None] * np.eye(6)[r]
             given = given - value * change[..., r]
     f, m = force[..., :3], force[..., 3:]
-    m = m - share * turned(transposed(part), cross(arm, f))
+    m = m - share * rotated(transposed(part), cross(arm, f))
     tau = solved(transposed(Gamma), m)
-    G, g = -0.5 * tilde(tau) @ P, -turned(transposed(Q), f)
+    G, g = -0.5 * tilde(tau) @ P, -rotated(transposed(Q), f)
     on_A, on_B = B @ transposed(G) + d[..., :, None] * g[..., None, :], A @ G
     for k, e in enumerate(np.eye(3)):
         a.add_direction(loads[0], e, on_A[..., k])
         b.add_direction(loads[1], e, on_B[..., k])
-    F = turned(A, g)
+    F = rotated(A, g)
     a.add_force(loads[0], -F)
     b.add_force(loads[1], F)
     return given, dot(damping, change)
@@ -304,8 +304,8 @@ def body_load(model: Model, k: int, body: Body, step: BodyStep, load: Load, span
     q = 0.5 * (step.q_0 + step.q_1)
     s = body.center(q)
     R = 0.5 * (step.R_0 + step.R_1)
-    F, T = turned(R, f), turned(R, tau - cross(s, np.broadcast_to(f, s.shape)))
-    h = modal - turned(np.swapaxes(body.shapes(q), -1, -2), f)
+    F, T = rotated(R, f), rotated(R, tau - cross(s, np.broadcast_to(f, s.shape)))
+    h = modal - rotated(np.swapaxes(body.shapes(q), -1, -2), f)
     load.force += F
     load.torque += T
     load.modal += h

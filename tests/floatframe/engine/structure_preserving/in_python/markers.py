@@ -10,7 +10,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.engine.kernels.model import Model
 from floatframe.model.bodies.marker_shape import MarkerShape
-from floatframe.model.rotations import cross, dot, left_jacobian, rotation_exp, turned
+from floatframe.model.rotations import cross, dot, left_jacobian, rotated, rotation_exp
 from tests.floatframe.engine.structure_preserving.in_python.bodies import Body, BodyStep
 from tests.floatframe.engine.structure_preserving.in_python.rotation import relative_cayley
 
@@ -98,7 +98,7 @@ class MarkerStep:
         e = self.marker.shape.triad @ e
         if self.step is None:
             return e, e
-        return turned(self.step.R_0, self.rotation_0 @ e), turned(self.step.R_1, self.rotation_1 @ e)
+        return rotated(self.step.R_0, self.rotation_0 @ e), rotated(self.step.R_1, self.rotation_1 @ e)
 
     def change(self, e: Array, E_mean: Array) -> Array:
         """Return dE of direction e."""
@@ -106,7 +106,7 @@ class MarkerStep:
             return np.zeros(3)
         change = cross(self.step.theta_G, E_mean)
         if self.dpsi is not None:
-            change = change + turned(self.step.R_m, cross(self.dpsi, self.eps_mean(e)))
+            change = change + rotated(self.step.R_m, cross(self.dpsi, self.eps_mean(e)))
         return change
 
     def turning(self) -> Array:
@@ -115,7 +115,7 @@ class MarkerStep:
             return np.zeros(3)
         if self.dpsi is None:
             return self.step.theta_G
-        return self.step.theta_G + turned(self.step.R_m, self.dpsi)
+        return self.step.theta_G + rotated(self.step.R_m, self.dpsi)
 
     def eps_mean(self, e: Array) -> Array:
         """Return the mean of direction e in the body."""
@@ -127,8 +127,8 @@ class MarkerStep:
             return
         load.force += F
         load.torque += cross(self.lever, F)
-        F_B = turned(np.swapaxes(self.step.R_m, -1, -2), F)
-        load.modal += turned(np.swapaxes(self.Psi_sigma, -1, -2), F_B)
+        F_B = rotated(np.swapaxes(self.step.R_m, -1, -2), F)
+        load.modal += rotated(np.swapaxes(self.Psi_sigma, -1, -2), F_B)
 
     def add_direction(self, load: Load | None, e: Array, G: Array) -> None:
         """Add a load on direction e, with work G·dE."""
@@ -137,7 +137,7 @@ class MarkerStep:
         E_0, E_1 = self.ends(e)
         load.torque += cross(0.5 * (E_0 + E_1), G)
         if self.Gamma is not None:
-            m = cross(self.eps_mean(e), turned(np.swapaxes(self.step.R_m, -1, -2), G))
+            m = cross(self.eps_mean(e), rotated(np.swapaxes(self.step.R_m, -1, -2), G))
             self.add_elastic(load, m)
 
     def add_moment(self, load: Load | None, T: Array) -> None:
@@ -146,12 +146,12 @@ class MarkerStep:
             return
         load.torque += T
         if self.Gamma is not None:
-            self.add_elastic(load, turned(np.swapaxes(self.step.R_m, -1, -2), T))
+            self.add_elastic(load, rotated(np.swapaxes(self.step.R_m, -1, -2), T))
 
     def add_elastic(self, load: Load, m: Array) -> None:
         """Add a moment m on the elastic rotation, body axes."""
         assert self.Gamma is not None
-        load.modal += turned(np.swapaxes(self.Psi_r, -1, -2), turned(np.swapaxes(self.Gamma, -1, -2), m))
+        load.modal += rotated(np.swapaxes(self.Psi_r, -1, -2), rotated(np.swapaxes(self.Gamma, -1, -2), m))
 
 
 def marker_step(marker: BodyMarker, step: BodyStep | None) -> MarkerStep:
@@ -161,15 +161,15 @@ def marker_step(marker: BodyMarker, step: BodyStep | None) -> MarkerStep:
         return MarkerStep(marker, None, place, place, zero, zero, np.eye(3), np.eye(3), None, None, none, none)
     (sigma_0, th_0), (sigma_1, th_1) = marker.deformation(step.q_0), marker.deformation(step.q_1)
     Psi_sigma, Psi_r = marker.shapes(0.5 * (step.q_0 + step.q_1))
-    arm_0, arm_1 = turned(step.R_0, sigma_0), turned(step.R_1, sigma_1)
+    arm_0, arm_1 = rotated(step.R_0, sigma_0), rotated(step.R_1, sigma_1)
     lever = 0.5 * (arm_0 + arm_1)
-    dx = step.d + cross(step.theta_G, lever) + turned(step.R_m, turned(Psi_sigma, step.dq))
+    dx = step.d + cross(step.theta_G, lever) + rotated(step.R_m, rotated(Psi_sigma, step.dq))
     rotation_0 = rotation_1 = np.eye(3)
     Gamma = dpsi = None
     if marker.turns:
         rotation_0, rotation_1 = rotation_exp(th_0), rotation_exp(th_1)
         Gamma = mean_jacobian(th_0, th_1)
-        dpsi = turned(Gamma, turned(Psi_r, step.dq))
+        dpsi = rotated(Gamma, rotated(Psi_r, step.dq))
     return MarkerStep(
         marker, step, step.c_0 + arm_0, step.c_1 + arm_1, lever, dx, rotation_0, rotation_1, Gamma, dpsi, Psi_sigma,
         Psi_r,
@@ -184,6 +184,6 @@ def mean_jacobian(th_0: Array, th_1: Array) -> Array:
     is_small = np.abs(square) < SMALL
     if np.all(is_small):
         return T
-    rest = relative_cayley(th_0, th_1) - turned(T, dth)
+    rest = relative_cayley(th_0, th_1) - rotated(T, dth)
     factor = np.where(is_small, 0.0, 1.0 / np.where(is_small, 1.0, square))
     return T + rest[..., :, None] * dth[..., None, :] * factor[..., None, None]

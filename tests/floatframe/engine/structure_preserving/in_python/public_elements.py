@@ -11,7 +11,7 @@ from floatframe.engine.compiling.coordinate_elements import LEAST_SIZE
 from floatframe.engine.kernels.model import Model
 from floatframe.engine.structure_preserving.system import element_states, multiplier_rows
 from floatframe.model.joints.rows import POSITION, VELOCITY
-from floatframe.model.rotations import cross, dot, rotation_exp, turned
+from floatframe.model.rotations import cross, dot, rotated, rotation_exp
 from tests.floatframe.engine.structure_preserving.in_python.constraints import Loads, Pair, Span
 from tests.floatframe.engine.structure_preserving.in_python.coordinates import add_pair
 from tests.floatframe.engine.structure_preserving.in_python.markers import Load, MarkerStep
@@ -203,7 +203,7 @@ def add_axes_moment(marker: MarkerStep, load: Load | None, M: Array) -> None:
     m = np.zeros_like(M)
     for j, e in enumerate(np.eye(3)):
         G = 0.5 * cross(inner, E[..., :, j])
-        m = m + cross(marker.eps_mean(e), turned(np.swapaxes(marker.step.R_m, -1, -2), G))
+        m = m + cross(marker.eps_mean(e), rotated(np.swapaxes(marker.step.R_m, -1, -2), G))
     marker.add_elastic(load, m)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe import EnergyDecaying, EnergyMomentum, Variational
 from floatframe.engine.structure_preserving.compiled import Filter, filter_of
-from floatframe.model.rotations import cross, dot, turned
+from floatframe.model.rotations import cross, dot, rotated
 from tests.floatframe.engine.structure_preserving.in_python.bodies import Body, BodyStep, Placed, moved, step_of, still
 from tests.floatframe.engine.structure_preserving.in_python.constraints import Span
 from tests.floatframe.engine.structure_preserving.in_python.markers import Load
@@ -79,7 +79,7 @@ class VariationalScheme:
 
     def torque(self, place: Placed, x: Array, tau: Array) -> Array:
         """Rᵀ tau."""
-        return turned(place.R.T, tau)
+        return rotated(place.R.T, tau)
 
 
 def interval(body: Body, place: Placed, x: Array, h: float) -> tuple[Array, Array, Array]:
@@ -195,7 +195,7 @@ class ConservingScheme:
 
     def torque(self, place: Placed, x: Array, tau: Array) -> Array:
         """(1 - tilde(theta)/2) R_0ᵀ tau: (3) times (1 - tilde(theta)/2) R_0ᵀ, which makes it polynomial."""
-        tau = turned(place.R.T, tau)
+        tau = rotated(place.R.T, tau)
         return tau - 0.5 * cross(x[..., 3:6], tau)
 
 
