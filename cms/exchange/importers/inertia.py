@@ -122,7 +122,7 @@ def translations_of(numbers: IntArray) -> IntArray:
 def gram_of_full_mass(
     inertia: FullMass, shapes: Shapes, places: Mapping[int, Array], units: Units
 ) -> tuple[Array, bool]:
-    """Return the Gram matrix ∫ a aᵀ by a full mass matrix, basic axes, and whether it is exact: M is M_s ⊗ 1."""
+    """Return the Gram matrix ∫ a aᵀ of a full mass matrix, in basic axes, and whether it is exact (M is M_s ⊗ 1)."""
     numbers = np.unique(inertia.dofs[:, 0])
     lost = [int(number) for number in numbers if int(number) not in inertia.places and int(number) not in places]
     if lost:
@@ -138,7 +138,7 @@ def gram_of_full_mass(
 
 
 def gram_of_mesh(inertia: MeshMass, shapes: Shapes, places: Mapping[int, Array], units: Units) -> Array:
-    """Return the Gram matrix ∫ a aᵀ by the elements of a mesh, basic axes."""
+    """Return the Gram matrix ∫ a aᵀ of the elements of a mesh, in basic axes."""
     mesh = inertia.mesh
     numbers = mesh.node_numbers if len(mesh.node_numbers) else np.arange(len(mesh.nodes))
     common = [k for k, number in enumerate(numbers) if int(number) in places]

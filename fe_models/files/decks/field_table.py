@@ -29,7 +29,7 @@ class TableField:
     number: int  #: of the field, from 1; 0 for several fields, which `name` describes
     name: str
     use: str  #: "read", "default", "blank", "harmless" or "left out"
-    default: str = ""  #: value that says nothing, for "default"
+    default: str = ""  #: value that means the same as a blank field, if `use` is "default"
 
 
 def parse_fields(words: Iterable[str]) -> tuple[TableField, ...]:

@@ -13,7 +13,7 @@ from fe_models.meshes.objects.skfem_mesh import SOLID_KINDS, raw_from_cells
 __all__ = ["BasisNodes", "nodes_of_basis", "raw_from_basis"]
 
 COMPARED = 8  #: cells in which shape functions are compared
-SAME = 1e-12  #: difference of shape functions that are one, and of sums that are exact
+SAME = 1e-12  #: largest difference between equal shape functions, and of exact sums
 
 
 @dataclass(frozen=True, eq=False)

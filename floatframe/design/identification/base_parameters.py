@@ -44,15 +44,15 @@ __all__ = [
 ]
 
 
-# which parameters of a tree do nothing, by rules over its joints: the closed road to base parameters ------------------
+# parameters of a tree without effect on torques, by rules over its joints: base parameters in closed form -------------
 # Three kinds of changes of the parameters leave all torques as they are. With everything in ground axes at the placed
 # configuration (a: direction of a rotation through p, d: direction of a translation):
 #
-# (1) Transfers: what sits at body i so that it may as well sit at its parent, because the joint between them does not
-#     move it. A rotation lets through the masses along its axis (a mass at p, and two changes of it along a), a
-#     translation every inertia tensor without mass; a joint of several coordinates what passes all of them.
-#     What passes to the ground does nothing.
-# (2) Parameters without effect on their own body, because it cannot move so that they count.
+# (1) Transfers: parts of the inertia of body i that can be moved to its parent, because the joint between them does not
+#     move them. A rotation transfers masses along its axis (a mass at p, and two changes of it along a), a
+#     translation every inertia tensor without mass. A joint of several coordinates transfers the parts that each of
+#     them transfers. Parts that are transferred to the ground have no effect.
+# (2) Parameters without effect on their own body, because its possible motions do not depend on them.
 #     No rotation on the way to the ground: S and J; m too, if there is no translation either.
 #     All rotations parallel to e: J but for e·J e, and S·e; a translation along e then lets also the rest of S through;
 #     about a line that stays (all rotations on it, translations along it): m on it unless there is a translation, and
