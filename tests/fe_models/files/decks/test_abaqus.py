@@ -279,6 +279,15 @@ def test_nodes_of_a_beam_with_an_offset_lie_off_its_centroid(tmp_path):
     assert_allclose(deck.lines[0].offset, [-0.1, -0.075])
 
 
+def test_offsets_of_a_pipe_are_in_parts_of_its_diameter(tmp_path):
+    """OFFSET1 = 0.5 of a pipe of radius 0.2 has the nodes on its surface, 0.2 from the centroid."""
+    rectangle = DECK[DECK.index("SECTION=RECT") :].splitlines()[1]
+    pipe = DECK.replace(f"SECTION=RECT\n{rectangle}", "SECTION=PIPE, OFFSET1=0.5, OFFSET2=-0.25\n0.2, 0.05")
+    deck = deck_of(tmp_path, pipe)
+    assert deck.lines[0].shape["shape"] == "tube"
+    assert_allclose(deck.lines[0].offset, [-0.2, 0.1], rtol=1e-14)
+
+
 @pytest.mark.parametrize(
     ("old", "new"),
     [

@@ -87,6 +87,16 @@ def test_rocker_follows_the_loop_equation():
     assert_allclose(tip[:, :2], exact, rtol=0, atol=1e-8)
 
 
+def test_the_hub_of_a_satellite_is_a_solid_sphere_with_booms_on_its_surface():
+    """2/5 m r² about any axis; a boom reaches from r to r + length."""
+    system = satellite(hub_mass=30.0, hub_radius=0.3, boom_length=2.0, boom_mass=1.5, spin=0.7)
+    hub, right, left = system.bodies
+    assert_allclose(hub.inertia, 0.4 * 30.0 * 0.3**2 * np.eye(3), rtol=1e-14)
+    assert_allclose([right.position, left.position], [[0.3, 0, 0], [-0.3, 0, 0]], rtol=0, atol=1e-15)
+    assert_allclose([right.center_of_mass, left.center_of_mass], [[1.0, 0, 0]] * 2, rtol=0, atol=1e-15)
+    assert_allclose(right.velocity, [0, 0.7 * 0.3, 0], rtol=0, atol=1e-15)
+
+
 def test_bars_of_a_four_bar_linkage_have_the_mass_of_their_length():
     lengths = {"crank": 0.3, "coupler": 0.9, "rocker": 0.7}
     system = four_bar(**lengths, mass_per_length=1.7)
