@@ -15,7 +15,7 @@ from numba import njit
 from floatframe import GROUND, Element, ElementLaw, GeneralizedAlpha, Gravity, Marker, RigidBody, SpringDamper, System
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.kernels.work import new_work
-from floatframe.integrators.carry import Integrator
+from floatframe.integrators.integrator import Integrator
 from floatframe.model.elements import Placed
 
 N_BODIES, N_STEPS, H, TURNS = 20, 2000, 1e-4, 7
@@ -94,10 +94,10 @@ def chain(tangent: object) -> System:
 def step_time(system: System, method: Integrator) -> float:
     """Return the processor time of a step [s]."""
     work = new_work(compiled_system(system).model)
-    carry = method.start(system, 0.0)
-    carry, _ = method.observe(system, 0.0, carry, work)
+    memory = method.start(system, 0.0)
+    memory, _ = method.observe(system, 0.0, memory, work)
     began = time.process_time()
-    method.advance(system, carry, work, t0=0.0, h=H, first=0, n_steps=N_STEPS, every=N_STEPS)
+    method.advance(system, memory, work, t0=0.0, h=H, first=0, n_steps=N_STEPS, every=N_STEPS)
     return (time.process_time() - began) / N_STEPS
 
 

@@ -50,28 +50,28 @@ def chain(n_bodies, n_q, stiffening=False):
     return System(bodies, joints, [Gravity((0, 0, -9.81))])
 
 
-def counts_of(work):
+def counts_of(memory, work):
     """Return iterations and factorisations so far."""
-    return np.array([int(work.counted.iterations), int(work.counted.factorisations)])
+    return np.array([int(memory.n_iterations), int(work.counted.factorisations)])
 
 
 def measure(systems, n_steps, n_runs):
     """Return the least time per step of each system, the systems taken in turn, and the counts of the first."""
     method = GeneralizedAlpha(0.8)
-    carries = [method.start(system, 0.0) for system in systems]
+    memories = [method.start(system, 0.0) for system in systems]
     works = [new_work(compiled_system(system).model) for system in systems]
     best, counts = [np.inf] * len(systems), []
     for _ in range(n_runs):
         for k, (system, work) in enumerate(zip(systems, works, strict=True)):
-            before = counts_of(work)
+            before = counts_of(memories[k], work)
             start = time.thread_time()
-            carries[k], _, done, failure = method.advance(
-                system, carries[k], work, t0=0.0, h=H, first=0, n_steps=n_steps, every=100
+            memories[k], _, done, failure = method.advance(
+                system, memories[k], work, t0=0.0, h=H, first=0, n_steps=n_steps, every=100
             )
             best[k] = min(best[k], (time.thread_time() - start) / n_steps)
             assert failure is None, failure
             if k == 0:
-                counts = (counts_of(work) - before) / done
+                counts = (counts_of(memories[k], work) - before) / done
     return best, counts
 
 

@@ -28,14 +28,14 @@ def cost(system: System, formulation: str, n_steps: int, h: float = 1e-3) -> tup
     """Return the processor time of a step [s] and its iterations, the kernels being compiled."""
     method = in_formulation(GeneralizedAlpha(), formulation)
     work = new_work(compiled_system(system).model)
-    carry = method.start(system, 0.0)
-    carry, _, _, failure = method.advance(system, carry, work, t0=0.0, h=h, first=0, n_steps=5, every=10**6)
+    memory = method.start(system, 0.0)
+    memory, _, _, failure = method.advance(system, memory, work, t0=0.0, h=h, first=0, n_steps=5, every=10**6)
     assert failure is None, failure
-    before, began = carry.n_iterations, time.process_time()
-    carry, _, _, failure = method.advance(system, carry, work, t0=0.0, h=h, first=5, n_steps=n_steps, every=10**6)
+    before, began = memory.n_iterations, time.process_time()
+    memory, _, _, failure = method.advance(system, memory, work, t0=0.0, h=h, first=5, n_steps=n_steps, every=10**6)
     seconds = time.process_time() - began
     assert failure is None, failure
-    return seconds / n_steps, (carry.n_iterations - before) / n_steps
+    return seconds / n_steps, (memory.n_iterations - before) / n_steps
 
 
 def beam(n_modes: int) -> cms.ReducedBody:
@@ -52,14 +52,14 @@ def motion(system: System, formulation: str, h: float, tolerance: float, t_end: 
     """Return places of body frames, modal coordinates, the processor time [s] and iterations of a step."""
     method = in_formulation(GeneralizedAlpha(tolerance=tolerance), formulation)
     work = new_work(compiled_system(system).model)
-    carry, n_steps = method.start(system, 0.0), round(t_end / h)
+    memory, n_steps = method.start(system, 0.0), round(t_end / h)
     began = time.process_time()
-    carry, rows, _, failure = method.advance(
-        system, carry, work, t0=0.0, h=h, first=0, n_steps=n_steps, every=round(every / h)
+    memory, rows, _, failure = method.advance(
+        system, memory, work, t0=0.0, h=h, first=0, n_steps=n_steps, every=round(every / h)
     )
     seconds = time.process_time() - began
     assert failure is None, failure
-    return rows.r, rows.q, seconds, carry.n_iterations / n_steps
+    return rows.r, rows.q, seconds, memory.n_iterations / n_steps
 
 
 def rms(x: np.ndarray) -> float:

@@ -103,11 +103,11 @@ def counts(cases):
     told = []
     for n_bodies, n_q in cases:
         system, method = chain(n_bodies, n_q), GeneralizedAlpha(0.8)
-        carry, work = method.start(system, 0.0), new_work(compiled_system(system).model)
-        carry, *_ = method.advance(system, carry, work, t0=0.0, h=H, first=0, n_steps=3, every=100)
-        before, counts_before = n_operations, counts_of(work)
-        method.advance(system, carry, work, t0=0.0, h=H, first=3, n_steps=STEPS, every=100)
-        iterations, factorisations = (counts_of(work) - counts_before) / STEPS
+        memory, work = method.start(system, 0.0), new_work(compiled_system(system).model)
+        memory, *_ = method.advance(system, memory, work, t0=0.0, h=H, first=0, n_steps=3, every=100)
+        before, counts_before = n_operations, counts_of(memory, work)
+        after, *_ = method.advance(system, memory, work, t0=0.0, h=H, first=3, n_steps=STEPS, every=100)
+        iterations, factorisations = (counts_of(after, work) - counts_before) / STEPS
         told.append(((n_operations - before) / STEPS, iterations, factorisations))
     return told
 

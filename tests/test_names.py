@@ -79,7 +79,7 @@ floatframe/engine/tree/kernels/tree.py kept
 floatframe/files/cosimulation/held_inputs.py words
 floatframe/files/cosimulation/interface.py words
 floatframe/files/cosimulation/model_description.py words
-floatframe/integrators/carry.py words
+floatframe/integrators/integrator.py words
 floatframe/model/bodies/marker_shape.py bend
 floatframe/results/validity.py words
 floatframe/simulation/energy_watch.py taken

@@ -1,7 +1,5 @@
 """A row of results at one state, and the power of loads and dampers."""
 
-import numpy as np
-
 from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.system import CompiledSystem
 from floatframe.engine.kernels.memory import Rows, memory_at
@@ -20,4 +18,4 @@ def observed_state(
     work.state.time[...] = t
     memory = memory_at(state, u_dot, w)
     rows = absolute_kernels.observe(compiled.model, work, memory=memory, t=t)
-    return rows, np.array([memory.power_given, memory.power_taken])
+    return rows, memory.power

@@ -1,14 +1,14 @@
 """Integrators, one file each. The time loop is `floatframe.simulation.integrate`.
 
-An integrator is a frozen object with the functions `start` and `step`; all its memory between steps is in a carry.
+An integrator is a frozen object with the functions `start` and `step`; what it carries between steps is a `Memory`.
 """
 
 from collections.abc import Callable
 
-from floatframe.integrators.carry import Integrator
 from floatframe.integrators.energy_momentum import EnergyDecaying, EnergyMomentum
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha, hht, newmark, trapezoidal
 from floatframe.integrators.ida import Ida
+from floatframe.integrators.integrator import Integrator
 from floatframe.integrators.relative import RelativeGeneralizedAlpha, in_formulation
 from floatframe.integrators.relative_ode import RelativeOde
 from floatframe.integrators.variational import Variational

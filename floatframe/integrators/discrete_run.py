@@ -1,7 +1,5 @@
 """Common parts of the conserving and variational schemes: start, continuation and observation of a run."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
@@ -11,18 +9,15 @@ from floatframe.engine.initial_conditions.initial import (
     with_compatible_velocities,
 )
 from floatframe.engine.kernels.entry import Outcome
-from floatframe.engine.kernels.memory import Rows
+from floatframe.engine.kernels.memory import Memory, Rows, memory_at
 from floatframe.engine.kernels.work import Work
 from floatframe.engine.structure_preserving.compiled import kept_of
 from floatframe.engine.structure_preserving.system import discrete_system
 from floatframe.errors import ModelError
-from floatframe.integrators.carry import (
+from floatframe.integrators.integrator import (
     LEAST_STEP,
-    Carry,
     Failure,
-    carry_of,
     has_divided_steps,
-    memory_of,
     observed,
     one_step_of,
     started_anew,
@@ -51,7 +46,7 @@ class DiscreteScheme:
         """Spectral radius of modes far above 1/h; 1 without dissipation."""
         return 1.0
 
-    def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
+    def start(self, system: System, t: float, state: State | None = None, before: Memory | None = None) -> Memory:
         """Return the memory at the beginning, from a consistent state.
 
         `a` holds the multipliers: of joints zero, of equations of elements those that fulfil them there.
@@ -61,33 +56,33 @@ class DiscreteScheme:
         held = discrete_system(system, type(self).__name__).held
         is_of_law = np.isin(held, compiled_system(system).model.laws.equation)
         f = np.where(is_of_law, consistent.w[held], 0.0)
-        carry = Carry(consistent.state, consistent.u_dot, f, 0.0, consistent.w, np.zeros(2), np.zeros(2))
-        return with_angles(system, t, carry, before, state)
+        memory = memory_at(consistent.state, consistent.u_dot, consistent.w, f)
+        return with_angles(system, t, memory, before, state)
 
-    def after_jump(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
+    def after_jump(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
         """Return the memory after a jump of forces at t, and the results there."""
-        return started_anew(self, system, t, carry, work)
+        return started_anew(self, system, t, memory, work)
 
-    def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
+    def step(self, system: System, t: float, h: float, memory: Memory) -> Memory:
         """Return the memory one step of size h later; `ConvergenceError` if it fails."""
-        return one_step_of(self, system, t, h, carry)
+        return one_step_of(self, system, t, h, memory)
 
-    def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
-        """Return the results at the carried state, with accelerations and reactions of the equations of motion."""
+    def observe(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
+        """Return the results at a state, with accelerations and reactions of the equations of motion."""
         compiled = compiled_system(system)
         work.state.time[...] = t
-        work.state.w_start[:] = carry.w
-        work.states.base[:], work.states.rate_base[:] = carry.w[compiled.model.states.row], 0.0
+        work.state.w_start[:] = memory.w
+        work.states.base[:], work.states.rate_base[:] = memory.w[compiled.model.states.row], 0.0
         work.states.kappa[...], work.states.rho[...] = 0.0, 1.0
-        fitting = with_compatible_velocities(compiled, work, carry.state, carry.w)
-        u_dot, w = solve_accelerations(compiled, work, fitting, carry.w)
-        _, rows = observed(system, t, replace(carry, u_dot=u_dot, w=w), work)
-        return carry, rows
+        fitting = with_compatible_velocities(compiled, work, memory.state, memory.w)
+        u_dot, w = solve_accelerations(compiled, work, fitting, memory.w)
+        _, rows = observed(system, t, memory.changed(u_dot=u_dot, w=w), work)
+        return memory, rows
 
     def advance(
-        self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
-    ) -> tuple[Carry, Rows, int, Failure | None]:
-        """Advance by n_steps of size h, the first of them number `first` from t0; see `carry.Integrator`."""
+        self, system: System, memory: Memory, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
+    ) -> tuple[Memory, Rows, int, Failure | None]:
+        """Advance by n_steps of size h, the first of them number `first` from t0; see `Integrator`."""
         from floatframe.engine.structure_preserving.kernels.newton import NO_ACCELERATION
         from floatframe.engine.structure_preserving.kernels.steps import discrete_kernels
 
@@ -97,24 +92,20 @@ class DiscreteScheme:
         ds = discrete_system(system, type(self).__name__)
         kept = kept_of(work, ds, self.equations, h, self.damping)
         step = kept.step
-        kept.go_on_from(carry, carry.a, is_anew=bool(work.solver.c_k == 0.0))
+        kept.go_on_from(memory, memory.a, is_anew=bool(work.solver.c_k == 0.0))
         work.solver.c_k[...] = 1.0
-        memory = memory_of(carry)
-        iterations = int(step.n_iterations)
+        after = memory.copied()
         rows, outcome = discrete_kernels.advance(
-            model, work, kept.discrete, step, memory=memory, t0=t0, h=h, first=first, n_steps=n_steps, every=every,
+            model, work, kept.discrete, step, memory=after, t0=t0, h=h, first=first, n_steps=n_steps, every=every,
             tolerance=self.tolerance, max_iterations=self.max_iterations, length=ds.length, h_min=least,
         )  # fmt: skip
         if outcome.status == NO_ACCELERATION:  # the memory is beyond the last good step: repeat the good steps
             # explained first, because the repeated steps overwrite what it needs
             failure = explained(compiled, work, outcome, self.max_iterations, LEAST_STEP * h)
             work.past.n[...] = 0
-            again = self.advance(system, carry, work, t0=t0, h=h, first=first, n_steps=outcome.n_steps, every=every)
+            again = self.advance(system, memory, work, t0=t0, h=h, first=first, n_steps=outcome.n_steps, every=every)
             return *again[:3], failure
-        memory.h[...] = h
-        n_iterations = carry.n_iterations + int(step.n_iterations) - iterations
-        after = replace(carry_of(memory, n_iterations), a=step.f_kept.copy(), power=carry.power)
-        kept.after = after
+        kept.after = after = after.changed(a=step.f_kept, h=h, power=memory.power)
         return after, rows, outcome.n_steps, explained(compiled, work, outcome, self.max_iterations, least)
 
 

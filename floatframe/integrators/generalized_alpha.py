@@ -28,17 +28,14 @@ from floatframe.engine.initial_conditions.step_filter import (
     spin_of,
     step_filter,
 )
-from floatframe.engine.kernels.memory import Rows
+from floatframe.engine.kernels.memory import Memory, Rows, memory_at
 from floatframe.engine.kernels.model import COUPLER, JOINT, MASS, Model
 from floatframe.engine.kernels.work import Work
 from floatframe.errors import ModelError
-from floatframe.integrators.carry import (
+from floatframe.integrators.integrator import (
     LEAST_STEP,
-    Carry,
     Failure,
-    carry_of,
     has_divided_steps,
-    memory_of,
     observed,
     one_step_of,
     started_anew,
@@ -89,7 +86,7 @@ class GeneralizedAlpha:
     .. [1] Arnold & Bruels (2007), Multibody System Dynamics 18, 185-202.
     .. [2] Bruels & Cardona (2010), Journal of Computational and Nonlinear Dynamics 5, 031002.
     .. [3] The estimate of Zienkiewicz & Xie (1991), Earthquake Engineering & Structural Dynamics 20, 871-887, which
-       Negrut et al. carry to the index-3 equations of HHT, for all parameters; derived above.
+       Negrut et al. memory to the index-3 equations of HHT, for all parameters; derived above.
     """
 
     #: spectral radius at infinite frequency, 0 <= rho_inf <= 1; 1: no numerical damping, so that reactions of joints
@@ -138,39 +135,39 @@ class GeneralizedAlpha:
         gamma = 0.5 + alpha_f - alpha_m
         return alpha_m, alpha_f, 0.25 * (gamma + 0.5) ** 2, gamma
 
-    def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
+    def start(self, system: System, t: float, state: State | None = None, before: Memory | None = None) -> Memory:
         """Return the memory at the beginning: the consistent state and its accelerations."""
         known, angle = (None, None) if before is None else (before.w, before.angle)
         consistent = consistent_motion(system, state, t=t, known=known, angle=angle)
-        return with_angles(system, t, begun_carry(consistent), before, state)
+        return with_angles(system, t, memory_at(consistent.state, consistent.u_dot, consistent.w), before, state)
 
-    def after_jump(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
+    def after_jump(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
         """Return the memory after a jump of forces at t, and the results there.
 
         The state stays; u_dot and a change by what the filter of `start.step_filter` with s = 1 lets of the jump.
         """
-        if carry.h == 0.0:
-            return started_anew(self, system, t, carry, work)
-        exact, change = self.jump(compiled_system(system), carry, t)
+        if memory.h == 0.0:
+            return started_anew(self, system, t, memory, work)
+        exact, change = self.jump(compiled_system(system), memory, t)
         after, rows = self.observe(system, t, exact, work)
-        return replace(after, u_dot=carry.u_dot + change, a=carry.a + change), rows
+        return after.changed(u_dot=memory.u_dot + change, a=memory.a + change), rows
 
     def jump(
-        self, compiled: CompiledSystem, carry: Carry, t: float, may: NDArray[np.bool_] | None = None
-    ) -> tuple[Carry, Array]:
+        self, compiled: CompiledSystem, memory: Memory, t: float, may: NDArray[np.bool_] | None = None
+    ) -> tuple[Memory, Array]:
         """Return the memory with u_dot and w after a jump of forces at t, with the change of u_dot filtered.
 
         may: as of `spin_at`.
         """
-        work = work_from(compiled.model, carry.w)
+        work = work_from(compiled.model, memory.w)
         work.state.time[...] = t
-        u_dot, w = solve_accelerations(compiled, work, carry.state, carry.w)
-        after = replace(carry, u_dot=u_dot, w=w, h_next=0.0)
-        z = self.filter_at(compiled, after, carry.h, t, full=True, spin=self.spin_at(compiled, after, may))
+        u_dot, w = solve_accelerations(compiled, work, memory.state, memory.w)
+        after = memory.changed(u_dot=u_dot, w=w, h_next=0.0)
+        z = self.filter_at(compiled, after, float(memory.h), t, full=True, spin=self.spin_at(compiled, after, may))
         assert z is not None
-        return after, z.twice(u_dot - carry.u_dot)
+        return after, z.twice(u_dot - memory.u_dot)
 
-    def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
+    def step(self, system: System, t: float, h: float, memory: Memory) -> Memory:
         """Return the memory one step of size h later.
 
         Raises
@@ -178,33 +175,28 @@ class GeneralizedAlpha:
         ConvergenceError
             If Newton's method fails.
         """
-        return one_step_of(self, system, t, h, carry)
+        return one_step_of(self, system, t, h, memory)
 
-    def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
-        """Return the results at the carried state, and store the power there in the carry."""
-        power, rows = observed(system, t, carry, work)
-        return replace(carry, power=power), rows
+    def observe(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
+        """Return the memory with the power at its state, and the results there."""
+        return observed(system, t, memory, work)
 
     def advance(
-        self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
-    ) -> tuple[Carry, Rows, int, Failure | None]:
-        """Advance by n_steps of size h, the first of them number `first` from t0; see `carry.Integrator`.
+        self, system: System, memory: Memory, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
+    ) -> tuple[Memory, Rows, int, Failure | None]:
+        """Advance by n_steps of size h, the first of them number `first` from t0; see `integrator.Integrator`.
 
         `work` holds the factors of the last Newton matrix, which serve until they are too old.
         """
         from floatframe.engine.kernels.entry import absolute_kernels
 
         compiled = compiled_system(system)
-        carry = self.prepared(system, carry, h, t0 + first * h)
-        memory = memory_of(carry)
-        memory.a[:] = carry.a
-        iterations = int(work.counted.iterations)
+        after = self.prepared(system, memory, h, t0 + first * h).copied()
         rows, outcome = absolute_kernels.advance(
-            compiled.model, work, memory=memory,
+            compiled.model, work, memory=after,
             t0=t0, h=h, first=first, n_steps=n_steps, every=every, **self.numbers(compiled, h),
         )  # fmt: skip
-        after = carry_of(memory, carry.n_iterations + int(work.counted.iterations) - iterations)
-        failure = None if outcome.status == 0 else self.explain(system, work, outcome, after.state.u, h)
+        failure = None if outcome.status == 0 else self.explain(system, work, outcome, after.u, h)
         return after, rows, outcome.n_steps, failure
 
     def numbers(self, compiled: CompiledSystem, h: float) -> dict[str, float]:
@@ -225,67 +217,67 @@ class GeneralizedAlpha:
         is_fixed = self.error_tolerance is None and not has_divided_steps(compiled.model)
         return 0.0 if is_fixed else LEAST_STEP * h
 
-    def spin_at(self, compiled: CompiledSystem, carry: Carry, may: NDArray[np.bool_] | None = None) -> Spin | None:
+    def spin_at(self, compiled: CompiledSystem, memory: Memory, may: NDArray[np.bool_] | None = None) -> Spin | None:
         """Return the bodies whose spin the next step takes by itself, of those that may, (n_b,), None for all."""
-        return spin_of(compiled, consistent_of(carry), may) if self.stabilized else None
+        return spin_of(compiled, consistent_of(memory), may) if self.stabilized else None
 
     def filter_at(
-        self, compiled: CompiledSystem, carry: Carry, h: float, t: float, *, full: bool, spin: Spin | None
+        self, compiled: CompiledSystem, memory: Memory, h: float, t: float, *, full: bool, spin: Spin | None
     ) -> StepFilter | None:
         """Return the filter of `start.step_filter` for steps of size h; full: with s = 1; None for s = 0."""
         _, _, beta, gamma = self.coefficients
         s = 1.0 if full else min(gamma - 0.5, 1.0)
         if s <= 0.0:
             return None
-        return step_filter(compiled, consistent_of(carry), t, c_d=s * gamma * h, c_k=s * beta * h**2, spin=spin)
+        return step_filter(compiled, consistent_of(memory), t, c_d=s * gamma * h, c_k=s * beta * h**2, spin=spin)
 
     def filtered(
-        self, compiled: CompiledSystem, carry: Carry, h: float, t: float, *, full: bool, spin: Spin | None
+        self, compiled: CompiledSystem, memory: Memory, h: float, t: float, *, full: bool, spin: Spin | None
     ) -> Beginning:
         """Return the initial accelerations of a motion and their rates, from the filter of `filter_at`."""
-        z = self.filter_at(compiled, carry, h, t, full=full, spin=spin)
-        return beginning_of(compiled, consistent_of(carry), t, h, z, spin=spin)
+        z = self.filter_at(compiled, memory, h, t, full=full, spin=spin)
+        return beginning_of(compiled, consistent_of(memory), t, h, z, spin=spin)
 
-    def first_step(self, compiled: CompiledSystem, carry: Carry, h: float, t: float, spin: Spin | None) -> float:
+    def first_step(self, compiled: CompiledSystem, memory: Memory, h: float, t: float, spin: Spin | None) -> float:
         """Return the size of the first step: allowed by its estimated error, and an equal part of h."""
         if self.error_tolerance is None:
             return h
         model = compiled.model
         _, _, beta, gamma = self.coefficients
-        rates = self.filtered(compiled, carry, h, t, full=True, spin=spin).rates
+        rates = self.filtered(compiled, memory, h, t, full=True, spin=spin).rates
         squares = np.add.reduceat(mass_weights(model) * rates**2, model.bodies.u0[:-1])
         largest = np.sqrt(squares / model.body_types.mass[model.bodies.kind]) / model.bodies.size
         error = abs(gamma / 2 - beta - 1 / 12) * largest.max()
         fitting = (self.error_tolerance / error) ** (1 / 3) if error > 0 else h
         return h / ceil(h / max(0.5 * fitting, self.least_step(h, compiled), 1e-3 * h) * (1 - 1e-9))
 
-    def prepared(self, system: System, carry: Carry, h: float, t: float) -> Carry:
+    def prepared(self, system: System, memory: Memory, h: float, t: float) -> Memory:
         """Return the memory with its algorithmic accelerations for steps of size h from t.
 
         At the start, and where longer steps follow: as `start.step_filter` says. Shorter steps: a nearer to u_dot.
         """
         compiled = compiled_system(system)
         is_divided = self.least_step(h, compiled) > 0.0
-        if carry.h == h or (carry.h != 0.0 and is_divided):
-            return replace(carry, h_next=min(carry.h_next or h, h) if is_divided else h)
-        if h <= LONGER * carry.h:
-            return replace(carry, a=carry.u_dot + h / carry.h * (carry.a - carry.u_dot), h=h, h_next=h)
-        spin = self.spin_at(compiled, carry)
-        if carry.h == 0.0:
-            h = self.first_step(compiled, carry, h, t, spin)
+        if memory.h == h or (memory.h != 0.0 and is_divided):
+            return memory.changed(h_next=min(float(memory.h_next) or h, h) if is_divided else h)
+        if h <= LONGER * memory.h:
+            return memory.changed(a=memory.u_dot + h / memory.h * (memory.a - memory.u_dot), h=h, h_next=h)
+        spin = self.spin_at(compiled, memory)
+        if memory.h == 0.0:
+            h = self.first_step(compiled, memory, h, t, spin)
         alpha_m, alpha_f, beta, _ = self.coefficients
-        begun = self.filtered(compiled, carry, h, t, full=False, spin=spin)
+        begun = self.filtered(compiled, memory, h, t, full=False, spin=spin)
         u_dot, a = begun.u_dot, begun.u_dot + (alpha_m - alpha_f) * h * begun.rates
-        state = carry.state
+        state = memory.state
         rows = rows_closed_by_positions(compiled.model, self.stabilized)
         if rows.any():
-            z = self.filter_at(compiled, carry, h, t, full=True, spin=None)
+            z = self.filter_at(compiled, memory, h, t, full=True, spin=None)
             assert z is not None
-            begun = beginning_of(compiled, consistent_of(carry), t, h, z)
+            begun = beginning_of(compiled, consistent_of(memory), t, h, z)
             x = h * state.u + h**2 * (0.5 * begun.u_dot + ((alpha_m - alpha_f) / 2 + beta) * h * begun.rates)
             after = displaced(compiled.model, state, x)
-            state = replace(state, u=state.u + closing_velocities(z, after, carry.w, t, h, rows))
-        return replace(carry, state=state, u_dot=u_dot, a=a, h=h, h_next=h)
+            state = replace(state, u=state.u + closing_velocities(z, after, memory.w, t, h, rows))
+        return memory.changed(state=state, u_dot=u_dot, a=a, h=h, h_next=h)
 
     def explain(self, system: System, work: Work, outcome: tuple, u: Array, h: float) -> Failure:
         """Return the reason of a failed step of size h that began with velocities u, (n_u,)."""
@@ -446,13 +438,6 @@ def rows_closed_by_positions(model: Model, stabilized: bool) -> NDArray[np.bool_
     return is_held_position(model.rows.kind) & ~(is_stabilized & stabilized)
 
 
-def consistent_of(carry: Carry) -> ConsistentState:
+def consistent_of(memory: Memory) -> ConsistentState:
     """Return the state in a memory with its accelerations and wrenches."""
-    return ConsistentState(carry.state, carry.u_dot, carry.w)
-
-
-def begun_carry(consistent: ConsistentState) -> Carry:
-    """Return the memory before the first step at a consistent state; its angles are not counted yet."""
-    return Carry(
-        consistent.state, consistent.u_dot, consistent.u_dot, 0.0, consistent.w, np.zeros(2), np.zeros(2)
-    )  # fmt: skip
+    return ConsistentState(memory.state, memory.u_dot, memory.w)

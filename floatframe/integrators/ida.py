@@ -3,7 +3,7 @@
 Evaluated in `floatframe.engine.kernels.evaluation`.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,12 +17,11 @@ from floatframe.engine.initial_conditions.initial import (
     solve_accelerations,
     with_compatible_velocities,
 )
-from floatframe.engine.kernels.memory import WORK_GIVEN, WORK_TAKEN, Rows, new_rows
+from floatframe.engine.kernels.memory import WORK_GIVEN, WORK_TAKEN, Memory, Rows, memory_at, new_rows
 from floatframe.engine.kernels.model import COUPLER, USER_FORCE
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import FloatframeError, ModelError
-from floatframe.integrators.carry import (
-    Carry,
+from floatframe.integrators.integrator import (
     Failure,
     FollowedRotations,
     joined_rows,
@@ -69,7 +68,7 @@ class Ida:
             if not 0.0 < getattr(self, name) < 1.0:
                 raise ModelError(f"Ida: {name}: expected a number between 0 and 1, got {getattr(self, name)}")
 
-    def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
+    def start(self, system: System, t: float, state: State | None = None, before: Memory | None = None) -> Memory:
         """Return the memory at the beginning, from a consistent state."""
         solver_class()
         compiled = compiled_system(system)
@@ -84,36 +83,35 @@ class Ida:
                 )
         require_no_remembered_contacts(compiled, "Ida")
         made = consistent_motion(system, state, t=t, angle=None if before is None else before.angle)
-        carry = Carry(made.state, made.u_dot, np.zeros(0), 0.0, made.w, np.zeros(2), np.zeros(2))
-        return with_angles(system, t, carry, before, state)
+        memory = memory_at(made.state, made.u_dot, made.w, np.zeros(0))
+        return with_angles(system, t, memory, before, state)
 
-    def after_jump(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
+    def after_jump(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
         """Return the memory after a jump of forces at t, and the results there."""
-        return started_anew(self, system, t, carry, work)
+        return started_anew(self, system, t, memory, work)
 
-    def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
+    def step(self, system: System, t: float, h: float, memory: Memory) -> Memory:
         """Return the memory a time h later; `ConvergenceError` if it fails."""
-        return one_step_of(self, system, t, h, carry)
+        return one_step_of(self, system, t, h, memory)
 
-    def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
-        """Return the results at the carried state, and store the power there in the carry."""
+    def observe(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
+        """Return the memory with the power at its state, and the results there."""
         work.state.time[...] = t
-        power, rows = observed(system, t, carry, work)
-        return replace(carry, power=power), rows
+        return observed(system, t, memory, work)
 
     def advance(
-        self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
-    ) -> tuple[Carry, Rows, int, Failure | None]:
-        """Advance by n_steps output times, the first of them number `first` from t0; see `carry.Integrator`."""
+        self, system: System, memory: Memory, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
+    ) -> tuple[Memory, Rows, int, Failure | None]:
+        """Advance by n_steps output times, the first of them number `first` from t0; see `integrator.Integrator`."""
         compiled = compiled_system(system)
         own = new_work(compiled.model)
         t: Array = t0 + h * np.arange(first, first + n_steps + 1, dtype=float)
         made = Motion(compiled, own)
-        made.rotations = FollowedRotations(compiled.model, own, float(t[0]), carry)
+        made.rotations = FollowedRotations(compiled.model, own, float(t[0]), memory)
         solution = self.solved_past_contacts if has_gaps(compiled) else self.solved
-        reached, message = solution(made, t, flattened(carry.state))
+        reached, message = solution(made, t, flattened(memory.state))
         rows, n_good, failure, has_stopped = [new_rows(compiled.model, 0)], 0, None, False
-        made.rotations = FollowedRotations(compiled.model, own, float(t[0]), carry)
+        made.rotations = FollowedRotations(compiled.model, own, float(t[0]), memory)
         for k, (at, y) in enumerate(reached, start=first + 1):
             if not np.isfinite(y).all() or abs(at - t[k - first]) > 1e-9 * h:  # it may end before its failure
                 break
@@ -122,21 +120,21 @@ class Ida:
             state = assembled(compiled, own, state_of(compiled, y))
             state = with_compatible_velocities(compiled, own, state)
             u_dot, w = made.accelerations(t[k - first], state)
-            after = replace(carry, state=state, u_dot=u_dot, w=w, h=h, n_steps=carry.n_steps + 1)
+            after = memory.changed(state=state, u_dot=u_dot, w=w, h=h, n_steps=memory.n_steps + 1)
             after = turned_on(system, after, h)
-            power, row, failure = observed_unless_stopped(system, float(t[k - first]), after, work)
+            after, row, failure = observed_unless_stopped(system, float(t[k - first]), after, work)
             has_stopped = failure is not None
             if has_stopped:
                 break
-            carry = replace(after, power=power, work=carry.work + 0.5 * h * (carry.power + power))
-            row.diagnostics[0, [WORK_GIVEN, WORK_TAKEN]] = carry.work
+            memory = after.changed(work=memory.work + 0.5 * h * (memory.power + after.power))
+            row.diagnostics[0, [WORK_GIVEN, WORK_TAKEN]] = memory.work
             if k % every == 0:
                 rows.append(row)
             n_good += 1
         if n_good < n_steps and not has_stopped:
             failure = Failure(f"IDA: {made.problem or message}", np.inf)
-        carry = replace(carry, n_iterations=carry.n_iterations + made.n_evaluations)
-        return carry, joined_rows(rows), n_good, failure
+        memory = memory.changed(n_iterations=memory.n_iterations + made.n_evaluations)
+        return memory, joined_rows(rows), n_good, failure
 
     def solved(self, made: "Motion", t: Array, y_0: Array) -> tuple[list[tuple[float, Array]], str]:
         """Return times and y at all times but the first, as far as the solver gets, and its message."""

@@ -4,7 +4,7 @@ Evaluated in `floatframe.engine.tree.kernels.steps`.
 """
 
 import weakref
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,15 +14,15 @@ from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.initial_conditions.initial import work_from
 from floatframe.engine.initial_conditions.newton_equations import displaced, set_iterate
 from floatframe.engine.initial_conditions.step_filter import Beginning, Spin
-from floatframe.engine.kernels.memory import Rows
+from floatframe.engine.kernels.memory import Memory, Rows
 from floatframe.engine.kernels.model import Model
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.engine.tree.formulation import is_relative
 from floatframe.engine.tree.kernels.tree import JointWork, TangentWork, Tree, new_joint_work, new_tangent_work
 from floatframe.engine.tree.topology import tree_of
 from floatframe.errors import ModelError
-from floatframe.integrators.carry import Carry, Failure, Integrator, carry_of, memory_of, one_step_of, started_anew
 from floatframe.integrators.generalized_alpha import LONGER, GeneralizedAlpha, rows_closed_by_positions, words_of_turn
+from floatframe.integrators.integrator import Failure, Integrator, one_step_of, started_anew
 from floatframe.integrators.relative_ode import RelativeOde
 from floatframe.model.rotations import rotation_exp
 from floatframe.model.state import State
@@ -67,85 +67,81 @@ class RelativeGeneralizedAlpha:
         """The same method in absolute coordinates."""
         return GeneralizedAlpha(**asdict(self))
 
-    def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
+    def start(self, system: System, t: float, state: State | None = None, before: Memory | None = None) -> Memory:
         """Return the memory at the beginning: the consistent state and its accelerations."""
         return self.absolute.start(system, t, state, before)
 
-    def after_jump(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
+    def after_jump(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
         """Return the memory after a jump of forces at t, and the results there; as `GeneralizedAlpha`."""
-        if carry.h == 0.0:
-            return started_anew(self, system, t, carry, work)
+        if memory.h == 0.0:
+            return started_anew(self, system, t, memory, work)
         compiled, tree = compiled_system(system), tree_of(system).tree
-        exact, change = self.absolute.jump(compiled, carry, t, may_spin(tree))
+        exact, change = self.absolute.jump(compiled, memory, t, may_spin(tree))
         after, rows = self.observe(system, t, exact, work)
-        a, u_dot = carry.a.copy(), carry.u_dot + change
-        for sign, each in ((1.0, u_dot), (-1.0, carry.u_dot)):
-            _, joints = joint_iterate(compiled, tree, carry.state, each)
+        a, u_dot = memory.a.copy(), memory.u_dot + change
+        for sign, each in ((1.0, u_dot), (-1.0, memory.u_dot)):
+            _, joints = joint_iterate(compiled, tree, memory.state, each)
             a += sign * in_slots(tree, joints, each, joints.acceleration)
-        return replace(after, u_dot=u_dot, a=a), rows
+        return after.changed(u_dot=u_dot, a=a), rows
 
-    def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
+    def step(self, system: System, t: float, h: float, memory: Memory) -> Memory:
         """Return the memory one step of size h later; `ConvergenceError` if Newton's method fails."""
-        return one_step_of(self, system, t, h, carry)
+        return one_step_of(self, system, t, h, memory)
 
-    def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
-        """Return the results at the carried state, and store the power there in the carry."""
+    def observe(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
+        """Return the memory with the power at its state, and the results there."""
         from floatframe.engine.tree.kernels.entry import NO_TANGENT, joint_kernels
 
         model, tree = compiled_system(system).model, tree_of(system).tree
-        memory = memory_of(carry)
-        rows = joint_kernels.observe(model, work, tree, new_joint_work(model, tree), NO_TANGENT, memory=memory, t=t)
-        return replace(carry, power=np.array([memory.power_given, memory.power_taken])), rows
+        after, joints = memory.copied(), new_joint_work(model, tree)
+        rows = joint_kernels.observe(model, work, tree, joints, NO_TANGENT, memory=after, t=t)
+        return memory.changed(power=after.power), rows  # reactions written there are those of the row alone
 
     def advance(
-        self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
-    ) -> tuple[Carry, Rows, int, Failure | None]:
-        """Advance by n_steps of size h, the first of them number `first` from t0; see `carry.Integrator`."""
+        self, system: System, memory: Memory, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
+    ) -> tuple[Memory, Rows, int, Failure | None]:
+        """Advance by n_steps of size h, the first of them number `first` from t0; see `integrator.Integrator`."""
         from floatframe.engine.tree.kernels.entry import joint_kernels
 
         compiled, tree = compiled_system(system), tree_of(system).tree
         model, kept = compiled.model, kept_of(work, compiled.model, tree)
-        begun = self.prepared(system, carry, h, t0 + first * h)
-        goes_on = kept.after is carry and begun.u_dot is carry.u_dot  # longer steps begin with other accelerations
+        begun = self.prepared(system, memory, h, t0 + first * h)
+        goes_on = kept.after is memory and begun.u_dot is memory.u_dot  # longer steps begin with other accelerations
         if not goes_on or work.solver.c_k == 0.0:  # a run that is resumed from a file begins in the same way
             kept.joints.is_known[...] = 0
             kept.tangent.n_known[...] = 0
-        carry = begun
-        memory = memory_of(carry)
-        memory.a[:] = carry.a
-        iterations = int(work.counted.iterations)
+        after = begun.copied()
         rows, outcome = joint_kernels.advance(
-            model, work, tree, kept.joints, kept.tangent, memory=memory,
+            model, work, tree, kept.joints, kept.tangent, memory=after,
             t0=t0, h=h, first=first, n_steps=n_steps, every=every, **self.absolute.numbers(compiled, h),
         )  # fmt: skip
-        after = carry_of(memory, carry.n_iterations + int(work.counted.iterations) - iterations)
         kept.after = after
-        return after, rows, outcome.n_steps, self.explain(system, work, outcome, after.state.u, h)
+        return after, rows, outcome.n_steps, self.explain(system, work, outcome, after.u, h)
 
-    def prepared(self, system: System, carry: Carry, h: float, t: float) -> Carry:
+    def prepared(self, system: System, memory: Memory, h: float, t: float) -> Memory:
         """Return the memory with algorithmic accelerations of the unknowns for steps of size h from t.
 
         At the start, and where longer steps follow: as `start.step_filter` says, in the coordinates of the joints.
         """
         compiled, method = compiled_system(system), self.absolute
         is_divided = method.least_step(h, compiled) > 0.0
-        if carry.h != 0.0 and (is_divided or h <= LONGER * carry.h):
-            return replace(carry, h_next=min(carry.h_next or h, h) if is_divided else h)
+        if memory.h != 0.0 and (is_divided or h <= LONGER * memory.h):
+            return memory.changed(h_next=min(float(memory.h_next) or h, h) if is_divided else h)
         tree = tree_of(system).tree
-        spin = method.spin_at(compiled, carry, may_spin(tree))
-        if carry.h == 0.0:
-            h = method.first_step(compiled, carry, h, t, spin)
+        spin = method.spin_at(compiled, memory, may_spin(tree))
+        if memory.h == 0.0:
+            h = method.first_step(compiled, memory, h, t, spin)
         alpha_m, alpha_f, beta, _ = method.coefficients
-        begun = method.filtered(compiled, carry, h, t, full=False, spin=spin)
-        a, rates = joint_accelerations(compiled, tree, carry, begun, h, spin)
+        begun = method.filtered(compiled, memory, h, t, full=False, spin=spin)
+        a, rates = joint_accelerations(compiled, tree, memory, begun, h, spin)
         a, u_dot = a + (alpha_m - alpha_f) * h * rates, begun.u_dot
         rows = rows_closed_by_positions(compiled.model, self.stabilized)[tree.kept_row >= 0]
         if rows.any():
-            begun = method.filtered(compiled, carry, h, t, full=True, spin=None)
-            now, rates = joint_accelerations(compiled, tree, carry, begun, h, None)
+            begun = method.filtered(compiled, memory, h, t, full=True, spin=None)
+            now, rates = joint_accelerations(compiled, tree, memory, begun, h, None)
             way = 0.5 * now + ((alpha_m - alpha_f) / 2 + beta) * h * rates
-            carry = shifted(system, carry, way, h, method.coefficients, t, rows)
-        return replace(carry, u_dot=u_dot, a=a, h=h, h_next=h)
+            memory = shifted(system, memory, way, h, method.coefficients, t, rows)
+        return memory.changed(u_dot=u_dot, a=a, h=h, h_next=h)
 
     def explain(self, system: System, work: Work, outcome: tuple, u: Array, h: float) -> Failure | None:
         """Return the reason of a failed step of size h that began with velocities u, (n_u,); None if none failed."""
@@ -199,7 +195,7 @@ class Kept:
 
     joints: JointWork
     tangent: TangentWork
-    after: Carry | None = None
+    after: Memory | None = None
 
 
 #: by the identity of an array of the working arrays, with whose lifetime they end
@@ -241,14 +237,14 @@ def may_spin(tree: Tree) -> NDArray[np.bool_]:
 
 
 def joint_accelerations(
-    compiled: CompiledSystem, tree: Tree, carry: Carry, begun: Beginning, h: float, spin: Spin | None
+    compiled: CompiledSystem, tree: Tree, memory: Memory, begun: Beginning, h: float, spin: Spin | None
 ) -> tuple[Array, Array]:
     """Return the initial s_ddot and its rate at the indices of the unknowns, (n_u,).
 
     spin: bodies that spin by themselves, whose rates are those of s_ddot without the turn of their axes, in axes that
     do not spin.
     """
-    state, u_dot, s = carry.state, begun.u_dot, NEAR_BY * h
+    state, u_dot, s = memory.state, begun.u_dot, NEAR_BY * h
     jerk = begun.rates if spin is None else begun.rates - spin.further
     spinning = [] if spin is None else np.flatnonzero(spin.bodies).tolist()
     start, by_spin = {}, {}
@@ -275,13 +271,13 @@ def joint_accelerations(
 
 def shifted(
     system: System,
-    carry: Carry,
+    memory: Memory,
     way: Array,
     h: float,
     coefficients: tuple[float, float, float, float],
     t: float,
     rows: NDArray[np.bool_],
-) -> Carry:
+) -> Memory:
     """Return the memory with velocities changed by O(h²), so that x = h s_dot + h² way closes some of the kept rows.
 
     G ds = -g(after)/h with the matrix of a step, M + gamma h D + beta h² K, as (3) of `start.step_filter`.
@@ -291,9 +287,9 @@ def shifted(
     compiled, tree = compiled_system(system), tree_of(system).tree
     model = compiled.model
     kept = tree.kept_row >= 0
-    state, (_, _, beta, gamma) = carry.state, coefficients
-    work, joints = joint_iterate(compiled, tree, state, carry.u_dot)
-    work.states.base[:] = work_from(model, carry.w).states.base
+    state, (_, _, beta, gamma) = memory.state, coefficients
+    work, joints = joint_iterate(compiled, tree, state, memory.u_dot)
+    work.states.base[:] = work_from(model, memory.w).states.base
     joints.d_start[:], joints.Q_start[:] = joints.d, joints.Q
     rate, is_column = joints.rate.copy(), tree.column >= 0
     s_dot = in_slots(tree, joints, state.u, rate)[tree.slot]
@@ -306,12 +302,12 @@ def shifted(
         increments[k] = tree.factor[k] * (motion(t + h) - motion(t))
     work.state.q[tree.mode[~is_column]] += x[~is_column]
     work.state.time[...] = t + h
-    work.state.w[:] = carry.w
-    work.state.w[model.coordinates.row] += h * carry.w[model.coordinates.row + 1]
+    work.state.w[:] = memory.w
+    work.state.w[model.coordinates.row] += h * memory.w[model.coordinates.row + 1]
     moved(model, work, tree, joints, increments)
     projected(model, work, tree, joints, beta * h**2)
     gap = np.where(rows, work.connections.g[kept], 0.0)
-    set_iterate(work, state, None, carry.w)
+    set_iterate(work, state, None, memory.w)
     work.state.time[...] = t
     joints.x[:] = 0.0
     joints.d[:], joints.Q[:], joints.acceleration[:] = joints.d_start, joints.Q_start, 0.0
@@ -321,4 +317,4 @@ def shifted(
     joints.rate[tree.column[is_column]] += change[is_column]
     work.state.u[tree.slot[~is_column]] += change[~is_column]
     motion_of_bodies(model, work, tree, joints)
-    return replace(carry, state=replace(state, u=work.state.u.copy()))
+    return memory.changed(u=work.state.u)

@@ -4,7 +4,7 @@ Evaluated in `floatframe.engine.tree.kernels.accelerations`.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -18,14 +18,13 @@ from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.initial_conditions.gaps import gaps_at, has_gaps
 from floatframe.engine.initial_conditions.initial import consistent_motion, has_normal_friction
 from floatframe.engine.initial_conditions.newton_equations import set_iterate
-from floatframe.engine.kernels.memory import WORK_GIVEN, WORK_TAKEN, Rows, new_rows
+from floatframe.engine.kernels.memory import WORK_GIVEN, WORK_TAKEN, Memory, Rows, memory_at, new_rows
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.engine.structure_preserving.bodies import central_bodies
 from floatframe.engine.tree.kernels.tree import new_joint_work, new_tangent_work
 from floatframe.engine.tree.topology import SystemTree, tree_of
 from floatframe.errors import FloatframeError, ModelError
-from floatframe.integrators.carry import (
-    Carry,
+from floatframe.integrators.integrator import (
     Failure,
     FollowedRotations,
     joined_rows,
@@ -82,7 +81,7 @@ class RelativeOde:
             if not 0.0 < getattr(self, name) < 1.0:
                 raise ModelError(f"RelativeOde: {name}: expected a number between 0 and 1, got {getattr(self, name)}")
 
-    def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
+    def start(self, system: System, t: float, state: State | None = None, before: Memory | None = None) -> Memory:
         """Return the memory at the beginning, from a consistent state."""
         compiled = compiled_system(system)
         for each in compiled.laws:
@@ -94,59 +93,58 @@ class RelativeOde:
         require_no_remembered_contacts(compiled, "RelativeOde")
         known, angle = (None, None) if before is None else (before.w, before.angle)
         made = consistent_motion(system, state, t=t, known=known, angle=angle)
-        carry = Carry(made.state, made.u_dot, np.zeros(0), 0.0, made.w, np.zeros(2), np.zeros(2))
-        return with_angles(system, t, carry, before, state)
+        memory = memory_at(made.state, made.u_dot, made.w, np.zeros(0))
+        return with_angles(system, t, memory, before, state)
 
-    def after_jump(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
+    def after_jump(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
         """Return the memory after a jump of forces at t, and the results there."""
-        return started_anew(self, system, t, carry, work)
+        return started_anew(self, system, t, memory, work)
 
-    def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
+    def step(self, system: System, t: float, h: float, memory: Memory) -> Memory:
         """Return the memory a time h later; `ConvergenceError` if it fails."""
-        return one_step_of(self, system, t, h, carry)
+        return one_step_of(self, system, t, h, memory)
 
-    def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
-        """Return the results at the carried state, and store the power there in the carry."""
-        power, rows = observed(system, t, carry, work)
-        return replace(carry, power=power), rows
+    def observe(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
+        """Return the memory with the power at its state, and the results there."""
+        return observed(system, t, memory, work)
 
     def advance(
-        self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
-    ) -> tuple[Carry, Rows, int, Failure | None]:
-        """Advance by n_steps output times, the first of them number `first` from t0; see `carry.Integrator`."""
+        self, system: System, memory: Memory, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
+    ) -> tuple[Memory, Rows, int, Failure | None]:
+        """Advance by n_steps output times, the first of them number `first` from t0; see `integrator.Integrator`."""
         times: Array = t0 + h * np.arange(first, first + n_steps + 1, dtype=float)
         rows, n_good, failure, has_stopped = [new_rows(compiled_system(system).model, 0)], 0, None, False
-        motion = Motion(system, carry, float(times[0]))
+        motion = Motion(system, memory, float(times[0]))
         try:
             for t, state, u_dot, w in motion.outputs(self, times):
-                after = replace(carry, state=state, u_dot=u_dot, w=w, h=h, n_steps=carry.n_steps + 1)
+                after = memory.changed(state=state, u_dot=u_dot, w=w, h=h, n_steps=memory.n_steps + 1)
                 after = turned_on(system, after, h)
-                power, row, failure = observed_unless_stopped(system, t, after, work)
+                after, row, failure = observed_unless_stopped(system, t, after, work)
                 has_stopped = failure is not None
                 if has_stopped:
                     break
-                carry = replace(after, power=power, work=carry.work + 0.5 * h * (carry.power + power))
-                row.diagnostics[0, [WORK_GIVEN, WORK_TAKEN]] = carry.work
+                memory = after.changed(work=memory.work + 0.5 * h * (memory.power + after.power))
+                row.diagnostics[0, [WORK_GIVEN, WORK_TAKEN]] = memory.work
                 n_good += 1
                 if (first + n_good) % every == 0:
                     rows.append(row)
         except (FloatframeError, np.linalg.LinAlgError) as error:
             failure = Failure(f"{self.method}: {error}", np.inf)
-        carry = replace(carry, n_iterations=carry.n_iterations + motion.n_evaluations)
+        memory = memory.changed(n_iterations=memory.n_iterations + motion.n_evaluations)
         if failure is not None and n_steps > 1 and not has_stopped and compiled_system(system).stop_words:
             begun = first + n_good  # its stop may precede the failure: output by output up to the stop
-            carry, more_rows, more, failure = one_by_one(
-                self, system, carry, work, t0=t0, h=h, first=begun, n_steps=n_steps - n_good, every=every
+            memory, more_rows, more, failure = one_by_one(
+                self, system, memory, work, t0=t0, h=h, first=begun, n_steps=n_steps - n_good, every=every
             )
             rows, n_good = [*rows, *more_rows], n_good + more
-        return carry, joined_rows(rows), n_good, failure
+        return memory, joined_rows(rows), n_good, failure
 
 
 class Motion:
     """A system along a motion: y = (independent x, independent rates, states, counted coordinates) and its rates."""
 
-    def __init__(self, system: System, carry: Carry, t: float) -> None:
-        state, w = carry.state, carry.w
+    def __init__(self, system: System, memory: Memory, t: float) -> None:
+        state, w = memory.state, memory.w
         self.compiled: CompiledSystem = compiled_system(system)
         self.parts: SystemTree = tree_of(system)
         self.model, self.tree = self.compiled.model, self.parts.tree
@@ -168,7 +166,7 @@ class Motion:
         self.z_size = np.concatenate([states.size, np.full(len(self.own) - self.n_states, np.inf)])
         self.work.states.kappa[:], self.work.states.rho[...] = 0.0, 1.0
         own_equations = any(each.law.multipliers for each in self.compiled.laws)
-        self.rotations = FollowedRotations(self.model, self.work, t, carry)
+        self.rotations = FollowedRotations(self.model, self.work, t, memory)
         self.is_linear = not (self.n_states or has_normal_friction(self.model) or own_equations)
         self.begin(state, t)
 

@@ -5,9 +5,9 @@ Evaluated in `floatframe.engine.structure_preserving.kernels.steps`.
 
 from dataclasses import dataclass
 
+from floatframe.engine.kernels.memory import Memory
 from floatframe.engine.structure_preserving.kernels.records import VARIATIONAL
 from floatframe.errors import ModelError
-from floatframe.integrators.carry import Carry
 from floatframe.integrators.discrete_run import DiscreteScheme, check_options
 from floatframe.model.state import State
 from floatframe.model.system import System
@@ -49,7 +49,7 @@ class Variational(DiscreteScheme):
     def __post_init__(self) -> None:
         check_options(self)
 
-    def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
+    def start(self, system: System, t: float, state: State | None = None, before: Memory | None = None) -> Memory:
         """Return the memory at the beginning, from a consistent state."""
         for force in system.forces:
             if getattr(force, "friction_coefficient", 0.0) > 0:

@@ -26,7 +26,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.kernels.memory import GRAVITATION, KINETIC, SPRINGS, STRAIN, WORK_GIVEN, WORK_TAKEN, Rows
-from floatframe.integrators.carry import joined_rows
+from floatframe.integrators.integrator import joined_rows
 from floatframe.model.system import System
 from floatframe.results.validity import ValidityNote
 from floatframe.simulation.step_watch import FIRST_VERDICT

@@ -20,12 +20,12 @@ from floatframe.engine.compiling.public_elements import PlacedLaw
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.impulses import impact
 from floatframe.engine.initial_conditions.initial import consistent_motion
-from floatframe.engine.kernels.memory import KINETIC, SPRINGS, WORK_GIVEN, WORK_TAKEN, Rows
+from floatframe.engine.kernels.memory import KINETIC, SPRINGS, WORK_GIVEN, WORK_TAKEN, Memory, Rows
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import ModelError
-from floatframe.integrators.carry import Carry, Failure, Integrator, carry_of_past, coasted, counted_on, joined_rows
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha
 from floatframe.integrators.ida import Ida
+from floatframe.integrators.integrator import Failure, Integrator, coasted, counted_on, joined_rows, memory_of_past
 from floatframe.integrators.relative_ode import RelativeOde
 from floatframe.model.joints.rows import NOTHING, POSITION
 from floatframe.model.state import State
@@ -64,7 +64,7 @@ MOST_IN_A_STEP = 100  #: most events in one step; with more, events switch each 
 class Ended(NamedTuple):
     """The end of a step."""
 
-    carry: Callable[[], Carry]  #: returns the memory
+    memory: Callable[[], Memory]  #: returns the memory
     row: Rows | None  #: results; None: not written
     values: Array  #: watched values of the events, (n_events,)
 
@@ -74,21 +74,21 @@ class Place(NamedTuple):
 
     part: float  #: time from the start of the step over the step size
     j: int
-    carry: Carry
+    memory: Memory
     row: Rows
     failure: Failure | None  #: of the trial step to this location
 
 
-def same(carry: Carry) -> Carry:
-    """Return a memory: the carry of an `Ended` whose memory exists already."""
-    return carry
+def same(memory: Memory) -> Memory:
+    """Return a memory: the memory of an `Ended` whose memory exists already."""
+    return memory
 
 
 def past_rows(work: Work, n_steps: int, t0: float, h: float, first: int) -> Rows:
     """Return rows with only the times and the kept angles after each of n_steps."""
     empty = Rows(*(np.zeros(0) for _ in Rows._fields))
     times: Array = t0 + h * np.arange(first + 1, first + n_steps + 1, dtype=float)
-    return empty._replace(t=times, angle=work.past.angle[:n_steps])
+    return empty._replace(t=times, angle=work.past.memory.angle[:n_steps])
 
 
 def one_of(rows: Rows, k: int) -> Rows:
@@ -255,9 +255,9 @@ class EventWatch:
         return self.trial[1]
 
     def steps(
-        self, integrator: Integrator, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int,
+        self, integrator: Integrator, memory: Memory, work: Work, *, t0: float, h: float, first: int, n_steps: int,
         every: int,
-    ) -> tuple[Carry, Rows, Work, int, Failure | None]:  # fmt: skip
+    ) -> tuple[Memory, Rows, Work, int, Failure | None]:  # fmt: skip
         """Take a block of up to n_steps steps of size h, the first of them number `first` from t0.
 
         Return the memory, the results after every `every`-th step (and at a stop), working arrays, the number of steps
@@ -275,9 +275,9 @@ class EventWatch:
         n = 1 if is_single else min(n_steps, BLOCK - first % BLOCK, self.calm, self.longest)
         # other methods complete their memories only where results are written
         every_row = every if self.is_direct and isinstance(integrator, GeneralizedAlpha) else 1
-        begin, before = carry, self.row
+        begin, before = memory, self.row
         work.past.n[...] = 0
-        carry, rows, n_good, failure = integrator.advance(
+        memory, rows, n_good, failure = integrator.advance(
             self.system, begin, work, t0=t0, h=h, first=first, n_steps=n, every=every_row
         )
         if every_row == 1:
@@ -294,19 +294,19 @@ class EventWatch:
                 if k == 0:
                     return self.steps(integrator, begin, work, t0=t0, h=h, first=first, n_steps=1, every=every)
                 n_good, values = k, values[: k + 1]
-                carry, rows, _, failure = integrator.advance(
+                memory, rows, _, failure = integrator.advance(
                     self.system, begin, work, t0=t0, h=h, first=first, n_steps=n_good, every=1
                 )
                 break
             self.values = values[k]
             if every_row == 1:
                 self.row = before if k == 0 else one_of(rows, k - 1)
-            after = partial(carry_of_past, work, carry, k) if keeps_past else partial(same, carry)
+            after = partial(memory_of_past, work, memory, k) if keeps_past else partial(same, memory)
             ended = Ended(after, one_of(rows, k) if every_row == 1 else None, values[k + 1])
             close = slice(max(0, k + 1 - MOST_NEIGHBOURS), k + 1 + MOST_NEIGHBOURS)
             settled = self.settled(
                 integrator,
-                begin if k == 0 else carry_of_past(work, carry, k - 1),
+                begin if k == 0 else memory_of_past(work, memory, k - 1),
                 ended,
                 work,
                 t=t0 + (first + k) * h,
@@ -315,19 +315,19 @@ class EventWatch:
                 neighbours=(k - close.start, values[close]),
             )
             if settled is not None:
-                carry, row, work, failure = settled
+                memory, row, work, failure = settled
                 n_good = k + int(failure is None)
                 rows = Rows(*(array[: (first + k) // every_row - first // every_row] for array in rows))
                 if failure is None and (self.has_stopped or (first + n_good) % every_row == 0):
                     rows = joined_rows([rows, row])
                 self.calm = max(1, (first + n_good - self.changed) // 2)
                 self.changed = first + n_good
-                return carry, self.due_of(rows, first, every // every_row), work, n_good, failure
+                return memory, self.due_of(rows, first, every // every_row), work, n_good, failure
         self.values = values[n_good]
         if n_good and every_row == 1:
             self.row = one_of(rows, n_good - 1)
         self.calm = min(2 * self.calm, BLOCK)
-        return carry, self.due_of(rows, first, every // every_row), work, n_good, failure
+        return memory, self.due_of(rows, first, every // every_row), work, n_good, failure
 
     def due_of(self, rows: Rows, first: int, every: int) -> Rows:
         """Select every `every`-th of the results after steps from `first` on, and the one at a stop."""
@@ -339,20 +339,20 @@ class EventWatch:
         return Rows(*(array[is_due] for array in rows))
 
     def step(
-        self, integrator: Integrator, carry: Carry, work: Work, *, t0: float, h: float, k: int
-    ) -> tuple[Carry, Rows, Work, Failure | None]:
+        self, integrator: Integrator, memory: Memory, work: Work, *, t0: float, h: float, k: int
+    ) -> tuple[Memory, Rows, Work, Failure | None]:
         """Take step k of size h from t0 + k h, with the events in it; return the results at its end, or at the stop."""
-        after, row, _, failure = integrator.advance(self.system, carry, work, t0=t0, h=h, first=k, n_steps=1, every=1)
+        after, row, _, failure = integrator.advance(self.system, memory, work, t0=t0, h=h, first=k, n_steps=1, every=1)
         if failure is not None:
-            return carry, row, work, failure
+            return memory, row, work, failure
         ended = Ended(partial(same, after), row, self.values_after(row))
-        settled = self.settled(integrator, carry, ended, work, t=t0 + k * h, t_end=t0 + (k + 1) * h, h=h)
+        settled = self.settled(integrator, memory, ended, work, t=t0 + k * h, t_end=t0 + (k + 1) * h, h=h)
         return (after, row, work, None) if settled is None else settled
 
     def settled(
-        self, integrator: Integrator, begin: Carry, ended: "Ended", work: Work, *, t: float, t_end: float, h: float,
+        self, integrator: Integrator, begin: Memory, ended: "Ended", work: Work, *, t: float, t_end: float, h: float,
         neighbours: tuple[int, Array] | None = None,
-    ) -> tuple[Carry, Rows, Work, Failure | None] | None:  # fmt: skip
+    ) -> tuple[Memory, Rows, Work, Failure | None] | None:  # fmt: skip
         """Handle the events in a step of size h from t; return None if they do not change the motion.
 
         Otherwise return memory, results and working arrays at the end of the step or at the stop, and why the step
@@ -381,7 +381,7 @@ class EventWatch:
             if acting is None:
                 self.values, self.row = values, ended.row
                 return reached_end
-            event, carry = events[acting.j], acting.carry
+            event, memory = events[acting.j], acting.memory
             t = t + acting.part * size if event.at is None else event.at
             row = acting.row._replace(t=np.array([t]))
             reached = self.values_after(row)
@@ -395,21 +395,21 @@ class EventWatch:
             self.values, self.row = reached, row
             before = self.system
             if isinstance(event, StopEvent):
-                state = self.strike(carry, event, t, h)
+                state = self.strike(memory, event, t, h)
             elif isinstance(event, SwitchEvent):
                 self.add(event, t)
                 self.signs[event.name] = -self.signs[event.name]
                 self.switch(self.off)
-                state = carry.state
+                state = None
             else:
                 self.add(event, t)
                 if event.record and not event.stop:
                     self.recorded.append(row)
                 if event.stop:
                     self.has_stopped = True
-                    return carry, row, work, None
-                state = self.engage(event, carry, t)
-            begin, row, work = self.begun_anew(integrator, before, carry, state, row, t)
+                    return memory, row, work, None
+                state = self.engage(event, memory, t)
+            begin, row, work = self.begun_anew(integrator, before, memory, state, row, t)
             self.row = row
             self.take_inside()
             size, neighbours = t_end - t, None
@@ -417,47 +417,47 @@ class EventWatch:
                 begin, row = coasted(integrator, self.system, t, size, begin, work)
                 self.row = row._replace(t=np.array([t_end]))
                 return begin, self.row, work, None
-            carry, row, _, failure = integrator.advance(
+            memory, row, _, failure = integrator.advance(
                 self.system, begin, work, t0=t, h=size, first=0, n_steps=1, every=1
             )
             if failure is not None:
                 return begin, row, work, failure
-            ended = Ended(partial(same, carry), row, self.values_after(row))
-            reached_end = carry, row, work, None
+            ended = Ended(partial(same, memory), row, self.values_after(row))
+            reached_end = memory, row, work, None
         words = f"{MOST_IN_A_STEP} events happened in one step: {', '.join(e['name'] for e in self.happened[-3:])}, ..."
-        return carry, row, work, Failure(words, np.inf)
+        return memory, row, work, Failure(words, np.inf)
 
     def begun_anew(
-        self, integrator: Integrator, system: System, carry: Carry, state: State, row: Rows, t: float
-    ) -> tuple[Carry, Rows, Work]:
-        """Return memory, results and working arrays of the motion after an event at t, from an engine state.
+        self, integrator: Integrator, system: System, memory: Memory, state: State | None, row: Rows, t: float
+    ) -> tuple[Memory, Rows, Work]:
+        """Return memory, results and working arrays of the motion after an event at t.
 
-        system: the system as switched before t. The method restarts if velocities or constraints have changed; it
-        continues if only forces have. The energy that springs bring or remove counts as work given, and the energy that
-        an impact removes as work taken.
+        system: as switched before t. state: of the engine, with other velocities; None: that of the memory. The method
+        restarts if velocities or constraints have changed; it continues if only forces have. The energy that springs
+        bring or remove counts as work given, and the energy that an impact removes as work taken.
         """
-        is_struck = state is not carry.state
-        before, work_done, work = row.diagnostics[-1], carry.work, self.new_work()
+        is_struck = state is not None
+        before, work_done, work = row.diagnostics[-1], memory.work, self.new_work()
         if is_struck or not holds_alike(system, self.system):
-            told = state_of_file(compiled_system(self.full), state)
-            fresh = counted_on(integrator.start(self.system, t, told, before=carry), carry)
-            carry, row = integrator.observe(self.system, t, fresh, work)
+            told = state_of_file(compiled_system(self.full), memory.state if state is None else state)
+            fresh = counted_on(integrator.start(self.system, t, told, before=memory), memory)
+            memory, row = integrator.observe(self.system, t, fresh, work)
         else:
-            carry, row = integrator.after_jump(self.system, t, carry, work)
+            memory, row = integrator.after_jump(self.system, t, memory, work)
         after = row.diagnostics[-1]
         taken = float(before[KINETIC] - after[KINETIC]) if is_struck else 0.0
         change = np.array([float(after[SPRINGS] - before[SPRINGS]), taken])
         after[WORK_GIVEN] += change[0]
         after[WORK_TAKEN] += change[1]
-        return replace(carry, work=work_done + change), row, work
+        return memory.changed(work=work_done + change), row, work
 
-    def engage(self, event: Event, carry: Carry, t: float) -> State:
-        """Apply the switches of an event; return the engine state with the velocities after it."""
+    def engage(self, event: Event, memory: Memory, t: float) -> State | None:
+        """Apply the switches of an event; return the engine state with other velocities after it, None: unchanged."""
         compiled = compiled_system(self.full)
         couplers = {coupler.name: coupler for coupler in self.full.couplers}
         engaged = [name for name in event.switch_on if name in couplers and name in self.off]
         for name in engaged:
-            caught, constant = coupled_sum(compiled, name, carry.w), couplers[name].constant
+            caught, constant = coupled_sum(compiled, name, memory.w), couplers[name].constant
             if constant is None:
                 self.caught[name] = caught
                 continue
@@ -475,8 +475,8 @@ class EventWatch:
         ]
         self.switch((self.off | set(event.switch_off)) - set(event.switch_on))
         if not engaged and not holding:
-            return carry.state
-        hit = impact(compiled_system(self.system), carry.state, t=t, known=carry.w, restitution={})
+            return None
+        hit = impact(compiled_system(self.system), memory.state, t=t, known=memory.w, restitution={})
         for placed in holding:
             require_shut(event, placed, hit.gap, t, compiled.length)
         cores = [sum_rows(compiled, name)[2] for name in engaged]
@@ -487,24 +487,24 @@ class EventWatch:
         self.happened[-1]["impulse"] = impulse
         return hit.state
 
-    def strike(self, carry: Carry, event: StopEvent, t: float, h: float) -> State:
-        """Handle a coupler that reaches or leaves its limit; return the engine state with the velocities after it."""
+    def strike(self, memory: Memory, event: StopEvent, t: float, h: float) -> State | None:
+        """Handle a coupler that reaches or leaves its limit; return the engine state with other velocities after it."""
         self.add(event, t)
         happened = self.happened[-1]
         if event.side == "release":
             del self.resting[event.coupler]
             self.switch(self.off)
-            return carry.state
+            return None
         limits = next(each.limits for each in self.full.couplers if each.name == event.coupler)
         assert limits is not None  # it has events
         _, factors, core = sum_rows(compiled_system(self.full), event.coupler)
         self.resting[event.coupler] = event.side
         self.switch(self.off)
         holding = compiled_system(self.system)
-        hit = impact(holding, carry.state, t=t, known=carry.w, restitution={})
+        hit = impact(holding, memory.state, t=t, known=memory.w, restitution={})
         speed = float(hit.rate[core]) * float(np.abs(factors).max())  # rows of couplers have a largest coefficient of 1
         told = state_of_file(compiled_system(self.full), hit.state)
-        pressed = INWARD[event.side] * float(consistent_motion(self.system, told, t=t, known=carry.w).w[core])
+        pressed = INWARD[event.side] * float(consistent_motion(self.system, told, t=t, known=memory.w).w[core])
         thrown = 2 * limits.restitution * abs(float(hit.impulse[core]))  # pressed by this for the time of the flight
         happened["speed before"], happened["speed after"] = speed, 0.0
         if pressed > 0.0 and thrown <= pressed * h:
@@ -512,7 +512,7 @@ class EventWatch:
             return hit.state
         if limits.restitution > 0.0:
             restitution = {core: limits.restitution}
-            hit = impact(holding, carry.state, t=t, known=carry.w, restitution=restitution)
+            hit = impact(holding, memory.state, t=t, known=memory.w, restitution=restitution)
             happened["speed after"] = -limits.restitution * speed
         happened["impulse"] = {event.coupler: float(hit.impulse[core])}
         del self.resting[event.coupler]
@@ -547,7 +547,7 @@ class EventWatch:
         return rows
 
     def located(
-        self, integrator: Integrator, begin: Carry, ended: "Ended", t: float, size: float, j: int,
+        self, integrator: Integrator, begin: Memory, ended: "Ended", t: float, size: float, j: int,
         neighbours: tuple[int, Array] | None,
     ) -> "Place":  # fmt: skip
         """Locate event j in a step of size `size` from t; return the place just after it.
@@ -559,19 +559,19 @@ class EventWatch:
 
         def at(part: float) -> Place:
             if part == 1.0:
-                carry, row = ended.carry(), ended.row
+                memory, row = ended.memory(), ended.row
                 if row is None:
-                    _, row = integrator.observe(self.system, t + size, carry, work)
-                return Place(part, j, carry, row, None)
+                    _, row = integrator.observe(self.system, t + size, memory, work)
+                return Place(part, j, memory, row, None)
             if part <= 0.0:  # at the start, after another event at this time
                 begun, row = integrator.observe(self.system, t, begin, work)
                 return Place(0.0, j, begun, row, None)
             if part not in tried:
                 work.solver.c_k[...] = 0.0  # do not use factors of other trial steps
-                carry, row, _, failure = integrator.advance(
+                memory, row, _, failure = integrator.advance(
                     self.system, begin, work, t0=t, h=part * size, first=0, n_steps=1, every=1
                 )
-                tried[part] = Place(part, j, carry, row, failure)
+                tried[part] = Place(part, j, memory, row, failure)
             return tried[part]
 
         if event.at is not None:

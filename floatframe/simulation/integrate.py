@@ -5,7 +5,7 @@
     (3) observe     what steps, energy, laws and ranges of validity say about the motion          `Run.observe`
     (4) write       results, records to go on from, and progress                   `Run.keep`, `Run.close_segment`
 
-`resume` begins with the record of an interrupted run in place of (1). The memory between steps is the `Carry` of the
+`resume` begins with the record of an interrupted run in place of (1). The memory between steps is the `Memory` of the
 integrator; results of output times are `Rows`.
 """
 
@@ -27,11 +27,11 @@ from floatframe.engine.compiling.file_frames import rows_of_file
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.impulses import words_of_begun_drives
 from floatframe.engine.initial_conditions.mass_positivity import indefinite_mass_words, indefinite_masses
-from floatframe.engine.kernels.memory import Rows
+from floatframe.engine.kernels.memory import Memory, Rows
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import ConvergenceError, ModelError, ResultsError
 from floatframe.integrators import CLASSES, has_fixed_steps, has_second_order, in_formulation
-from floatframe.integrators.carry import Carry, Failure, Integrator, joined_rows
+from floatframe.integrators.integrator import Failure, Integrator, joined_rows
 from floatframe.model.checked_values import number
 from floatframe.model.state import State
 from floatframe.model.system import System
@@ -47,7 +47,7 @@ from floatframe.simulation.events import has_events, require_times_of_events
 from floatframe.simulation.jumps import jumps_of_steps, next_steps
 from floatframe.simulation.law_watch import LawWatch
 from floatframe.simulation.motion_head import head_of, joint_rows
-from floatframe.simulation.restart import RESTART_STEPS, carry_of_record, restart_record, system_digest
+from floatframe.simulation.restart import RESTART_STEPS, memory_of_record, restart_record, system_digest
 from floatframe.simulation.step_advice import frequency_words, knot_words, step_advice
 from floatframe.simulation.step_watch import WATCHES, StepWatch
 from floatframe.simulation.validity_watch import ValidityWatch
@@ -173,21 +173,21 @@ def integrate(
     begun = system if events is None else events.system
     with ExitStack() as held:  # location of the results, fixed from before the computation until its end
         place = None if output is None else held.enter_context(ResultsPlace(output, inputs=system.files))
-        carry = integrator.start(begun, t_start, state)  # (1)
+        memory = integrator.start(begun, t_start, state)  # (1)
         run = Run(
             system, integrator, head, t_start, t_end, step, n_total, output_every,
             writer=None, notes=tuple(acting), events=events,
         )  # fmt: skip
         run.words_of_start = lambda: words_of_begun_drives(begun, t_start, state, step)
-        carry, rows = run.begin(carry, 0)
+        memory, rows = run.begin(memory, 0)
         require_sensors(system, head, rows)
         run.writer = None if place is None else ResultsWriter(place, head)
-        run.steps.begin(carry.state)
+        run.steps.begin(memory.state)
         run.energy.observe(system, rows, is_switched=False)
         run.keep(rows)
-        run.close_segment(run.record(carry, 0))
+        run.close_segment(run.record(memory, 0))
         raise_if_interrupted = held.enter_context(heeded_interrupts())
-        return run.advance(carry, 0, batch_steps, progress, raise_if_interrupted)
+        return run.advance(memory, 0, batch_steps, progress, raise_if_interrupted)
 
 
 def require_no_units(system: System) -> None:
@@ -257,7 +257,7 @@ def resume(
             )
         if record is None:
             raise ResultsError(f"{output}: the interrupted run has no restart record; run it anew")
-        carry, n_done = carry_of_record(record, system)
+        memory, n_done = memory_of_record(record, system)
         watch = EventWatch(system, head) if has_events(system) else None
         if watch is not None:
             watch.restore(record)
@@ -271,9 +271,9 @@ def resume(
         )  # fmt: skip
         again.steps.restore(record, again.notes)
         again.energy.restore(record, again.notes)
-        again.begin(carry, n_done)
+        again.begin(memory, n_done)
         with heeded_interrupts() as raise_if_interrupted:
-            return again.advance(carry, n_done, BATCH_STEPS, progress, raise_if_interrupted)
+            return again.advance(memory, n_done, BATCH_STEPS, progress, raise_if_interrupted)
 
 
 @dataclass
@@ -303,24 +303,22 @@ class Run:
         """Time the run has taken so far [s]."""
         return self.seconds_before + time.perf_counter() - self.began
 
-    def record(self, carry: Carry, n_done: int) -> dict[str, np.ndarray]:
+    def record(self, memory: Memory, n_done: int) -> dict[str, np.ndarray]:
         """Return the data to resume from here."""
         self.report(*self.energy.flush(self.system))
         events = {} if self.events is None else self.events.record()
         watches = self.steps.record() | self.energy.record()
-        return restart_record(carry, n_done) | {"seconds": np.array(self.seconds)} | events | watches
+        return restart_record(memory, n_done) | {"seconds": np.array(self.seconds)} | events | watches
 
-    def record_where_due(self, carry: Carry, n_done: int) -> dict[str, np.ndarray] | None:
+    def record_where_due(self, memory: Memory, n_done: int) -> dict[str, np.ndarray] | None:
         """Return the data to resume from here, None if a run cannot be resumed here."""
-        return self.record(carry, n_done) if self.writer is not None and n_done % RESTART_STEPS == 0 else None
+        return self.record(memory, n_done) if self.writer is not None and n_done % RESTART_STEPS == 0 else None
 
-    def summary(self, carry: Carry) -> dict[str, Any]:
+    def summary(self, memory: Memory) -> dict[str, Any]:
         """Return the counts and times of the run, and its events."""
         events = {} if self.events is None else {"events": self.events.happened}
         return events | {
-            "n_steps": carry.n_steps,
-            "n_rejected": carry.n_rejected,
-            "n_iterations": carry.n_iterations,
+            **{name: int(getattr(memory, name)) for name in ("n_steps", "n_rejected", "n_iterations")},
             "wall_time": self.seconds,
         }
 
@@ -372,17 +370,17 @@ class Run:
         if self.writer is not None:
             self.writer.close_segment(record)
 
-    def begin(self, carry: Carry, n_done: int) -> tuple[Carry, Rows]:
+    def begin(self, memory: Memory, n_done: int) -> tuple[Memory, Rows]:
         """Observe the motion from where the run begins or goes on: the iterate of the first step, and its results."""
         self.work = new_work(compiled_system(self.acting).model) if self.events is None else self.events.new_work()
-        carry, rows = self.integrator.observe(self.acting, self.t_start + n_done * self.h, carry, self.work)
+        memory, rows = self.integrator.observe(self.acting, self.t_start + n_done * self.h, memory, self.work)
         if self.events is not None:
             self.events.begin(rows)
-        return carry, rows
+        return memory, rows
 
     def advance(
         self,
-        carry: Carry,
+        memory: Memory,
         n_done: int,
         batch_steps: int,
         progress: Callable[[Progress], None] | None,
@@ -393,7 +391,7 @@ class Run:
         laws = LawWatch(self.system, self.t_start, self.h, self.jumps, n_done)
         n_told = n_done  # steps at the last progress
         failure: Failure | None = None
-        safe = self.record_where_due(carry, n_done)  # while a block runs, its events are ahead of its memory
+        safe = self.record_where_due(memory, n_done)  # while a block runs, its events are ahead of its memory
         try:
             while n_done < self.n_total:
                 raise_if_interrupted()
@@ -401,20 +399,20 @@ class Run:
                     self.work.solver.c_k[...] = 0.0  # factors are renewed, as after a resumption
                     if n_done and time.monotonic() - self.closed > SEGMENT_SECONDS:
                         self.close_segment(safe)
-                batch = self.step(carry, n_done, batch_steps - (n_done - n_told), batch_steps)  # (2)
-                carry, failure, n_done = batch.end, batch.failure, batch.n_done
+                batch = self.step(memory, n_done, batch_steps - (n_done - n_told), batch_steps)  # (2)
+                memory, failure, n_done = batch.end, batch.failure, batch.n_done
                 self.keep(batch.rows)
                 self.observe(batch, laws)  # (3)
-                safe = self.record_where_due(carry, n_done)  # (4)
+                safe = self.record_where_due(memory, n_done)  # (4)
                 is_over = n_done == self.n_total or failure is not None or batch.has_stopped or self.is_beyond
                 if is_over:
-                    self.report(self.steps.conclude(self.acting, carry, n_done, self.t_start, self.h))
+                    self.report(self.steps.conclude(self.acting, memory, n_done, self.t_start, self.h))
                     self.look()
                 is_due = n_done % RESTART_STEPS == 0 or n_done - n_told >= batch_steps or n_done == self.n_total
                 if is_due or not batch.n_good or self.events is not None:
                     n_told = n_done
                     if progress is not None:
-                        progress(self.progress(carry, n_done))
+                        progress(self.progress(memory, n_done))
                 if is_over:
                     break
         except BaseException:
@@ -426,12 +424,12 @@ class Run:
             begins = self.words_of_start() if n_done < FIRST_STEPS else ""
             if begins:
                 failure = replace(failure, words=f"{failure.words}; {begins}")
-            raise stopped(self, failure, self.t_start + n_done * self.h, carry.state)
+            raise stopped(self, failure, self.t_start + n_done * self.h, memory.state)
         if self.is_beyond:
             raise energetic(self, self.t_start + n_done * self.h)
-        return self.finished(carry)
+        return self.finished(memory)
 
-    def step(self, carry: Carry, first: int, n_left: int, batch_steps: int) -> "Batch":
+    def step(self, memory: Memory, first: int, n_left: int, batch_steps: int) -> "Batch":
         """Take a batch of steps: at most `n_left`, up to where the watch looks, the run ends, or factors are renewed.
 
         The watch divides batches of `batch_steps`, and leaves their ends.
@@ -442,13 +440,13 @@ class Run:
         starts_companion = self.steps.has_companion and self.steps.companion is None
         before = self.events.copied() if self.events is not None and starts_companion else None
         end, rows, self.work, n_good, failure = next_steps(
-            self.integrator, self.acting, carry, self.work, t0=self.t_start, h=self.h, first=first, n_steps=n_steps,
+            self.integrator, self.acting, memory, self.work, t0=self.t_start, h=self.h, first=first, n_steps=n_steps,
             every=self.output_every, jumps=self.jumps, events=self.events,
         )  # fmt: skip
         if self.events is not None:
             rows = in_order([*self.events.taken(), rows])
         has_stopped = self.events is not None and self.events.has_stopped
-        return Batch(first, n_good, carry, end, rows, failure, before, self.n_happened > n_happened, has_stopped)
+        return Batch(first, n_good, memory, end, rows, failure, before, self.n_happened > n_happened, has_stopped)
 
     def observe(self, batch: "Batch", laws: LawWatch) -> None:
         """Show a batch to the watches, and report what they find."""
@@ -472,9 +470,9 @@ class Run:
                 self.watch.found[note.key] = note
                 log.warning("system %r: %s", self.system.name, words)
 
-    def progress(self, carry: Carry, n_done: int) -> Progress:
+    def progress(self, memory: Memory, n_done: int) -> Progress:
         """Return where the run is."""
-        t, counts = self.t_start + n_done * self.h, (carry.n_iterations, self.watch.notes, carry.n_rejected)
+        t, counts = self.t_start + n_done * self.h, (int(memory.n_iterations), self.watch.notes, int(memory.n_rejected))
         return Progress(t, self.t_end, n_done, self.n_total, *counts)
 
     @property
@@ -497,14 +495,14 @@ class Run:
         if time.monotonic() - self.closed > SEGMENT_SECONDS:
             self.close_segment()
 
-    def finished(self, carry: Carry) -> Trajectory:
+    def finished(self, memory: Memory) -> Trajectory:
         """Return the motion, whose steps have all been stored."""
         self.look()
         if self.writer is None:
-            head = replace(self.head, summary=self.summary(carry))
+            head = replace(self.head, summary=self.summary(memory))
             arrays = MemorySource(joint_rows(self.system, self.kept))
             return Trajectory(head, arrays, is_complete=True, validity=self.watch.notes)
-        self.writer.finish(self.summary(carry))
+        self.writer.finish(self.summary(memory))
         return read_results(self.writer.path)
 
 
@@ -514,8 +512,8 @@ class Batch:
 
     first: int  #: steps that were done before
     n_good: int  #: of them, that succeeded
-    begin: Carry
-    end: Carry
+    begin: Memory
+    end: Memory
     rows: Rows  #: results of the output times and events in it
     failure: Failure | None  #: why the next step could not be made
     events_before: EventWatch | None  #: a copy from before it, where the watch begins a companion there

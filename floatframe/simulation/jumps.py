@@ -13,11 +13,11 @@ import numpy as np
 
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.compiling.time_laws import functions_of_time, parts_of_time
-from floatframe.engine.kernels.memory import Rows
+from floatframe.engine.kernels.memory import Memory, Rows
 from floatframe.engine.kernels.work import Work
 from floatframe.errors import ModelError
 from floatframe.integrators import has_fixed_steps
-from floatframe.integrators.carry import Carry, Failure, Integrator
+from floatframe.integrators.integrator import Failure, Integrator
 from floatframe.model.functions.time_switches import OfTime, switch_times
 from floatframe.model.system import System
 from floatframe.simulation.event_steps import EventWatch
@@ -86,7 +86,7 @@ def jumps_by_step(times: list[float], t0: float, h: float) -> dict[int, list[flo
 def next_steps(
     integrator: Integrator,
     system: System,
-    carry: Carry,
+    memory: Memory,
     work: Work,
     *,
     t0: float,
@@ -96,7 +96,7 @@ def next_steps(
     every: int,
     jumps: dict[int, list[float]],
     events: EventWatch | None = None,
-) -> tuple[Carry, Rows, Work, int, Failure | None]:
+) -> tuple[Memory, Rows, Work, int, Failure | None]:
     """Take steps of size h, the first with number `first` from t0: the one with the next jumps, or those before it.
 
     Return the memory after them, the results after every `every`-th (and at a stop), how many steps are done, at most
@@ -104,34 +104,34 @@ def next_steps(
     """
     n_smooth = min((k - first for k in jumps if k >= first), default=n_steps)
     if n_smooth == 0:
-        carry, rows, work, failure = over_jumps(
-            integrator, system, carry, work, t=t0 + first * h, h=h, jumps=jumps[first], events=events
+        memory, rows, work, failure = over_jumps(
+            integrator, system, memory, work, t=t0 + first * h, h=h, jumps=jumps[first], events=events
         )
         n_good = int(failure is None)
         has_row = n_good and ((first + 1) % every == 0 or (events is not None and events.has_stopped))
-        return carry, Rows(*(array[: 1 if has_row else 0] for array in rows)), work, n_good, failure
+        return memory, Rows(*(array[: 1 if has_row else 0] for array in rows)), work, n_good, failure
     n_steps = min(n_steps, n_smooth)
     if events is not None:
-        return events.steps(integrator, carry, work, t0=t0, h=h, first=first, n_steps=n_steps, every=every)
-    carry, rows, n_good, failure = integrator.advance(
-        system, carry, work, t0=t0, h=h, first=first, n_steps=n_steps, every=every
+        return events.steps(integrator, memory, work, t0=t0, h=h, first=first, n_steps=n_steps, every=every)
+    memory, rows, n_good, failure = integrator.advance(
+        system, memory, work, t0=t0, h=h, first=first, n_steps=n_steps, every=every
     )
-    return carry, rows, work, n_good, failure
+    return memory, rows, work, n_good, failure
 
 
 def over_jumps(
     integrator: Integrator,
     system: System,
-    carry: Carry,
+    memory: Memory,
     work: Work,
     *,
     t: float,
     h: float,
     jumps: list[float],
     events: EventWatch | None = None,
-) -> tuple[Carry, Rows, Work, Failure | None]:
+) -> tuple[Memory, Rows, Work, Failure | None]:
     """Take a step of size h from t, divided at jumps; return the memory and the results at its end, or at a stop."""
-    where, end, begin = t, t + h, carry
+    where, end, begin = t, t + h, memory
     rows: Rows | None = None
     is_after = False  # a jump
     for number, until in enumerate([*jumps, end]):
@@ -139,32 +139,32 @@ def over_jumps(
         size = until - where - (0.0 if is_last else SHORT * h)
         if size > SHORT * h:
             acting = system if events is None else events.system
-            n_parts = n_settling_parts(integrator, acting, carry, work, where, size) if is_after else 0
+            n_parts = n_settling_parts(integrator, acting, memory, work, where, size) if is_after else 0
             done = 0.0
             for part in range(n_parts + 1):  # each part is as long as all parts before it
                 until_part = size * 2.0 ** (part - n_parts)
                 at, own = where + done, until_part - done
                 if events is None:
-                    carry, rows, _, failure = integrator.advance(
-                        system, carry, work, t0=at, h=own, first=0, n_steps=1, every=1
+                    memory, rows, _, failure = integrator.advance(
+                        system, memory, work, t0=at, h=own, first=0, n_steps=1, every=1
                     )
                 else:
-                    carry, rows, work, failure = events.step(integrator, carry, work, t0=at, h=own, k=0)
+                    memory, rows, work, failure = events.step(integrator, memory, work, t0=at, h=own, k=0)
                 if failure is not None:
                     return begin, rows, work, failure
                 if events is not None and events.has_stopped:
-                    return carry, rows, work, None
+                    return memory, rows, work, None
                 done = until_part
         if not is_last:
             acting = system if events is None else events.system
-            carry, rows = integrator.after_jump(acting, until, carry, work)
+            memory, rows = integrator.after_jump(acting, until, memory, work)
             is_after = True
         where = until
     assert rows is not None
-    return carry, rows._replace(t=np.full_like(rows.t, end)), work, None
+    return memory, rows._replace(t=np.full_like(rows.t, end)), work, None
 
 
-def n_settling_parts(integrator: Integrator, system: System, carry: Carry, work: Work, t: float, size: float) -> int:
+def n_settling_parts(integrator: Integrator, system: System, memory: Memory, work: Work, t: float, size: float) -> int:
     """Return how often a step of this size after a jump is halved at its beginning.
 
     A step is tried: a state whose rate at its beginning would lead much further than the step does settles in less.
@@ -172,10 +172,10 @@ def n_settling_parts(integrator: Integrator, system: System, carry: Carry, work:
     rows = compiled_system(system).model.states.row
     if not len(rows) or not has_fixed_steps(integrator):
         return 0
-    after, _, n_good, _ = integrator.advance(system, carry, work, t0=t, h=size, first=0, n_steps=1, every=2)
+    after, _, n_good, _ = integrator.advance(system, memory, work, t0=t, h=size, first=0, n_steps=1, every=2)
     if not n_good:
         return N_PARTS
-    z, z_after = carry.w[rows], after.w[rows]
-    way = size * np.abs(carry.w[rows + 1])
+    z, z_after = memory.w[rows], after.w[rows]
+    way = size * np.abs(memory.w[rows + 1])
     is_fast = (way > FOLLOWED * np.abs(z_after - z)) & (way > FELT * np.maximum(np.abs(z), np.abs(z_after)))
     return N_PARTS if is_fast.any() else 0

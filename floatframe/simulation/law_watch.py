@@ -17,8 +17,8 @@ from floatframe.engine.compiling.callbacks import Callback
 from floatframe.engine.compiling.public_elements import PlacedLaw
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.initial_conditions.newton_equations import linearized, set_iterate
+from floatframe.engine.kernels.memory import Memory
 from floatframe.engine.kernels.work import Work, new_work
-from floatframe.integrators.carry import Carry
 from floatframe.model.forces import UserForce
 from floatframe.model.system import System
 from floatframe.simulation.switch_events import unknowns_of_force
@@ -37,7 +37,7 @@ class AskedLaw:
 
     where: str
     callback: Callback
-    inputs: Callable[[Carry, Work], Array]  #: with the time first
+    inputs: Callable[[Memory, Work], Array]  #: with the time first
     ask: Callable[[Array, Array], Array]  #: values at times for inputs, (n_t, n_out)
     is_told: bool = False
 
@@ -57,7 +57,7 @@ class LawWatch:
     def __post_init__(self) -> None:
         self.laws = list(asked_laws(self.system, compiled_system(self.system)))
 
-    def observe(self, carry: Carry, n_done: int, *, is_last: bool) -> list[str]:
+    def observe(self, memory: Memory, n_done: int, *, is_last: bool) -> list[str]:
         """Check the steps since the last check, with the motion after the last of them; return new messages."""
         if all(law.is_told for law in self.laws) or (n_done - self.n_seen < N_STEPS and not is_last):
             return []
@@ -67,7 +67,7 @@ class LawWatch:
         model = compiled_system(self.system).model
         if self.work is None:
             self.work = new_work(model)
-        set_iterate(self.work, carry.state, w=carry.w)
+        set_iterate(self.work, memory.state, w=memory.w)
         self.work.state.time[...] = self.t_start + n_done * self.h
         linearized(model, self.work, 0.0, 0.0, 1.0)
         t: Array = self.t_start + self.h * (first + 0.5 * np.arange(2 * (n_done - first) + 1, dtype=float))
@@ -75,7 +75,7 @@ class LawWatch:
         words = []
         for law in self.laws:
             error = law.callback.error
-            values = law.ask(law.inputs(carry, self.work), t)
+            values = law.ask(law.inputs(memory, self.work), t)
             law.callback.error = error  # only errors of the run itself are raised
             far = np.abs(values[1::2] - 0.5 * (values[:-2:2] + values[2::2])) > FAR * np.abs(values).max(axis=0)
             steps = [first + int(k) for k in np.flatnonzero(far.any(axis=1)) if first + k not in self.cut]
@@ -114,7 +114,7 @@ def asked_force(where: str, compiled: CompiledSystem, u: int, i: int, callback: 
             function(at, first + k * stride)
         return values
 
-    return AskedLaw(where, callback, lambda carry, _: np.array([0.0, *carry.w[unknowns]]), ask)
+    return AskedLaw(where, callback, lambda memory, _: np.array([0.0, *memory.w[unknowns]]), ask)
 
 
 def asked_element(where: str, compiled: CompiledSystem, i: int, placed: PlacedLaw) -> AskedLaw:
@@ -124,13 +124,13 @@ def asked_element(where: str, compiled: CompiledSystem, i: int, placed: PlacedLa
     function, head, data = LAW(placed.value.address), np.array(placed.head, np.int64), np.array(placed.law.data)
     unknowns = [*placed.states, *placed.multipliers]
 
-    def inputs(carry: Carry, work: Work) -> Array:
+    def inputs(memory: Memory, work: Work) -> Array:
         markers, parts = work.markers, [np.zeros(1)]
         for m in range(first, first + n):
             parts += [markers.r[m], markers.A[m].ravel(), markers.v[m], markers.omega[m]]
             if placed.law.accelerations:
                 parts.append(markers.acceleration[model.markers.accelerated[m]])
-        return np.concatenate([*parts, carry.w[unknowns]])
+        return np.concatenate([*parts, memory.w[unknowns]])
 
     def ask(row: Array, t: Array) -> Array:
         values = np.zeros((len(t), placed.n_out + len(placed.law.outputs)))

@@ -8,7 +8,7 @@ import numpy as np
 from fe_models.foundation.digest import file_digest
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.kernels.memory import Rows
-from floatframe.integrators.carry import Integrator
+from floatframe.integrators.integrator import Integrator
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.forces import BodyLoad, PointForce
 from floatframe.model.system import System

@@ -13,54 +13,36 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.kernels.memory import Memory, memory_at
 from floatframe.engine.kernels.records import leaves
 from floatframe.errors import ResultsError
-from floatframe.integrators.carry import Carry, Integrator
-from floatframe.model.state import State
+from floatframe.integrators.integrator import Integrator
 from floatframe.model.system import System
 from floatframe.simulation.events import events_of
 
-__all__ = ["RESTART_STEPS", "carry_of_record", "restart_record", "system_digest"]
+__all__ = ["RESTART_STEPS", "memory_of_record", "restart_record", "system_digest"]
 
 RESTART_STEPS = 400
 STATE = ("r", "p", "q", "u")
-ARRAYS = ("u_dot", "a", "w", "work", "power", "angle", "angle_rate")
-STEPS = ("h", "h_next")
-COUNTS = ("n_iterations", "n_steps", "n_rejected")
 
 
-def restart_record(carry: Carry, n_done: int) -> dict[str, Array]:
+def restart_record(memory: Memory, n_done: int) -> dict[str, Array]:
     """Return the memory of the integrator after n_done steps as arrays by name."""
-    record = {name: np.asarray(getattr(carry.state, name)) for name in STATE}
-    record |= {name: np.asarray(getattr(carry, name)) for name in ARRAYS}
-    return record | {
-        **{name: np.array(getattr(carry, name)) for name in STEPS + COUNTS},
-        "n_done": np.array(n_done),
-    }
+    return memory._asdict() | {"n_done": np.array(n_done)}
 
 
-def carry_of_record(record: Mapping[str, Array], system: System) -> tuple[Carry, int]:
+def memory_of_record(record: Mapping[str, Array], system: System) -> tuple[Memory, int]:
     """Return the memory of the integrator and the number of steps done; `ResultsError` if it is of another system."""
-    placed, model = compiled_system(system).placed, compiled_system(system).model
-    shapes = {name: getattr(placed, name).shape for name in STATE}
-    shapes |= {
-        "u_dot": placed.u.shape,
-        "w": (int(model.connections.w0[-1]),),
-        "work": (2,),
-        "power": (2,),
-        "angle": model.angles.sign.shape,
-        "angle_rate": model.angles.sign.shape,
-    }
-    shapes |= dict.fromkeys((*STEPS, *COUNTS, "n_done"), ())
-    for name, shape in shapes.items():
-        if name not in record or record[name].shape != shape:
+    compiled = compiled_system(system)
+    n_w = int(compiled.model.connections.w0[-1])
+    expected = memory_at(compiled.placed, compiled.placed.u, np.zeros(n_w), n_angles=len(compiled.model.angles.sign))
+    for name, array in {**expected._asdict(), "n_done": np.array(0)}.items():
+        if name not in record or (record[name].shape != array.shape and name != "a"):
             raise ResultsError("restart: the record is of a system with other bodies; resume the system that was run")
-    if "a" not in record or record["a"].ndim != 1:  # accelerations, or multipliers in the conserving schemes
+    if record["a"].ndim != 1:  # accelerations, or multipliers in the conserving schemes
         raise ResultsError("restart: the record lacks the memory of the method; run the system again")
-    values: dict[str, Any] = {name: np.asarray(record[name], dtype=float) for name in ARRAYS}
-    values |= {name: float(record[name]) for name in STEPS} | {name: int(record[name]) for name in COUNTS}
-    carry = Carry(State(*(np.asarray(record[name], dtype=float) for name in STATE)), **values)
-    return carry, int(record["n_done"])
+    values: dict[str, Any] = {name: record[name] for name in Memory._fields}
+    return expected.changed(**values), int(record["n_done"])
 
 
 def system_digest(system: System, integrator: Integrator) -> str:

@@ -31,11 +31,12 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.kernels.memory import Memory
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import FloatframeError, ResultsError
 from floatframe.integrators import has_fixed_steps
-from floatframe.integrators.carry import Carry, Integrator, has_divided_steps
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha
+from floatframe.integrators.integrator import Integrator, has_divided_steps
 from floatframe.integrators.relative import RelativeGeneralizedAlpha
 from floatframe.model.rotations import rotations_between
 from floatframe.model.state import State
@@ -82,11 +83,11 @@ class Companion:
     """The same motion with another step size, from a memory of the run on."""
 
     integrator: Integrator
-    begin: Carry  #: memory of the run from which it started
+    begin: Memory  #: memory of the run from which it started
     start: int  #: number of run steps before it started
     ratio: float  #: its step size over that of the run
     at: int  #: number of run steps that it has reached
-    carry: Carry  #: its memory
+    memory: Memory  #: its memory
     work: Work  #: its working arrays
     error: Array  #: error of positions and rotations of the run at the last comparison, (n_b, 2, 3)
     before: int  #: number of run steps at the comparison before
@@ -98,7 +99,7 @@ class Companion:
 
     @classmethod
     def begun(
-        cls, integrator: Integrator, carry: Carry, work: Work, start: int, ratio: float, h: float = 0.0,
+        cls, integrator: Integrator, memory: Memory, work: Work, start: int, ratio: float, h: float = 0.0,
         events: EventWatch | None = None, is_light: bool = False,
     ) -> "Companion":  # fmt: skip
         """Return a companion that starts from the memory of the run after `start` steps.
@@ -107,21 +108,21 @@ class Companion:
         events: those of the run after `start` steps, if it has any; the companion gets a copy with working arrays.
         is_light: with the numerical damping of `LIGHT` where that is less.
         """
-        none = np.zeros((len(carry.state.r), 2, 3))
-        method, begin, share = integrator_of(integrator, ratio), carry, ERROR_SHARE[ratio]
+        none = np.zeros((len(memory.state.r), 2, 3))
+        method, begin, share = integrator_of(integrator, ratio), memory, ERROR_SHARE[ratio]
         if is_light:
             method, share = lighter(integrator, share)
-        if h and carry.h and isinstance(method, GeneralizedAlpha | RelativeGeneralizedAlpha) and method.h_min is None:
-            method, begin = replace(method, h_min=h), replace(carry, h_next=ratio * h)  # without a new start
+        if h and memory.h and isinstance(method, GeneralizedAlpha | RelativeGeneralizedAlpha) and method.h_min is None:
+            method, begin = replace(method, h_min=h), memory.changed(h_next=ratio * h)  # without a new start
         own = None if events is None else events.copied()
         if own is not None:
             work = own.new_work()
         work.solver.c_k[...] = 0.0  # a resumed run has no factors of other steps
         peak = lengths(none)
-        return cls(method, carry, start, ratio, start, begin, work, none, start, none, peak, own, events, share)
+        return cls(method, memory, start, ratio, start, begin, work, none, start, none, peak, own, events, share)
 
     def follow(
-        self, system: System, end: Carry, last: int, t0: float, h: float, jumps: Mapping[int, list[float]]
+        self, system: System, end: Memory, last: int, t0: float, h: float, jumps: Mapping[int, list[float]]
     ) -> bool:
         """Advance to run step `last` and compare with the memory `end` of the run; return whether the steps converged.
 
@@ -130,11 +131,11 @@ class Companion:
         begin, size = t0 + self.start * h, self.ratio * h
         done, until = round((self.at - self.start) / self.ratio), round((last - self.start) / self.ratio)
         ahead = [t for k, times in jumps.items() if self.at <= k < last for t in times]
-        carry, own_jumps = self.carry, jumps_by_step(ahead, begin, size)
+        memory, own_jumps = self.memory, jumps_by_step(ahead, begin, size)
         try:
             while done < until:
-                carry, _, self.work, n_good, failure = next_steps(
-                    self.integrator, system if self.events is None else self.events.system, carry, self.work, t0=begin,
+                memory, _, self.work, n_good, failure = next_steps(
+                    self.integrator, system if self.events is None else self.events.system, memory, self.work, t0=begin,
                     h=size, first=done, n_steps=until - done, every=until + 1, jumps=own_jumps, events=self.events,
                 )  # fmt: skip
                 done += n_good
@@ -142,8 +143,8 @@ class Companion:
                     return False
         except FloatframeError:
             return False
-        self.carry, self.before, self.error_before, self.at = carry, self.at, self.error, last
-        self.error = self.share * difference(end.state, carry.state)
+        self.memory, self.before, self.error_before, self.at = memory, self.at, self.error, last
+        self.error = self.share * difference(end.state, memory.state)
         self.peak = np.maximum(self.peak, lengths(self.error))
         return True
 
@@ -178,7 +179,7 @@ class StepWatch:
     size: Array = field(default_factory=lambda: np.zeros((2, 2)))
     turn: Array = field(default_factory=lambda: np.zeros(0))  #: largest rotation of each body in a step, (n_b,) [rad]
     note: ValidityNote | None = None
-    open_window: list[tuple[int, Carry]] = field(
+    open_window: list[tuple[int, Memory]] = field(
         default_factory=list
     )  #: step and memory at the start and middle of a window
     kept_work: tuple[System, Work] | None = None  #: working arrays of companions and windows
@@ -231,7 +232,7 @@ class StepWatch:
         return self.companion is None or self.companion.ratio == HALVES or (n_done - self.companion.start) % 2 == 0
 
     def take(
-        self, system: System, begin: Carry, end: Carry, *, t0: float, h: float, first: int, n_steps: int,
+        self, system: System, begin: Memory, end: Memory, *, t0: float, h: float, first: int, n_steps: int,
         events: EventWatch | None = None, is_cut: bool = False,
     ) -> ValidityNote | None:  # fmt: skip
         """Take the memories before and after n_steps steps of the run; return the note if it is new.
@@ -260,7 +261,7 @@ class StepWatch:
         self.close_companion(h)
 
     def compare(
-        self, system: System, begin: Carry, end: Carry, t0: float, h: float, first: int, last: int,
+        self, system: System, begin: Memory, end: Memory, t0: float, h: float, first: int, last: int,
         events: EventWatch | None,
     ) -> ValidityNote | None:  # fmt: skip
         """Compare the run after step `last` with the companion; return the note if it is new."""
@@ -340,7 +341,7 @@ class StepWatch:
             self.kept_work = system, new_work(compiled_system(system).model)
         return self.kept_work[1]
 
-    def close_window(self, system: System, end: Carry, last: int, t0: float, h: float) -> ValidityNote | None:
+    def close_window(self, system: System, end: Memory, last: int, t0: float, h: float) -> ValidityNote | None:
         """Repeat the window up to the memory `end` with half steps; return the note if it is new."""
         (start, before), (middle, half) = self.open_window
         self.open_window = []
@@ -369,7 +370,7 @@ class StepWatch:
         speed = lengths(difference(end, half)).max(axis=0) / seconds
         self.size = np.maximum(self.size, np.stack([way, 2 * speed], axis=1))
 
-    def conclude(self, system: System, end: Carry, n_done: int, t0: float, h: float) -> ValidityNote | None:
+    def conclude(self, system: System, end: Memory, n_done: int, t0: float, h: float) -> ValidityNote | None:
         """Add the errors up to the end of the run; return the note if it is new."""
         if self.open_window and self.open_window[1][0] == n_done:
             note = self.close_window(system, end, n_done, t0, h)

@@ -12,7 +12,7 @@ import numpy as np
 import cms
 import floatframe as ff
 from fe_models.foundation.units import Units, unit_system
-from floatframe.integrators.carry import Integrator
+from floatframe.integrators.integrator import Integrator
 from floatframe.model.functions.time_functions import constant, cycloidal_spin_up, harmonic, piecewise
 from floatframe.model.rotations import euler_parameters, rotation_exp
 

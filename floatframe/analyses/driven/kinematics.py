@@ -28,10 +28,10 @@ from floatframe.engine.initial_conditions.constraint_words import conflict_of_dr
 from floatframe.engine.initial_conditions.freedoms import constraint_mobility, dependent_rows, unit_rows
 from floatframe.engine.initial_conditions.initial import assembled, checked
 from floatframe.engine.initial_conditions.newton_equations import displaced, set_iterate
-from floatframe.engine.kernels.memory import WORK_GIVEN, WORK_TAKEN, Rows
+from floatframe.engine.kernels.memory import WORK_GIVEN, WORK_TAKEN, Rows, memory_at
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import ConvergenceError, ModelError
-from floatframe.integrators.carry import Carry, turned_on, with_angles
+from floatframe.integrators.integrator import turned_on, with_angles
 from floatframe.model.joints.rows import is_held, is_held_velocity
 from floatframe.model.state import State
 from floatframe.model.system import System
@@ -204,8 +204,8 @@ def kinematics(
     spacing = float(t[-1] - t[0]) / (len(t) - 1)
     head = head_of(system, Kinematics(name), float(t[0]), float(t[-1]), spacing, 1)  # type: ignore[arg-type]
     head = replace(head, angles=compiled.angles)
-    carry = Carry(now.state, now.u_dot, now.u_dot, 0.0, now.w, np.zeros(2), np.zeros(2))
-    carry = with_angles(system, float(t[0]), carry)
+    memory = memory_at(now.state, now.u_dot, now.w)
+    memory = with_angles(system, float(t[0]), memory)
     with ExitStack() as held:  # the place of the results, until the end of the analysis
         place = None if output is None else held.enter_context(ResultsPlace(output, inputs=system.files))
         writer = None if place is None else ResultsWriter(place, head)
@@ -217,11 +217,11 @@ def kinematics(
                     now = moved_on(compiled, work, now, float(time), elasticity, guard)
                 rows, power[1] = observed_state(compiled, work, now.state, now.u_dot, now.w, now.t)
                 if k:
-                    carry = turned_on(system, replace(carry, state=now.state), float(time - t[k - 1]))
+                    memory = turned_on(system, memory.changed(state=now.state), float(time - t[k - 1]))
                     done = done + (time - t[k - 1]) / 2 * (power[0] + power[1])
                 power[0] = power[1]
                 rows.diagnostics[0, [WORK_GIVEN, WORK_TAKEN]] = done
-                rows.angle[0] = carry.angle
+                rows.angle[0] = memory.angle
                 rows = rows_of_file(compiled, rows)
                 if writer is None:
                     kept.append(rows)

@@ -22,18 +22,17 @@ from floatframe.design.gradients.outputs import vector_of
 from floatframe.design.gradients.parameters import Family, Neighbour
 from floatframe.design.gradients.tangents import Point, PointTangents, in_blocks, tangents_at
 from floatframe.engine.initial_conditions.initial import (
-    ConsistentState,
     assembled,
     checked,
     solve_accelerations,
     with_compatible_velocities,
 )
+from floatframe.engine.kernels.memory import Memory, memory_at
 from floatframe.engine.kernels.work import new_work
 from floatframe.engine.open_equations.configuration import Configurations
 from floatframe.engine.open_equations.rows import Structure
 from floatframe.errors import ConvergenceError, ModelError
-from floatframe.integrators.carry import Carry
-from floatframe.integrators.generalized_alpha import GeneralizedAlpha, begun_carry
+from floatframe.integrators.generalized_alpha import GeneralizedAlpha
 from floatframe.model.rotations import rotation_exp
 from floatframe.model.state import State
 from floatframe.model.system import System
@@ -43,11 +42,11 @@ __all__ = ["ComputedMotion", "Step", "adjoint_gradient", "computed_motion", "dir
 
 @dataclass(frozen=True, eq=False)
 class ComputedMotion:
-    """The computed motion: a point and a carry after each step, beginning with the start."""
+    """The computed motion: a point and a memory after each step, beginning with the start."""
 
     method: GeneralizedAlpha
     h: float
-    carries: tuple[Carry, ...]
+    memories: tuple[Memory, ...]
     points: tuple[Point, ...]
 
     @property
@@ -71,18 +70,18 @@ def computed_motion(
     work = new_work(compiled_system(system).model)
     # results begin with the start; the steps begin with velocities shifted by O(h²)
     begun = method.start(system, t_start, state)
-    carry = method.prepared(system, begun, h, t_start)
-    carries, points = [carry], [Point(t_start, begun.state, begun.u_dot, begun.w, angle=begun.angle)]
+    memory = method.prepared(system, begun, h, t_start)
+    memories, points = [memory], [Point(t_start, begun.state, begun.u_dot, begun.w, angle=begun.angle)]
     for k in range(n_steps):
-        after, _, _, failure = method.advance(system, carry, work, t0=t_start, h=h, first=k, n_steps=1, every=2)
+        after, _, _, failure = method.advance(system, memory, work, t0=t_start, h=h, first=k, n_steps=1, every=2)
         t = t_start + (k + 1) * h
         if failure is not None:
             words = f"sensitivities: the step of {h:g} to t = {t:g} failed: {failure.words}"
             raise ConvergenceError(words, t=t - h, h=h, residual=failure.residual)
-        points.append(Point(t, after.state, after.u_dot, after.w, carry.w, after.angle))
-        carries.append(after)
-        carry = after
-    return ComputedMotion(method, h, tuple(carries), tuple(points))
+        points.append(Point(t, after.state, after.u_dot, after.w, memory.w, after.angle))
+        memories.append(after)
+        memory = after
+    return ComputedMotion(method, h, tuple(memories), tuple(points))
 
 
 def start_columns(
@@ -98,9 +97,9 @@ def start_columns(
         of_S, of_shown = [], []
         for each in parameter.around:
             begun = begun_beside(each, t_start, state)
-            carry = motion.method.prepared(each.system, begun, motion.h, t_start)
-            dx = group.difference(x_0, vector_of(group, each.compiled, carry.state))
-            of_S.append(np.concatenate([dx, carry.state.u, carry.u_dot, carry.a]))
+            memory = motion.method.prepared(each.system, begun, motion.h, t_start)
+            dx = group.difference(x_0, vector_of(group, each.compiled, memory.state))
+            of_S.append(np.concatenate([dx, memory.state.u, memory.u_dot, memory.a]))
             dx = group.difference(x_0, vector_of(group, each.compiled, begun.state))
             of_shown.append(np.concatenate([dx, begun.state.u, begun.u_dot, begun.w]))
         S.append(parameter.derivative(of_S))
@@ -108,14 +107,13 @@ def start_columns(
     return np.array(S).T, np.array(shown).T
 
 
-def begun_beside(each: Neighbour, t: float, state: State | None) -> Carry:
+def begun_beside(each: Neighbour, t: float, state: State | None) -> Memory:
     """Return what `GeneralizedAlpha.start` makes of a neighbour: what it checks has been checked of the system."""
     compiled, work = each.compiled, each.work
     given = compiled.placed if state is None else checked(compiled, state)
     work.state.time[...] = t
     closed = with_compatible_velocities(compiled, work, assembled(compiled, work, given))
-    made = ConsistentState(closed, *solve_accelerations(compiled, work, closed))
-    return begun_carry(made)
+    return memory_at(closed, *solve_accelerations(compiled, work, closed))
 
 
 class ScaledSolver:
@@ -150,7 +148,7 @@ class Step:
     def __init__(self, structure: Structure, own: Neighbour, group: Configurations, motion: ComputedMotion, k: int):
         """Linearise step k of a motion, from point k to point k + 1."""
         alpha_m, alpha_f, beta, gamma = motion.method.coefficients
-        h, before, after = motion.h, motion.carries[k], motion.carries[k + 1]
+        h, before, after = motion.h, motion.memories[k], motion.memories[k + 1]
         self.n, self.c_k = group.n_v, motion.c_k
         self.point = motion.points[k + 1]
         xi = h * before.state.u + h**2 * ((0.5 - beta) * before.a + beta * after.a)

@@ -16,7 +16,7 @@ from floatframe.engine.compiling.system import CompiledSystem
 from floatframe.engine.kernels.memory import new_rows
 from floatframe.engine.open_equations.configuration import Configurations
 from floatframe.errors import ModelError
-from floatframe.integrators.carry import joined_rows
+from floatframe.integrators.integrator import joined_rows
 from floatframe.model.state import State
 from floatframe.model.system import System
 from floatframe.results.results_file import MemorySource

@@ -44,8 +44,8 @@ from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.open_equations.configuration import Configurations
 from floatframe.engine.open_equations.rows import structure_of
 from floatframe.errors import ModelError
-from floatframe.integrators.carry import Integrator
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha
+from floatframe.integrators.integrator import Integrator
 from floatframe.model.checked_values import array_of_shape, number
 from floatframe.model.forces import UserForce
 from floatframe.model.state import State

@@ -31,8 +31,8 @@ from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.words import nearest, quoted
 from floatframe.design.gradients.outputs import columns_of, wanted_of
 from floatframe.errors import FloatframeError, ModelError
-from floatframe.integrators.carry import Integrator
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha
+from floatframe.integrators.integrator import Integrator
 from floatframe.model.state import State
 from floatframe.model.system import System
 from floatframe.results.sensors import measured as measured_by

@@ -38,7 +38,7 @@ from floatframe.design.laboratory.exact_beam import ExactBeam, with_exact_beams
 from floatframe.design.laboratory.full_model import FullModel, all_dofs
 from floatframe.design.laboratory.substitution import with_body
 from floatframe.errors import ModelError
-from floatframe.integrators.carry import Integrator
+from floatframe.integrators.integrator import Integrator
 from floatframe.model.system import System
 from floatframe.results.sensors import measured
 from floatframe.simulation.integrate import integrate

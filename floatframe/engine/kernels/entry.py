@@ -26,7 +26,7 @@ from floatframe.engine.kernels.generalized_alpha import (
     load_state,
     write_row,
 )
-from floatframe.engine.kernels.memory import Memory, Rows, new_rows
+from floatframe.engine.kernels.memory import GIVEN, TAKEN, Memory, Rows, new_rows
 from floatframe.engine.kernels.model import Model
 from floatframe.engine.kernels.records import integer, real, zeros
 from floatframe.engine.kernels.schur import correction, factorize_bodies
@@ -107,7 +107,7 @@ def make_entry(digest):
         elif what == OBSERVE:
             work.counted.rows = 0
             write_row(model, work, memory, order.t0, rows)
-            memory.power_given, memory.power_taken = power(model, work)
+            memory.power[GIVEN], memory.power[TAKEN] = power(model, work)
         else:
             c_m, c_d, c_k = order.c_m, order.c_d, order.c_k
             evaluate(model, work, c_k if c_k > 0.0 else 1.0)
@@ -127,7 +127,7 @@ def make_entry(digest):
     return kept_entry(run)
 
 
-NO_SIZES = dict.fromkeys(("n_t", "n_b", "n_c", "n_q", "n_u", "n_w", "angles", "loads", "body loads"), 0)
+NO_SIZES = dict.fromkeys(("n_t", "n_b", "n_c", "n_q", "n_u", "n_w", "n_remembered", "angles", "loads", "body loads"), 0)
 ORDER, NO_MEMORY, NO_ROWS = Order(), zeros(Memory(), NO_SIZES), zeros(Rows(), NO_SIZES)
 
 

@@ -12,7 +12,7 @@ from floatframe.engine.kernels.connections.user_force import resize_states
 from floatframe.engine.kernels.diagnostics import diagnose, power
 from floatframe.engine.kernels.evaluation import evaluate
 from floatframe.engine.kernels.joints.row_formulas import held_value
-from floatframe.engine.kernels.memory import WORK_GIVEN, WORK_TAKEN
+from floatframe.engine.kernels.memory import GIVEN, TAKEN, WORK_GIVEN, WORK_TAKEN
 from floatframe.engine.kernels.model import JOINT, MASS, STIFFNESS
 from floatframe.engine.kernels.past import keep_past
 from floatframe.engine.kernels.rotation import (
@@ -587,7 +587,7 @@ def one_step(model, work, memory, order, h):
             first_of_rates = math.sqrt(of_rates)
         elif iteration == 1:
             is_aged = are_aged(work.solver, math.sqrt(of_positions), last, first_of_rates)
-        work.counted.iterations += 1
+        memory.n_iterations += 1
         if not math.isfinite(norm):
             work.solver.is_due, work.solver.has_late_gaps = 1, 0
             return DIVERGED, -1, math.inf, -1.0
@@ -687,10 +687,10 @@ def keep_iterate(model, work, memory, h):
     copy(work.state.w, memory.w)
     count_turns(model, work, memory, h)
     loads, dissipated = power(model, work)
-    memory.work_given += 0.5 * h * (memory.power_given + loads)
-    memory.work_taken += 0.5 * h * (memory.power_taken + dissipated)
-    memory.power_given = loads
-    memory.power_taken = dissipated
+    memory.work[GIVEN] += 0.5 * h * (memory.power[GIVEN] + loads)
+    memory.work[TAKEN] += 0.5 * h * (memory.power[TAKEN] + dissipated)
+    memory.power[GIVEN] = loads
+    memory.power[TAKEN] = dissipated
 
 
 @inner
@@ -710,8 +710,8 @@ def write_row(model, work, memory, t, rows):
     copy(memory.w, rows.w[k])
     copy(memory.angle, rows.angle[k])
     diagnose(model, work, rows.diagnostics[k], rows.drift[k])
-    rows.diagnostics[k, WORK_GIVEN] = memory.work_given
-    rows.diagnostics[k, WORK_TAKEN] = memory.work_taken
+    rows.diagnostics[k, WORK_GIVEN] = memory.work[GIVEN]
+    rows.diagnostics[k, WORK_TAKEN] = memory.work[TAKEN]
     for j in range(model.loads.marker.shape[0]):
         copy(work.markers.wrench[model.loads.marker[j]], rows.load[k, j])
     for j in range(model.body_loads.body.shape[0]):
@@ -844,7 +844,7 @@ def time_loop(try_step, write):
             while left > 0.0:
                 n_parts = 1.0
                 if h_min > 0.0:
-                    n_parts = max(1.0, math.ceil(left / memory.h_wanted * (1.0 - 1e-9)))
+                    n_parts = max(1.0, math.ceil(left / memory.h_next * (1.0 - 1e-9)))
                 part = left / n_parts
                 if has_gaps:
                     load_state(work.state, memory)
@@ -853,7 +853,7 @@ def time_loop(try_step, write):
                         part, n_parts = shorter, 2.0
                 status, index, excess, error = try_step(model, work, memory, others, order, end - (left - part), part)
                 if status == DONE:
-                    memory.n_accepted += 1
+                    memory.n_steps += 1
                     if work.counted.stopped > 0:
                         return STOPPED, k, work.counted.rows, work.counted.stopped - 1, excess
                     left = left - part if n_parts > 1.0 else 0.0
@@ -861,7 +861,7 @@ def time_loop(try_step, write):
                         wanted = step_after(part, error, most_error, has_failed)
                         if has_gaps and most_error <= 0.0 and work.gaps.n_closed == 0:
                             wanted = h  # an approaching contact is detected
-                        memory.h_wanted = min(wanted, h, work.gaps.step)
+                        memory.h_next = min(wanted, h, work.gaps.step)
                     has_failed = False
                     continue
                 if h_min <= 0.0 or part <= h_min:
@@ -872,11 +872,11 @@ def time_loop(try_step, write):
                     shorter = min(max(SAFETY * (most_error / error) ** (1.0 / 3.0), LEAST), SAFETY) * part
                 elif status == UNRESOLVED:
                     shorter = work.gaps.step
-                memory.h_wanted = max(shorter, h_min)
+                memory.h_next = max(shorter, h_min)
                 has_failed = True
             if (first + k + 1) % order.every == 0:
                 write(model, work, memory, others, end, rows)
-            keep_past(work.past, memory, memory.a, memory.h, work.counted.iterations)
+            keep_past(work.past, memory, memory.a, memory.h)
         return DONE, order.n_steps, work.counted.rows, -1, excess
 
     return advance

@@ -1,15 +1,21 @@
-"""The memory of an integrator after a step, and the results of output times; sizes as in `kernels.model`."""
+"""The memory of a motion between steps, and the results of output times; sizes as in `kernels.model`.
 
-from typing import NamedTuple
+`State` is what a user gives and gets, `Memory` all that a method carries from step to step. Kernels overwrite a memory,
+restart records store one, and a block of steps keeps the one after each step (`work.Past`).
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.engine.kernels.model import Model, n_angles, n_b, n_body_loads, n_c, n_loads, n_w
+from floatframe.engine.kernels.model import Model, n_angles, n_b, n_body_loads, n_c, n_loads, n_q, n_u, n_w
 from floatframe.engine.kernels.records import Size, integer, real, tabled, zeros
-from floatframe.engine.kernels.work import n_q, n_u, state_sizes
 from floatframe.model.state import State
 
 __all__ = [
     "ANGULAR_MOMENTUM",
+    "GIVEN",
     "GRAVITATION",
     "KINETIC",
     "MOMENTUM",
@@ -21,12 +27,14 @@ __all__ = [
     "OF_DISTANCE_RATES",
     "SPRINGS",
     "STRAIN",
+    "TAKEN",
     "WORK_GIVEN",
     "WORK_TAKEN",
     "Memory",
     "Rows",
     "memory_at",
     "new_rows",
+    "state_sizes",
 ]
 
 N_DIAGNOSTICS = 12
@@ -36,30 +44,50 @@ KINETIC, STRAIN, GRAVITATION, SPRINGS, MOMENTUM, ANGULAR_MOMENTUM, WORK_GIVEN, W
 N_DRIFTS = 4
 OF_DISTANCES, OF_ANGLES, OF_DISTANCE_RATES, OF_ANGLE_RATES = range(N_DRIFTS)  #: columns of `Rows.drift`
 
+GIVEN, TAKEN = 0, 1  #: items of `Memory.work` and `Memory.power`
+
 n_t = Size("n_t")
 
 
 @tabled
 class Memory(NamedTuple):
-    """The memory of an integrator after a step, which the next step overwrites."""
+    """The memory of a method after a step; kernels overwrite it, everything else makes another with `changed`."""
 
     r: Array = real(n_b, 3, unit="m")
     p: Array = real(n_b, 4)  #: Euler parameters
     q: Array = real(n_q)
     u: Array = real(n_u, unit="m/s, rad/s, 1/s")
     u_dot: Array = real(n_u, unit="m/s², rad/s², 1/s²")
-    a: Array = real(n_u, unit="m/s², rad/s², 1/s²")  #: algorithmic acceleration
+    #: further memory of the method: algorithmic accelerations (n_u,), or multipliers
+    a: Array = real(Size("n_remembered"))
     w: Array = real(n_w, unit="N, N m")
-    work_given: Array = real(unit="J")  #: by forces and drives
-    work_taken: Array = real(unit="J")  #: energy dissipated by dampers, friction and modal damping
-    power_given: Array = real(unit="W")
-    power_taken: Array = real(unit="W")
-    h: Array = real(unit="s")  #: size of the step for which `a` holds
-    h_wanted: Array = real(unit="s")  #: of the next step
-    n_accepted: IntArray = integer()  #: steps
-    n_rejected: IntArray = integer()
-    angle: Array = real(n_angles, unit="rad")  #: counted through full turns
+    work: Array = real(2, unit="J")  #: given by forces and drives, taken by dampers, friction and modal damping
+    power: Array = real(2, unit="W")  #: their rates
+    h: Array = real(unit="s")  #: size of the step for which `a` holds; 0 at the start
+    h_next: Array = real(unit="s")  #: desired size of the next step
+    n_steps: IntArray = integer()  #: accepted so far
+    n_rejected: IntArray = integer()  #: tried in vain so far
+    n_iterations: IntArray = integer()  #: of Newton's method so far
+    #: angles of `CompiledSystem.angles`, counted through full turns; empty: not counted
+    angle: Array = real(n_angles, unit="rad")
     angle_rate: Array = real(n_angles, unit="rad/s")
+
+    @property
+    def state(self) -> State:
+        """Positions and velocities."""
+        return State(self.r, self.p, self.q, self.u)
+
+    def changed(self, *, state: State | None = None, **values: Any) -> "Memory":
+        """Return the memory with other values; arrays that stay are shared."""
+        if state is not None:
+            values |= {name: getattr(state, name) for name in ("r", "p", "q", "u")}
+        arrays = {name: np.array(value, getattr(self, name).dtype, order="C") for name, value in values.items()}
+        return self._replace(**arrays)
+
+    def copied(self) -> "Memory":
+        """Return a copy for the kernels to overwrite."""
+        arrays: Any = (array.copy() for array in self)
+        return type(self)(*arrays)
 
 
 @tabled
@@ -80,19 +108,21 @@ class Rows(NamedTuple):
     load_case: Array = real(n_t, n_body_loads)  #: factors of load cases
 
 
-def memory_at(state: State, u_dot: Array, w: Array, *, n_angles: int = 0) -> Memory:
-    """Return a copy of the memory at a state, before any step, with algorithmic accelerations equal to u_dot.
+def memory_at(state: State, u_dot: Array, w: Array, a: Array | None = None, *, n_angles: int = 0) -> Memory:
+    """Return the memory at a state, before any step.
 
-    n_angles: how many angles are counted, all of the model or none.
+    a: of the method; None: accelerations. n_angles: how many angles are counted, all of the model or none.
     """
+    a = u_dot if a is None else a
     sizes = {"n_b": len(state.r), "n_q": len(state.q), "n_u": len(state.u), "n_w": len(w), "angles": n_angles}
-    memory = zeros(Memory(), sizes)
-    for name in ("r", "p", "q", "u"):
-        getattr(memory, name)[:] = getattr(state, name)
-    memory.u_dot[:] = u_dot
-    memory.a[:] = u_dot
-    memory.w[:] = w
-    return memory
+    return zeros(Memory(), sizes | {"n_remembered": len(a)}).changed(state=state, u_dot=u_dot, a=a, w=w)
+
+
+def state_sizes(model: Model) -> dict[str, int]:
+    """Return the sizes of the arrays that change with time, by name."""
+    bodies = model.bodies
+    n_u, n_w = int(bodies.u0[-1]), int(model.connections.w0[-1])
+    return {"n_b": len(bodies.kind), "n_q": int(bodies.q0[-1]), "n_u": n_u, "n_w": n_w}
 
 
 def new_rows(model: Model, n_t: int) -> Rows:

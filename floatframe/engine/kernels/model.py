@@ -65,7 +65,7 @@ n_functions, n_pieces, n_springs, n_bushings = (Size(name) for name in ("functio
 n_contacts, n_forces, n_elements, n_x = (Size(name) for name in ("contacts", "joint forces", "elements", "coordinates"))
 n_lines, n_stations, n_users, n_states = (Size(name) for name in ("lines", "stations", "user forces", "states"))
 n_tapes, n_operations, n_loads, n_body_loads = (Size(name) for name in ("tapes", "operations", "loads", "body loads"))
-n_angles, n_laws, n_gaps = Size("angles"), Size("laws"), Size("gaps")
+n_angles, n_laws, n_gaps, n_q, n_u = (Size(name) for name in ("angles", "laws", "gaps", "n_q", "n_u"))
 
 
 class Bodies(NamedTuple):

@@ -13,24 +13,24 @@ def keep_row(source, target, k):
 
 
 @inner
-def keep_past(past, memory, a, h, n_iterations):
+def keep_past(past, memory, a, h):
     """Store the memory after a step of size h, for which the method has the accelerations a, if space is left."""
-    k = past.n
-    if k >= past.h.shape[0]:
+    k, target = past.n, past.memory
+    if k >= target.h.shape[0]:
         return
     for i in range(memory.r.shape[0]):
-        keep_row(memory.r[i], past.r[k], i)
-        keep_row(memory.p[i], past.p[k], i)
-    keep_row(memory.q, past.q, k)
-    keep_row(memory.u, past.u, k)
-    keep_row(memory.u_dot, past.u_dot, k)
-    keep_row(a, past.a, k)
-    keep_row(memory.w, past.w, k)
-    past.work[k, 0], past.work[k, 1] = memory.work_given, memory.work_taken
-    past.power[k, 0], past.power[k, 1] = memory.power_given, memory.power_taken
-    past.h[k], past.h_wanted[k] = h, memory.h_wanted
-    keep_row(memory.angle, past.angle, k)
-    keep_row(memory.angle_rate, past.angle_rate, k)
-    past.counts[k, 0], past.counts[k, 1] = memory.n_accepted, memory.n_rejected
-    past.counts[k, 2] = n_iterations
+        keep_row(memory.r[i], target.r[k], i)
+        keep_row(memory.p[i], target.p[k], i)
+    keep_row(memory.q, target.q, k)
+    keep_row(memory.u, target.u, k)
+    keep_row(memory.u_dot, target.u_dot, k)
+    keep_row(a, target.a, k)
+    keep_row(memory.w, target.w, k)
+    keep_row(memory.work, target.work, k)
+    keep_row(memory.power, target.power, k)
+    keep_row(memory.angle, target.angle, k)
+    keep_row(memory.angle_rate, target.angle_rate, k)
+    target.h[k], target.h_next[k] = h, memory.h_next
+    target.n_steps[k], target.n_rejected[k] = memory.n_steps, memory.n_rejected
+    target.n_iterations[k] = memory.n_iterations
     past.n = k + 1

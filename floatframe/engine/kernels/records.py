@@ -21,7 +21,20 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
 
-__all__ = ["Declared", "Size", "filled", "flat", "integer", "leaves", "measured", "of_items", "real", "tabled", "zeros"]
+__all__ = [
+    "Declared",
+    "Size",
+    "filled",
+    "flat",
+    "integer",
+    "leaves",
+    "measured",
+    "of_items",
+    "real",
+    "stacked",
+    "tabled",
+    "zeros",
+]
 
 Record = TypeVar("Record", bound=NamedTuple)
 
@@ -96,6 +109,12 @@ def real(*shape: Size | int, unit: str = "") -> Any:
 def integer(*shape: Size | int) -> Any:
     """Declare an array of integers."""
     return Declared(np.int64, shape, "")
+
+
+def stacked(declaration: Record, size: Size) -> Record:
+    """Declare records of arrays, one after the other: each array gets one more dimension, its first."""
+    arrays: Any = (Declared(each.dtype, (size, *each.shape), each.unit) for each in declaration)
+    return type(declaration)(*arrays)
 
 
 def zeros(declaration: Record, sizes: Mapping[str, int]) -> Record:

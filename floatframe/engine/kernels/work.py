@@ -9,8 +9,22 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.engine.kernels.model import Model, n_angles, n_b, n_c, n_gaps, n_lines, n_m, n_pairs, n_states, n_w
-from floatframe.engine.kernels.records import Size, Tabled, integer, real, tabled, zeros
+from floatframe.engine.kernels.memory import Memory, state_sizes
+from floatframe.engine.kernels.model import (
+    Model,
+    n_angles,
+    n_b,
+    n_c,
+    n_gaps,
+    n_lines,
+    n_m,
+    n_pairs,
+    n_q,
+    n_states,
+    n_u,
+    n_w,
+)  # fmt: skip
+from floatframe.engine.kernels.records import Size, Tabled, integer, real, stacked, tabled, zeros
 
 __all__ = [
     "BodyWork",
@@ -32,13 +46,12 @@ __all__ = [
     "Work",
     "new_work",
     "sizes_of",
-    "state_sizes",
 ]
 
-n_q, n_u, n_x, n_most, most_rows = (Size(name) for name in ("n_q", "n_u", "n_x", "n_most", "most_rows"))
+n_x, n_most, most_rows = (Size(name) for name in ("n_x", "n_most", "most_rows"))
 n_inputs, n_outputs, n_gradients, n_results = (Size(name) for name in ("inputs", "outputs", "gradients", "results"))
 n_accelerated, n_a = Size("accelerated markers"), Size("n_a")
-n_past, n_remembered = Size("n_past"), Size("n_remembered")
+n_past = Size("n_past")
 n_law_inputs, n_law_outputs, n_law_slopes = (Size(f"{name} of a law") for name in ("inputs", "outputs", "slopes"))
 
 
@@ -261,7 +274,6 @@ class Counted(NamedTuple):
 
     evaluations: IntArray = integer()
     factorisations: IntArray = integer()
-    iterations: IntArray = integer()
     no_number: IntArray = integer()  #: 1 + the first element of a step whose law was not finite, 0 for none
     stopped: IntArray = integer()  #: 1 + the first output of a step that ends the run, 0 for none
     rows: IntArray = integer()  #: rows written into the results of the present call
@@ -271,20 +283,7 @@ class Past(NamedTuple):
     """The memories after each of the last steps, if there is space for them; see kernels/past.py."""
 
     n: IntArray = integer()  #: number stored so far; the caller resets it to zero
-    r: Array = real(n_past, n_b, 3, unit="m")
-    p: Array = real(n_past, n_b, 4)
-    q: Array = real(n_past, n_q)
-    u: Array = real(n_past, n_u, unit="m/s, rad/s, 1/s")
-    u_dot: Array = real(n_past, n_u, unit="m/s², rad/s², 1/s²")
-    a: Array = real(n_past, n_remembered)  #: further memory of the method: algorithmic accelerations, or multipliers
-    w: Array = real(n_past, n_w, unit="N, N m")
-    work: Array = real(n_past, 2, unit="J")  #: given, taken
-    power: Array = real(n_past, 2, unit="W")  #: given, taken
-    h: Array = real(n_past, unit="s")
-    h_wanted: Array = real(n_past, unit="s")
-    angle: Array = real(n_past, n_angles, unit="rad")
-    angle_rate: Array = real(n_past, n_angles, unit="rad/s")
-    counts: IntArray = integer(n_past, 3)  #: steps accepted and rejected, iterations
+    memory: Memory = stacked(Memory(), n_past)
 
 
 @tabled
@@ -307,13 +306,6 @@ class Work(NamedTuple):
     solver: Solver = Solver()
     counted: Counted = Counted()
     past: Past = Past()
-
-
-def state_sizes(model: Model) -> dict[str, int]:
-    """Return the sizes of the arrays that change with time, by name."""
-    bodies = model.bodies
-    n_u, n_w = int(bodies.u0[-1]), int(model.connections.w0[-1])
-    return {"n_b": len(bodies.kind), "n_q": int(bodies.q0[-1]), "n_u": n_u, "n_w": n_w}
 
 
 def sizes_of(model: Model) -> dict[str, int]:

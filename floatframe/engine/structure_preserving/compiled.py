@@ -209,21 +209,21 @@ class Kept:
     known: tuple[Array, ...] = ()  #: and what they knew
     after: object = None  #: memory at their end
 
-    def go_on_from(self, carry: object, f: Array, *, is_anew: bool) -> None:
+    def go_on_from(self, memory: object, f: Array, *, is_anew: bool) -> None:
         """Prepare the arrays for steps from a memory with multipliers f: as the previous steps left or found them.
 
         is_anew: without what was known, as a run that goes on from a file begins.
         """
         arrays = [getattr(self.step, name) for name in REMEMBERED]
-        if carry is self.before and not is_anew:
+        if memory is self.before and not is_anew:
             for array, value in zip(arrays, self.known, strict=True):
                 array[...] = value
-        elif carry is not self.after or is_anew:
+        elif memory is not self.after or is_anew:
             self.step.is_due[:] = 1
             self.step.acceleration[:] = 0.0
             self.step.f_kept[:] = f
             self.step.f_size[self.discrete.equation] = np.abs(f[self.discrete.equation])
-        self.before, self.known = carry, tuple(array.copy() for array in arrays)
+        self.before, self.known = memory, tuple(array.copy() for array in arrays)
 
 
 #: by the identity of an array of the working arrays, with whose lifetime they end

@@ -13,7 +13,7 @@ from floatframe.files.cosimulation.foreign_slave import ForeignSlave
 from floatframe.files.cosimulation.held_inputs import input_choices
 from floatframe.files.cosimulation.interface import output_variables
 from floatframe.files.cosimulation.unit import Unit
-from floatframe.integrators.carry import Integrator
+from floatframe.integrators.integrator import Integrator
 from floatframe.model.system import System
 from floatframe.results.sensors import sensors_of
 from floatframe.results.trajectory import Trajectory
@@ -88,7 +88,7 @@ def co_simulate(
         master = Master(replace(system, fmus=()), integrator, H / per_step, slaves, coupling)
         master.begin()
         unit = master.unit
-        assert unit.carry is not None
+        assert unit.memory is not None
         assert unit.row is not None
         n_total = n_macro * per_step
         head = replace(unit.head, run=dict(unit.head.run) | {"t_end": t_end, "output_every": output_every})
@@ -108,9 +108,9 @@ def co_simulate(
             run.close_segment_when_due()
             if progress is not None:
                 n_done = (k + 1) * per_step
-                counts = unit.carry.n_iterations, run.watch.notes, unit.carry.n_rejected
+                counts = int(unit.memory.n_iterations), run.watch.notes, int(unit.memory.n_rejected)
                 progress(Progress((k + 1) * H, t_end, n_done, n_total, *counts))
-        return run.finished(unit.carry)
+        return run.finished(unit.memory)
 
 
 def with_motion(error: CosimulationError | ConvergenceError, run: Run, t: float, H: float) -> Exception:

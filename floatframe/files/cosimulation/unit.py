@@ -11,11 +11,11 @@ from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.callbacks import raise_errors_of
 from floatframe.engine.compiling.file_frames import rows_of_file
 from floatframe.engine.compiling.system import compiled_system
-from floatframe.engine.kernels.memory import Rows
+from floatframe.engine.kernels.memory import Memory, Rows
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import ConvergenceError, ModelError, ResultsError
 from floatframe.files.cosimulation.held_inputs import HeldInput, function_numbers, with_held_inputs, write_function
-from floatframe.integrators.carry import Carry, Integrator
+from floatframe.integrators.integrator import Integrator
 from floatframe.model.system import System
 from floatframe.results.results_file import MemorySource
 from floatframe.results.sensors import Measurement, sensor_of, sensors_of
@@ -25,7 +25,7 @@ from floatframe.simulation.events import events_of
 from floatframe.simulation.integrate import number_of_steps
 from floatframe.simulation.jumps import jumps_of_steps, over_jumps
 from floatframe.simulation.motion_head import head_of
-from floatframe.simulation.restart import carry_of_record, restart_record
+from floatframe.simulation.restart import memory_of_record, restart_record
 from floatframe.simulation.switch_events import switch_events
 from floatframe.simulation.validity_watch import ValidityWatch
 
@@ -37,10 +37,10 @@ JUMP = 1e-9  #: of an input, as in `TimeFunction.jumps`: changes below it are ro
 
 @dataclass(frozen=True, eq=False)
 class UnitState:
-    """The complete memory of a unit: time, carry of the integrator, inputs, and the pieces of its drives."""
+    """The complete memory of a unit: time, memory of the integrator, inputs, and the pieces of its drives."""
 
     t: float
-    carry: Carry
+    memory: Memory
     inputs: Mapping[str, float]
     acting: Mapping[str, float]  #: values of force inputs that act
     drives: Mapping[str, Array]  #: value, rate and second rate at t, (3,) each
@@ -48,7 +48,7 @@ class UnitState:
     def to_bytes(self) -> bytes:
         """Return it as bytes (npz)."""
         data = io.BytesIO()
-        record = {f"carry.{name}": array for name, array in restart_record(self.carry, 0).items()}
+        record = {f"memory.{name}": array for name, array in restart_record(self.memory, 0).items()}
         for part in ("inputs", "acting"):
             record |= {f"{part}.{name}": np.array(value) for name, value in getattr(self, part).items()}
         record |= {f"drives.{name}": value for name, value in self.drives.items()}
@@ -63,14 +63,14 @@ class UnitState:
                 record = dict(file)
         except (ValueError, OSError, EOFError) as error:
             raise ResultsError(f"state of a unit: these bytes are not one that was serialised ({error})") from error
-        parts: dict[str, dict[str, Any]] = {"carry": {}, "inputs": {}, "acting": {}, "drives": {}}
+        parts: dict[str, dict[str, Any]] = {"memory": {}, "inputs": {}, "acting": {}, "drives": {}}
         for key, value in record.items():
             part, _, name = key.partition(".")
             if part in parts:
                 parts[part][name] = value
-        carry, _ = carry_of_record(parts["carry"], system)
+        memory, _ = memory_of_record(parts["memory"], system)
         inputs, acting = ({k: float(v) for k, v in parts[part].items()} for part in ("inputs", "acting"))
-        return UnitState(float(record["t"]), carry, inputs, acting, parts["drives"])
+        return UnitState(float(record["t"]), memory, inputs, acting, parts["drives"])
 
 
 def quintic(begin: Array, end: Array, duration: float) -> Array:
@@ -155,7 +155,7 @@ class Unit:
             start = (each.start, 0.0, 0.0)
             variables = each.variables(self.system.units.time_symbol)
             self.inputs |= {name: x for (name, _), x in zip(variables, start, strict=False)}
-        self.carry: Carry | None = None
+        self.memory: Memory | None = None
         self.acting: dict[str, float] = {}
         self.drives: dict[str, Array] = {}
         self.row: Rows | None = None
@@ -185,8 +185,8 @@ class Unit:
         self.head = head_of(self.system, self.integrator, t, t + self.h, self.h, 1)
         self.head = replace(self.head, angles=compiled.angles)
         self.work = new_work(compiled.model)
-        self.carry = self.integrator.start(self.system, t)
-        self.carry, self.row = self.integrator.observe(self.system, t, self.carry, self.work)
+        self.memory = self.integrator.start(self.system, t)
+        self.memory, self.row = self.integrator.observe(self.system, t, self.memory, self.work)
         raise_errors_of(compiled.callbacks)
 
     def drive_inputs(self, each: HeldInput) -> list[float]:
@@ -200,7 +200,7 @@ class Unit:
 
     def settle(self) -> None:
         """Apply changed force inputs; if one jumps, the motion restarts with it from the state."""
-        assert self.carry is not None
+        assert self.memory is not None
         jumps = False
         for each in self.held:
             if each.is_drive or self.acting[each.name] == self.inputs[each.name]:
@@ -210,7 +210,7 @@ class Unit:
             self.acting[each.name] = new
             self.write(each, self.t, np.array([new]))
         if jumps:
-            self.carry, self.row = self.integrator.after_jump(self.system, self.t, self.carry, self.work)
+            self.memory, self.row = self.integrator.after_jump(self.system, self.t, self.memory, self.work)
 
     def step(self, t: float, size: float) -> None:
         """Take a communication step from t to t + size with the inputs held, in equal steps of up to h.
@@ -222,7 +222,7 @@ class Unit:
         ModelError
             If the unit is at another time, or size is not above 0.
         """
-        if self.carry is None:
+        if self.memory is None:
             raise ModelError(f"unit {self.system.name!r}: a step before its beginning")
         if not 0.0 < size < np.inf:
             raise ModelError(f"unit {self.system.name!r}: expected a communication step above 0, got {size}")
@@ -242,9 +242,9 @@ class Unit:
         self.settle()
         n = number_of_steps(0.0, size, self.h)
         h, t = size / n, self.t
-        assert self.carry is not None
-        if abs(h - self.carry.h) <= ROUNDING * h:  # a rounding of the master's clock is no other step size
-            h = self.carry.h
+        assert self.memory is not None
+        if abs(h - self.memory.h) <= ROUNDING * h:  # a rounding of the master's clock is no other step size
+            h = float(self.memory.h)
         drives: dict[str, Array] = {}
         for each in self.held:
             if each.is_drive:
@@ -258,12 +258,12 @@ class Unit:
         while k < n:
             n_smooth = min((j - k for j in jumps if j >= k), default=n - k)
             if n_smooth:
-                self.carry, rows, n_good, failure = self.integrator.advance(
-                    self.system, self.carry, self.work, t0=t, h=h, first=k, n_steps=n_smooth, every=1
+                self.memory, rows, n_good, failure = self.integrator.advance(
+                    self.system, self.memory, self.work, t0=t, h=h, first=k, n_steps=n_smooth, every=1
                 )
             else:
-                self.carry, rows, self.work, failure = over_jumps(
-                    self.integrator, self.system, self.carry, self.work, t=t + k * h, h=h, jumps=jumps[k]
+                self.memory, rows, self.work, failure = over_jumps(
+                    self.integrator, self.system, self.memory, self.work, t=t + k * h, h=h, jumps=jumps[k]
                 )
                 n_good = int(failure is None)
             k += n_good
@@ -280,7 +280,7 @@ class Unit:
 
     def measured(self) -> list[Measurement]:
         """Return the current values of the sensors, with the current inputs."""
-        if self.carry is None:
+        if self.memory is None:
             raise ModelError(f"unit {self.system.name!r}: outputs before its beginning")
         self.settle()
         assert self.row is not None
@@ -295,13 +295,13 @@ class Unit:
 
     def state(self) -> UnitState:
         """Return all the unit remembers."""
-        if self.carry is None:
+        if self.memory is None:
             raise ModelError(f"unit {self.system.name!r}: its state before its beginning")
-        return UnitState(self.t, self.carry, dict(self.inputs), dict(self.acting), dict(self.drives))
+        return UnitState(self.t, self.memory, dict(self.inputs), dict(self.acting), dict(self.drives))
 
     def restore(self, state: UnitState) -> None:
         """Go back, or on, to a state of this unit."""
-        self.t, self.carry = state.t, state.carry
+        self.t, self.memory = state.t, state.memory
         self.inputs, self.acting, self.drives = dict(state.inputs), dict(state.acting), dict(state.drives)
         for each in self.held:
             if each.is_drive:
@@ -310,4 +310,4 @@ class Unit:
             else:
                 self.write(each, self.t, np.array([self.acting[each.name]]))
         self.work = new_work(compiled_system(self.system).model)
-        self.carry, self.row = self.integrator.observe(self.system, self.t, self.carry, self.work)
+        self.memory, self.row = self.integrator.observe(self.system, self.t, self.memory, self.work)

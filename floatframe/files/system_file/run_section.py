@@ -14,8 +14,8 @@ from fe_models.foundation.words import nearest
 from floatframe.engine.tree.formulation import FORMULATIONS
 from floatframe.errors import SystemFileError
 from floatframe.integrators import INTEGRATORS
-from floatframe.integrators.carry import Integrator
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha, hht, newmark, trapezoidal
+from floatframe.integrators.integrator import Integrator
 from floatframe.integrators.relative import RelativeGeneralizedAlpha, in_formulation
 from floatframe.simulation.foreign_units import Coupling
 from floatframe.simulation.step_watch import WATCHES

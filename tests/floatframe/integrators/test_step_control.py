@@ -64,17 +64,17 @@ def test_estimated_error_of_one_step_is_the_true_one():
     system = spinning()
     for h in (0.02, 0.01):
         method = GeneralizedAlpha(0.8, 1e-13)
-        carry = method.start(system, 0.0)
+        memory = method.start(system, 0.0)
         for _ in range(3):  # the algorithmic acceleration settles
-            carry = method.step(system, 0.0, h, carry)
-        after = method.step(system, 0.0, h, carry)
+            memory = method.step(system, 0.0, h, memory)
+        after = method.step(system, 0.0, h, memory)
         fine = GeneralizedAlpha(1.0, 1e-13)
-        begin = fine.start(system, 0.0, carry.state)
+        begin = fine.start(system, 0.0, memory.state)
         for _ in range(64):
             begin = fine.step(system, 0.0, h / 64, begin)
         error_q = np.abs(after.state.q - begin.state.q).max()
         _, _, beta, gamma = method.coefficients
-        estimate = abs(gamma / 2 - beta - 1 / 12) * h**2 * np.abs((after.a - carry.a)[6:]).max()
+        estimate = abs(gamma / 2 - beta - 1 / 12) * h**2 * np.abs((after.a - memory.a)[6:]).max()
         assert 0.5 < estimate / error_q < 2
 
 

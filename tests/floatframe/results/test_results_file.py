@@ -64,11 +64,11 @@ def test_output_every_thins_the_same_motion_out():
 
 def test_steps_one_by_one_are_the_same_motion_to_the_tolerance():
     motion = integrate(SYSTEM, METHOD, 0.02, 1e-3)
-    carry = METHOD.start(SYSTEM, 0.0)
+    memory = METHOD.start(SYSTEM, 0.0)
     for k in range(20):
-        carry = METHOD.step(SYSTEM, k * 1e-3, 1e-3, carry)
+        memory = METHOD.step(SYSTEM, k * 1e-3, 1e-3, memory)
     u = motion.source.read("u")
-    assert_allclose(carry.state.u, u[-1], rtol=0, atol=1e-8 * np.abs(u).max())
+    assert_allclose(memory.state.u, u[-1], rtol=0, atol=1e-8 * np.abs(u).max())
 
 
 def test_a_step_size_that_does_not_divide_the_time_is_made_smaller():

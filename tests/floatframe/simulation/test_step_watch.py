@@ -95,17 +95,17 @@ def test_the_estimated_error_is_that_of_an_oscillator(method, steps_in_period):
 
 def running(system, method, h, n_steps, watch):
     """Return the estimated error of a run, over its way."""
-    carry, work = method.start(system, 0.0), new_work(compiled_system(system).model)
-    carry, _ = method.observe(system, 0.0, carry, work)
-    watch.begin(carry.state)
+    memory, work = method.start(system, 0.0), new_work(compiled_system(system).model)
+    memory, _ = method.observe(system, 0.0, memory, work)
+    watch.begin(memory.state)
     done = 0
     while done < n_steps:
-        n, begin = min(watch.room(done, 400), n_steps - done), carry
-        carry, _, _, failure = method.advance(system, carry, work, t0=0.0, h=h, first=done, n_steps=n, every=10**6)
+        n, begin = min(watch.room(done, 400), n_steps - done), memory
+        memory, _, _, failure = method.advance(system, memory, work, t0=0.0, h=h, first=done, n_steps=n, every=10**6)
         assert failure is None
-        watch.take(system, begin, carry, t0=0.0, h=h, first=done, n_steps=n)
+        watch.take(system, begin, memory, t0=0.0, h=h, first=done, n_steps=n)
         done += n
-    watch.conclude(system, carry, done, 0.0, h)
+    watch.conclude(system, memory, done, 0.0, h)
     return float(np.linalg.norm(watch.total[:, 0] / watch.size[0], axis=1).max())
 
 

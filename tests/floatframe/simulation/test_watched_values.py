@@ -24,7 +24,7 @@ from floatframe.engine.kernels.compiler.structure import n_words, table_of_numbe
 from floatframe.engine.kernels.entry import Order
 from floatframe.engine.kernels.records import filled, zeros
 from floatframe.engine.kernels.work import new_work
-from floatframe.integrators.carry import carry_of_past
+from floatframe.integrators.integrator import memory_of_past
 from floatframe.integrators.relative import RelativeGeneralizedAlpha
 from floatframe.results.sensors import CoordinateSensor
 from floatframe.simulation.restart import restart_record
@@ -68,13 +68,13 @@ def test_a_memory_of_the_past_is_that_of_a_run_that_ends_there(method):
 
     def run(n_steps):
         work = new_work(model, 20)
-        carry, _ = method.observe(system, 0.0, method.start(system, 0.0), work)
-        carry, *_ = method.advance(system, carry, work, t0=0.0, h=0.01, first=0, n_steps=n_steps, every=1)
-        return carry, work
+        memory, _ = method.observe(system, 0.0, method.start(system, 0.0), work)
+        memory, *_ = method.advance(system, memory, work, t0=0.0, h=0.01, first=0, n_steps=n_steps, every=1)
+        return memory, work
 
     end, work = run(20)
     for k in (0, 7, 19):
-        expected, found = restart_record(run(k + 1)[0], 0), restart_record(carry_of_past(work, end, k), 0)
+        expected, found = restart_record(run(k + 1)[0], 0), restart_record(memory_of_past(work, end, k), 0)
         for name, value in expected.items():
             assert_array_equal(found[name], value, err_msg=name)
 

@@ -2,7 +2,7 @@
 
 The table of a record (`records.tabled`) has for each array, in its order, the address and then the shape; a record in
 a record has its part of the table. A kernel that reads `work.markers.r` gets the array back from there; one number
-(declared without a shape) is read and written as such, `work.counted.iterations += 1`. Tables and arrays belong to
+(declared without a shape) is read and written as such, `work.counted.evaluations += 1`. Tables and arrays belong to
 Python, so that the kernels count no references; numbers in a table do not change while a kernel runs, so that they may
 be kept in registers.
 """
@@ -49,7 +49,7 @@ class Structure(types.Type):
         for name, declared in zip(declaration._fields, declaration, strict=True):
             self.fields[name] = type_of(declared), place
             place += n_words(declared)
-        super().__init__(f"Structure({type(declaration).__name__})")
+        super().__init__(f"Structure({type(declaration).__name__} of {n_words(declaration)} words)")
 
 
 register_model(Structure)(models.OpaqueModel)

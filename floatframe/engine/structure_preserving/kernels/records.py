@@ -8,9 +8,9 @@ connections with multipliers or states.
 from typing import NamedTuple
 
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.engine.kernels.model import n_angles, n_b, n_c, n_lines, n_m, n_stations, n_t, n_w
+from floatframe.engine.kernels.model import n_angles, n_b, n_c, n_lines, n_m, n_q, n_stations, n_t, n_u, n_w
 from floatframe.engine.kernels.records import Size, integer, real, tabled
-from floatframe.engine.kernels.work import n_most, n_q, n_u
+from floatframe.engine.kernels.work import n_most
 
 __all__ = [
     "BENT", "C1", "C2", "CONSERVING", "DAMPING", "FILTER", "FREE_TURNING", "INERTIA", "MASS", "N_BLOCKS", "PRODUCTS",

@@ -11,7 +11,7 @@ from floatframe.engine.kernels.compiler.structure import converter
 from floatframe.engine.kernels.connections.gap import next_step, step_before_contact
 from floatframe.engine.kernels.entry import CompiledEntry, Order
 from floatframe.engine.kernels.generalized_alpha import load_state
-from floatframe.engine.kernels.memory import Memory, Rows
+from floatframe.engine.kernels.memory import GIVEN, TAKEN, Memory, Rows
 from floatframe.engine.kernels.model import Model
 from floatframe.engine.kernels.past import keep_past
 from floatframe.engine.kernels.turns import count_turns
@@ -146,8 +146,8 @@ def conserving_step(model, work, discrete, step, memory, order):
         add_drives(model, discrete, step)
     for i in range(model.bodies.kind.shape[0]):
         end_rates(model, discrete, step, i)
-    memory.work_given += step.given
-    memory.work_taken += step.taken + work_of_dampers(model, discrete, step)
+    memory.work[GIVEN] += step.given
+    memory.work[TAKEN] += step.taken + work_of_dampers(model, discrete, step)
     learn(model, discrete, step)
     remember(model, discrete, step)
     keep(discrete, step, memory)
@@ -230,8 +230,8 @@ def variational_step(model, work, discrete, step, memory, order):
         put(step.w_1, u0, scaled(1.0 / h, turned(R, vector(step.z[u0:]))))
         for k in range(u0 + 3, u0 + 6 + n):
             step.w_1[k] = step.z[k] / h
-    memory.work_given += 0.5 * given
-    memory.work_taken += 0.5 * taken + dampers
+    memory.work[GIVEN] += 0.5 * given
+    memory.work[TAKEN] += 0.5 * taken + dampers
     learn(model, discrete, step)
     for j in range(step.f.shape[0]):
         step.f_kept[j] = step.kept[j]
@@ -299,12 +299,12 @@ def take_parts(model, work, discrete, step, memory, order, t_0, t_1):
     With h_min above 0 a part that fails is tried again, shorter, down to it.
     """
     h, has_gaps, left, has_failed = order.h, model.gaps.connection.shape[0] > 0, order.h, False
-    if memory.h_wanted <= 0.0 or memory.h_wanted > h:
-        memory.h_wanted = h
+    if memory.h_next <= 0.0 or memory.h_next > h:
+        memory.h_next = h
     while left > 0.0:
         part, is_last = left, True
         if order.h_min > 0.0:
-            part = left / max(1.0, math.ceil(left / memory.h_wanted * (1.0 - 1e-9)))
+            part = left / max(1.0, math.ceil(left / memory.h_next * (1.0 - 1e-9)))
             if has_gaps:
                 begin_iterate(model, work, step, memory)
                 part = max(step_before_contact(model, work, t_1 - left, part), order.h_min)
@@ -316,14 +316,16 @@ def take_parts(model, work, discrete, step, memory, order, t_0, t_1):
             status = conserving_step(model, work, discrete, step, memory, order)
         else:
             status = variational_step(model, work, discrete, step, memory, order)
+        memory.n_iterations += step.n_iterations
+        step.n_iterations = 0
         if status == CONVERGED:
             count_angles(model, work, memory, part)
-            memory.n_accepted += 1
+            memory.n_steps += 1
             left = 0.0 if is_last else left - part
             wanted = part if has_failed else 2.0 * part
             if has_gaps:
                 wanted = min(h if work.gaps.n_closed == 0 else wanted, work.gaps.step)
-            memory.h_wanted = min(wanted, h)
+            memory.h_next = min(wanted, h)
             has_failed = False
             if work.counted.stopped > 0:
                 return STOPPED
@@ -331,7 +333,7 @@ def take_parts(model, work, discrete, step, memory, order, t_0, t_1):
         if part <= order.h_min or order.h_min <= 0.0:
             return status
         memory.n_rejected += 1
-        memory.h_wanted = max(work.gaps.step if status == UNRESOLVED else 0.5 * part, order.h_min)
+        memory.h_next = max(work.gaps.step if status == UNRESOLVED else 0.5 * part, order.h_min)
         has_failed = True
     return CONVERGED
 
@@ -356,7 +358,7 @@ def advance(model, work, discrete, step, memory, rows, order):
                 return NO_ACCELERATION, k, work.counted.rows
             if work.counted.stopped > 0:  # row at the end of the step, which belongs to the step
                 return STOPPED, k, work.counted.rows - 1
-        keep_past(work.past, memory, step.f_kept, h, step.n_iterations)
+        keep_past(work.past, memory, step.f_kept, h)
     return CONVERGED, order.n_steps, work.counted.rows
 
 

@@ -8,7 +8,7 @@ from floatframe.engine.kernels.compiler.structure import converter
 from floatframe.engine.kernels.diagnostics import power
 from floatframe.engine.kernels.entry import ADVANCE, OBSERVE, CompiledEntry, Order, Outcome
 from floatframe.engine.kernels.generalized_alpha import DONE
-from floatframe.engine.kernels.memory import Memory, Rows
+from floatframe.engine.kernels.memory import GIVEN, TAKEN, Memory, Rows
 from floatframe.engine.kernels.model import Model
 from floatframe.engine.kernels.records import zeros
 from floatframe.engine.kernels.work import Work
@@ -58,7 +58,7 @@ def make_entry(digest):
         if what == OBSERVE:
             work.counted.rows = 0
             write_tree_row(model, work, memory, tree, joints, order.t0, rows)
-            memory.power_given, memory.power_taken = power(model, work)
+            memory.power[GIVEN], memory.power[TAKEN] = power(model, work)
         elif what == MOTION_OF_JOINTS:
             joint_motion(model, work, tree, joints)
         elif what == MOTION_OF_BODIES:

@@ -380,7 +380,7 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
             wanted = order.tolerance * (c_k * math.sqrt(size) + OF_MOTION * math.sqrt(size_x))
             allowed = wanted + math.sqrt(roundoff_floor(model, work, order.length))
         norm = math.sqrt(of_rates + update(model, work, tree, joints, tangent, c_d / c_k, c_m / c_k, c_k))
-        work.counted.iterations += 1
+        memory.n_iterations += 1
         if is_old and work.counted.factorisations > factorisations:
             is_old = False
         if is_old and not norm <= max(SLOW * last, allowed):

@@ -137,8 +137,8 @@ def test_steps_before_one_whose_end_has_no_accelerations_are_told_with_as_many_r
     ball = RigidBody("ball", 1.0, np.eye(3), position=(-1.0, 0, 0), velocity=(1.0, 0, 0))
     along = AxialDistance(Marker(GROUND), Marker("ball"), (1, 0, 0))
     system, method = System([ball], [], [UserForce("pull", {"x": along}, {"x": "1e-300/x"})]), EnergyMomentum()
-    carry, work = method.start(system, 0.0), new_work(compiled_system(system).model)
-    after, rows, n_good, failure = method.advance(system, carry, work, t0=0.0, h=0.25, first=0, n_steps=8, every=every)
+    memory, work = method.start(system, 0.0), new_work(compiled_system(system).model)
+    after, rows, n_good, failure = method.advance(system, memory, work, t0=0.0, h=0.25, first=0, n_steps=8, every=every)
     assert failure is not None
     assert "no accelerations" in failure.words
     assert n_good == after.n_steps == 3
@@ -157,21 +157,21 @@ def assert_steps_are_those_of_python(system, method, name, n_steps=8, h=0.04):
     ds = step_system(discrete_system(system, name))
     model = compiled_system(system).model
     contacts = model.connections.w0[:-1][model.connections.law == CONTACT] + V_0
-    carry, work, f = method.start(system, 0.0), new_work(model), np.zeros(ds.n_held)
+    memory, work, f = method.start(system, 0.0), new_work(model), np.zeros(ds.n_held)
     for k in range(n_steps):
-        placed = placed_bodies(ds.bodies, ds.model, carry.state)
-        expected = one_step(method, ds, placed, Span(k * h, (k + 1) * h, (k + 0.5) * h, carry.w), f)
-        before = carry.work
-        carry, _, _, failure = method.advance(system, carry, work, t0=0.0, h=h, first=k, n_steps=1, every=100)
+        placed = placed_bodies(ds.bodies, ds.model, memory.state)
+        expected = one_step(method, ds, placed, Span(k * h, (k + 1) * h, (k + 0.5) * h, memory.w), f)
+        before = memory.work
+        memory, _, _, failure = method.advance(system, memory, work, t0=0.0, h=h, first=k, n_steps=1, every=100)
         assert failure is None
         state = state_of(ds.bodies, expected.placed)
         for field in ("r", "p", "q", "u"):
-            assert_allclose(getattr(carry.state, field), getattr(state, field), rtol=0, atol=1e-11)
-        assert_allclose(carry.work - before, expected.work, rtol=0, atol=1e-11)
+            assert_allclose(getattr(memory.state, field), getattr(state, field), rtol=0, atol=1e-11)
+        assert_allclose(memory.work - before, expected.work, rtol=0, atol=1e-11)
         for rows in (model.coordinates.row, model.states.row, contacts):
-            assert_allclose(carry.w[rows], expected.w[rows], rtol=0, atol=1e-10)
+            assert_allclose(memory.w[rows], expected.w[rows], rtol=0, atol=1e-10)
         f = expected.f
         points = model.rows.kind[[k for c in ds.connections for k in c.held]] == POINT
-        sizes = [np.linalg.norm(each[points].reshape(-1, 3), axis=1) for each in (carry.a, f)]
+        sizes = [np.linalg.norm(each[points].reshape(-1, 3), axis=1) for each in (memory.a, f)]
         assert_allclose(sizes[0], sizes[1], rtol=1e-7, atol=1e-7)
-        assert_allclose(carry.a[~points], f[~points], rtol=1e-7, atol=1e-7)
+        assert_allclose(memory.a[~points], f[~points], rtol=1e-7, atol=1e-7)

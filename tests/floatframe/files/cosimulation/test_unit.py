@@ -140,7 +140,7 @@ def test_a_step_that_fails_leaves_the_unit_where_it_was(arm):
     with pytest.raises(ConvergenceError, match=r"the step of 0\.001 from t = 0 failed"):
         unit.step(0.0, MACRO)
     assert unit.t == 0.0
-    assert_array_equal(unit.state().carry.state.q, before.carry.state.q)
+    assert_array_equal(unit.state().memory.state.q, before.memory.state.q)
     unit.set("torque", 0.0)
     unit.step(0.0, MACRO)
 

@@ -1,7 +1,7 @@
-"""Memory and report of an integrator between steps: one type for all integrators."""
+"""What integrators have in common: their protocol, the reason of a failed step, and ways from memory to memory."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -11,7 +11,7 @@ from floatframe.engine.compiling.file_frames import state_of_file
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.initial_conditions.initial import counted_angles_of
 from floatframe.engine.initial_conditions.newton_equations import displaced
-from floatframe.engine.kernels.memory import Memory, Rows, memory_at
+from floatframe.engine.kernels.memory import Memory, Rows
 from floatframe.engine.kernels.model import Model
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import ConvergenceError
@@ -21,16 +21,13 @@ from floatframe.model.system import System
 
 __all__ = [
     "LEAST_STEP",
-    "Carry",
     "Failure",
     "FollowedRotations",
     "Integrator",
-    "carry_of",
-    "carry_of_past",
     "counted_on",
     "has_divided_steps",
     "joined_rows",
-    "memory_of",
+    "memory_of_past",
     "observed",
     "observed_unless_stopped",
     "one_by_one",
@@ -44,26 +41,6 @@ __all__ = [
 LEAST_STEP = 1e-6  #: fraction of the largest step, for steps that may be divided without a given smallest step
 
 
-@dataclass(frozen=True, eq=False)
-class Carry:
-    """The complete memory of an integrator between steps."""
-
-    state: State
-    u_dot: Array  #: accelerations, (n_u,)
-    a: Array  #: algorithmic accelerations, (n_u,); for h = 0 (at the start) the rates of u_dot
-    h: float  #: step size for which `a` holds; 0 at the start
-    w: Array  #: wrenches of the connections on their markers A, ground axes, (n_w,)
-    work: Array  #: work of point forces; energy dissipated by dampers and modal damping, (2,)
-    power: Array  #: their rates, (2,)
-    n_iterations: int = 0  #: of Newton's method so far
-    h_next: float = 0.0  #: desired size of the next step
-    n_steps: int = 0  #: accepted so far
-    n_rejected: int = 0  #: tried in vain so far
-    #: angles of `CompiledSystem.angles`, counted through full turns, (n_angles,) [rad]; empty: not counted
-    angle: Array = field(default_factory=lambda: np.zeros(0))
-    angle_rate: Array = field(default_factory=lambda: np.zeros(0))  #: their rates [rad/s]
-
-
 @dataclass(frozen=True)
 class Failure:
     """Reason of a failed step."""
@@ -73,29 +50,29 @@ class Failure:
 
 
 class Integrator(Protocol):
-    """A method with its parameters: a frozen dataclass of plain numbers, all memory in the carry."""
+    """A method with its parameters: a frozen dataclass of plain numbers, all that changes in the memory."""
 
-    def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
+    def start(self, system: System, t: float, state: State | None = None, before: Memory | None = None) -> Memory:
         """Return the memory at the beginning, from a consistent state.
 
         Counted angles, angles of couplers and states of user forces go on from those of a memory `before`.
         """
 
-    def after_jump(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
+    def after_jump(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
         """Return the memory after a jump of forces at t, and the results there.
 
         Positions and velocities are continuous.
         """
 
-    def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
+    def step(self, system: System, t: float, h: float, memory: Memory) -> Memory:
         """Return the memory one step of size h later; `ConvergenceError` if it fails."""
 
-    def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
-        """Return the results at the carried state, and store the power there in the carry."""
+    def observe(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
+        """Return the memory with the power at its state, and the results there."""
 
     def advance(
-        self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
-    ) -> tuple[Carry, Rows, int, Failure | None]:
+        self, system: System, memory: Memory, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
+    ) -> tuple[Memory, Rows, int, Failure | None]:
         """Advance by n_steps of size h, the first with the number `first` from t0, with a row after every `every`-th.
 
         Returns
@@ -106,24 +83,27 @@ class Integrator(Protocol):
         """
 
 
-def started_anew(method: Integrator, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
+def started_anew(method: Integrator, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
     """Return the memory of a motion that begins at t in the state of another memory, and the results there."""
-    fresh = method.start(system, t, state_of_file(compiled_system(system), carry.state), before=carry)
-    return method.observe(system, t, counted_on(fresh, carry), work)
+    fresh = method.start(system, t, state_of_file(compiled_system(system), memory.state), before=memory)
+    return method.observe(system, t, counted_on(fresh, memory), work)
 
 
-def counted_on(fresh: Carry, carry: Carry) -> Carry:
+def counted_on(fresh: Memory, memory: Memory) -> Memory:
     """Return the memory of a new start with work and counts of the previous one."""
-    return replace(
-        fresh, work=carry.work, n_iterations=carry.n_iterations, n_steps=carry.n_steps, n_rejected=carry.n_rejected,
+    return fresh.changed(
+        work=memory.work,
+        n_iterations=memory.n_iterations,
+        n_steps=memory.n_steps,
+        n_rejected=memory.n_rejected,
         h_next=0.0,
-    )  # fmt: skip
+    )
 
 
-def one_step_of(method: Integrator, system: System, t: float, h: float, carry: Carry) -> Carry:
+def one_step_of(method: Integrator, system: System, t: float, h: float, memory: Memory) -> Memory:
     """Return the memory one step of size h later, as computed by `advance`; `ConvergenceError` if it fails."""
     work = new_work(compiled_system(system).model)
-    after, _, _, failure = method.advance(system, carry, work, t0=t, h=h, first=0, n_steps=1, every=2)
+    after, _, _, failure = method.advance(system, memory, work, t0=t, h=h, first=0, n_steps=1, every=2)
     if failure is not None:
         words = f"the step of {h:g} from t = {t:g} failed: {failure.words}"
         raise ConvergenceError(words, t=t, h=h, residual=failure.residual)
@@ -133,7 +113,7 @@ def one_step_of(method: Integrator, system: System, t: float, h: float, carry: C
 def one_by_one(
     method: Integrator,
     system: System,
-    carry: Carry,
+    memory: Memory,
     work: Work,
     *,
     t0: float,
@@ -141,76 +121,28 @@ def one_by_one(
     first: int,
     n_steps: int,
     every: int,
-) -> tuple[Carry, list[Rows], int, Failure | None]:
+) -> tuple[Memory, list[Rows], int, Failure | None]:
     """Advance as `Integrator.advance`, step by step: memory, rows, number of good steps, reason of failure."""
     rows: list[Rows] = []
     for k in range(n_steps):
-        carry, row, n_good, failure = method.advance(
-            system, carry, work, t0=t0, h=h, first=first + k, n_steps=1, every=every
+        memory, row, n_good, failure = method.advance(
+            system, memory, work, t0=t0, h=h, first=first + k, n_steps=1, every=every
         )
         rows.append(row)
         if not n_good:
-            return carry, rows, k, failure
-    return carry, rows, n_steps, None
+            return memory, rows, k, failure
+    return memory, rows, n_steps, None
 
 
-def memory_of(carry: Carry) -> Memory:
-    """Return a copy of the memory that the kernels may overwrite; its algorithmic accelerations are u_dot."""
-    memory = memory_at(carry.state, carry.u_dot, carry.w, n_angles=len(carry.angle))
-    memory.angle[:], memory.angle_rate[:] = carry.angle, carry.angle_rate
-    memory.work_given[...], memory.work_taken[...] = carry.work
-    memory.power_given[...], memory.power_taken[...] = carry.power
-    memory.h[...], memory.h_wanted[...] = carry.h, carry.h_next
-    memory.n_accepted[...], memory.n_rejected[...] = carry.n_steps, carry.n_rejected
-    return memory
-
-
-def carry_of(memory: Memory, n_iterations: int) -> Carry:
-    """Return the memory as left by the kernels after a number of iterations of Newton's method."""
-    return Carry(
-        State(memory.r, memory.p, memory.q, memory.u),
-        memory.u_dot,
-        memory.a,
-        float(memory.h),
-        memory.w,
-        np.array([memory.work_given, memory.work_taken]),
-        np.array([memory.power_given, memory.power_taken]),
-        n_iterations,
-        float(memory.h_wanted),
-        int(memory.n_accepted),
-        int(memory.n_rejected),
-        memory.angle,
-        memory.angle_rate,
-    )
-
-
-def carry_of_past(work: Work, end: Carry, k: int) -> Carry:
-    """Return the memory after step k, from 0, of a call of `advance` that led to the memory `end`.
-
-    The working arrays have room for it, and had kept none before the call.
-    """
-    past, last = work.past, int(work.past.n) - 1
-    n_steps, n_rejected, n_iterations = (int(count) for count in past.counts[k])
-    return Carry(
-        State(past.r[k], past.p[k], past.q[k], past.u[k]),
-        past.u_dot[k].copy(),
-        past.a[k, : len(end.a)].copy(),
-        float(past.h[k]),
-        past.w[k].copy(),
-        past.work[k].copy(),
-        past.power[k].copy(),
-        end.n_iterations - int(past.counts[last, 2]) + n_iterations,
-        float(past.h_wanted[k]),
-        n_steps,
-        n_rejected,
-        past.angle[k].copy(),
-        past.angle_rate[k].copy(),
-    )
+def memory_of_past(work: Work, end: Memory, k: int) -> Memory:
+    """Return the memory after step k, from 0, of a call of `advance` that led to the memory `end`."""
+    memory = Memory._make(np.array(array[k]) for array in work.past.memory)
+    return memory._replace(a=memory.a[: len(end.a)])
 
 
 def with_angles(
-    system: System, t: float, carry: Carry, before: Carry | None = None, state: State | None = None
-) -> Carry:
+    system: System, t: float, memory: Memory, before: Memory | None = None, state: State | None = None
+) -> Memory:
     """Return the memory at the start of a motion with its angles counted.
 
     They go on from those of a memory before, else from the motions that prescribe them, from the state that a motion
@@ -224,40 +156,41 @@ def with_angles(
         start = np.array([angle if motion is None else motion(t) for angle, motion in pairs])
     else:
         start = before.angle
-    return turned_on(system, replace(carry, angle=start, angle_rate=np.zeros_like(start)), 0.0)
+    return turned_on(system, memory.changed(angle=start, angle_rate=np.zeros_like(start)), 0.0)
 
 
-def turned_on(system: System, carry: Carry, h: float) -> Carry:
+def turned_on(system: System, memory: Memory, h: float) -> Memory:
     """Return the memory with its angles advanced by a step of size h to its state; none if none are counted."""
     from floatframe.engine.kernels.entry import count_angles
 
-    if not len(carry.angle):
-        return carry
-    model = compiled_system(system).model
-    memory = memory_of(carry)
-    count_angles(model, new_work(model), memory, h)
-    return replace(carry, angle=memory.angle, angle_rate=memory.angle_rate)
+    if not len(memory.angle):
+        return memory
+    model, after = compiled_system(system).model, memory.copied()
+    count_angles(model, new_work(model), after, h)
+    return after
 
 
-def coasted(method: Integrator, system: System, t: float, size: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
+def coasted(
+    method: Integrator, system: System, t: float, size: float, memory: Memory, work: Work
+) -> tuple[Memory, Rows]:
     """Return the memory so shortly after t that a step would be only rounding, from its rates, and the results."""
     compiled = compiled_system(system)
-    state = displaced(compiled.model, carry.state, size * carry.state.u)
-    w, rows = carry.w.copy(), compiled.model.states.row
+    state = displaced(compiled.model, memory.state, size * memory.state.u)
+    w, rows = memory.w.copy(), compiled.model.states.row
     w[rows] += size * w[rows + 1]
-    state = replace(state, u=carry.state.u + size * carry.u_dot)
-    carry = replace(carry, state=state, w=w, work=carry.work + size * carry.power)
-    return method.observe(system, t + size, turned_on(system, carry, size), work)
+    state = replace(state, u=memory.state.u + size * memory.u_dot)
+    memory = memory.changed(state=state, w=w, work=memory.work + size * memory.power)
+    return method.observe(system, t + size, turned_on(system, memory, size), work)
 
 
 class FollowedRotations:
     """Counted rotations of bushings for a method with its own steps; they are set in the iterate."""
 
-    def __init__(self, model: Model, work: Work, t: float, carry: Carry) -> None:
+    def __init__(self, model: Model, work: Work, t: float, memory: Memory) -> None:
         """Begin with the state of a motion at time t."""
         self.angles, self.u0, self.state = model.angles, model.bodies.u0, work.state
         self.first = np.flatnonzero(model.angles.part == 0)
-        self.begin(t, carry.angle, carry.angle_rate)
+        self.begin(t, memory.angle, memory.angle_rate)
 
     def begin(self, t: float, angle: Array, rate: Array) -> None:
         """Set the rotations at time t, from which counting continues."""
@@ -294,21 +227,22 @@ class FollowedRotations:
         return np.zeros(3) if i < 0 else np.asarray(self.state.R[i] @ self.state.u[self.u0[i] + 3 : self.u0[i] + 6])
 
 
-def observed_unless_stopped(system: System, t: float, carry: Carry, work: Work) -> tuple[Array, Rows, Failure | None]:
-    """Return the same as `observed`, and the reason if an element ends the run at the carried state; otherwise None."""
+def observed_unless_stopped(
+    system: System, t: float, memory: Memory, work: Work
+) -> tuple[Memory, Rows, Failure | None]:
+    """Return the same as `observed`, and the reason if an element ends the run at the state; otherwise None."""
     work.counted.stopped[...] = 0
-    power, rows = observed(system, t, carry, work)
+    after, rows = observed(system, t, memory, work)
     stop = int(work.counted.stopped)
-    return power, rows, Failure(compiled_system(system).stop_words[stop - 1], 0.0) if stop else None
+    return after, rows, Failure(compiled_system(system).stop_words[stop - 1], 0.0) if stop else None
 
 
-def observed(system: System, t: float, carry: Carry, work: Work) -> tuple[Array, Rows]:
-    """Return the power, (2,), and the results at the carried state."""
+def observed(system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
+    """Return the memory with the power at its state, and the results there."""
     from floatframe.engine.kernels.entry import absolute_kernels
 
-    memory = memory_of(carry)
-    rows = absolute_kernels.observe(compiled_system(system).model, work, memory=memory, t=t)
-    return np.array([memory.power_given, memory.power_taken]), rows
+    after = memory.copied()
+    return after, absolute_kernels.observe(compiled_system(system).model, work, memory=after, t=t)
 
 
 def joined_rows(parts: Sequence[Rows]) -> Rows:
