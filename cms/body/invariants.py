@@ -11,12 +11,14 @@ from fe_models.foundation.arrays import Array, frozen, require_finite, require_s
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["INERTIA_TERMS", "Moments", "NodalSums", "known_P", "known_S_kl", "moments_from_gram"]
+__all__ = ["INERTIA_TERMS", "NEGATIVITY", "Moments", "NodalSums", "known_P", "known_S_kl", "moments_from_gram"]
 
 
 #: Terms that a reduced mass matrix alone does not determine: the symmetric part of P; the part of S_kl that is
 #: antisymmetric in a, b; and the part that is symmetric in a, b and traceless. The rest of P and S_kl is 2C and M*.
 INERTIA_TERMS = ("3C", "4C", "5C")
+#: key of the provenance: `Moments.negativity` of a model that has inertia without a distribution of its mass
+NEGATIVITY = "negativity of the moments"
 
 
 @frozen_copies
@@ -72,6 +74,22 @@ class Moments:
     def center_of_mass(self) -> Array:
         """Undeformed centre of mass in B, (3,) [m]."""
         return self.S / self.m
+
+    @cached_property
+    def negativity(self) -> float:
+        """Smallest eigenvalue of the Gram matrix about the centre of mass, divided by the largest, if negative; else 0.
+
+        The matrix is scaled to a unit diagonal. That of masses has no negative eigenvalue; an inertia without a
+        distribution of its mass has, such as that of bars without rotary inertia of bending.
+        """
+        L = np.eye(4 + 3 * self.n_q)
+        L[1:4, 0] = -self.center_of_mass
+        gram = L @ self.gram @ L.T
+        diagonal = np.abs(np.diag(gram))
+        size = np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
+        values = np.linalg.eigvalsh((gram + gram.T) / 2 / np.outer(size, size))
+        least = float(values[0] / np.abs(values).max())
+        return -least if least < -len(values) * np.finfo(float).eps else 0.0
 
     @cached_property
     def J0(self) -> Array:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cms.body.invariants import Moments, NodalSums, moments_from_gram
+from cms.body.invariants import NEGATIVITY, Moments, NodalSums, moments_from_gram
 from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.errors import BodyError, ModeSetError
 from cms.linear_algebra.solvers.tall import inner, rows_times
@@ -57,6 +57,7 @@ __all__ = ["assembled", "reduce"]
 log = logging.getLogger(__name__)
 
 FAR = 10.0  #: distance of the frame from the mesh origin over the radius of gyration, beyond which R loses two digits
+OF_MASSES = 1e-9  #: negativity of the moments up to which they are those of masses
 ROUNDING = 1e3 * np.finfo(float).eps  #: of a second moment about the mesh origin, relative
 SHAPES_AT_ONCE = 64  #: number of shapes whose displacements of all nodes are held at a time
 
@@ -146,11 +147,13 @@ def reduce(
     kept = kept_nodes(keeping)
     axes, origin = condition.frame.axes, condition.frame.origin
     moments = reduced_moments(body, finished.Phi, condition.frame)
-    told = left_out if states is None else chosen_words(body, states.names)
+    told = {"geometric stiffness": left_out if states is None else chosen_words(body, states.names)}
+    if moments.is_exact and moments.negativity > OF_MASSES:
+        told[NEGATIVITY] = f"{moments.negativity:.3g}"
     reduced = assembled(keeping, modes, finished, condition, kept=kept, moments=moments, damping=damping)
     return replace(
         reduced,
-        provenance={**reduced.provenance, **({"geometric stiffness": told} if told else {})},
+        provenance={**reduced.provenance, **{key: words for key, words in told.items() if words}},
         recovery=recovery_of_model(source, in_memory(finished.Phi), condition, reduced, recovery) if recovery else {},
         stress=nodal_stress_modes(body, finished.Phi, kept, axes) if stress else None,
         point_stress=point_stress_modes(body, finished.Phi, origin, axes) if stress else None,

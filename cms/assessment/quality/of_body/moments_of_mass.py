@@ -8,14 +8,15 @@ sum and centre have moments of about the same direction, unless these are small.
 import numpy as np
 
 from cms.assessment.quality.of_body.identities import body_length
-from cms.assessment.quality.of_body.symmetry import negativity
 from cms.assessment.quality.record import QualityRecord, information, judge
+from cms.body.invariants import NEGATIVITY
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 
 __all__ = ["check_gram", "check_moments_of_shapes"]
 
 ROUNDING = 1e3 * np.finfo(float).eps  #: of the Gram matrix about the origin of B, relative
+ALIKE = 10.0  #: negativity of a body in another frame, or of some of its shapes, relative to that of the model
 LEAST_NODES = 60  #: smallest number of nodes that can represent the mass of a body
 EVEN = 0.3  #: weight of equal masses beside the second moment
 CLEAR = 0.1  #: smallest moment whose direction is judged, relative to the largest that the mass could have
@@ -26,15 +27,17 @@ def check_gram(reduced: ReducedBody) -> QualityRecord:
     moments = reduced.moments
     if moments.missing or not moments.is_exact:
         return information("gram", "the moments are not all known, or approximate")
-    n, c = moments.n_q, moments.center_of_mass
-    L = np.eye(4 + 3 * n)
-    L[1:4, 0] = -c
-    gram = L @ moments.gram @ L.T
-    size = np.sqrt(np.abs(np.diag(gram)))
+    c, second = moments.center_of_mass, np.diag(moments.R) - moments.S**2 / moments.m
     far = float(np.linalg.norm(c) + np.linalg.norm(reduced.frame.origin))  # integrals about the mesh origin lose digits
-    offset = far / float(size[1:4].max() / size[0]) if size[1:4].max() > 0 else 0.0
-    value = negativity(gram)
+    offset = far / float(np.sqrt(second.max() / moments.m)) if second.max() > 0 else 0.0
+    value = moments.negativity
     value = 0.0 if value < ROUNDING * (1 + offset**2) else value
+    if 0 < value <= ALIKE * float(reduced.provenance.get(NEGATIVITY, 0.0)):
+        return information(
+            "gram",
+            f"the model has inertia that no distribution of its mass has, such as that of bars without rotary inertia "
+            f"({-value:.1e}): without the model its moments are not judged against each other",
+        )
     reason = (
         f"some combination of positions and shapes would have a negative integral of its square ({-value:.1e})"
         if value > 0
