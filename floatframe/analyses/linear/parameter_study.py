@@ -257,7 +257,7 @@ def undecided(like: Array, shapes: Array, last: Array, values: Array) -> Array:
     return np.asarray(exchange.any(axis=1))
 
 
-def differ(eigenvalues: Array, others: Array) -> Array:
+def differ(eigenvalues: Array, others: Array) -> np.ndarray:
     """Return whether eigenvalues are not equal to others within their accuracy, (n, n_others)."""
     size = np.abs(eigenvalues)[:, None] + np.abs(others)
     return np.asarray(np.abs(eigenvalues[:, None] - others) > SAME * size + ROUNDING * size.max(initial=0.0))
