@@ -23,17 +23,13 @@ q_k sym(2 X_k + S_kl q_l).
 from dataclasses import dataclass
 
 import numpy as np
+from numpy import cross
 
 from floatframe.design.generation.graph import Graph, Terms, terms
 from floatframe.design.generation.modes import ElasticMarker, Modes
 from floatframe.design.generation.rotation_series import rotation_matrix
 
-__all__ = ["MarkerPlace", "MarkerRates", "ModalForces", "ModalMoments", "axial", "cross"]
-
-
-def cross(a: Terms, b: Terms) -> Terms:
-    """Return the cross product a × b."""
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]], dtype=object)
+__all__ = ["MarkerPlace", "MarkerRates", "ModalForces", "ModalMoments"]
 
 
 def axial(A: Terms) -> Terms:

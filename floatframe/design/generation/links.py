@@ -20,6 +20,7 @@ from floatframe.design.generation.modes import ElasticMarker, Modes, elastic_mar
 from floatframe.design.identification.inertial_parameters import INERTIAL, parameters_of
 from floatframe.engine.tree.recursion.expansion import Expansion, marker_shape
 from floatframe.errors import ModelError
+from floatframe.model.bodies.added_mass import second_moments
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.bodies.marker_shape import MarkerShape, interface_shape
 from floatframe.model.bodies.rigid_body import RigidBody
@@ -144,15 +145,6 @@ def chosen(patterns: Sequence[str], values: dict[str, float]) -> tuple[str, ...]
     return tuple(name for name in values if name in wanted)
 
 
-def second_moment(J: Any) -> Any:
-    """Return the integral of c cᵀ for an inertia tensor, (3, 3), of numbers or terms."""
-    half = 0.5 * (J[0, 0] + J[1, 1] + J[2, 2])
-    P = -J
-    for k in range(3):
-        P[k, k] = half - J[k, k]
-    return P
-
-
 def tree_terms(expansion: Expansion, parameters: Sequence[str] = ()) -> TreeTerms:
     """Return a tree of bodies as terms, with selected parameters as symbols.
 
@@ -234,17 +226,15 @@ def link_of(
     """Return node k as terms; symbols, values: of parameters by name, length: the largest of the tree."""
     nodes, body = expansion.nodes, int(expansion.nodes.body[k])
     mass, s, P = graph.zero, terms(graph, np.zeros(3)), terms(graph, np.zeros((3, 3)))
-    if body >= 0 and nodes.n_q[k]:
-        mass, s, P = undeformed_moments(graph, expansion, body, length)
-    elif body >= 0:
+    if body >= 0:
         own = [f"{expansion.system.bodies[body].name}/{each}" for each in INERTIAL]
         if any(name in symbols for name in own):
             phi = terms(graph, [symbols.get(name, values[name]) for name in own])
             mass, s, P = moments_in_node(phi, *(terms(graph, each) for each in frame_in_body(expansion, body, length)))
         else:
-            J, size = nodes.J[k], max(float(np.abs(nodes.s[k]).max()), float(nodes.mass[k]) * length)
+            size = max(float(np.abs(nodes.s[k]).max()), float(nodes.mass[k]) * length)
             mass, s = graph.constant(float(nodes.mass[k])), terms(graph, without_rounding(nodes.s[k], size))
-            P = terms(graph, without_rounding(second_moment(J), float(np.abs(J).max())))
+            P = terms(graph, without_rounding(nodes.P[k], float(np.abs(nodes.J[k]).max())))
     return Link(
         **elastic_parts(graph, expansion, k, length),
         parent=int(nodes.parent[k]),
@@ -260,20 +250,6 @@ def link_of(
         s=s,
         P=P,
     )
-
-
-def undeformed_moments(graph: Graph, expansion: Expansion, i: int, length: float) -> tuple[Scalar, Terms, Terms]:
-    """Return mass, first and second moment of the undeformed flexible body i in its node frame."""
-    types, t = expansion.compiled.model.body_types, int(expansion.compiled.model.bodies.kind[i])
-    F, c = frame_in_body(expansion, i, length)
-    m, S, P = float(types.mass[t]), types.S[t], second_moment(types.J0[t])
-    s = S - m * c
-    P = F.T @ (P - np.outer(S, c) - np.outer(c, s)) @ F
-    size = max(float(np.abs(S).max()), m * length)
-    return (
-        graph.constant(m), terms(graph, without_rounding(F.T @ s, size)),
-        terms(graph, without_rounding(0.5 * (P + P.T), float(np.abs(P).max()))),
-    )  # fmt: skip
 
 
 def elastic_parts(graph: Graph, expansion: Expansion, k: int, length: float) -> dict[str, Any]:
@@ -309,7 +285,7 @@ def moments_in_node(phi: Terms, F: Terms, c: Terms) -> tuple[Scalar, Terms, Term
     """Return mass, first and second moment in a node with axes F at c, from the parameters of the body, (10,)."""
     m, S = phi[0], phi[1:4]
     xx, xy, xz, yy, yz, zz = phi[4:]
-    P = second_moment(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], dtype=object))
+    P = second_moments(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], dtype=object))
     s = S - m * c
     moved = np.empty((3, 3), dtype=object)
     for i in range(3):

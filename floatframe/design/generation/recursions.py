@@ -15,8 +15,9 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+from numpy import cross
 
-from floatframe.design.generation.elastic import MarkerPlace, MarkerRates, ModalForces, ModalMoments, cross
+from floatframe.design.generation.elastic import MarkerPlace, MarkerRates, ModalForces, ModalMoments
 from floatframe.design.generation.graph import Scalar, Terms, terms
 from floatframe.design.generation.links import Link, TreeTerms
 from floatframe.design.generation.tracing import Traced
@@ -224,20 +225,25 @@ def mass_matrix(recursion: Recursion) -> Terms:
         link, body, modes, rows = links[k], bodies[k], links[k].modes, []
         for row in range(link.v0, link.v0 + link.n_z):
             work = recursion.moved_by(row, k)
-            rows.append((row, body.wrench(work.acc[k], work.alpha[k])))
+            rows.append((row, wrench(body.m, body.s, body.P, work.acc[k], work.alpha[k])))
         held = range(0)
         if modes is not None:
             held = range(modes.v0, modes.v0 + modes.n)
             M[modes.rates, modes.rates], wrenches = body.modal_block(recursion.places.get(2 * k + 1))
             rows += zip(held, wrenches, strict=True)
-        for row, wrench in rows:
-            force = recursion.forces_of(k, wrench)
+        for row, needed in rows:
+            force = recursion.forces_of(k, needed)
             for column in range(n):
                 if column not in held and M[row, column].is_constant(0.0):
                     M[row, column] = M[column, row] = force[column]
         if link.parent >= 0:
             bodies[link.parent].carry(recursion, k, body)
     return M
+
+
+def wrench(m: Scalar, s: Terms, P: Terms, v: Terms, w: Terms) -> tuple[Terms, Terms]:
+    """Return the wrench of an acceleration of moments m, s, P."""
+    return m * v + cross(w, s), cross(s, v) + (P[0, 0] + P[1, 1] + P[2, 2]) * w - P @ w
 
 
 class Composite:
@@ -250,12 +256,6 @@ class Composite:
             self.H = modes.M  #: by modes, the frame held, (n, n)
             self.f, self.t = recursion.moments[k].first, recursion.moments[k].B  #: wrench by each, (n, 3)
 
-    def wrench(self, v: Terms, w: Terms) -> tuple[Terms, Terms]:
-        """Return the wrench of an acceleration."""
-        P = self.P
-        t = cross(self.s, v) + (P[0, 0] + P[1, 1] + P[2, 2]) * w - P @ w
-        return self.m * v + cross(w, self.s), t
-
     def modal_block(self, own: MarkerPlace | None) -> tuple[Terms, list[tuple[Terms, Terms]]]:
         """Return the modal mass matrix with the joint fixed at the marker, and the wrench of each mode."""
         if own is None:
@@ -264,7 +264,7 @@ class Composite:
         back = [(cross(w, own.d) - v, -w) for v, w in zip(shift, turn, strict=True)]
         wrenches = []
         for (v, w), f, t in zip(back, self.f, self.t, strict=True):
-            f_own, t_own = self.wrench(v, w)
+            f_own, t_own = wrench(self.m, self.s, self.P, v, w)
             wrenches.append((f + f_own, t + t_own))
         H = self.H.copy()
         for i, (f, t) in enumerate(wrenches):
@@ -288,10 +288,9 @@ class Composite:
     def carry_on_modes(self, place: MarkerPlace, m: Scalar, s: Terms, P: Terms) -> None:
         """Add the contribution of a subtree at a marker to the modes, with moments about the marker."""
         columns = list(zip(*place.columns(), strict=True))
-        trace = P[0, 0] + P[1, 1] + P[2, 2]
         H, f_modes, t_modes = self.H.copy(), self.f.copy(), self.t.copy()
         for i, (v, w) in enumerate(columns):
-            f, t = m * v + cross(w, s), cross(s, v) + trace * w - P @ w
+            f, t = wrench(m, s, P, v, w)
             f_modes[i], t_modes[i] = f_modes[i] + f, t_modes[i] + t + cross(place.rho, f)
             for j, (v_j, w_j) in enumerate(columns[: i + 1]):
                 H[i, j] = H[j, i] = H[i, j] + v_j @ f + w_j @ t

@@ -4,9 +4,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy import cross
 
 from fe_models.foundation.arrays import Array
-from floatframe.design.generation.elastic import MarkerPlace, MarkerRates, cross
+from floatframe.design.generation.elastic import MarkerPlace, MarkerRates
 from floatframe.design.generation.graph import (
     ADD,
     CONSTANT,

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
-from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.arrays import Array, IntArray, tilde
 from fe_models.foundation.words import nearest, quoted
 from floatframe.design.identification.inertial_parameters import INERTIAL, inertia_columns, parameters_of
 from floatframe.design.identification.tree_samples import (
@@ -357,20 +357,15 @@ def linear_form(system: System, terms: Sequence[str] = (), *, independent: Seque
 def body_wrenches(samples: TreeSamples) -> Array:
     """Return the wrench on each body about its origin, ground axes, by its parameters, (n, n_b, 6, 10)."""
     n, n_b = samples.r.shape[:2]
-    omega, alpha = tildes(samples.omega), tildes(samples.alpha)
+    omega, alpha = tilde(samples.omega), tilde(samples.alpha)
     A = np.zeros((n, n_b, 6, 10))
     A[..., :3, 0] = samples.a
     A[..., :3, 1:4] = alpha + omega @ omega
-    A[..., 3:, 1:4] = -tildes(samples.a)
+    A[..., 3:, 1:4] = -tilde(samples.a)
     A[..., 3:, 4:] = inertia_columns(samples.alpha) + omega @ inertia_columns(samples.omega)
     A[..., :3, :] = samples.R @ A[..., :3, :]
     A[..., 3:, :] = samples.R @ A[..., 3:, :]
     return A
-
-
-def tildes(x: Array) -> Array:
-    """Return the matrices of cross products, (..., 3, 3)."""
-    return np.cross(x[..., None, :], np.eye(3)).swapaxes(-1, -2)
 
 
 def torque_rows(form: LinearForm, samples: TreeSamples) -> Array:
@@ -411,5 +406,5 @@ def reaction_rows(form: LinearForm, samples: TreeSamples, point: Array) -> Array
     for i in range(n_b):
         at = slice(10 * i, 10 * i + 10)
         Y[:, :3, at] = A[:, i, :3]
-        Y[:, 3:, at] = A[:, i, 3:] + tildes(samples.r[:, i] - point) @ A[:, i, :3]
+        Y[:, 3:, at] = A[:, i, 3:] + tilde(samples.r[:, i] - point) @ A[:, i, :3]
     return Y

@@ -11,6 +11,7 @@ rod = with_masses(rod, [AddedMass("small_end", 0.3), AddedMass("big_end", 0.5, o
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import array_of_shape, number
 
-__all__ = ["AddedMass", "with_masses"]
+__all__ = ["AddedMass", "second_moments", "with_masses"]
 
 
 @frozen_copies
@@ -60,9 +61,9 @@ class AddedMass:
         return self.mass / 6, self.offset + np.concatenate([arms.T, -arms.T])
 
 
-def second_moments(J: Array) -> Array:
-    """Return ∫ x xᵀ = tr(J)/2 1 - J of an inertia tensor J, (3, 3)."""
-    return np.asarray(0.5 * np.trace(J) * np.eye(3) - J)
+def second_moments(J: Any) -> Any:
+    """Return ∫ x xᵀ = tr(J)/2 1 - J of an inertia tensor J, (3, 3), of numbers or terms."""
+    return 0.5 * np.trace(J) * np.eye(3) - J
 
 
 def with_masses(body: ReducedBody, masses: Sequence[AddedMass]) -> ReducedBody:

@@ -19,6 +19,7 @@ from floatframe.engine.tree.charts import SIDE_A
 from floatframe.engine.tree.kernels.tree import Tree
 from floatframe.engine.tree.recursion.nodes import FIXED, NO_MARKER, ROTATION, SCREW, TRANSLATION, Nodes
 from floatframe.engine.tree.topology import SystemTree, tree_of
+from floatframe.model.bodies.added_mass import second_moments
 from floatframe.model.bodies.marker_shape import MarkerShape
 from floatframe.model.joints import FixedJoint, SphericalJoint, UniversalJoint
 from floatframe.model.joints.axis_frame import axis_in_b, normals_of, turning_frame
@@ -277,22 +278,15 @@ def zero_rotation_of(system: System, compiled: CompiledSystem, tree: Tree, i: in
 
 
 def carried(model: Model, i: int, F: Array, origin: Array) -> dict:
-    """Return the data of a node for the body that it carries: moments of a rigid one in its own frame."""
+    """Return the data of a node for the body that it carries: moments of the undeformed one, F at its origin."""
     bodies, types = model.bodies, model.body_types
-    numbers = {"body": i, "q0": int(bodies.q0[i]), "u0": int(bodies.u0[i])}
-    if is_flexible(model, i):
-        return numbers | {"F": F}
     t = int(bodies.kind[i])
-    m, S, J0 = float(types.mass[t]), types.S[t], types.J0[t]
-    moved = J0 - about(S, origin) - about(origin, S) + m * about(origin, origin)
-    J = F.T @ moved @ F
-    P = 0.5 * np.trace(J) * np.eye(3) - J
-    return numbers | {"F": F, "mass": m, "s": F.T @ (S - m * origin), "J": J, "P": P}
-
-
-def about(a: Array, b: Array) -> Array:
-    """Return a·b 1 - a bᵀ, (3, 3)."""
-    return np.asarray((a @ b) * np.eye(3) - np.outer(a, b))
+    m, S = float(types.mass[t]), types.S[t]
+    s = S - m * origin
+    P = F.T @ (second_moments(types.J0[t]) - np.outer(S, origin) - np.outer(origin, s)) @ F
+    P = 0.5 * (P + P.T)
+    moments = {"mass": m, "s": F.T @ s, "J": np.trace(P) * np.eye(3) - P, "P": P}
+    return {"body": i, "q0": int(bodies.q0[i]), "u0": int(bodies.u0[i]), "F": F} | moments
 
 
 # positions of joints from the poses of bodies, and bodies from those of nodes (docs/recursive.md §1) ------------------

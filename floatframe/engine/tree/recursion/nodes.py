@@ -60,7 +60,7 @@ class Nodes(NamedTuple):
     above: IntArray = integer(n_n)  #: flexible parent: marker that carries the joint there, else -1
     own: IntArray = integer(n_n)  #: flexible body: its marker at the joint, else -1
     F: Array = real(n_n, 3, 3)  #: flexible body: outer frame of the joint in axes of the undeformed body
-    mass: Array = real(n_n, unit="kg")  #: of a rigid body, frame of the node
+    mass: Array = real(n_n, unit="kg")  #: of the undeformed body, outer frame of the joint
     s: Array = real(n_n, 3, unit="kg m")  #: first moment
     J: Array = real(n_n, 3, 3, unit="kg m²")  #: inertia about the origin
     P: Array = real(n_n, 3, 3, unit="kg m²")  #: second moment about the origin, the integral of c cᵀ over mass
