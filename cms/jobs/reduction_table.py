@@ -1,7 +1,7 @@
 """The table [reduction] of a job: the mode set, its options, and the body frame (docs/job_file.md)."""
 
 import inspect
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -61,12 +61,17 @@ Rows = tuple[tuple[float, ...], ...]
 
 def components(value: Any) -> tuple[str, ...]:
     """Return one component or a list of components of an interface."""
+    return each_once(value, MOTION_COMPONENTS, "a list of components", "component")
+
+
+def each_once(value: Any, choices: Collection[str], wanted: str, kind: str) -> tuple[str, ...]:
+    """Return one of the choices or a list of them, each once."""
     words = [value] if isinstance(value, str) else value
     if not isinstance(words, list | tuple) or not words or len(set(map(str, words))) < len(words):
-        raise ValueError(f"expected a list of components, each once, of {', '.join(MOTION_COMPONENTS)}")
+        raise ValueError(f"expected {wanted}, each once, of {', '.join(choices)}")
     for word in words:
-        if word not in MOTION_COMPONENTS:
-            raise ValueError(f"unknown component {quoted(word)}{nearest(str(word), MOTION_COMPONENTS)}")
+        if word not in choices:
+            raise ValueError(f"unknown {kind} {quoted(word)}{nearest(str(word), choices)}")
     return tuple(words)
 
 
@@ -114,13 +119,7 @@ def places(value: Any) -> tuple[str, ...]:
 
 def extras(value: Any) -> tuple[str, ...]:
     """Return one kind of extra columns, or a list of kinds."""
-    words = [value] if isinstance(value, str) else value
-    if not isinstance(words, list | tuple) or not words or len(set(map(str, words))) < len(words):
-        raise ValueError(f"expected a list, each once, of {', '.join(EXTRA_COLUMNS)}")
-    for word in words:
-        if word not in EXTRA_COLUMNS:
-            raise ValueError(f"unknown extra columns {quoted(word)}{nearest(str(word), EXTRA_COLUMNS)}")
-    return tuple(words)
+    return each_once(value, EXTRA_COLUMNS, "a list", "extra columns")
 
 
 def workers_key(value: Any) -> int | str:

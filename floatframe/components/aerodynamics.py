@@ -14,7 +14,7 @@ from floatframe.model.checked_values import array_of_shape, number
 from floatframe.model.elements import Element, ElementLaw, Placed
 from floatframe.model.elements.curves import function_at, function_numbers
 from floatframe.model.elements.smooth import atan2
-from floatframe.model.elements.unit_names import in_units
+from floatframe.model.elements.unit_names import outputs_in
 from floatframe.model.functions.time_functions import TimeFunction, constant
 
 __all__ = ["ELEMENTS", "LiftingSurface"]
@@ -83,8 +83,7 @@ class LiftingSurface(Element):
         return ElementLaw(
             function=lifting_surface_law,
             data=[*data, self.induced_drag, *self.wind, *factor, *zero_lift],
-            outputs=[name for name, _ in OUTPUTS],
-            output_units=in_units(placed.units, [unit for _, unit in OUTPUTS]),
+            **outputs_in(placed.units, OUTPUTS),
             tangent="complex",
             acts=("force",),
             power_lost="power lost",

@@ -27,7 +27,7 @@ from floatframe.model.bodies.markers import Marker
 from floatframe.model.checked_values import array_of_shape, number, unit_vector
 from floatframe.model.elements import Element, ElementLaw, Placed
 from floatframe.model.elements.pairs import axial_motion, direction_of, inner_product, vector_product
-from floatframe.model.elements.unit_names import in_units
+from floatframe.model.elements.unit_names import outputs_in
 
 __all__ = ["ELEMENTS", "Bearing"]
 
@@ -130,8 +130,7 @@ class Bearing(Element):
         return ElementLaw(
             function=bearing_law,
             data=[*self.coefficients, *self.x_axis, *y_axis, *self.axis, *self.shaft_axis],
-            outputs=tuple(OUTPUTS),
-            output_units=in_units(placed.units, list(OUTPUTS.values())),
+            **outputs_in(placed.units, OUTPUTS),
             tangent="complex",
             acts=("wrench", "wrench" if self.resists_tilt else "force"),
             is_opposite=True,

@@ -18,7 +18,7 @@ from floatframe.model.bodies.markers import Marker
 from floatframe.model.checked_values import number
 from floatframe.model.elements import Element, ElementLaw, Placed
 from floatframe.model.elements.pairs import line_between
-from floatframe.model.elements.unit_names import in_units
+from floatframe.model.elements.unit_names import outputs_in
 from floatframe.model.shapes.drawn import Stretched
 
 __all__ = ["ELEMENTS", "Cable"]
@@ -84,8 +84,7 @@ class Cable(Element):
         return ElementLaw(
             function=cable_law,
             data=[self.stiffness, self.damping, length],
-            outputs=[name for name, _ in outputs],
-            output_units=in_units(placed.units, [unit for _, unit in outputs]),
+            **outputs_in(placed.units, outputs),
             tangent="complex",
             acts=("force",) * len(self.points),
             is_opposite=len(self.points) == 2,

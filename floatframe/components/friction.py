@@ -24,7 +24,7 @@ from floatframe.model.checked_values import number, unit_vector
 from floatframe.model.elements import Element, ElementLaw, Placed
 from floatframe.model.elements.pairs import add_axial_force, add_torque, axial_motion, direction_of, turning_speed
 from floatframe.model.elements.smooth import absolute
-from floatframe.model.elements.unit_names import in_units
+from floatframe.model.elements.unit_names import in_units, outputs_in
 
 __all__ = ["ELEMENTS", "BristleFriction"]
 
@@ -106,8 +106,7 @@ class BristleFriction(Element):
             start=[start],
             state_units=in_units(placed.units, [length]),
             state_sizes=[self.static / self.stiffness],
-            outputs=[name for name, _ in outputs],
-            output_units=in_units(placed.units, [unit for _, unit in outputs]),
+            **outputs_in(placed.units, outputs),
             tangent="complex",
             acts=("moment", "moment") if self.motion == "about" else ("wrench", "force"),
             energy="energy",

@@ -29,7 +29,7 @@ from floatframe.model.elements.pairs import (
     direction_of,
     turning_speed,
 )
-from floatframe.model.elements.unit_names import in_units
+from floatframe.model.elements.unit_names import outputs_in
 
 __all__ = ["Backlash", "BallWithPlay"]
 
@@ -73,8 +73,7 @@ class BallWithPlay(Element):
         return ElementLaw(
             function=ball_law,
             data=[*contact_numbers(self), self.play],
-            outputs=tuple(OUTPUTS),
-            output_units=in_units(placed.units, list(OUTPUTS.values())),
+            **outputs_in(placed.units, OUTPUTS),
             tangent="complex",
             acts=("wrench", "wrench"),
             is_opposite=True,
@@ -144,8 +143,7 @@ class Backlash(Element):
         return ElementLaw(
             function=backlash_law,
             data=data,
-            outputs=tuple(outputs),
-            output_units=in_units(placed.units, list(outputs.values())),
+            **outputs_in(placed.units, outputs),
             tangent="complex",
             acts=("moment", "moment") if self.motion == "about" else ("wrench", "force"),
             energy="energy",

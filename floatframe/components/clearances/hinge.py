@@ -38,7 +38,7 @@ from floatframe.model.elements.pairs import (
     turning_speed,
 )
 from floatframe.model.elements.smooth import absolute
-from floatframe.model.elements.unit_names import in_units
+from floatframe.model.elements.unit_names import outputs_in
 
 __all__ = ["HingeWithPlay"]
 
@@ -115,8 +115,7 @@ class HingeWithPlay(Element):
         return ElementLaw(
             function=hinge_law,
             data=data,
-            outputs=tuple(OUTPUTS),
-            output_units=in_units(placed.units, list(OUTPUTS.values())),
+            **outputs_in(placed.units, OUTPUTS),
             tangent="complex",
             acts=("wrench", "wrench"),
             is_opposite=True,

@@ -17,7 +17,7 @@ from floatframe.model.elements import Element, ElementLaw, Placed
 from floatframe.model.elements.curves import function_at, function_numbers
 from floatframe.model.elements.pairs import add_torque, direction_of, turning_speed
 from floatframe.model.elements.smooth import larger, smaller
-from floatframe.model.elements.unit_names import in_units
+from floatframe.model.elements.unit_names import in_units, outputs_in
 from floatframe.model.functions.time_functions import TimeFunction
 
 __all__ = ["AntiSkidBrake"]
@@ -110,8 +110,7 @@ class AntiSkidBrake(Element):
             start=start,
             state_units=in_units(placed.units, ["rad/s", "m/s", "Pa", "Pa"]),
             state_sizes=[self.drop_out / self.radius, self.drop_out, size, size],
-            outputs=[name for name, _ in OUTPUTS],
-            output_units=in_units(placed.units, [unit for _, unit in OUTPUTS]),
+            **outputs_in(placed.units, OUTPUTS),
             tangent="complex",
             acts=("moment", "moment"),
             power_lost="power lost",

@@ -28,7 +28,7 @@ from floatframe.model.checked_values import array_of_shape
 from floatframe.model.elements import Element, ElementLaw, Placed
 from floatframe.model.elements.curves import function_at, function_integral_at, function_numbers
 from floatframe.model.elements.pairs import add_torque, direction_of, turning_speed
-from floatframe.model.elements.unit_names import in_units
+from floatframe.model.elements.unit_names import outputs_in
 from floatframe.model.functions.time_functions import TimeFunction
 
 __all__ = ["InductionMotor"]
@@ -138,8 +138,7 @@ class InductionMotor(Element):
             states=STATES,
             start=self.fluxes,
             state_units=["V s"] * 4,
-            outputs=[name for name, _ in OUTPUTS],
-            output_units=in_units(placed.units, [unit for _, unit in OUTPUTS]),
+            **outputs_in(placed.units, OUTPUTS),
             tangent="complex",
             acts=("moment", "moment"),
             energy="energy",

@@ -12,7 +12,7 @@ from floatframe.model.bodies.markers import Marker
 from floatframe.model.elements import Element, ElementLaw, Placed
 from floatframe.model.elements.curves import function_at, function_numbers
 from floatframe.model.elements.pairs import add_torque, direction_of, turning_speed
-from floatframe.model.elements.unit_names import in_units
+from floatframe.model.elements.unit_names import in_units, outputs_in
 from floatframe.model.functions.time_functions import TimeFunction
 
 __all__ = ["SpeedControl"]
@@ -62,8 +62,7 @@ class SpeedControl(Element):
             states=["filtered speed"] if has_state else [],
             start=[self.speed] if has_state else [],
             state_units=in_units(placed.units, ["rad/s"] if has_state else []),
-            outputs=[name for name, _ in outputs],
-            output_units=in_units(placed.units, [unit for _, unit in outputs]),
+            **outputs_in(placed.units, outputs),
             tangent="complex",
             acts=("moment", "moment"),
             power_in="power in",

@@ -60,7 +60,7 @@ from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.elements import Element, ElementLaw, GapSpring, Placed
 from floatframe.model.elements.curves import function_numbers
-from floatframe.model.elements.unit_names import in_units
+from floatframe.model.elements.unit_names import in_units, outputs_in
 from floatframe.model.functions.time_functions import TimeFunction
 from floatframe.model.shapes.drawn import Stretched
 
@@ -363,8 +363,7 @@ def written(made: Builder, placed: Placed, acts: list[str]) -> ElementLaw:
         states=[name for name, _, _ in states],
         start=list(start),
         state_units=in_units(placed.units, [unit for _, unit, _ in states]),
-        outputs=[name for name, _ in outputs],
-        output_units=in_units(placed.units, [unit for _, unit in outputs]),
+        **outputs_in(placed.units, outputs),
         tangent="complex",
         rest=circuit_rest,
         acts=acts,

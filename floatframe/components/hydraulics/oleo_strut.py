@@ -18,7 +18,7 @@ from floatframe.model.bodies.markers import Marker
 from floatframe.model.checked_values import number, unit_vector
 from floatframe.model.elements import Element, ElementLaw, GapSpring, Placed
 from floatframe.model.elements.curves import function_numbers
-from floatframe.model.elements.unit_names import in_units
+from floatframe.model.elements.unit_names import in_units, outputs_in
 from floatframe.model.functions.time_functions import NOT_OF_TIME, TimeFunction, constant
 from floatframe.model.shapes.drawn import Stretched
 
@@ -176,8 +176,7 @@ class OleoStrut(Element):
             states=["oil pressure"] if start else [],
             start=start,
             state_units=in_units(placed.units, ["Pa"] if start else []),
-            outputs=[name for name, _ in OUTPUTS],
-            output_units=in_units(placed.units, [unit for _, unit in OUTPUTS]),
+            **outputs_in(placed.units, OUTPUTS),
             tangent="complex",
             energy="energy",
             power_lost="power lost",

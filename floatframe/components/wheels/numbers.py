@@ -11,7 +11,7 @@ from floatframe.components.wheels.roads.road import Road
 from floatframe.components.wheels.roads.surface import FLAT
 from floatframe.errors import ModelError
 from floatframe.model.elements import ElementLaw, Placed
-from floatframe.model.elements.unit_names import in_units
+from floatframe.model.elements.unit_names import in_units, outputs_in
 
 __all__ = ["tyre_law", "tyre_numbers"]
 
@@ -76,8 +76,7 @@ def tyre_law(
         start=(0.0,) * len(states),
         state_units=in_units(placed.units, ["m"] * len(states)),
         state_sizes=(TREAD * float(data[RADIUS]),) * len(states),
-        outputs=tuple(OUTPUTS),
-        output_units=in_units(placed.units, list(OUTPUTS.values())),
+        **outputs_in(placed.units, OUTPUTS),
         energy="energy",
         power_lost="power_lost",
         stops={} if data[int(data[ROAD])] == FLAT else {"off_road": "the wheel is beyond the end of its road"},

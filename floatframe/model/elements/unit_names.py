@@ -1,10 +1,11 @@
 """Units of the outputs of elements, converted from SI names to the units of a system."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from fe_models.foundation.units import Dimensions, Units, unit_words
 
-__all__ = ["in_units"]
+__all__ = ["in_units", "outputs_in"]
 
 DIMENSIONS = {
     "m": Dimensions(0, 1, 0),
@@ -33,6 +34,12 @@ def in_units(units: Units, names: Sequence[str]) -> list[str]:
     if units.name == SI:
         return list(names)
     return [in_unit(units, name) for name in names]
+
+
+def outputs_in(units: Units, outputs: Mapping[str, str] | Iterable[tuple[str, str]]) -> dict[str, Any]:
+    """Return `outputs` and `output_units` of a law, from SI unit names by output."""
+    found = dict(outputs)
+    return {"outputs": tuple(found), "output_units": in_units(units, list(found.values()))}
 
 
 def in_unit(units: Units, name: str) -> str:
