@@ -15,6 +15,7 @@ Records that Python hands to kernels are `tabled`: `model.table` holds addresses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import prod
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -37,6 +38,9 @@ __all__ = [
 ]
 
 Record = TypeVar("Record", bound=NamedTuple)
+
+WORD = 8  #: bytes of a number of any type
+LINE = 8  #: numbers of a cache line, at whose beginning every array begins
 
 
 class Tabled:
@@ -118,14 +122,41 @@ def stacked(declaration: Record, size: Size) -> Record:
 
 
 def zeros(declaration: Record, sizes: Mapping[str, int]) -> Record:
-    """Return the arrays of a record, all zero."""
-    made: list[Any] = []
+    """Return the arrays of a record, all zero, in one block of memory: addresses in it make the table at no cost."""
+    places: list[tuple[type, list[int], int]] = []  # number type, shape and first word in the block
+    n_words = 0
+    for each in declarations(declaration):
+        shape = [size.of(sizes) if isinstance(size, Size) else size for size in each.shape]
+        places.append((each.dtype, shape, n_words))
+        n_words += -(-prod(shape) // LINE) * LINE
+    block = np.zeros(n_words + LINE)
+    address = block.__array_interface__["data"][0]
+    shift = -(address // WORD) % LINE  # words up to the first cache line
+    words: list[int] = []
+    arrays: list[Array] = []
+    for dtype, shape, first in places:
+        offset = WORD * (shift + first)
+        arrays.append(np.ndarray(shape, dtype, block, offset))
+        words.append(address + offset)
+        words += shape
+    made = grouped(declaration, iter(arrays))
+    if isinstance(made, Tabled):
+        made.table = np.array(words, np.int64)
+    return made
+
+
+def declarations(declaration: Any) -> Iterator[Declared]:
+    """Return the declarations of the arrays of a record and of the records in it, as `leaves` does."""
     for each in declaration:
         if isinstance(each, Declared):
-            shape = [size.of(sizes) if isinstance(size, Size) else size for size in each.shape]
-            made.append(np.zeros(shape, each.dtype))
+            yield each
         else:
-            made.append(zeros(each, sizes))
+            yield from declarations(each)
+
+
+def grouped(declaration: Record, arrays: Iterator[Array]) -> Record:
+    """Return a record made of as many of the arrays as it declares."""
+    made: list[Any] = [next(arrays) if isinstance(each, Declared) else grouped(each, arrays) for each in declaration]
     return type(declaration)(*made)
 
 
