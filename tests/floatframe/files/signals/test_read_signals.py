@@ -57,6 +57,9 @@ def test_gaps_are_refused_with_their_line_and_filled_up_to_a_length(tmp_path):
     lost = written(tmp_path, rows(t[:20] + t[23:], values[:20] + values[23:]), "lost.csv")
     with pytest.raises(SignalError, match=r"lost.csv, line 22: samples are missing between t = 0.019 and 0.023 s"):
         read_signals(lost)
+    for path in (broken, lost):
+        with pytest.raises(SignalError, match="fill = 0.004"):
+            read_signals(path, fill=0.0039)
     for path, words in ((broken, "3 samples in 1 gaps filled"), (lost, "3 missing samples in 1 gaps")):
         filled = read_signals(path, fill=0.004)
         assert_allclose(filled.time, np.arange(60) / 1000, rtol=0, atol=1e-12)
