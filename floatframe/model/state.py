@@ -1,11 +1,13 @@
 """The state of a system: positions and velocities of its bodies."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen
-from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.copies import FrozenMapping, frozen_copies
 
 __all__ = ["State"]
 
@@ -28,6 +30,9 @@ class State:
     #: angles between bodies, counted through full turns, (n_angles,) [rad], such as those of a motion before; None, or
     #: of another number: they begin between -pi and pi
     angle: Array | None = None
+    #: errors of steps and energy up to here, as the watch of a run has found them; a run that continues from here in
+    #: time adds its own; None: unknown
+    watched: Mapping[str, Any] | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         for name in ("r", "p", "q", "u"):
@@ -35,3 +40,5 @@ class State:
         for name in ("w", "angle"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, frozen(np.array(getattr(self, name), dtype=float)))
+        if self.watched is not None:
+            object.__setattr__(self, "watched", FrozenMapping(self.watched))

@@ -230,7 +230,7 @@ def run_record(trajectory: Trajectory, system: System | None = None) -> dict[str
         "n_outputs": n_t,
         "t_first": float(trajectory.t[0]) if n_t else None,
         "t_last": float(trajectory.t[-1]) if n_t else None,
-        "summary": dict(trajectory.head.summary),
+        "summary": {name: value for name, value in trajectory.head.summary.items() if name != "watched"},
         "n_steps": trajectory.head.summary.get("n_steps")
         or (round((float(trajectory.t[-1]) - run["t_start"]) / run["h"]) if n_t else 0),
         "bodies": [

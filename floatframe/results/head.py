@@ -170,6 +170,11 @@ def check_summary(summary: Mapping[str, Any]) -> None:
         value = summary.get(name, 0)
         require(type(value) is int and value >= 0, f"summary.{name}", "a whole number", value)
     require(is_number(summary.get("wall_time", 0.0)), "summary.wall_time", "a number", summary.get("wall_time"))
+    watched = summary.get("watched", {})
+    require(isinstance(watched, dict), "summary.watched", "an object", watched)
+    for name, value in watched.items():
+        is_valid = is_number(value) or (is_list(value, int | float) and all(map(is_number, value)))
+        require(is_valid, f"summary.watched.{name}", "a number or a list of numbers", value)
     events = summary.get("events", [])
     require(is_list(events, dict), "summary.events", "a list of objects", events)
     for k, event in enumerate(events):

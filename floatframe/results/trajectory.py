@@ -145,10 +145,13 @@ class Trajectory:
     def state(self, i_time: int) -> State:
         """Return the state at an output time (-1: the last), for example as initial state of another motion.
 
-        States of elements and user forces, and counted angles, go on in that motion (`State.w`, `State.angle`).
+        States of elements and user forces, and counted angles, go on in that motion (`State.w`, `State.angle`), and so
+        do the errors that the watch has found up to the last time (`State.watched`).
         """
         r, p, q, u, w = (self.source.read(name)[i_time] for name in ("position", "euler_parameters", "q", "u", "w"))
-        return State(r, p, q, u, w, None if self.head.angles is None else self.source.read("angle")[i_time])
+        angle = None if self.head.angles is None else self.source.read("angle")[i_time]
+        is_last = i_time in (-1, len(self.t) - 1)
+        return State(r, p, q, u, w, angle, watched=self.head.summary.get("watched") if is_last else None)
 
     def reaction(self, name: str) -> Reaction:
         """Return force and moment that a joint or spring-damper exerts on its marker A."""

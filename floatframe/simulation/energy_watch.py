@@ -20,6 +20,7 @@ Not counted in favour of a gain or a loss:
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -53,6 +54,7 @@ class EnergyWatch:
 
     every: int  #: steps between rows
     h: float  #: step size [s]
+    n_before: int = 0  #: steps of earlier runs that this one continues
     n_seen: int = 0  #: rows after the first one
     last: Array | None = None  #: energy, work given and taken at the last row, (3,)
     change: Array | None = None  #: work in the previous interval, (2,)
@@ -121,7 +123,7 @@ class EnergyWatch:
         unsure = self.unsure + np.cumsum(swing.sum(axis=1))
         self.gain, self.unsure = float(gains[-1]), float(unsure[-1])
         self.unresolved, self.taken = float(unresolved[-1]), float(taken_so_far[-1])
-        is_judged = number * self.every >= FIRST_VERDICT
+        is_judged = self.n_before + number * self.every >= FIRST_VERDICT
         is_judged[-1] = is_judged[-1] or is_last
         is_judged &= scales > 0.0
         share_of = np.where(is_judged, 1.0 / np.where(scales > 0.0, scales, 1.0), 0.0)
@@ -151,13 +153,22 @@ class EnergyWatch:
         self.notes[kind] = ValidityNote(body, kind, limit, largest, first, t, advice=ADVICE[kind])
         return self.notes[kind]
 
+    def passed_on(self) -> dict[str, list[float]]:
+        """Return what a run that continues this one in time has to know; no rows may be waiting."""
+        return {"energy": [self.gain, self.unsure, self.unresolved, self.taken, self.scale, self.noise]}
+
+    def continue_from(self, watched: Mapping[str, Any]) -> None:
+        """Add to the errors of the run that this one continues."""
+        self.n_before = int(watched["n_steps"])
+        self.gain, self.unsure, self.unresolved, self.taken, self.scale, self.noise = watched["energy"]
+
     def record(self) -> dict[str, Array]:
         """Return the data to resume from, by name; no rows may be waiting."""
         if self.last is None or self.potential is None:
             return {}
         change = np.full(2, np.nan) if self.change is None else self.change
         sums = np.array([self.gain, self.unsure, self.unresolved, self.taken, self.scale, self.noise])
-        return {"energy_sums": np.concatenate([sums, self.last, change, self.potential])}
+        return {"energy_sums": np.concatenate([sums, self.last, change, self.potential, [self.n_before]])}
 
     def restore(self, record: Mapping[str, Array], notes: tuple[ValidityNote, ...]) -> None:
         """Resume from a record and the notes of the completed part."""
@@ -169,6 +180,7 @@ class EnergyWatch:
         self.n_seen = FIRST_VERDICT  # a restart comes later
         self.last, change, self.potential = numbers[6:9], numbers[9:11], numbers[11:13]
         self.change = None if np.isnan(change).any() else change
+        self.n_before = int(numbers[13])
         self.notes = {note.kind: note for note in notes if note.kind in ADVICE}
 
     def measured(self, d: Array) -> Array:

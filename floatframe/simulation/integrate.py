@@ -62,6 +62,7 @@ LOOK_ROWS, LOOK_SECONDS = 1000, 0.2  #: rows of results are checked after this n
 SEGMENT_SECONDS = 2.0  #: a segment of the results is closed after this time
 TIMES = ("t_start", "t_end", "h", "output_every")  #: attributes of the run in the head
 MOST_STEPS = 1e12  #: of a run: months of computing
+SAME_TIME = 1e-6  #: fraction of a step by which a run may begin apart from the end of the one that it continues
 
 
 @dataclass(frozen=True)
@@ -183,6 +184,7 @@ def integrate(
         require_sensors(system, head, rows)
         run.writer = None if place is None else ResultsWriter(place, head)
         run.steps.begin(memory.state)
+        run.continue_from(state)
         run.energy.observe(system, rows, is_switched=False)
         run.keep(rows)
         run.close_segment(run.record(memory, 0))
@@ -317,10 +319,33 @@ class Run:
     def summary(self, memory: Memory) -> dict[str, Any]:
         """Return the counts and times of the run, and its events."""
         events = {} if self.events is None else {"events": self.events.happened}
-        return events | {
-            **{name: int(getattr(memory, name)) for name in ("n_steps", "n_rejected", "n_iterations")},
-            "wall_time": self.seconds,
-        }
+        return (
+            events
+            | self.watched()
+            | {name: int(getattr(memory, name)) for name in ("n_steps", "n_rejected", "n_iterations")}
+            | {"wall_time": self.seconds}
+        )
+
+    def continue_from(self, state: State | None) -> None:
+        """Add the errors of the run that reached this state where this run continues it in time."""
+        if state is None:
+            return
+        self.steps.is_piece = True
+        watched = {} if state.watched is None else state.watched
+        is_next = abs(watched.get("t", np.inf) - self.t_start) <= SAME_TIME * self.h
+        if is_next and len(watched.get("r", state.r.ravel())) == state.r.size:
+            self.steps.continue_from(watched)
+            self.energy.continue_from(watched)
+
+    def watched(self) -> dict[str, dict[str, Any]]:
+        """Return the errors up to the end of the run, for one that continues it."""
+        if self.watching == "off":
+            return {}
+        t = self.t_start + self.n_total * self.h
+        if self.events is not None and self.events.has_stopped:
+            t = self.events.happened[-1]["t"]
+        found: dict[str, Any] = {"t": t, "n_steps": self.energy.n_before + self.n_total}
+        return {"watched": found | self.steps.passed_on() | self.energy.passed_on()}
 
     def __post_init__(self) -> None:
         self.watch = ValidityWatch(self.system, self.notes)

@@ -10,6 +10,9 @@ It works for second-order methods, with fixed steps and with an error tolerance:
     run by 3/4 of the error. Only its estimate is reported. From the start of a run it has little numerical damping
     (`LIGHT`): a run may damp vibrations that its steps do not resolve, and equal damping would hide what they do to the
     motion.
+    The estimate holds for errors of second order. The companion with double steps goes on beside one with half steps
+    of the same damping. Where the difference from the run falls to more than a quarter from double to half steps
+    (vibrations of much energy that no step resolves), the estimate follows this ratio, up to `MOST_RATIO`.
 (3) The companion covers `COMPANION_STEPS` steps. It crosses jumps of forces and has its own events. In a run of more
     than `LONG_RUN` steps it starts after the first steps, from their memory. There it ends as soon as the error,
     extrapolated in proportion to the end of the run, is far below the limit.
@@ -20,12 +23,15 @@ It works for second-order methods, with fixed steps and with an error tolerance:
     also count the errors of speeds, relative to twice the largest speed (a vibration moves by two amplitudes). Errors a
     of place and b of speed combine to sqrt(a² + b²), since they turn into one another.
 
-A companion restarts where a run can be resumed; its error up to there is added. The sum over windows does not know how
-the motion changes earlier errors: it may forget them (damping) or magnify them (chaos).
+A companion restarts where a run can be resumed; its error up to there is added. A run that continues another one in
+time (`State.watched`) adds its errors to those of the other, relative to the motion since that began. These sums, and
+that over windows, do not know how the motion changes earlier errors: it may forget them (damping) or magnify them
+(chaos).
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -62,7 +68,8 @@ WINDOW_GROWTH = 4  #: growth of the distance between windows
 MOST_BETWEEN_WINDOWS = 16380  #: most steps between two windows
 FIRST_VERDICT = 20  #: no verdict before this step: the motion is too short yet to relate errors to it
 STEP_LIMIT = 0.03  #: relative error above which a run is reported
-SHORT_LIMIT = 0.01  #: the same for runs of less than `FIRST_VERDICT` steps, which may be pieces of a longer motion
+#: the same for runs of less than `FIRST_CHECK` steps, and of less than `FIRST_VERDICT` from a state of unknown past
+SHORT_LIMIT = 0.01
 REST_LENGTH = 1e-7  #: displacement over the length of the system below which the system is at rest
 REST_ANGLE = 1e-6  #: rotation below which the system is at rest [rad]
 SMALL_TURN = 1e-3  #: rotation below which errors of rotation do not count in a motion as long as the system [rad]
@@ -73,9 +80,11 @@ SCREEN = 0.25  #: share of the limit above which half steps decide: double steps
 AIM = 0.2  #: share of the limit that the recommended step would reach
 DOUBLES, HALVES = 2.0, 0.5  #: step size of a companion over that of the run
 ERROR_SHARE = {DOUBLES: 1 / 3, HALVES: 4 / 3}  #: error of the run over the difference: 1/(2² - 1) and 1/(1 - 1/2²)
+MOST_RATIO = 2 / 3  #: largest ratio of the differences by half and by double steps from which an error is estimated
 
 
-COUNTS = ("next_window", "window_distance", "n_watched", "n_companion_steps", "companions_done")  #: of a record
+#: of a record
+COUNTS = ("next_window", "window_distance", "n_watched", "n_companion_steps", "companions_done", "n_before", "is_piece")
 
 
 @dataclass
@@ -165,9 +174,12 @@ class StepWatch:
     integrator: Integrator
     n_total: int  #: number of steps of the run
     is_on: bool = True
+    n_before: int = 0  #: number of steps of earlier runs that this one continues
+    is_piece: bool = False  #: whether it starts from a state whose errors are unknown
     n_companion_steps: int = 0  #: number of steps that companions have covered
     companions_done: bool = False  #: whether only windows follow
     companion: Companion | None = None
+    coarse: Companion | None = None  #: with double steps, beside a companion with half steps
     next_window: int = 0  #: step at which the next window starts
     window_distance: int = 0  #: number of steps between the last window and the next
     n_watched: int = 0  #: number of steps with summed errors
@@ -190,10 +202,36 @@ class StepWatch:
         n = len(state.r)
         self.initial_state, self.total, self.turn = state, np.zeros((n, 2, 2)), np.zeros(n)
 
+    def passed_on(self) -> dict[str, list[float]]:
+        """Return what a run that continues this one in time has to know."""
+        if not self.is_on or self.initial_state is None:
+            return {}
+        first = self.initial_state
+        return {
+            name: [float(x) for x in array.ravel()]
+            for name, array in (("errors", self.total), ("size", self.size), ("r", first.r), ("p", first.p))
+        }
+
+    def continue_from(self, watched: Mapping[str, Any]) -> None:
+        """Add to the errors of the run that this one continues, relative to the motion since that began."""
+        if not self.is_on or "errors" not in watched:
+            return
+        assert self.initial_state is not None
+        shapes = {"errors": self.total.shape, "size": (2, 2), "r": self.initial_state.r.shape,
+                  "p": self.initial_state.p.shape}  # fmt: skip
+        self.total, self.size, r, p = (np.reshape(watched[name], shape) for name, shape in shapes.items())
+        self.initial_state = replace(self.initial_state, r=r, p=p)
+        self.n_before, self.is_piece = int(watched["n_steps"]), False
+
     @property
     def limit(self) -> float:
         """Relative error above which the run is reported."""
-        return STEP_LIMIT if self.n_total >= FIRST_VERDICT else SHORT_LIMIT
+        is_short = self.n_before + self.n_total < (FIRST_VERDICT if self.is_piece else FIRST_CHECK)
+        return SHORT_LIMIT if is_short else STEP_LIMIT
+
+    def is_judged(self, n_done: int) -> bool:
+        """Whether the motion up to step n_done is long enough to relate errors to it."""
+        return self.n_before + n_done >= FIRST_VERDICT
 
     @property
     def is_long(self) -> bool:
@@ -278,9 +316,16 @@ class StepWatch:
             is_good = False
             if other.ratio == HALVES or not self.turns_far(system):
                 is_good = other.follow(system, end, last, t0, h, self.jumps)
+            if self.coarse is not None and (last - other.start) % 2 == 0:
+                if not self.coarse.follow(system, end, last, t0, h, self.jumps):
+                    self.coarse = None
             is_small = is_good and self.relative_errors(system, other).max() < SCREEN * self.limit
             if other.ratio == DOUBLES and not is_small:
+                coarse = other if is_good else None
                 other = self.companion = self.with_half_steps(system, other)
+                if coarse is not None and not other.is_light:
+                    self.coarse, self.kept_work = coarse, None  # each has its own working arrays
+                    other = self.companion = self.with_half_steps(system, coarse)
                 is_good = other.follow(system, end, last, t0, h, self.jumps)
             if not is_good and other.is_light:  # less damping may be what fails
                 damped = self.with_half_steps(system, other, is_light=False)
@@ -289,8 +334,8 @@ class StepWatch:
             if not is_good:  # what it has found so far counts
                 self.close_companion(h)
                 self.companions_done, self.next_window = True, last
-                return self.new_note(system, t0 + last * h, h) if last >= FIRST_VERDICT else None
-        is_due = last >= max(FIRST_VERDICT, min(self.n_total, COMPANION_STEPS) // 2)
+                return self.new_note(system, t0 + last * h, h) if self.is_judged(last) else None
+        is_due = self.is_judged(last) and last >= min(self.n_total, COMPANION_STEPS) // 2
         note = self.new_note(system, t0 + last * h, h) if is_due else None
         is_over = self.n_companion_steps + last - other.start >= COMPANION_STEPS or self.note is not None
         if self.is_long and last >= LEAST_COMPANION_STEPS:  # errors of phase grow in proportion to time
@@ -322,9 +367,10 @@ class StepWatch:
     def close_companion(self, h: float) -> None:
         """Add the error that the companion has found, and remove the companion."""
         other, self.companion = self.companion, None
+        coarse, self.coarse = self.coarse, None
         if other is None or other.at == other.start:
             return
-        found = np.stack([other.peak, other.speeds(h)], axis=2)
+        found = np.stack([other.peak, other.speeds(h)], axis=2) * by_observed_order(other, coarse)[:, :, None]
         self.total, self.error_per_step = self.total + found, found / (other.at - other.start)
         self.n_companion_steps += other.at - other.start
         self.n_watched = other.at
@@ -359,7 +405,7 @@ class StepWatch:
         self.turn = np.maximum(self.turn, turns_in_a_step(system, end.state, h))
         begun, then = (middle, half) if last > middle else (start, before)
         self.update_size(then.state, end.state, h * (last - begun))
-        return self.new_note(system, t0 + last * h, h) if last >= FIRST_VERDICT else None
+        return self.new_note(system, t0 + last * h, h) if self.is_judged(last) else None
 
     def update_size(self, half: State, end: State, seconds: float) -> None:
         """Update the largest displacements, rotations and speeds by two states that are so many seconds apart."""
@@ -399,7 +445,7 @@ class StepWatch:
         total = self.total
         if companion is not None:
             total = total.copy()
-            total[:, :, 0] += companion.peak
+            total[:, :, 0] += companion.peak * by_observed_order(companion, self.coarse)
         parts = total / np.where(size > 0.0, size, np.inf)
         return np.where(moves, np.linalg.norm(parts, axis=2), 0.0)
 
@@ -477,6 +523,18 @@ def lighter(integrator: Integrator, share: float) -> tuple[Integrator, float]:
         return integrator, share
     own, light = (1 / 12 + 3 / 8 * ((1 - rho) / (1 + rho)) ** 2 for rho in (integrator.rho_inf, LIGHT))
     return replace(integrator, rho_inf=LIGHT), own / (own - light / 4)
+
+
+def by_observed_order(other: Companion, coarse: Companion | None) -> Array:
+    """Return by how much the errors that a companion finds are larger where they are not of second order, (n_b, 2).
+
+    Differences by double and half steps from the run that fall by a ratio x leave an error of 1/(1 - x) times the last.
+    """
+    if coarse is None or other.ratio != HALVES or other.is_light:
+        return np.ones(other.peak.shape)
+    by_halves, by_doubles = other.peak / other.share, coarse.peak / coarse.share
+    ratio = np.clip(by_halves / np.where(by_doubles > 0.0, by_doubles, np.inf), 0.25, MOST_RATIO)
+    return np.asarray(1 / (1 - ratio) / ERROR_SHARE[HALVES])
 
 
 def lengths(vectors: Array) -> Array:

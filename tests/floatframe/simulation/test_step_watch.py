@@ -192,6 +192,49 @@ def test_a_run_of_few_steps_is_judged_at_its_end(n, h):
     assert not fine.validity
 
 
+def pieces(h, n, n_total, pause=0.0, folder=None):
+    """Return runs of n steps of a pendulum, each from the last state of the one before, after a pause."""
+    motions, state = [], None
+    for k in range(0, n_total, n):
+        begin = k * (h + pause)
+        output = None if folder is None else folder / f"{k}.h5"
+        motions.append(
+            integrate(pendulum(), GeneralizedAlpha(0.8), begin + n * h, h, t_start=begin, state=state, output=output)
+        )
+        state = motions[-1].state(-1)
+    return motions
+
+
+@pytest.mark.parametrize("to_files", [False, True])
+def test_a_motion_in_pieces_is_judged_by_the_sum_of_their_errors(to_files, tmp_path):
+    """None of the pieces is off by 1 % of its own motion; all of them are by 6 %."""
+    h, n, n_total = 0.05, 3, 120
+    found = pieces(h, n, n_total, folder=tmp_path if to_files else None)
+    r = np.array([motion.body("rod").r[-1] for motion in found])
+    fine = integrate(pendulum(), GeneralizedAlpha(0.8), n_total * h, h / 50, output_every=50 * n).body("rod").r
+    error = np.linalg.norm(r - fine[1:], axis=1).max() / np.linalg.norm(fine - fine[0], axis=1).max()
+    assert error > 0.05
+    assert kinds(found[-1]) == {"steps"}
+    assert_allclose(found[-1].validity[0].largest, error, rtol=0.3)
+    assert not found[0].validity
+    assert not any(motion.validity for motion in pieces(h, n, n_total, pause=1.0))  # each a motion of its own
+
+
+def test_energy_that_pieces_lose_is_summed():
+    """An oscillator of 8 steps a period loses as much in pieces as in one run, a tenth in none of them."""
+    h = 2 * np.pi / 5.0 / 8
+    whole = integrate(oscillator(), GeneralizedAlpha(0.5), 40 * h, h)
+    state = None
+    for k in range(0, 40, 4):
+        motion = integrate(oscillator(), GeneralizedAlpha(0.5), (k + 4) * h, h, t_start=k * h, state=state)
+        told = {note.kind: note.largest for note in motion.validity}
+        assert k >= 8 or "damping" not in told
+        state = motion.state(-1)
+    lost = whole.energies.balance[0] - whole.energies.balance[-1]
+    assert lost > 0.2 * whole.energies.balance[0]
+    assert_allclose(told["damping"], lost / whole.energies.balance[0], rtol=0.3)
+
+
 def test_a_swing_that_many_steps_follow_is_not_told():
     motion = integrate(two_bars(0.3), GeneralizedAlpha(0.8), 4.0, 0.002)
     fine = integrate(two_bars(0.3), GeneralizedAlpha(0.8), 4.0, 0.001, output_every=2, watch="off")
@@ -464,6 +507,37 @@ def test_vibrations_that_steps_and_their_companion_damp_count_in_the_error(dampi
     assert error > 0.3
     (note,) = (note for note in motion.validity if note.kind == "steps")
     assert note.largest > error / 2
+
+
+def test_vibrations_that_no_step_resolves_count_where_half_steps_change_little():
+    """A pendulum on a pivot that vibrates up and down, 1.5 periods a step, as after a blow to its stiff spring.
+
+    Exact, by the mean over the fast vibration of speed V (Kapitza): l² Theta'' = -g l sin Theta - V²/4 sin 2 Theta.
+    Steps of 9 rad see a third of the second term, half of them half of it: the difference is a part of the error.
+    """
+    g, start, V, h, n_steps, z = 9.81, 0.5, 1.5, 0.02, 60, np.zeros(3)
+    arm = np.array([np.sin(start), -np.cos(start), 0.0])  # 1 m long
+    turn = np.array([0.0, 0.0, -V * np.sin(start)])  # of the vibration alone: Theta is at rest
+    start_velocity = np.cross(turn, arm) + np.array([0.0, V, 0.0])
+    pivot = RigidBody("pivot", 1e3, np.eye(3), velocity=(0, V, 0))
+    bob = RigidBody("bob", 1.0, 1e-4 * np.eye(3), position=arm, velocity=start_velocity, omega_B=turn)
+    slide = PrismaticJoint("slide", GROUND, Marker("pivot", position=z), axis=(0, 1, 0))
+    hinge = RevoluteJoint("hinge", Marker("pivot", position=z), Marker("bob", position=-arm), axis=(0, 0, 1))
+    spring = JointForce("spring", "slide", "distance", stiffness=1e3 * (9.4 / h) ** 2)
+    system = System([pivot, bob], [slide, hinge], [Gravity((0, -g, 0)), spring])
+    slow = solve_ivp(
+        lambda t, y: [y[1], -g * np.sin(y[0]) - V**2 / 4 * np.sin(2 * y[0])], (0, n_steps * h), [start, 0.0], rtol=1e-9
+    ).y[0, -1]  # fmt: skip
+    exact = np.array([np.sin(slow), -np.cos(slow), 0.0])
+    motion = integrate(system, EnergyMomentum(), n_steps * h, h)
+    fine = integrate(system, EnergyMomentum(), n_steps * h, h / 64, output_every=64, watch="off")
+    way = np.linalg.norm(fine.body("bob").r - arm, axis=1).max()
+    error, of_fine = (
+        np.linalg.norm(each.body("bob").r[-1] - each.body("pivot").r[-1] - exact) / way for each in (motion, fine)
+    )
+    assert of_fine < 0.005
+    assert error > 0.05
+    assert kinds(motion) == {"steps"}
 
 
 def test_double_steps_do_not_judge_a_flexible_body_that_turns_by_more_than_a_radian_in_a_step():
