@@ -2,7 +2,8 @@
 
 (1) the case is run as drawn (`random_motion`), in chunks where it says so
 (2) the reference is the same system in fine steps, absolute and relative, with steps halved until both agree
-(3) the error is that of positions over the way of the farthest body in any fine step, or that of rotations over theirs
+(3) the error is that of frame origins and centres of mass over the farthest way of one in any fine step, or that of
+    rotations over theirs
 (4) a note of the run about its steps or energy, or an error in words, is an answer; else the motion has to be right,
     unless it is chaotic: a fine run whose velocities begin 1e-6 away ends more than `CHAOS` times as far away
 """
@@ -14,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import floatframe as ff
+from floatframe.model.rotations import rotation_matrix
 from tests.campaign.random_motions import MotionCase, finer, random_motion
 from tests.campaign.verdict import ACCEPTED, REFUSED, TRACEBACK, WRONG, Verdict
 
@@ -62,15 +64,27 @@ def motion_verdict(case: MotionCase) -> Verdict:
 
 
 class Samples:
-    """Places and rotations of bodies at the times that are compared; how far they go in between too."""
+    """Places and rotations of bodies at the times that are compared; how far they go in between too.
 
-    def __init__(self, parts: list[ff.Trajectory], every: int) -> None:
-        names = [body.name for body in parts[0].head.bodies]
-        r = np.stack([joined([p.body(n).r for p in parts]) for n in names])  # (n_b, n_t, 3)
+    The centre of mass counts beside the frame origin, which may lie in a hinge about which the body turns.
+    """
+
+    def __init__(self, system: ff.System, parts: list[ff.Trajectory], every: int) -> None:
+        names = [body.name for body in system.bodies]
+        origins = np.stack([joined([p.body(n).r for p in parts]) for n in names])  # (n_b, n_t, 3)
         p = np.stack([joined([p.body(n).p for p in parts]) for n in names])
+        arms = np.einsum("itab,ib->ita", rotation_matrix(p), [center_of_mass(body) for body in system.bodies])
+        r = np.concatenate([origins, origins + arms])  # (2 n_b, n_t, 3)
         self.way = np.linalg.norm(r - r[:, :1], axis=2).max()
         self.angle = 2 * np.arccos(np.clip(np.abs(np.einsum("itk,itk->it", p, p[:, :1])), 0, 1)).max()
         self.r, self.p = r[:, ::every], p[:, ::every]
+
+
+def center_of_mass(body: ff.RigidBody | ff.FlexibleBody) -> np.ndarray:
+    """Return the centre of mass of an undeformed body in its frame."""
+    if isinstance(body, ff.FlexibleBody):
+        return np.asarray(body.reduced.moments.center_of_mass)
+    return np.asarray(body.center_of_mass)
 
 
 def joined(parts: list[np.ndarray]) -> np.ndarray:
@@ -93,7 +107,7 @@ def run(case: MotionCase, finer_by: int, watch: str = "stop") -> tuple[Samples, 
         state = part.state(-1)
         parts.append(part)
         notes = (*notes, *(note for note in part.validity if note.kind in ("steps", "energy", "damping")))
-    return Samples(parts, every), notes
+    return Samples(case.system, parts, every), notes
 
 
 def reference_of(case: MotionCase) -> Samples | None:
@@ -144,4 +158,4 @@ def growth_of(case: MotionCase) -> float:
         case.system, finest.method, case.n_steps * case.h, case.h / 32, state=replace(start, u=u), output_every=32
     )
     every = max(1, case.n_steps // SAMPLES)
-    return difference(Samples([other], every), Samples([first], every)) / small
+    return difference(Samples(case.system, [other], every), Samples(case.system, [first], every)) / small

@@ -125,6 +125,11 @@ def test_the_oracle_of_motions_tells_a_right_motion_from_another_one():
     assert difference(in_chunks, reference) < WRONG_BY
 
 
+def test_the_way_of_a_body_that_turns_about_its_origin_is_that_of_its_centre_of_mass():
+    samples = run(pendulum(n_steps=60), 1)[0]  # swings from the level to the other side
+    np.testing.assert_allclose(samples.way, 2.0, rtol=0.02)
+
+
 def test_the_oracle_of_motions_knows_chaos():
     assert growth_of(pendulum()) < 30
     chaotic = pendulum(3, n_steps=600)
