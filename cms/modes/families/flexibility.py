@@ -27,7 +27,7 @@ from fe_models.foundation.tall.on_disk import of_this_process
 
 __all__ = ["BoundaryConditions", "CondensedBody", "Flexibility", "held_factor"]
 
-RIGID_ENERGY = 1e-14  #: squared motion against the conditions, below which a rigid-body motion is free
+RIGID_MOTION = 1e-7  #: motion against the conditions, below which a rigid-body motion is free
 COUNTED = 1e-11  #: eigenvalue of the scaled boundary block relative to its largest, above which its sign is certain
 
 
@@ -235,18 +235,27 @@ def _free_motions(condensed: CondensedBody, conditions: BoundaryConditions) -> A
     column = np.abs(scaled).max(axis=0)
     scaled = scaled / column
     against = scaled - (Z / size[:, None]) @ (Z.T @ (scaled * size[:, None]))
-    energy = against.T @ against
-    if conditions.K_load is not None:
-        stiffness = np.abs(condensed.S * np.outer(size, size)).max()
-        spring = Psi_R[h] / column
-        energy = energy + spring.T @ conditions.K_load @ spring / stiffness
-    values, vectors = la.eigh((energy + energy.T) / 2)
+    spring = _root_of_load(condensed, conditions, size) @ (Psi_R[h] / column)
+    some_rows = np.zeros((Psi_R.shape[1], Psi_R.shape[1]))  # so that the vectors span all rigid-body motions
+    _, sizes, vectors = la.svd(np.vstack([against, spring, some_rows]), full_matrices=False)
+    return (Psi_R / column) @ vectors[sizes < RIGID_MOTION].T
+
+
+def _root_of_load(condensed: CondensedBody, conditions: BoundaryConditions, size: Array) -> Array:
+    """Return R with Rᵀ R = K_load / k, (k, n_h), where k is the largest stiffness of the body at the interfaces.
+
+    Singular values of R resolve motions of the size of rounding, the eigenvalues of K_load their squares alone.
+    """
+    if conditions.K_load is None:
+        return np.zeros((0, len(size)))
+    stiffness = np.abs(condensed.S * np.outer(size, size)).max()
+    values, vectors = la.eigh(conditions.K_load * np.outer(size, size) / stiffness)
     if values[0] < -1e-12 * max(values[-1], 1.0):
         raise BodyError(
-            f"body {condensed.body.name!r}: the stiffness of its neighbours has negative energy in a rigid-body "
-            "motion; expected a symmetric positive semidefinite matrix"
+            f"body {condensed.body.name!r}: the stiffness of its neighbours has negative energy in some motion; "
+            "expected a symmetric positive semidefinite matrix"
         )
-    return (Psi_R / column) @ vectors[:, values < RIGID_ENERGY]
+    return np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T / size
 
 
 def _lengths(body: FEBody, h: IntArray, Z: Array) -> Array:

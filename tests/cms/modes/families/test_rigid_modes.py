@@ -3,6 +3,7 @@ import pytest
 import scipy.linalg as la
 from numpy.testing import assert_allclose
 
+import fe_models as fm
 from cms.errors import BodyError
 from cms.modes.families.rigid_modes import (
     determinate_dofs,
@@ -10,9 +11,13 @@ from cms.modes.families.rigid_modes import (
     null_space_rigid_modes,
     static_rigid_modes,
 )
+from cms.modes.mode_sets.classical import craig_bampton
 from fe_models.body.couplings.couplings import couple
+from fe_models.body.fe_body import Interface
 from fe_models.body.rigid_motion import rigid_motion_of_points
-from tests.bodies import bar, beam
+from fe_models.foundation.units import UNIT_SYSTEMS
+from fe_models.meshes.mesh import Mesh
+from tests.bodies import bar, beam, box_mesh
 
 
 @pytest.mark.parametrize("make", [lambda: couple(bar(nx=4)), lambda: couple(beam())])
@@ -48,3 +53,22 @@ def test_dofs_on_a_line_of_nodes_are_refused():
     candidates = np.flatnonzero(np.isin(body.dofs[:, 0], on_edge))
     with pytest.raises(BodyError, match="hold only 5 of the 6"):
         determinate_dofs(body, candidates)
+
+
+@pytest.mark.parametrize("seed", [*range(8), 38, 53, 54, 57, 66, 70, 97, 104])
+def test_a_body_held_along_a_line_may_turn_about_it(seed):
+    rng = np.random.default_rng(seed)
+    axes = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    axes *= np.sign(la.det(axes))
+    box = box_mesh(3, 1, 1, 1.0, 0.4, 0.3, "hexahedron")
+    edge = np.flatnonzero((box.nodes[:, 1] == 0) & (box.nodes[:, 2] == 0))
+    mesh = Mesh(box.nodes @ axes.T + rng.normal(size=3), box.cells)
+    port = Interface("edge", "nodes", edge, mesh.nodes[edge].mean(axis=0), axes)
+    steel = fm.Material("steel", 2.1e11, 0.3, 7850.0)
+    body = couple(fm.solid_body(mesh, steel, name="box", units=UNIT_SYSTEMS["m-kg-s"], interfaces=[port]))
+    modes = craig_bampton(body, n_modes=3)
+    K, M = body.K.toarray(), body.M.toarray()
+    free = np.setdiff1d(np.arange(body.n_dof), body.b)
+    omega2 = la.eigh(K[np.ix_(free, free)], M[np.ix_(free, free)], eigvals_only=True)
+    assert abs(omega2[0]) < 1e-10 * omega2[1]
+    assert_allclose(modes.frequencies[-3:], np.sqrt(omega2[1:4]) / (2 * np.pi), rtol=1e-8)
