@@ -10,11 +10,15 @@ from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.linear_algebra.solvers.shift_inverted import ModeRequest
 from cms.modes.families.fixed_interface import FixedInterfaceBody
 from cms.modes.families.flexibility import Flexibility
+from cms.modes.families.mechanism import rounding_of_energy, without_energy
 from fe_models.body.couplings.submatrix import PrincipalBlock
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.ranks.spread_columns import SpreadColumns
 
 __all__ = ["elastic_modes", "fixed_interface_modes", "no_modes"]
+
+#: rounding of a body's energy over the energy of a mode that its neighbours alone hold, above which omega² is lost
+LOST = 2e-3
 
 
 def fixed_interface_modes(fixed: FixedInterfaceBody, wanted: ModeCount) -> EigenResult:
@@ -43,17 +47,28 @@ def elastic_modes(flexibility: Flexibility, wanted: ModeCount) -> EigenResult:
     try:
         modes = eigenmodes(K, M, replace(wanted, verify=False), factorization=flexibility, numbering=numbering)
     except FactorMismatchError as error:
-        body, load = flexibility.condensed.body, flexibility.conditions.K_load
-        largest = float(np.abs(K.diagonal()).max())
-        softest = "" if load is None else f", those of its neighbours {np.abs(np.diag(load)).max():.1e} at most"
-        raise EigenError(
-            f"body {body.name!r}: its slowest modes are lost in rounding: some motion besides the rigid ones has "
-            f"almost no stiffness compared with the largest stiffness, {largest:.1e}{softest}; rounding is some "
-            f"{np.finfo(float).eps * largest:.1e}: increase the stiffness of this motion, or remove it"
-        ) from error
+        raise _lost_in_rounding(flexibility) from error
     if wanted.verify:
         modes = _proven(flexibility, modes, wanted)
-    return replace(modes, Phi=flexibility.expand(modes.Phi))
+    modes = replace(modes, Phi=flexibility.expand(modes.Phi))
+    if flexibility.conditions.K_load is not None:
+        body, omega2 = flexibility.condensed.body, modes.omega2
+        rounding = rounding_of_energy(body, modes.Phi)
+        if (without_energy(body, modes.Phi) & (rounding > LOST * omega2)).any():
+            raise _lost_in_rounding(flexibility)
+    return modes
+
+
+def _lost_in_rounding(flexibility: Flexibility) -> EigenError:
+    """Return the error about motions whose stiffness is near the rounding of the largest stiffness."""
+    load = flexibility.conditions.K_load
+    largest = float(np.abs(flexibility.K.diagonal()).max())
+    softest = "" if load is None else f", those of its neighbours {np.abs(np.diag(load)).max():.1e} at most"
+    return EigenError(
+        f"body {flexibility.condensed.body.name!r}: its slowest modes are lost in rounding: some motion besides the "
+        f"rigid ones has almost no stiffness compared with the largest stiffness, {largest:.1e}{softest}; rounding is "
+        f"some {np.finfo(float).eps * largest:.1e}: increase the stiffness of this motion, or remove it"
+    )
 
 
 def _proven(flexibility: Flexibility, modes: EigenResult, asked: ModeCount) -> EigenResult:

@@ -108,14 +108,20 @@ def test_a_deck_of_nastran_is_read_whole(tmp_path):
 
 
 def test_the_job_of_a_deck_of_nastran_has_its_mass_and_its_loads(tmp_path):
-    path = deck_of(tmp_path)
+    path = deck_of(tmp_path, DECK.replace("CELAS2,70,5.+3,1,2,2,2", "CELAS2,70,5.+3,5,1,6,2"))
     body = job_body(job_of(path, leave_out=("CELAS2",)))
     up = np.where(body.dofs[:, 1] == 2, 1.0, 0.0)
     assert_allclose(up @ body.M @ up, 2 * 7850.0 + 6.0, rtol=1e-12)
     assert_allclose(body.load_cases[0].f @ up, 2.0, rtol=1e-12)
     assert body.provenance["deck sha256"] == sha256(path.read_bytes()).hexdigest()
     text = path.with_suffix(".toml").read_text()
-    assert "#   1 CELAS2: LEFT OUT ON REQUEST: between grid points of different axes, or apart across" in text
+    assert "#   1 CELAS2: LEFT OUT ON REQUEST: between different components, grid points of different axes, or" in text
+
+
+def test_a_spring_between_held_components_is_left_out_with_a_note(tmp_path):
+    path = deck_of(tmp_path)
+    job_of(path)
+    assert "#   1 CELAS2: between components that are held: without effect in" in path.with_suffix(".toml").read_text()
 
 
 @pytest.mark.parametrize(
@@ -262,7 +268,7 @@ def test_an_rbe3_without_weight_and_components_is_refused(tmp_path, words):
 @pytest.mark.parametrize("weight", ["[1.0, 2.0]", "true", '"1"', "[1, 1, 1, 0, 0, nan]"])
 def test_a_weight_of_a_coupling_is_a_number_or_six(tmp_path, weight):
     path = deck_of(tmp_path, DECK.replace("RBE2,60,9,123456,5,6,7,8", "RBE3,60,,9,123456,1.,123,5,6\n,7,8"))
-    text = job_text(read_deck(path), JobRequest("m-kg-s", {}, ("CELAS2",)), path.name)
+    text = job_text(read_deck(path), JobRequest("m-kg-s", {}), path.name)
     job = path.with_suffix(".toml")
     job.write_text(text.replace("rbe3_60_nodes_1 = 1.0", f"rbe3_60_nodes_1 = {weight}"))
     with pytest.raises(ValueError, match="expected a number, or a list of six"):

@@ -357,7 +357,7 @@ def test_a_load_that_hardly_holds_the_mechanism_gives_its_modes_or_is_refused_by
     try:
         found = frequencies(stiffness)
     except (BodyError, EigenError) as error:
-        assert exponent < -1
+        assert exponent < 0
         assert re.search("costs? no energy: a mechanism|slowest modes are lost in rounding", str(error))  # noqa: PT017
     else:
         assert_allclose(found, np.sqrt(stiffness / 1e5) * frequencies(1e5), rtol=1e-3)
