@@ -41,6 +41,12 @@ TURN = 1.234  #: angle by which the fastest body turns until the later time, not
 AHEAD = 0.1  #: distance travelled until the later time if nothing spins, relative to the size of the system
 MOST_ITERATIONS = 10
 NOT = "linearize: this state is not steady:"
+AT_ONCE = "use the state of steady_motion or steady_rotation"  #: advice where forces are unbalanced at the state
+#: the same where they are balanced there but not later
+LATER = (
+    "what acts there changes as the system moves on, such as a torsion spring to the ground that is wound up, "
+    "an uneven road, or a function of time"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +83,7 @@ def require_steady(
         return
     carrier = carrier_of(compiled, state, about.omega)
     now = balance(compiled, work, about.w)
-    require_balance(now, max(BALANCED, 10 * about.residual), "forces are unbalanced")
+    require_balance(now, max(BALANCED, 10 * about.residual), "forces are unbalanced", AT_ONCE)
     model, spins = compiled.model, spins_in(compiled, state, about.omega)
     fastest = max((float(np.linalg.norm(spin)) for spin in spins), default=0.0)
     speed, turning = float(np.abs(carrier.velocity).max()), float(np.linalg.norm(about.omega))
@@ -92,9 +98,8 @@ def require_steady(
     set_iterate(other, moved, moved_u_dot, about.w)
     require_round(compiled, work, other, turned)
     after = balance(compiled, other, about.w)
-    require_balance(
-        after, max(BALANCED_LATER, 10 * about.residual), f"{later:.3g} time units later, forces are unbalanced"
-    )
+    words = f"{later:.3g} time units later, forces are unbalanced"
+    require_balance(after, max(BALANCED_LATER, 10 * about.residual), words, LATER)
     set_iterate(other, moved, moved_u_dot, after.w)
     others = tangents(model, other)
     N_later = turned.T @ N
@@ -210,12 +215,11 @@ def next_wrenches(parts: Linearized, f: Array, g: Array, free: NDArray[np.bool_]
     return np.asarray(la.lstsq(A, b, cond=1e-12)[0])
 
 
-def require_balance(found: Balance, most: float, words: str) -> None:
-    """Raise `ModelError` if unbalanced forces, relative to the acting forces, exceed `most`."""
+def require_balance(found: Balance, most: float, words: str, advice: str) -> None:
+    """Raise `ModelError` with an advice if unbalanced forces, relative to the acting forces, exceed `most`."""
     if not found.error <= most:
         raise ModelError(
-            f"{NOT} {words} by {found.error:.2g} of the acting forces, most at body {found.body!r}; use the state of "
-            "steady_motion or steady_rotation"
+            f"{NOT} {words} by {found.error:.2g} of the acting forces, most at body {found.body!r}; {advice}"
         )
 
 

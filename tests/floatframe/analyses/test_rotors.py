@@ -74,6 +74,20 @@ def test_whirls_keep_their_lines_beyond_the_critical_speed(n_speeds, damping):
     assert_allclose(apart, 0.0, rtol=0, atol=2e-4 * OMEGA)
 
 
+def test_a_spring_that_a_rotation_winds_up_is_named():
+    """A bearing shell on the shaft, held by a torsion spring from the ground: it cannot turn with the rotor."""
+    system = disc()
+    shell = RigidBody("shell", 0.1, 1e-3 * np.eye(3))
+    sleeve = RevoluteJoint("sleeve", Marker("disc"), Marker("shell"), axis=(0, 0, 1))
+    holder = Bushing("holder", Marker(GROUND), Marker("shell"), stiffness=np.array([0, 0, 0, 0, 0, 1e3]))
+    held = replace(
+        system, bodies=[*system.bodies, shell], joints=[*system.joints, sleeve], forces=[*system.forces, holder]
+    )
+    assert np.isfinite(campbell(held, [0.0]).eigenvalues).all()
+    with pytest.raises(ModelError, match=r"later, forces are unbalanced .* 'shell'; .* torsion spring to the ground"):
+        campbell(held, [0.0, 50.0])
+
+
 def test_whirls_that_speeds_far_apart_leave_undecided_are_not_joined(monkeypatch):
     """From W = 150 to 280 each whirl changes by more than the two differ: without steps between, their lines end."""
     monkeypatch.setattr(parameter_study, "MOST_HALVINGS", 0)
