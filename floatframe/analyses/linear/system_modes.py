@@ -202,12 +202,13 @@ def with_motions_that_cost_nothing(A: Array, eigenvalues: Array, V: Array, error
     """Return one mode of each conjugate pair, and one mode with lambda = 0 for each motion without resistance.
 
     Q spans the eigenvectors of zero. Motions without resistance are the null space of A within Q, without velocities.
+    The two eigenvectors of such a motion are equal but for rounding, so that Q has fewer columns than there are zeros.
     """
     is_zero = np.abs(eigenvalues) <= errors
     kept = ~is_zero & (eigenvalues.imag >= 0)
     both = np.concatenate([V[:, is_zero].real, V[:, is_zero].imag], axis=1)
     Q, values, _ = np.linalg.svd(both, full_matrices=False)
-    Q = Q[:, np.argsort(-values)[: int(is_zero.sum())]]
+    Q = Q[:, values > np.finfo(float).eps / FREE * values.max(initial=0.0)][:, : int(is_zero.sum())]
     _, values, right = np.linalg.svd(Q.T @ A @ Q)
     free = Q @ right[values <= FREE * np.abs(A).max(initial=0.0)].T
     zeros = np.zeros(free.shape[1])

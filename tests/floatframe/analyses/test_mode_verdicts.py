@@ -1,5 +1,7 @@
 """Verdicts about modes: each by its own frequency, one for each motion that costs nothing, rates of what decays."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -82,6 +84,40 @@ def test_a_free_body_has_six_motions_that_cost_nothing(has_damper):
     assert len(modes.eigenvalues) == 7
     assert np.linalg.matrix_rank(modes.shapes[:, :6], tol=1e-6) == 6
     assert modes.is_stable
+
+
+@pytest.mark.parametrize("k_stiff", [1e3, 1e6, 1e9, 1e11])
+@pytest.mark.parametrize("speed", [0.0, 110.0])
+def test_a_rotor_on_its_shaft_turns_freely_once(speed, k_stiff):
+    """Beside a small body that may turn about its centre: four motions cost nothing, each vibration is another mode.
+
+    Seen from axes that turn with W, a small body that is tilted stands still or turns backwards with W.
+    """
+    system = rotor("a", k_stiff)
+    shaft = RigidBody("shaft", 1.0, 0.2 * np.eye(3), position=PLACE, orientation=euler_parameters(A))
+    hinge = RevoluteJoint("shaft", Marker(GROUND, position=PLACE), Marker("shaft"), axis=A[:, 2])
+    holder = Bushing("holder", Marker("shaft"), Marker("rotor"), stiffness=np.array([1e5, 1e5, 0, 0, 0, 1e3]),
+                     damping=np.array([100.0, 100.0, 0, 0, 0, 1.0]))  # fmt: skip
+    system = replace(system, bodies=[*system.bodies, shaft], joints=[*system.joints, hinge],
+                     forces=[holder, system.forces[1]])  # fmt: skip
+    found = modes_at(system, speed).eigenvalues
+    assert np.count_nonzero(found == 0) == 4
+    torsion, small = np.roots([0.1, 1.0, 1e3])[0], np.sqrt(k_stiff / 0.1)
+    # a spring and a damper that turn with the rotor: m (z'' + 2 i W z' - W² z) + d z' + k z = 0, z = x + i y
+    whirls = np.roots([10.0, 20j * speed + 100.0, 1e5 - 10.0 * speed**2])
+    expected = [
+        torsion,
+        *whirls,
+        1j * small,
+        1j * (small + speed),
+        1j * (small - speed),
+        *([1j * speed] if speed else []),
+    ]
+    found = found[found != 0]
+    for part in (np.real, lambda values: np.abs(np.imag(values))):
+        assert_allclose(
+            np.sort(part(found)), np.sort(part(np.array(expected))), rtol=1e-6, atol=1e-6 * np.abs(whirls).min()
+        )
 
 
 def test_what_is_overdamped_has_its_two_rates():
