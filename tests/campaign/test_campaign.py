@@ -126,8 +126,12 @@ def test_the_oracle_of_motions_tells_a_right_motion_from_another_one():
 
 
 def test_the_way_of_a_body_that_turns_about_its_origin_is_that_of_its_centre_of_mass():
-    samples = run(pendulum(n_steps=60), 1)[0]  # swings from the level to the other side
+    samples = run(pendulum(n_steps=110), 1)[0]  # swings from the level to the other side, and almost back
     np.testing.assert_allclose(samples.way, 2.0, rtol=0.02)
+    origin, center = samples.r
+    np.testing.assert_allclose(origin, 0.0, atol=1e-6)
+    assert center[:, 1].min() < -0.9  # it hangs below the hinge
+    assert center[:, 1].max() < 0.01
 
 
 def test_the_oracle_of_motions_knows_chaos():

@@ -139,21 +139,27 @@ def test_drives_and_reactions_are_alike_in_other_units(name, units):
 
 
 @pytest.mark.parametrize("units", UNITS)
-def test_poses_that_reach_a_target_are_alike_in_other_units(units):
+@pytest.mark.parametrize("has_rotation", [False, True])
+def test_poses_that_reach_a_target_are_alike_in_other_units(has_rotation, units):
+    """Errors of place and rotation are weighed by the size of the system, a box along the ground axes: not turned."""
     found = {}
     for name in ("m-kg-s", units):
         other = Other(unit_system(name))
         plain = manipulator()
         free = replace(plain, joints=[replace(joint, motions={}) for joint in plain.joints])
-        turn, place = directions(other)
+        turn, place = (np.eye(3), np.zeros(3)) if has_rotation else directions(other)
         goal = Target(Marker("block", position=np.array([0.1, 0.0, 0.05]) * other.factor("m")),
-                      turn @ np.array([1.0, 0.3, 0.2]) * other.factor("m") + place)  # fmt: skip
+                      turn @ np.array([1.0, 0.3, 0.2]) * other.factor("m") + place,
+                      R if has_rotation else None)  # fmt: skip
+        moved = in_units(free, other.units, turn, np.zeros(3)) if has_rotation else elsewhere(free, other)
         limits = {"slide.distance": (-0.05 * other.factor("m"), 0.02 * other.factor("m"))}
-        found[name] = inverse_kinematics(elsewhere(free, other), goal, limits=limits)
+        found[name] = inverse_kinematics(moved, goal, limits=limits)
     a, b, other = found["m-kg-s"], found[units], Other(unit_system(units))
     assert not a.is_reached
     assert a.at_limits == b.at_limits != ()
     assert_allclose(b.position_error / other.factor("m"), a.position_error, rtol=1e-7)
+    assert (a.rotation_error > 0.1) == has_rotation
+    assert_allclose(b.rotation_error, a.rotation_error, rtol=1e-6)
     assert_allclose(b.coordinates["hinge.angle"], a.coordinates["hinge.angle"], rtol=0, atol=1e-6)
     assert_allclose(b.coordinates["slide.distance"] / other.factor("m"), a.coordinates["slide.distance"], atol=1e-9)
 

@@ -118,6 +118,20 @@ def test_numbers_that_a_file_does_not_give_are_those_of_python(file):
     assert (section.findley_k, section.planes) == (plain.findley_k, plain.n_planes) == (0.3, 18)
 
 
+@pytest.mark.parametrize(
+    ("name", "valid", "invalid"), [("planes", (4, 360), (3, 361)), ("findley_k", (0, 2), (-0.01, 2.01))]
+)
+def test_numbers_of_a_criterion_are_taken_up_to_their_bounds(file, name, valid, invalid):
+    text = file.read_text()
+    for value in (*valid, *invalid):
+        file.write_text(text.replace("[criterion]", f"[criterion]\n{name} = {value}"))
+        if value in valid:
+            assert getattr(read_fatigue(file).criterion, name) == value
+        else:
+            with pytest.raises(ValueError, match=name):
+                read_fatigue(file)
+
+
 @pytest.mark.parametrize("unit", ["Pa", "psi", "ksi", "N/mm^2", "GPa"])
 def test_the_unit_of_the_curve_does_not_change_the_damage(file, amplitude, unit):
     before = assess(read_fatigue(file)).result.damage

@@ -129,6 +129,12 @@ def measured():
     return Signal("base", times, np.sin(2 * np.pi * 7 * t) + 0.05 + 0.02 * t, "m/s^2")
 
 
+def test_the_note_on_drift_tells_the_largest_removed_value_and_its_share_of_the_peak():
+    """A straight line from -3 to 1 has the mean -1 and the peak 3."""
+    found = without_drift(Signal("base", t, np.linspace(-3.0, 1.0, len(t)), "m/s^2"), "mean")
+    assert found.notes == ("drift mean: up to 1 m/s^2 removed, 33.3 % of the peak",)
+
+
 def test_the_mean_is_taken_off_such_that_the_velocity_ends_as_it_began():
     motion, notes = integrated_twice(measured(), position=0.1, velocity=-0.3, drift="mean")
     end = measured().time[-1]
