@@ -12,7 +12,8 @@ It works for second-order methods, with fixed steps and with an error tolerance:
     motion.
     The estimate holds for errors of second order. The companion with double steps goes on beside one with half steps
     of the same damping. Where the difference from the run falls to more than a quarter from double to half steps
-    (vibrations of much energy that no step resolves), the estimate follows this ratio, up to `MOST_RATIO`.
+    (vibrations of much energy that no step resolves), the estimate follows this ratio, up to `MOST_RATIO`. Where double
+    steps fail, it is `UNKNOWN_RATIO`.
 (3) The companion covers `COMPANION_STEPS` steps. It crosses jumps of forces and has its own events. In a run of more
     than `LONG_RUN` steps it starts after the first steps, from their memory. There it ends as soon as the error,
     extrapolated in proportion to the end of the run, is far below the limit.
@@ -22,6 +23,8 @@ It works for second-order methods, with fixed steps and with an error tolerance:
     the largest rotation; where that is below `SMALL_TURN`, to the displacement over the length of the system. Windows
     also count the errors of speeds, relative to twice the largest speed (a vibration moves by two amplitudes). Errors a
     of place and b of speed combine to sqrt(a² + b²), since they turn into one another.
+(6) The first step is compared alone, with two half steps of the same damping. A stiff spring with a damper settles
+    before the comparisons of (1), while the first step may be wrong by the whole sag.
 
 A companion restarts where a run can be resumed; its error up to there is added. A run that continues another one in
 time (`State.watched`) adds its errors to those of the other, relative to the motion since that began. These sums, and
@@ -81,6 +84,7 @@ AIM = 0.2  #: share of the limit that the recommended step would reach
 DOUBLES, HALVES = 2.0, 0.5  #: step size of a companion over that of the run
 ERROR_SHARE = {DOUBLES: 1 / 3, HALVES: 4 / 3}  #: error of the run over the difference: 1/(2² - 1) and 1/(1 - 1/2²)
 MOST_RATIO = 2 / 3  #: largest ratio of the differences by half and by double steps from which an error is estimated
+UNKNOWN_RATIO = 1 / 2  #: the ratio where double steps fail, that of errors of first order
 
 
 #: of a record
@@ -176,10 +180,12 @@ class StepWatch:
     is_on: bool = True
     n_before: int = 0  #: number of steps of earlier runs that this one continues
     is_piece: bool = False  #: whether it starts from a state whose errors are unknown
+    first_error: Array | float = 0.0  #: error of position and rotation in the first step, not yet added, (n_b, 2)
     n_companion_steps: int = 0  #: number of steps that companions have covered
     companions_done: bool = False  #: whether only windows follow
     companion: Companion | None = None
     coarse: Companion | None = None  #: with double steps, beside a companion with half steps
+    coarse_fails: bool = False  #: whether double steps cannot follow the motion
     next_window: int = 0  #: step at which the next window starts
     window_distance: int = 0  #: number of steps between the last window and the next
     n_watched: int = 0  #: number of steps with summed errors
@@ -252,6 +258,8 @@ class StepWatch:
     def room(self, n_done: int, most: int) -> int:
         """Return how many steps to take at once after n_done: to a comparison, half a window, or the next window."""
         if self.has_companion:
+            if n_done < 2:
+                return 1 if n_done == 0 else FIRST_CHECK - 1
             gone = 0 if self.companion is None else n_done - self.companion.start
             if not self.is_comparable(n_done):
                 return 1
@@ -280,7 +288,12 @@ class StepWatch:
         """
         last = first + n_steps
         if self.has_companion:
-            if self.companion is None and self.is_long and begin.h == 0.0:
+            if last == 1:
+                halves = Companion.begun(self.integrator, begin, self.work_arrays(system), 0, HALVES, events=events)
+                if halves.follow(system, end, last, t0, h, self.jumps):
+                    self.first_error = halves.peak
+                    self.update_size(begin.state, end.state, h)
+            if self.companion is None and self.is_long and (begin.h == 0.0 or first < FIRST_CHECK):
                 return None
             return self.compare(system, begin, end, t0, h, first, last, events)
         if is_cut:
@@ -309,6 +322,7 @@ class StepWatch:
             self.companion = Companion.begun(
                 self.integrator, begin, self.work_arrays(system), first, DOUBLES, h if is_fixed else 0.0, events
             )
+            self.coarse_fails = False
         other = self.companion
         if self.is_comparable(last):
             self.update_size(begin.state, end.state, h * (last - first))
@@ -318,10 +332,10 @@ class StepWatch:
                 is_good = other.follow(system, end, last, t0, h, self.jumps)
             if self.coarse is not None and (last - other.start) % 2 == 0:
                 if not self.coarse.follow(system, end, last, t0, h, self.jumps):
-                    self.coarse = None
-            is_small = is_good and self.relative_errors(system, other).max() < SCREEN * self.limit
+                    self.coarse, self.coarse_fails = None, True
+            is_small = is_good and self.relative_errors(system, other.peak).max() < SCREEN * self.limit
             if other.ratio == DOUBLES and not is_small:
-                coarse = other if is_good else None
+                coarse, self.coarse_fails = (other, False) if is_good else (None, True)
                 other = self.companion = self.with_half_steps(system, other)
                 if coarse is not None and not other.is_light:
                     self.coarse, self.kept_work = coarse, None  # each has its own working arrays
@@ -339,7 +353,7 @@ class StepWatch:
         note = self.new_note(system, t0 + last * h, h) if is_due else None
         is_over = self.n_companion_steps + last - other.start >= COMPANION_STEPS or self.note is not None
         if self.is_long and last >= LEAST_COMPANION_STEPS:  # errors of phase grow in proportion to time
-            expected = float(self.relative_errors(system, other).max()) * self.n_total / last
+            expected = float(self.relative_errors(system, other.peak).max()) * self.n_total / last
             is_over = is_over or expected < SMALL_SHARE * self.limit
         if is_over or last % RESTART_STEPS == 0:
             self.close_companion(h)
@@ -370,8 +384,11 @@ class StepWatch:
         coarse, self.coarse = self.coarse, None
         if other is None or other.at == other.start:
             return
-        found = np.stack([other.peak, other.speeds(h)], axis=2) * by_observed_order(other, coarse)[:, :, None]
-        self.total, self.error_per_step = self.total + found, found / (other.at - other.start)
+        factors = by_observed_order(other, coarse, self.coarse_fails)
+        found = np.stack([other.peak, other.speeds(h)], axis=2) * factors[:, :, None]
+        self.error_per_step = found / (other.at - other.start)
+        found[:, :, 0] = np.maximum(found[:, :, 0], self.first_error)
+        self.total, self.first_error = self.total + found, 0.0
         self.n_companion_steps += other.at - other.start
         self.n_watched = other.at
 
@@ -434,7 +451,7 @@ class StepWatch:
         self.add_unwatched_steps(n_done, self.error_per_step)
         return self.new_note(system, t0 + n_done * h, h)
 
-    def relative_errors(self, system: System, companion: Companion | None = None) -> Array:
+    def relative_errors(self, system: System, found: Array | None = None) -> Array:
         """Return the relative errors of position and rotation of each body, with those of a companion, (n_b, 2)."""
         compiled = compiled_system(system)
         least = np.array([REST_LENGTH * compiled.length, REST_ANGLE])
@@ -443,9 +460,9 @@ class StepWatch:
             size[1] = np.maximum(size[1], size[0] / compiled.length)
         moves = size[:, 0] > least
         total = self.total
-        if companion is not None:
+        if found is not None:
             total = total.copy()
-            total[:, :, 0] += companion.peak * by_observed_order(companion, self.coarse)
+            total[:, :, 0] += found
         parts = total / np.where(size > 0.0, size, np.inf)
         return np.where(moves, np.linalg.norm(parts, axis=2), 0.0)
 
@@ -454,7 +471,11 @@ class StepWatch:
         companion = self.companion
         if companion is not None and companion.ratio == DOUBLES:
             return None
-        share = self.relative_errors(system, companion)
+        found = None
+        if companion is not None:
+            factors = by_observed_order(companion, self.coarse, self.coarse_fails)
+            found = np.maximum(companion.peak * factors, self.first_error)
+        share = self.relative_errors(system, found)
         i = int(np.argmax(share.max(axis=1)))
         largest, limit = float(share[i].max()), self.limit
         if not largest > limit:
@@ -525,15 +546,19 @@ def lighter(integrator: Integrator, share: float) -> tuple[Integrator, float]:
     return replace(integrator, rho_inf=LIGHT), own / (own - light / 4)
 
 
-def by_observed_order(other: Companion, coarse: Companion | None) -> Array:
+def by_observed_order(other: Companion, coarse: Companion | None, coarse_fails: bool) -> Array:
     """Return by how much the errors that a companion finds are larger where they are not of second order, (n_b, 2).
 
     Differences by double and half steps from the run that fall by a ratio x leave an error of 1/(1 - x) times the last.
+    Where double steps fail, the order is unknown, and the first is assumed.
     """
-    if coarse is None or other.ratio != HALVES or other.is_light:
+    if (coarse is None and not coarse_fails) or other.ratio != HALVES or other.is_light:
         return np.ones(other.peak.shape)
-    by_halves, by_doubles = other.peak / other.share, coarse.peak / coarse.share
-    ratio = np.clip(by_halves / np.where(by_doubles > 0.0, by_doubles, np.inf), 0.25, MOST_RATIO)
+    if coarse is None:
+        ratio = np.full(other.peak.shape, UNKNOWN_RATIO)
+    else:
+        by_halves, by_doubles = other.peak / other.share, coarse.peak / coarse.share
+        ratio = np.clip(by_halves / np.where(by_doubles > 0.0, by_doubles, np.inf), 0.25, MOST_RATIO)
     return np.asarray(1 / (1 - ratio) / ERROR_SHARE[HALVES])
 
 

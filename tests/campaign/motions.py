@@ -3,7 +3,7 @@
 (1) the case is run as drawn (`random_motion`), in chunks where it says so
 (2) the reference is the same system in fine steps, absolute and relative, with steps halved until both agree
 (3) the error is that of frame origins and centres of mass over the farthest way of one in any fine step, or that of
-    rotations over theirs
+    rotations over theirs; a way of less than 0.1 um is rest for systems of about 1 m
 (4) a note of the run about its steps or energy, or an error in words, is an answer; else the motion has to be right,
     unless it is chaotic: a fine run whose velocities begin 1e-6 away ends more than `CHAOS` times as far away
 """
@@ -24,6 +24,7 @@ __all__ = ["motion_case", "motion_verdict"]
 WRONG_BY = 0.05  #: of the motion
 CALM = 0.01  #: of the motion: below, a note is needless
 AGREED = 0.004  #: of the motion, between references
+REST = 1e-7  #: way below which a system of about 1 m is at rest [m]
 COARSEST, FINEST = 8, 256  #: steps of the reference in one of the case
 MOST_STEPS = 40_000  #: of a reference
 CHAOS = 30.0  #: growth of a difference in a run
@@ -75,7 +76,8 @@ class Samples:
         p = np.stack([joined([p.body(n).p for p in parts]) for n in names])
         arms = np.einsum("itab,ib->ita", rotation_matrix(p), [center_of_mass(body) for body in system.bodies])
         r = np.concatenate([origins, origins + arms])  # (2 n_b, n_t, 3)
-        self.way = np.linalg.norm(r - r[:, :1], axis=2).max()
+        rest = REST / system.units.to_si(length=1)
+        self.way = max(rest, np.linalg.norm(r - r[:, :1], axis=2).max())
         self.angle = 2 * np.arccos(np.clip(np.abs(np.einsum("itk,itk->it", p, p[:, :1])), 0, 1)).max()
         self.r, self.p = r[:, ::every], p[:, ::every]
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import floatframe as ff
+from fe_models.foundation.units import unit_system
 from tests.campaign.campaign import FAMILIES, case_of, main
 from tests.campaign.expressions import value_of_tape
 from tests.campaign.jobs import JOB, job_case, wrong_body
@@ -132,6 +133,22 @@ def test_the_way_of_a_body_that_turns_about_its_origin_is_that_of_its_centre_of_
     np.testing.assert_allclose(origin, 0.0, atol=1e-6)
     assert center[:, 1].min() < -0.9  # it hangs below the hinge
     assert center[:, 1].max() < 0.01
+
+
+@pytest.mark.parametrize(("units", "length"), [("m-kg-s", 1.0), ("mm-t-s", 1e3)])
+def test_a_body_that_moves_by_nanometres_is_at_rest_to_the_oracle(units, length):
+    """Exact: on a spring of 1e5 rad/s a mass sags by 1 nm, and swings by 2 nm."""
+    at = ff.Marker("ground", position=np.zeros(3))
+    rail = ff.PrismaticJoint("rail", at, ff.Marker("mass", position=np.zeros(3)), axis=(0, 0, 1))
+    spring = ff.JointForce("spring", "rail", "distance", stiffness=1e10)
+    system = ff.System(
+        [ff.RigidBody("mass", 1.0, np.eye(3))], [rail], [ff.Gravity((0, 0, -10.0 * length)), spring],
+        unit_system(units),
+    )  # fmt: skip
+    case = MotionCase(system, ff.GeneralizedAlpha(0.8), 1e-5, 100, 0, "absolute", "stiff")
+    samples = run(case, 1)[0]
+    np.testing.assert_allclose(np.ptp(samples.r[..., 2]), 2e-9 * length, rtol=0.05)
+    np.testing.assert_allclose(samples.way, 1e-7 * length, rtol=1e-12)
 
 
 def test_the_oracle_of_motions_knows_chaos():
