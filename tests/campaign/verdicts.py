@@ -61,6 +61,8 @@ def verdict_case(seed: int, folder: Path) -> Verdict:
             if bad is None or ("carried" in sound.words and names[k].startswith(NOT_CARRIED)):
                 continue
             record = judged(sound, bad, reference)[CORRUPTIONS[names[k]][0]]
+            if "not compared" in record.reason:
+                continue
             if record.verdict not in ("warn", "fail"):
                 return Verdict(WRONG, f"not found: {names[k]}: {record.name}: {record.reason}; {sound.words}")
             break

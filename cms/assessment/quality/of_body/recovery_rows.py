@@ -15,7 +15,7 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["check_recovery_forces", "check_recovery_motions", "check_recovery_shapes"]
 
-ROUNDING = 1e-9  #: stress of a unit displacement, over stiffness by size, below which it is rounding
+ROUNDING = 1e-6  #: stress of a unit displacement, over stiffness by the square of the size, below which it is rounding
 
 MOTIONS = ("displacement", "velocity", "acceleration")
 NO_TABLE = "the body has no recovery tables"
@@ -46,7 +46,7 @@ def check_recovery_forces(reduced: ReducedBody) -> QualityRecord:
                     elastic = max(elastic, (whole / np.where(shape > 0, shape, 1.0)).max(initial=0.0))
                 if quantity == "stress" and size > 0:  # rounding in a rigid part, of a file without other stress
                     stiffness = np.diag(reduced.K) / np.where(shape > 0, shape, np.inf) ** 2
-                    elastic = max(elastic, ROUNDING * float(stiffness.max(initial=0.0)) / size)
+                    elastic = max(elastic, ROUNDING * float(stiffness.max(initial=0.0)) / size**2)
                 key = f"{name}: {quantity}"
                 found = float(rigid / elastic) if elastic > 0 else float(rigid > 0)
                 defects[key] = max(defects.get(key, 0.0), found)
