@@ -11,6 +11,7 @@ import numpy as np
 
 import cms
 from cms.assessment.quality.of_reduction.contents import CONTENTS
+from cms.assessment.quality.of_reduction.fields import leaves
 from cms.assessment.quality.record import QualityRecord
 from cms.assessment.quality.reduction_check import check_reduction
 from cms.assessment.quality.reference.full_reference import FullReference
@@ -39,6 +40,17 @@ def judged(sound: SoundBody, reduced: cms.ReducedBody, reference: FullReference)
     return {record.name: record for record in records}
 
 
+def changed_fields(body: cms.ReducedBody, other: cms.ReducedBody) -> set[str]:
+    """Return the paths of the fields in which two bodies differ."""
+    own, others = leaves(body), leaves(other)
+    return {path for path in set(own) | set(others) if not same_values(own.get(path, []), others.get(path, []))}
+
+
+def same_values(a: list, b: list) -> bool:
+    """Return whether two lists hold the same values."""
+    return len(a) == len(b) and all(np.array_equal(x, y) for x, y in zip(a, b, strict=True))
+
+
 def verdict_case(seed: int, folder: Path) -> Verdict:
     """Return the verdict of the case of a seed."""
     rng = np.random.default_rng([seed, 1])
@@ -61,9 +73,11 @@ def verdict_case(seed: int, folder: Path) -> Verdict:
             if bad is None or ("carried" in sound.words and names[k].startswith(NOT_CARRIED)):
                 continue
             record = judged(sound, bad, reference)[CORRUPTIONS[names[k]][0]]
-            if "not compared" in record.reason:
-                continue
             if record.verdict not in ("warn", "fail"):
+                moments = sound.reduced.moments
+                vanishing = {"moments.C1"} if np.abs(moments.C1).max() < 1e-9 * np.sqrt(moments.m) else set()
+                if changed_fields(sound.reduced, bad) <= vanishing | set(record.data.get("left_out", ())):
+                    continue  # the record says that it does not compare them, or mean axes leave nothing to compare
                 return Verdict(WRONG, f"not found: {names[k]}: {record.name}: {record.reason}; {sound.words}")
             break
     is_known = found["points"].verdict == "pass"

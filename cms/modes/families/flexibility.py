@@ -236,8 +236,8 @@ def _free_motions(condensed: CondensedBody, conditions: BoundaryConditions) -> A
     scaled = scaled / column
     against = scaled - (Z / size[:, None]) @ (Z.T @ (scaled * size[:, None]))
     spring = _root_of_load(condensed, conditions, size) @ (Psi_R[h] / column)
-    some_rows = np.zeros((Psi_R.shape[1], Psi_R.shape[1]))  # so that the vectors span all rigid-body motions
-    _, sizes, vectors = la.svd(np.vstack([against, spring, some_rows]), full_matrices=False)
+    no_condition = np.zeros((Psi_R.shape[1], Psi_R.shape[1]))  # rows for all rigid-body motions, or a vector is missing
+    _, sizes, vectors = la.svd(np.vstack([against, spring, no_condition]), full_matrices=False)
     return (Psi_R / column) @ vectors[sizes < RIGID_MOTION].T
 
 

@@ -191,15 +191,16 @@ def record_of(name: str, case: Case, compare: Callable[[Case], Iterator[Compared
     worst = found[int(np.argmax([each.defect for each in found]))]  # not a number counts as the largest
     data: dict[str, float] = {}
     for each in found:
-        if each.left_out:
-            continue
-        data[each.field] = float(np.maximum(data.get(each.field, 0.0), each.defect))
+        if not each.left_out:
+            data[each.field] = float(np.maximum(data.get(each.field, 0.0), each.defect))
     at = f" ({worst.where})" if worst.where else ""
     reason = f"{worst.field}{at}: {worst.doubt}" if worst.doubt else ""
     if not reason:
         reason = f"largest difference from the model is {worst.defect:.1e}, of {worst.field}{at}; {len(data)} fields"
-    reason += "".join(f"; not compared: {each.field}, since {each.left_out}" for each in found if each.left_out)
-    return judge(name, worst.defect, reason, {"fields": data})
+    left_out = {each.field: each.left_out for each in found if each.left_out}
+    for why in dict.fromkeys(left_out.values()):
+        reason += f"; not compared: {', '.join(field for field, w in left_out.items() if w == why)}, since {why}"
+    return judge(name, worst.defect, reason, {"fields": data, "left_out": tuple(left_out)})
 
 
 def missing(field: str, where: str = "") -> Compared:
@@ -321,7 +322,7 @@ def compare_moments(case: Case) -> Iterator[Compared]:
     yield same("moments.missing", file.missing, made.missing)
     if not made.is_exact and CONVERTED in case.reduced.provenance:
         why = "matrices only approximate these moments, and the approximation depends on the frame"
-        yield Compared("moments.P, moments.S_kl", 0.0, left_out=why)
+        yield from (Compared(name, 0.0, left_out=why) for name in ("moments.P", "moments.S_kl"))
         return
     word = case.axes_words
     yield apart("moments.C1", file.C1 @ R, made.C1, size, axes=f"component {word}")
