@@ -193,7 +193,7 @@ def same_body_record(body: FEBody, basis: FreeBasis, reduced: ReducedBody, shape
     allowed = rounding_of(basis, np.eye(len(basis.omega2))[:, basis.is_massive][:, : len(distance)])
     omega = np.sqrt(basis.omega2[basis.is_massive][: len(distance)])
     frequencies = float(beyond(distance, allowed.mass + allowed.stiffness / omega).max(initial=0.0))
-    reason = f"free-free frequencies of file and mode set differ by {frequencies:.1e}"
+    reason = f"beyond rounding, free-free frequencies of file and mode set differ by {frequencies:.1e}"
     if shapes is None:
         reason += "; its kept nodes do not determine the modes over the whole body"
         return judge("same-body", frequencies, reason, {"set": own, "file": stored})
