@@ -13,7 +13,7 @@ It works for second-order methods, with fixed steps and with an error tolerance:
     The estimate holds for errors of second order. The companion with double steps goes on beside one with half steps
     of the same damping. Where the difference from the run falls to more than a quarter from double to half steps
     (vibrations of much energy that no step resolves), the estimate follows this ratio, up to `MOST_RATIO`. Where double
-    steps fail, it is `UNKNOWN_RATIO`.
+    steps fail, the ratio is taken as `UNKNOWN_RATIO`.
 (3) The companion covers `COMPANION_STEPS` steps. It crosses jumps of forces and has its own events. In a run of more
     than `LONG_RUN` steps it starts after the first steps, from their memory. There it ends as soon as the error,
     extrapolated in proportion to the end of the run, is far below the limit.
