@@ -7,6 +7,7 @@
     python -m tests --campaign   # seeded bad inputs, kills, random motions and bodies
     python -m tests --changed    # lint, and tests that guard what changed since main (or --changed HEAD~3)
     python -m tests --guards cms/linear_algebra/solvers/eigen.py    # which tests guard a module
+    python -m tests --mutants 60 --seed 5    # lines of physics changed at random: do their tests notice
 
 A group is a row of stages. The checks of a stage run side by side, each as its own process, and each report is printed
 as a whole when its check ends; the first stage in which one fails ends the run. The last line says how long the group
@@ -99,13 +100,17 @@ def main(arguments: list[str]) -> int:
         from tests.campaign import main as campaign
 
         return campaign(arguments[1:])
+    if arguments[:1] == ["--mutants"]:
+        from tests.mutants import main as mutants
+
+        return mutants(arguments[1:])
     if arguments[:1] == ["--guards"]:
         return tell_guards(arguments[1:])
     if arguments[:1] == ["--changed"]:
         return run_changed(arguments[1:])
     names = [argument.removeprefix("--") for argument in arguments] or ["ci"]
     if len(names) > 1 or names[0] not in GROUPS:
-        choices = ", ".join(f"--{name}" for name in (*GROUPS, "campaign", "changed", "guards"))
+        choices = ", ".join(f"--{name}" for name in (*GROUPS, "campaign", "changed", "guards", "mutants"))
         print(f"python -m tests: expected one of {choices}, or nothing for --ci; got {' '.join(arguments)}")
         return 2
     return run_told(names[0], GROUPS[names[0]])
