@@ -7,8 +7,9 @@
     python -m tests --campaign motions --count 1000 --seed 5      so many cases of each, seeds from 5 on
 
 Motions, bodies, verdicts and decks beside an assembler have new seeds in each run, the other families those from 0 on;
---seed gives the first. A fault prints its family and seed, which repeat it. A hang is a case beyond `LIMIT` seconds; a
-worker that ends is a traceback of its case. The exit code is 0 if there is no traceback, no hang, no wrong acceptance
+--seed gives the first. A fault prints its family and seed, which repeat it. A hang is a case that takes more than
+`LIMIT` seconds of processor time, or that is silent for `SILENCE` seconds; a worker that ends otherwise is a traceback
+of its case. The exit code is 0 if there is no traceback, no hang, no wrong acceptance
 and no unclear message.
 """
 
@@ -16,6 +17,7 @@ import argparse
 import importlib
 import secrets
 import shutil
+import signal
 import tempfile
 import time
 from collections import Counter
@@ -56,8 +58,9 @@ NEW_SEEDS = (
     "abaqus-bodies",
     "ansys-bodies",
 )  #: families whose seeds are new in each run
-LIMIT = 60.0  #: seconds of a case
-FIRST = 600.0  #: of the first one in a worker, before which it may compile the kernels
+LIMIT = 60.0  #: processor time of a case [s]; a loaded machine does not change it
+FIRST = 600.0  #: of the first one in a worker, which may compile the kernels [s]
+SILENCE = 3600.0  #: time after which a case that computes nothing is given up [s]
 PROCESSES = 2
 SORTS = (
     "compared",
@@ -76,6 +79,18 @@ def case_of(family: str) -> Any:
     return getattr(importlib.import_module(module), name)
 
 
+def limit_processor_time(seconds: float) -> None:
+    """End this process when it has used so many more seconds of processor time; 0 sets no limit."""
+    signal.setitimer(signal.ITIMER_PROF, seconds)  # SIGPROF ends a process, also within compiled code
+
+
+def verdict_of_exit(code: int | None) -> Verdict:
+    """Return the verdict of a case whose process ended."""
+    if code == -signal.SIGPROF:
+        return Verdict(HANG, "no answer within the limit of processor time")
+    return Verdict(TRACEBACK, f"the process ended with exit code {code}")
+
+
 def serve(pipe: Connection, home: str) -> None:
     """Run the cases that are asked for; the main function of a worker."""
     prepared(Path(home) / "prepared")  # compiles what is compiled at first use
@@ -85,10 +100,12 @@ def serve(pipe: Connection, home: str) -> None:
         number += 1
         folder = Path(home) / f"case{number}"
         folder.mkdir()
+        limit_processor_time(FIRST if number == 1 else LIMIT)
         try:
             verdict = case_of(family)(seed, folder)
         except BaseException as error:  # of the oracle too: it must understand what was accepted
             verdict = Verdict(TRACEBACK, f"{type(error).__name__}: {error}"[:600])
+        limit_processor_time(0.0)
         shutil.rmtree(folder, ignore_errors=True)
         pipe.send(verdict)
 
@@ -103,13 +120,11 @@ class Worker:
         self.process.start()
         other.close()
         self.case: tuple[str, int] | None = None
-        self.is_first = True
         self.deadline = 0.0
 
     def give(self, case: tuple[str, int]) -> None:
         """Give it a case."""
-        self.case, self.deadline = case, time.monotonic() + (FIRST if self.is_first else LIMIT)
-        self.is_first = False
+        self.case, self.deadline = case, time.monotonic() + SILENCE
         self.pipe.send(case)
 
     def end(self) -> None:
@@ -206,9 +221,9 @@ def verdicts(cases: list[tuple[str, int]], home: Path) -> Any:
                         worker.case = None
                     except (EOFError, OSError):
                         worker.process.join(5)
-                        verdict = Verdict(TRACEBACK, f"the process ended with exit code {worker.process.exitcode}")
+                        verdict = verdict_of_exit(worker.process.exitcode)
                 elif time.monotonic() > worker.deadline:
-                    verdict = Verdict(HANG, f"no answer within {LIMIT:g} s")
+                    verdict = Verdict(HANG, f"no answer within {SILENCE:g} s")
                 else:
                     continue
                 if worker.case is not None:

@@ -1,5 +1,7 @@
 """The oracles of the campaign: whole inputs pass, and each of them sees the fault it is there for."""
 
+import subprocess
+import sys
 import tomllib
 
 import numpy as np
@@ -7,14 +9,15 @@ import pytest
 
 import floatframe as ff
 from fe_models.foundation.units import unit_system
-from tests.campaign.campaign import FAMILIES, case_of, main
+from tests.campaign.campaign import FAMILIES, case_of, main, verdict_of_exit
 from tests.campaign.expressions import value_of_tape
 from tests.campaign.jobs import JOB, job_case, wrong_body
 from tests.campaign.motions import WRONG_BY, difference, growth_of, motion_verdict, reference_of, run
 from tests.campaign.plain_mesh import FORMATS, bar, read_plain
 from tests.campaign.random_motions import MotionCase, random_motion
 from tests.campaign.systems import SYSTEM, system_case, wrong_motion
-from tests.campaign.verdict import ACCEPTED, REFUSED
+from tests.campaign.verdict import ACCEPTED, HANG, REFUSED, TRACEBACK
+from tests.root import ROOT
 
 
 @pytest.fixture(scope="module")
@@ -103,6 +106,15 @@ def test_the_first_cases_of_every_family_pass(tmp_path, family):
 def test_a_request_that_is_wrong_is_refused_in_words(capsys, words, told):
     assert main(words) == 2
     assert told in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("work", "kind"), [
+    ("while True: pass", HANG), ("time.sleep(1.0)", None), ("os._exit(3)", TRACEBACK),
+])  # fmt: skip
+def test_a_hang_is_measured_in_processor_time(work, kind):
+    start = "import os, time\nfrom tests.campaign.campaign import limit_processor_time\nlimit_processor_time(0.3)\n"
+    ended = subprocess.run([sys.executable, "-c", start + work], cwd=ROOT, check=False).returncode
+    assert (None if ended == 0 else verdict_of_exit(ended).kind) == kind
 
 
 def pendulum(n_links=1, gravity=-9.81, h=0.02, n_steps=100):

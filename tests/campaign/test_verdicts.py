@@ -1,12 +1,16 @@
 """The campaign of verdicts: bodies that were judged wrongly."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 import cms
 from cms.assessment.quality.of_body.recovery_rows import check_recovery_forces
+from cms.assessment.quality.reference.full_reference import FullReference
 from tests.campaign.sound_bodies import sound_body
-from tests.campaign.verdicts import verdict_case
+from tests.campaign.verdicts import judged
 
 
 @pytest.mark.parametrize("seed", [120157, 120682])
@@ -20,5 +24,15 @@ def test_stress_that_is_rounding_alone_is_judged_alike_in_all_units(seed):
 
 
 @pytest.mark.parametrize("seed", [120160, 120251])
-def test_moments_that_depend_on_the_frame_are_said_not_to_be_compared(seed, tmp_path):
-    assert verdict_case(seed, tmp_path).kind == "accepted"
+def test_approximated_moments_are_compared_after_a_change_of_frame(seed):
+    sound = sound_body(seed)
+    assert "carried" in sound.words
+    assert not sound.reduced.moments.is_exact
+    moments = sound.reduced.moments
+    S_kl = np.array(moments.S_kl)
+    S_kl[0, 1, 0] *= -1
+    S_kl[1, 0, :, 0] *= -1
+    with FullReference(sound.body, band=1.5 * sound.reduced.free_frequencies[0]) as reference:
+        for changed, verdict in ((moments, "pass"), (replace(moments, S_kl=S_kl), "fail")):
+            body = replace(sound.reduced, moments=changed)
+            assert judged(sound, body, reference)["invariants"].verdict == verdict

@@ -2,6 +2,9 @@
 
 A linear field u = E c has the nodal values (E c, rotation ½ curl). With nodal inertia, these rotations make the
 products below exact if the inertia is isotropic. Otherwise the result is labelled approximate.
+
+The rigid motion in a shape needs no approximation. It is separated first, so that the moments of one body in two frames
+are those of the same deformations: reducing in a frame and converting to it give the same.
 """
 
 import numpy as np
@@ -13,14 +16,19 @@ from fe_models.foundation.tall.on_disk import in_memory
 
 __all__ = ["gram_from_matrices"]
 
+MASSLESS = 1e-12  #: inertia of a rigid motion, relative to the largest, below which it is rounding (masses on a line)
+ISOTROPIC = 1e-9  #: relative difference of the rigid mass matrix from m, S, J below which the body moves as masses do
+
 
 def gram_from_matrices(body: FEBody, Phi: Array, origin: Array | None = None) -> Array:
     """Return the Gram matrix ∫ a aᵀ dm of a = [1, c, phi_x, phi_y, phi_z] from M and the node positions.
 
+    (0) phi = phi' + d + theta × c, where phi' has no momentum (`rigid_parts`); (2) to (4) are those of phi'
     (1) m, S, R from the rigid-body mass matrix: exact
     (2) 1C = Psi_tᵀ M Phi: exact
     (3) P_ab,k = (field c_a e_b)ᵀ M phi_k, whose antisymmetric part 2C is exact
     (4) S_ab,kl = phi_kᵀ M (e_a (e_b·phi_l))
+    (5) L Gram' Lᵀ with a = L a': the rigid parts are linear in 1 and c
 
     Parameters
     ----------
@@ -32,12 +40,13 @@ def gram_from_matrices(body: FEBody, Phi: Array, origin: Array | None = None) ->
     Array
         (4 + 3 n_q, 4 + 3 n_q) in mesh axes.
     """
-    Phi = in_memory(Phi)
+    at = np.zeros(3) if origin is None else origin
+    C = rigid_parts(body, in_memory(Phi), at)  # (0)
+    Psi_R = geometric_rigid_modes(body, origin=at)
+    Phi = in_memory(Phi) - Psi_R @ C
     n = Phi.shape[1]
     node, component = body.dofs.T
     gram = np.zeros((4 + 3 * n, 4 + 3 * n))
-    at = np.zeros(3) if origin is None else origin
-    Psi_R = geometric_rigid_modes(body, origin=at)
     rigid_mass = Psi_R.T @ (body.M @ Psi_R)
     J = rigid_mass[3:, 3:]
     gram[0, 0] = np.trace(rigid_mass[:3, :3]) / 3
@@ -76,7 +85,32 @@ def gram_from_matrices(body: FEBody, Phi: Array, origin: Array | None = None) ->
             field[:, 3 + b] -= u[:, 3 + a] / 2
             gram[blocks[a], blocks[b]] = M_Phi.T @ _columns(body, field)
     # ∫ phi_a,k phi_b,l is the transpose of ∫ phi_b,l phi_a,k; both routes differ if M is not M_s ⊗ 1
-    return (gram + gram.T) / 2
+    gram = (gram + gram.T) / 2
+    L = np.eye(len(gram))  # (5)
+    L[4:, 0] = C[:3].reshape(-1)
+    L[4:, 1:4] = np.cross(C[3:].T[:, None], np.eye(3)).transpose(2, 0, 1).reshape(3 * n, 3)  # (theta_k × e_c)_a
+    return np.asarray(L @ gram @ L.T)
+
+
+def rigid_parts(body: FEBody, Phi: Array, origin: Array) -> Array:
+    """Return the rigid motions [d; theta] of shapes that carry their momentum, about a point, (6, n_q).
+
+    They are zero where the mass matrix does not move rigidly as masses do, such as that of a body with held dofs.
+    """
+    middle = body.nodes.mean(axis=0)  # about a point far away, the rotations would lose digits
+    Psi_R = geometric_rigid_modes(body, origin=middle)
+    M_R = Psi_R.T @ (body.M @ Psi_R)
+    m = np.trace(M_R[:3, :3]) / 3
+    scale = np.repeat([1.0, np.sqrt(np.trace(M_R[3:, 3:]) / m) or 1.0], 3)
+    M_R = M_R / np.outer(scale, scale)
+    moment = M_R[:3, 3:]
+    of_masses = np.allclose(M_R[:3, :3], m * np.eye(3), rtol=0, atol=ISOTROPIC * m)
+    if not (of_masses and np.allclose(moment, -moment.T, rtol=0, atol=ISOTROPIC * m)):
+        return np.zeros((6, Phi.shape[1]))
+    C = np.linalg.pinv(M_R, rcond=MASSLESS, hermitian=True) @ (Psi_R.T @ (body.M @ Phi) / scale[:, None])
+    C = C / scale[:, None]
+    C[:3] += np.cross(C[3:], origin - middle, axisa=0, axisc=0)
+    return np.asarray(C)
 
 
 def _nodal(body: FEBody, columns: Array) -> Array:

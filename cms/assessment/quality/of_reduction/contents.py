@@ -191,16 +191,12 @@ def record_of(name: str, case: Case, compare: Callable[[Case], Iterator[Compared
     worst = found[int(np.argmax([each.defect for each in found]))]  # not a number counts as the largest
     data: dict[str, float] = {}
     for each in found:
-        if not each.left_out:
-            data[each.field] = float(np.maximum(data.get(each.field, 0.0), each.defect))
+        data[each.field] = float(np.maximum(data.get(each.field, 0.0), each.defect))
     at = f" ({worst.where})" if worst.where else ""
     reason = f"{worst.field}{at}: {worst.doubt}" if worst.doubt else ""
     if not reason:
         reason = f"largest difference from the model is {worst.defect:.1e}, of {worst.field}{at}; {len(data)} fields"
-    left_out = {each.field: each.left_out for each in found if each.left_out}
-    for why in dict.fromkeys(left_out.values()):
-        reason += f"; not compared: {', '.join(field for field, w in left_out.items() if w == why)}, since {why}"
-    return judge(name, worst.defect, reason, {"fields": data, "left_out": tuple(left_out)})
+    return judge(name, worst.defect, reason, {"fields": data})
 
 
 def missing(field: str, where: str = "") -> Compared:
@@ -320,10 +316,6 @@ def compare_moments(case: Case) -> Iterator[Compared]:
     if not file.missing:
         yield same("moments.is_exact", file.is_exact, made.is_exact)
     yield same("moments.missing", file.missing, made.missing)
-    if not made.is_exact and CONVERTED in case.reduced.provenance:
-        why = "matrices only approximate these moments, and the approximation depends on the frame"
-        yield from (Compared(name, 0.0, left_out=why) for name in ("moments.P", "moments.S_kl"))
-        return
     word = case.axes_words
     yield apart("moments.C1", file.C1 @ R, made.C1, size, axes=f"component {word}")
     P = known_P(made.P, file.missing)

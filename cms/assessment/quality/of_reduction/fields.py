@@ -120,7 +120,6 @@ class Compared:
     defect: float  #: largest difference relative to the size of the field; infinite for words and counts that differ
     where: str = ""  #: description of the place of the largest difference
     doubt: str = ""  #: description of the difference, if it is not one of numbers
-    left_out: str = ""  #: why the field was not compared
 
 
 def leaves(value: Any, path: str = "") -> dict[str, list[Any]]:
