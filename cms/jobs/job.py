@@ -1,6 +1,7 @@
 """The reduction job, which `cms reduce` reads (docs/job_file.md)."""
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -34,8 +35,9 @@ from cms.jobs.tables.mesh_size_table import MeshSizeSection, check_mesh_size
 from cms.jobs.tables.recovery_section import RecoverySection
 from fe_models.body.fe_body import INTERFACE_KINDS
 from fe_models.body.load_cases import LOAD_CASE_KINDS
+from fe_models.foundation.parametric_file import read_parametric
 from fe_models.foundation.paths import near_file
-from fe_models.foundation.toml_file import Matrix3, Range, Table, Vector3, choice, is_no_number, read_toml, validated
+from fe_models.foundation.toml_file import Matrix3, Range, Table, Vector3, choice, is_no_number, validated
 from fe_models.foundation.units import UNIT_SYSTEMS
 from fe_models.foundation.words import nearest, quoted
 
@@ -459,8 +461,15 @@ class Job(Table):
         return self
 
 
-def read_job(path: str | os.PathLike[str]) -> Job:
+def read_job(path: str | os.PathLike[str], changes: Mapping[str, Any] | None = None) -> Job:
     """Read and check a job file.
+
+    Parameters
+    ----------
+    path
+        The job file.
+    changes
+        Values that replace those in the file: of its parameters by name, of other keys by key path.
 
     Raises
     ------
@@ -468,7 +477,7 @@ def read_job(path: str | os.PathLike[str]) -> Job:
         The message lists every problem with key path, value, expectation, choices and nearest name.
     """
     path = Path(path)
-    job = validated(Job, read_toml(path, JobError), path, JobError, context=path.parent)
+    job = validated(Job, read_parametric(path, JobError, changes), path, JobError, context=path.parent)
     if job.body.name is None:
         job = job.model_copy(update={"body": job.body.model_copy(update={"name": path.stem})})
     return job

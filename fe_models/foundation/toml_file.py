@@ -18,8 +18,8 @@ from fe_models.foundation.paths import is_stream, near_file
 from fe_models.foundation.words import nearest, quoted, shortened
 
 __all__ = [
-    "Matrix3", "Range", "Table", "Vector3", "changed", "choice", "describe", "files_named", "first_key", "read_toml",
-    "validated", "value_of",
+    "FileContent", "Location", "Matrix3", "Range", "Table", "Vector3", "changed", "choice", "describe", "files_named",
+    "first_key", "read_toml", "validated", "value_of",
 ]  # fmt: skip
 
 
@@ -30,12 +30,61 @@ class Table(BaseModel):
 
 
 Model = TypeVar("Model", bound=Table)
+Location = tuple[str | int, ...]  #: a key path: keys of tables, and indices in lists
 DEEPEST = 20  #: largest depth of nested tables and lists in a file
 GREATEST = 1e100  #: largest number in a file: products of three stay finite, and no physical quantity is larger
 MOST_PROBLEMS = 20  #: largest number of problems in one message
 
 
-def read_toml(path: Path, error: type[Exception]) -> dict[str, Any]:
+class FileContent(dict[str, Any]):
+    """The tables of a TOML file, with the places where its values stand.
+
+    Parameters
+    ----------
+    tables
+        The tables, which messages call by their key paths.
+    path
+        The file.
+    files
+        The file and all files that it extends.
+    origins
+        For key paths that come from elsewhere: the file, and the key path there.
+    outside
+        Key paths of values that were set from outside the file.
+    parameters
+        The values of its parameters, by name.
+    """
+
+    def __init__(
+        self,
+        tables: Mapping[str, Any],
+        path: Path,
+        *,
+        files: Sequence[Path] = (),
+        origins: Mapping[Location, tuple[Path, Location]] | None = None,
+        outside: Sequence[str] = (),
+        parameters: Mapping[str, Any] | None = None,
+    ) -> None:
+        super().__init__(tables)
+        self.path, self.files, self.outside = path, tuple(files) or (path,), tuple(outside)
+        self.origins, self.parameters = origins or {}, parameters or {}
+
+    def place(self, location: Location) -> str:
+        """Return ' (line 12)' for a key path, ' (base.toml, line 12)' in another file, '' where it is not known."""
+        if any(key_path(location) == key or key_path(location).startswith(f"{key}.") for key in self.outside):
+            return " (set from outside the file)"
+        near = [location[:n] for n in range(len(location), 0, -1)]
+        path, original = next((self.origins[each] for each in near if each in self.origins), (self.path, location))
+        try:
+            lines = line_numbers(path.read_text("utf-8-sig"))
+        except (OSError, UnicodeDecodeError):
+            return ""
+        line = next((lines[original[:n]] for n in range(len(original), 0, -1) if original[:n] in lines), None)
+        file = "" if path == self.path else f"{path.name}, "
+        return "" if line is None else f" ({file}line {line})"
+
+
+def read_toml(path: Path, error: type[Exception]) -> FileContent:
     """Return the content of a TOML file; raise `error` with the position and the reason if it is not valid TOML."""
     if is_stream(path):
         raise error(f"{path}: expected a file, got a device or a pipe")
@@ -55,7 +104,7 @@ def read_toml(path: Path, error: type[Exception]) -> dict[str, Any]:
         words = f"{problem}" if isinstance(problem, tomllib.TOMLDecodeError) else "a number has too many digits"
         raise error(f"{path}: not valid TOML: {shortened(words, 200)}") from None
     require_usable(content, path, error)
-    return content
+    return FileContent(content, Path(path))
 
 
 def too_deep(path: Path, error: type[Exception]) -> Exception:
@@ -90,7 +139,8 @@ def validated(
         return model.model_validate(data, context=context)
     except ValidationError as problem:
         details = problem.errors(include_url=False)
-        problems = [describe(model, detail) for detail in details]
+        place = data.place if isinstance(data, FileContent) else lambda location: ""
+        problems = [f"{describe(model, detail)}{place(detail['loc'])}" for detail in details]
     if len(problems) == 1:
         raise error(f"{path}: {problems[0]}")
     n = len(problems)
@@ -228,11 +278,18 @@ def changed(
     for path, value in changes.items():
         holder, key = holder_of(result, path, where, error)
         holder[key] = value
-    return result
+    if not isinstance(content, FileContent):
+        return result
+    return FileContent(
+        result, content.path, files=content.files, origins=content.origins, parameters=content.parameters,
+        outside=(*content.outside, *changes),
+    )  # fmt: skip
 
 
 def value_of(content: Mapping[str, Any], path: str, where: str, error: type[Exception]) -> Any:
-    """Return the value at a key path of a file's content; raise `error` with the nearest name if it does not exist."""
+    """Return the value of a parameter or at a key path; raise `error` with the nearest name if it does not exist."""
+    if isinstance(content, FileContent) and path in content.parameters:
+        return content.parameters[path]
     holder, key = holder_of(dict(content), path, where, error)
     if isinstance(holder, dict) and key not in holder:
         raise error(f"{where}: the key path {path!r}: there is no {quoted(key)}{nearest(key, list(holder))}")
@@ -275,3 +332,50 @@ def first_key(here: dict[str, Any] | list[Any], path: str) -> tuple[Any, str | N
         return None, path
     key = max(fitting, key=len)
     return key, path[len(key) + 1 :]
+
+
+# Lines ---------------------------------------------------------------------------------------------------------------
+
+
+def line_numbers(text: str) -> dict[Location, int]:
+    """Return the line, from 1, of each table and key of a TOML text that is valid; of values in one line, the first."""
+    found: dict[Location, int] = {}
+    table: Location = ()
+    n_rows: dict[Location, int] = {}
+    statement, first = "", 0
+    for k, line in enumerate(text.splitlines(), 1):
+        first = first if statement else k
+        statement += line + "\n"
+        try:
+            parsed = tomllib.loads(statement)
+        except tomllib.TOMLDecodeError:
+            continue  # the value goes on in the next line
+        is_header, is_row = statement.lstrip().startswith("["), statement.lstrip().startswith("[[")
+        statement = ""
+        path: Location = ()
+        here: Any = parsed
+        while isinstance(here, dict) and len(here) == 1:
+            key = next(iter(here))
+            path, here = (*path, key), here[key]
+        if not path:
+            continue
+        if is_header:
+            if is_row:
+                outer = (*row_of(path[:-1], n_rows), path[-1])
+                n_rows[outer] = n_rows.get(outer, -1) + 1
+            table = row_of(path, n_rows)
+            found.setdefault(table, first)
+        else:
+            for n in range(1, len(path) + 1):
+                found.setdefault((*table, *path[:n]), first)
+    return found
+
+
+def row_of(path: Location, n_rows: Mapping[Location, int]) -> Location:
+    """Return a key path of table headers with the index of the present row of each list of tables."""
+    result: Location = ()
+    for key in path:
+        result = (*result, key)
+        if result in n_rows:
+            result = (*result, n_rows[result])
+    return result

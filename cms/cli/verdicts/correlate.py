@@ -119,7 +119,8 @@ def updated_text(path: Path, parameters: "tuple[Parameter, ...]", values: "Array
 
     document = tomlkit.parse(path.read_text(encoding="utf-8-sig"))
     for parameter, value in zip(parameters, values, strict=True):
-        here, left = document, parameter.path
+        is_parameter = parameter.path in document.get("parameters", {})
+        here, left = document, f"parameters.{parameter.path}" if is_parameter else parameter.path
         while True:
             key, rest = first_key(here, left)
             if rest is None:

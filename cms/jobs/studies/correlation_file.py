@@ -21,8 +21,9 @@ from cms.jobs.body_of_job import checked_mesh, is_of_mesh, job_body
 from cms.jobs.job import Job
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.parametric_file import read_parametric
 from fe_models.foundation.stages import Stages
-from fe_models.foundation.toml_file import Table, Vector3, changed, read_toml, validated
+from fe_models.foundation.toml_file import Table, Vector3, read_toml, validated, value_of
 from fe_models.foundation.units import Units, unit_system
 from fe_models.meshes.mesh import Mesh
 
@@ -174,7 +175,7 @@ def run_correlation(asked: CorrelationFile, stages: Stages | None = None) -> Cor
         return CorrelationResult(found, None, damping_of(measured, reduced.units), None)
     assert asked.model.job is not None
     path = asked.model.job
-    content = read_toml(path, CorrelationError)
+    content = read_parametric(path, CorrelationError)
     job = validated(Job, content, path, CorrelationError, context=path.parent)
     units = unit_system(job.body.units)
     measured = measured_modes(asked.test, units.length)
@@ -189,15 +190,15 @@ def run_correlation(asked: CorrelationFile, stages: Stages | None = None) -> Cor
     parameters = tuple(parameter_of(name, table, content, path) for name, table in asked.update.parameters.items())
     with stages("update"):
         update = update_model(
-            measured, body_maker(content, path, parameters), parameters, held=asked.model.held, placement=placement,
+            measured, body_maker(path, parameters), parameters, held=asked.model.held, placement=placement,
             pairing=pairing, frequency_spread=asked.update.frequency_spread, most_iterations=asked.update.iterations,
         )  # fmt: skip
     values = {p.path: float(v) for p, v in zip(parameters, update.values, strict=True)}
-    document = changed(content, values, str(path), CorrelationError)
+    document = read_parametric(path, CorrelationError, values)
     return CorrelationResult(update.before, update, damping_of(measured, units), document)
 
 
-def body_maker(content: dict[str, Any], path: Path, parameters: tuple[Parameter, ...]) -> Callable[[Array], FEBody]:
+def body_maker(path: Path, parameters: tuple[Parameter, ...]) -> Callable[[Array], FEBody]:
     """Return the function from parameter values to the coupled body of the job; the last bodies are cached.
 
     A solid mesh is read and checked once, unless a parameter affects the mesh.
@@ -212,7 +213,7 @@ def body_maker(content: dict[str, Any], path: Path, parameters: tuple[Parameter,
             if len(made) > 1:
                 made.pop(next(iter(made)))
             given = {p.path: float(v) for p, v in zip(parameters, values, strict=True)}
-            document = changed(content, given, str(path), CorrelationError)
+            document = read_parametric(path, CorrelationError, given)
             job = named(validated(Job, document, path, CorrelationError, context=path.parent), path)
             if is_of_mesh(job) and not is_of_body and not meshes:
                 meshes.append(checked_mesh(job, Stages(), None)[0])
@@ -253,9 +254,7 @@ def measured_modes(test: TestTable, length: float) -> MeasuredModes:
 def parameter_of(name: str, table: ParameterTable, content: dict[str, Any], path: Path) -> Parameter:
     """Return a parameter with its current value in the job."""
     where = f"update.parameters.{name}"
-    probe = object()
-    document = changed(content, {table.path: probe}, str(path), CorrelationError)
-    value = replaced(document, content, probe)
+    value = value_of(content, table.path, str(path), CorrelationError)
     if isinstance(value, bool) or not isinstance(value, int | float) or not value:
         raise CorrelationError(f"{where}: {table.path}: expected a number of the job that is not 0, got {value!r}")
     at_least = -0.9 if table.least is None else table.least / value - 1
@@ -264,21 +263,6 @@ def parameter_of(name: str, table: ParameterTable, content: dict[str, Any], path
     if not least <= 0 <= most:
         raise CorrelationError(f"{where}: the value {value:g} lies outside least and most")
     return Parameter(name, table.path, float(value), table.spread, least, most)
-
-
-def replaced(document: Any, content: Any, probe: object) -> Any:
-    """Return the value in the content at the position of the probe in the document; None if there is none."""
-    if document is probe:
-        return content
-    keys = document if isinstance(document, dict) else range(len(document)) if isinstance(document, list) else ()
-    for key in keys:
-        inner = document[key]
-        old = content.get(key) if isinstance(content, dict) else content[key]
-        if inner is probe or isinstance(inner, dict | list):
-            found = replaced(inner, old, probe) if inner is probe or isinstance(old, dict | list) else None
-            if found is not None:
-                return found
-    return None
 
 
 def damping_of(measured: MeasuredModes, units: Units) -> tuple[DampingFit, ...]:

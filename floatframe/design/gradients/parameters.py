@@ -318,7 +318,8 @@ def numbers_of_file(path_of_file: str, paths: Mapping[str, str]) -> dict[str, fl
     """Return the numbers at key paths of a system file; `SystemFileError` if one does not exist."""
     from pathlib import Path
 
-    from fe_models.foundation.toml_file import read_toml, value_of
+    from fe_models.foundation.parametric_file import read_parametric
+    from fe_models.foundation.toml_file import value_of
     from floatframe.errors import SystemFileError
 
     for path in paths.values():
@@ -327,7 +328,7 @@ def numbers_of_file(path_of_file: str, paths: Mapping[str, str]) -> dict[str, fl
                 f"{path_of_file}: the key path {path!r}: the table [{table}] describes the run or the display, "
                 "and is no part of it; derivatives are by numbers of bodies, joints, forces, sensors, signals"
             )
-    content = read_toml(Path(path_of_file), SystemFileError)
+    content = read_parametric(Path(path_of_file), SystemFileError)
     found = {}
     for name, path in paths.items():
         value = value_of(content, path, path_of_file, SystemFileError)

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.parametric_file import read_parametric
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.tasks.workers import WORKERS_HELP
 from fe_models.foundation.toml_file import Table, choice, interval, read_toml, validated, value_of
@@ -257,7 +258,7 @@ def read_design(path: str | os.PathLike[str]) -> Design:
     """
     path = Path(path)
     data = validated(DesignFile, read_toml(path, SystemFileError), path, SystemFileError, context=path.parent)
-    content = read_toml(data.system, SystemFileError)
+    content = read_parametric(data.system, SystemFileError)
     parameters = tuple(parameter_of(name, section, content, path) for name, section in data.parameters.items())
     objectives = []
     for name, o in data.objectives.items():

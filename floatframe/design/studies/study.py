@@ -267,12 +267,11 @@ def as_placed(system: System) -> Trajectory:
 
 def read_system_keys(study: Study) -> None:
     """Raise `SystemFileError` if a key path does not exist."""
-    from fe_models.foundation.toml_file import changed, read_toml
+    from fe_models.foundation.parametric_file import read_parametric
     from floatframe.errors import SystemFileError
 
-    content = read_toml(Path(study.system), SystemFileError)
     for parameter in study.parameters:
-        changed(content, {parameter.path: parameter.values[0]}, study.system, SystemFileError)
+        read_parametric(Path(study.system), SystemFileError, {parameter.path: parameter.values[0]})
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fe_models.foundation.toml_file import first_key, read_toml
+from fe_models.foundation.parametric_file import read_parametric
+from fe_models.foundation.toml_file import first_key
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import FloatframeError, ModelError, SystemFileError
 from floatframe.files.cosimulation.unit import Unit
@@ -163,4 +164,4 @@ def output_variables(unit: Unit, system: System) -> Iterator[Variable]:
 
 def content_of(path: Path) -> dict[str, Any]:
     """Return the tables of a system file."""
-    return dict(read_toml(path, SystemFileError))
+    return dict(read_parametric(path, SystemFileError))

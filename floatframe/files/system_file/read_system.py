@@ -20,7 +20,8 @@ from pydantic import Field, model_validator
 
 from cms.body.reduced_body import ReducedBody
 from cms.errors import CmsError
-from fe_models.foundation.toml_file import Table, Vector3, changed, choice, read_toml, validated
+from fe_models.foundation.parametric_file import read_parametric
+from fe_models.foundation.toml_file import Table, Vector3, choice, validated
 from fe_models.foundation.units import UNIT_SYSTEMS, unit_system
 from fe_models.foundation.words import nearest
 from floatframe.engine.compiling.system import compiled_system
@@ -170,7 +171,8 @@ def read_system(
     path
         The system file.
     changes
-        Values that replace those in the file, by key path, such as {"bodies.rod.mass": 2.0}.
+        Values that replace those in the file: of its parameters by name, of other keys by key path, such as
+        {"length": 0.4, "bodies.rod.mass": 2.0}.
 
     Raises
     ------
@@ -179,7 +181,7 @@ def read_system(
         name.
     """
     path = Path(path)
-    content = changed(read_toml(path, SystemFileError), changes or {}, str(path), SystemFileError)
+    content = read_parametric(path, SystemFileError, changes)
     data = validated(SystemFile, content, path, SystemFileError, context=path.parent)
     files: dict[Any, ReducedBody] = {}
     try:
@@ -205,7 +207,11 @@ def read_system(
             fmus=[section.unit(key, path.parent) for key, section in data.fmus.items()],
             scene=[section.shape for section in data.scene],
             source=str(path.resolve()),
-            data_files=tuple(dict.fromkeys([*(str(each.file) for each in data.signals.values()), *element_files])),
+            data_files=tuple(
+                dict.fromkeys(
+                    [*map(str, content.files[1:]), *(str(each.file) for each in data.signals.values()), *element_files]
+                )
+            ),
         )  # fmt: skip
         _ = compiled_system(system)  # looks up all markers and interfaces
         require_events(system)

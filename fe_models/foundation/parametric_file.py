@@ -1,0 +1,334 @@
+"""Parametric TOML files: `[parameters]` with expressions, `extends = "other.toml"`, and `repeat` for rows of objects.
+
+A file is resolved in four steps:
+
+1. It is merged over the files that it extends. Tables are merged key by key; an empty table, `{}`, removes its key.
+2. The parameters are replaced by those given from outside (`--set length=0.4`, the points of a sweep).
+3. `repeat` copies its table, once for each value of an index, or once for each row of values.
+4. Each `{expression}` in a text is replaced by its value. A text that is one such expression becomes that value, so
+   `mass = "{density * volume}"` is a number.
+
+Expressions are evaluated by simpleeval: numbers, texts, lists, comparisons, `a if x < b else c`, and `FUNCTIONS`.
+"""
+
+import copy
+import logging
+import math
+import os
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from fe_models.foundation.toml_file import FileContent, Location, changed, key_path, quoted_value, read_toml
+from fe_models.foundation.words import nearest, quoted
+
+__all__ = ["read_parametric"]
+
+log = logging.getLogger(__name__)
+
+MOST_COPIES = 20_000  #: largest number of tables that `repeat` may create in one file
+FUNCTIONS: dict[str, Callable[..., Any]] = {
+    **{name: getattr(math, name) for name in ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sqrt", "exp",
+                                               "log", "radians", "degrees", "hypot", "floor", "ceil")},
+    "abs": abs, "min": min, "max": max, "round": round, "int": int, "str": str, "len": len, "sum": sum,
+    "range": lambda *limits: list(range(*(min(limit, MOST_COPIES) for limit in limits))),
+}  # fmt: skip
+CONSTANTS = {"pi": math.pi}
+EXPRESSION = re.compile(r"\{\{|\}\}|\{([^{}]*)\}")
+
+
+def read_parametric(path: Path, error: type[Exception], changes: Mapping[str, Any] | None = None) -> FileContent:
+    """Return the resolved content of a parametric file.
+
+    Parameters
+    ----------
+    path
+        The file.
+    error
+        The class of error to raise.
+    changes
+        Values from outside: of parameters by name, of all other keys by key path in the resolved file.
+
+    Raises
+    ------
+    error
+        With file and line, if an expression, a name, a parameter, a base file or a `repeat` is not valid.
+    """
+    content, origins = merged(Path(path), error, ())
+    files = tuple(dict.fromkeys([Path(path), *(source for source, _ in origins.values())]))
+    given = content.pop("parameters", {})
+    if not isinstance(given, dict):
+        raise error(f"{path}: parameters = {quoted_value(given)}: expected a table of names and values")
+    changes = dict(changes or {})
+    set_outside = {name: changes.pop(name) for name in list(changes) if name in given}
+    resolver = Resolver(Path(path), error, {**given, **set_outside}, frozenset(set_outside), origins)
+    if given or uses_repeat(content):
+        content, origins = resolver.table(content, (), (), {}), resolver.resolved
+    values = {name: resolver.parameter(name) for name in given}
+    result = FileContent(content, Path(path), files=files, origins=origins, parameters=values)
+    unused = [name for name in given if name not in resolver.used]
+    if unused and not changes and not set_outside:
+        log.warning("%s: parameters that nothing uses: %s", path, ", ".join(unused))
+    if changes:
+        for key in changes:
+            if "." not in key and key not in result:
+                raise error(f"{path}: there is no parameter {quoted(key)}{nearest(key, given)}")
+        return changed(result, changes, str(path), error)
+    return result
+
+
+# Step 1: files that a file extends -----------------------------------------------------------------------------------
+
+
+def merged(
+    path: Path, error: type[Exception], chain: tuple[Path, ...]
+) -> tuple[dict[str, Any], dict[Location, tuple[Path, Location]]]:
+    """Return the content of a file merged over the files that it extends, and where each key comes from."""
+    if path.resolve() in [each.resolve() for each in chain]:
+        names = " extends ".join(each.name for each in (*chain, path))
+        raise error(f"{chain[0]}: files extend each other in a circle: {names}")
+    own = read_toml(path, error)
+    bases = own.pop("extends", [])
+    bases = [bases] if isinstance(bases, str) else bases
+    if not isinstance(bases, list) or not all(isinstance(base, str) for base in bases):
+        raise error(f"{path}: extends = {quoted_value(bases)}: expected a file name, or a list of file names")
+    content: dict[str, Any] = {}
+    origins: dict[Location, tuple[Path, Location]] = {}
+    for base in bases:
+        lower, lower_origins = merged(path.parent / base, error, (*chain, path))
+        if (path.parent / base).parent.resolve() != path.parent.resolve():
+            lower = relocated(lower, (path.parent / base).parent)
+        merge(content, lower, lower_origins, origins)
+    own_origins = {location: (path, location) for location in locations(own)}
+    merge(content, own, own_origins, origins)
+    return content, origins
+
+
+def merge(
+    content: dict[str, Any],
+    upper: Mapping[str, Any],
+    upper_origins: Mapping[Location, tuple[Path, Location]],
+    origins: dict[Location, tuple[Path, Location]],
+    here: Location = (),
+) -> None:
+    """Merge the tables of another file into the content; an empty table removes its key."""
+    for key, value in upper.items():
+        location = (*here, key)
+        if value == {} and key in content:
+            del content[key]
+            continue
+        if isinstance(value, dict) and isinstance(content.get(key), dict):
+            merge(content[key], value, upper_origins, origins, location)
+            continue
+        content[key] = copy.deepcopy(value)
+        for inner in ((), *locations(value)):
+            origins[*location, *inner] = upper_origins[*location, *inner]
+
+
+def locations(value: Any) -> Iterator[Location]:
+    """Yield the key paths of all values inside tables and lists."""
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, inner in items:
+        yield (key,)
+        yield from ((key, *rest) for rest in locations(inner))
+
+
+def relocated(value: Any, folder: Path) -> Any:
+    """Return the content of a file in another folder, with absolute names of the files that stand beside it."""
+    if isinstance(value, dict):
+        return {key: relocated(inner, folder) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [relocated(inner, folder) for inner in value]
+    is_file = isinstance(value, str) and "." in value and len(value) < 1000 and (folder / value).is_file()
+    return os.path.abspath(folder / value) if is_file else value
+
+
+# Steps 2 to 4: parameters, repeat, expressions -----------------------------------------------------------------------
+
+
+def uses_repeat(value: Any) -> bool:
+    """Whether a table anywhere in the content is repeated."""
+    if isinstance(value, dict):
+        return "repeat" in value or any(uses_repeat(inner) for inner in value.values())
+    return isinstance(value, list) and any(uses_repeat(inner) for inner in value)
+
+
+@dataclass(eq=False)
+class Resolver:
+    """Evaluates the parameters and expressions of one file, and copies the tables that are repeated."""
+
+    path: Path
+    error: type[Exception]
+    given: Mapping[str, Any]
+    set_outside: frozenset[str]
+    origins: Mapping[Location, tuple[Path, Location]]
+    resolved: dict[Location, tuple[Path, Location]] = field(default_factory=dict)
+    used: set[str] = field(default_factory=set)
+    values: dict[str, Any] = field(default_factory=dict)
+    pending: list[str] = field(default_factory=list)
+    n_copies: int = 0
+
+    def problem(self, location: Location, text: str) -> Exception:
+        """Return the error about the value at a key path of the file."""
+        place = FileContent({}, self.path, origins=self.origins).place(location)
+        return self.error(f"{self.path}: {key_path(location)}: {text}{place}")
+
+    def parameter(self, name: str) -> Any:
+        """Return the value of a parameter; parameters that it uses are evaluated first."""
+        if name in self.values:
+            return self.values[name]
+        if name in self.pending:
+            circle = " -> ".join([*self.pending[self.pending.index(name) :], name])
+            raise self.problem(("parameters", name), f"parameters use each other in a circle: {circle}")
+        self.pending.append(name)
+        value = self.given[name]
+        if name not in self.set_outside:
+            value = self.parameter_value(value, ("parameters", name))
+        self.pending.pop()
+        self.values[name] = value
+        return value
+
+    def parameter_value(self, value: Any, location: Location) -> Any:
+        """Return the value of a parameter as written: each text in it is an expression."""
+        if isinstance(value, str):
+            return self.expression(value, location, {})
+        if isinstance(value, list):
+            return [self.parameter_value(inner, (*location, k)) for k, inner in enumerate(value)]
+        if isinstance(value, dict):
+            return {key: self.parameter_value(inner, (*location, key)) for key, inner in value.items()}
+        return value
+
+    def expression(self, text: str, location: Location, local: Mapping[str, Any]) -> Any:
+        """Return the value of an expression."""
+        from simpleeval import AttributeDoesNotExist, EvalWithCompoundTypes, FunctionNotDefined, InvalidExpression
+
+        def value_of_name(node: Any) -> Any:
+            name = node.id
+            if name in local:
+                return local[name]
+            if name in self.given:
+                self.used.add(name)
+                return self.parameter(name)
+            if name in CONSTANTS:
+                return CONSTANTS[name]
+            raise self.problem(
+                location, f"unknown name {quoted(name)} in {quoted(text)}{nearest(name, [*local, *self.given])}"
+            )
+
+        try:
+            value = EvalWithCompoundTypes(functions=FUNCTIONS, names=value_of_name).eval(text.strip())
+        except self.error:
+            raise
+        except FunctionNotDefined as problem:
+            name = problem.func_name
+            raise self.problem(
+                location, f"unknown function {quoted(name)} in {quoted(text)}{nearest(name, FUNCTIONS)}"
+            ) from None
+        except AttributeDoesNotExist as problem:
+            raise self.problem(location, f"there is no {quoted(problem.attr)} in {quoted(text)}") from None
+        except ZeroDivisionError:
+            raise self.problem(location, f"{quoted(text)} divides by zero") from None
+        except (InvalidExpression, SyntaxError, TypeError, ValueError, KeyError, IndexError, ArithmeticError,
+                RecursionError, MemoryError) as problem:  # fmt: skip
+            words = "not an expression" if isinstance(problem, SyntaxError) else str(problem).splitlines()[0]
+            raise self.problem(location, f"{quoted(text)} cannot be evaluated: {words}") from None
+        if isinstance(value, float) and not math.isfinite(value):
+            raise self.problem(location, f"{quoted(text)} is {value}; expected a finite number")
+        return list(value) if isinstance(value, tuple) else value
+
+    def text(self, text: str, location: Location, local: Mapping[str, Any]) -> Any:
+        """Return a text with its expressions replaced, or the value of the one expression that it consists of."""
+        whole = EXPRESSION.fullmatch(text)
+        if whole and whole[1] is not None:
+            return self.expression(whole[1], location, local)
+
+        def replaced(match: re.Match[str]) -> str:
+            if match[1] is None:
+                return match[0][0]
+            value = self.expression(match[1], location, local)
+            return f"{value:.12g}" if isinstance(value, float) else str(value)
+
+        return EXPRESSION.sub(replaced, text)
+
+    def value(self, value: Any, source: Location, target: Location, local: Mapping[str, Any]) -> Any:
+        """Return a value of the file with its expressions evaluated."""
+        if source in self.origins:
+            self.resolved[target] = self.origins[source]
+        if isinstance(value, str):
+            return self.text(value, source, local)
+        if isinstance(value, dict):
+            return self.table(value, source, target, local)
+        return self.rows(value, source, target, local) if isinstance(value, list) else value
+
+    def table(
+        self, table: Mapping[str, Any], source: Location, target: Location, local: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        """Return a table with its expressions evaluated and its repeated tables copied."""
+        result: dict[str, Any] = {}
+        for key, value in table.items():
+            at = (*source, key)
+            if not (isinstance(value, dict) and "repeat" in value):
+                name = str(self.text(key, at, local)) if local else key
+                result[name] = self.value(value, at, (*target, name), local)
+                continue
+            for inner in self.copies(value["repeat"], at, local):
+                pattern = key if "{" in key or INDEX not in inner else f"{key}{{{INDEX}}}"
+                name = str(self.text(pattern, at, inner))
+                if name in result:
+                    raise self.problem(
+                        at, f"two copies are called {quoted(name)}; write the values that differ into the name, "
+                        "such as [bodies.\"link{i}\"]",
+                    )  # fmt: skip
+                rest = {inner_key: each for inner_key, each in value.items() if inner_key != "repeat"}
+                result[name] = self.value(rest, at, (*target, name), inner)
+        return result
+
+    def rows(self, rows: list[Any], source: Location, target: Location, local: Mapping[str, Any]) -> list[Any]:
+        """Return a list with its expressions evaluated and its repeated tables copied."""
+        result: list[Any] = []
+        for k, value in enumerate(rows):
+            at = (*source, k)
+            if not (isinstance(value, dict) and "repeat" in value):
+                result.append(self.value(value, at, (*target, len(result)), local))
+                continue
+            rest = {key: each for key, each in value.items() if key != "repeat"}
+            for inner in self.copies(value["repeat"], at, local):
+                result.append(self.value(rest, at, (*target, len(result)), inner))
+        return result
+
+    def copies(self, repeat: Any, location: Location, local: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+        """Yield the names that each copy of a repeated table knows."""
+        location = (*location, "repeat")
+        repeat = self.value(repeat, location, location, local)
+        rows: list[dict[str, Any]]
+        if is_count(repeat):
+            rows = [{INDEX: k + 1} for k in range(min(repeat, MOST_COPIES + 1))]
+        elif isinstance(repeat, list) and repeat and all(isinstance(row, dict) for row in repeat):
+            rows = repeat
+        elif isinstance(repeat, dict) and repeat:
+            ranges = {name: list(range(1, each + 1)) if is_count(each) else each for name, each in repeat.items()}
+            if not all(isinstance(each, list) for each in ranges.values()):
+                raise self.problem(location, f"expected a count or a list for each name, got {quoted_value(repeat)}")
+            rows = [dict(zip(ranges, point, strict=True)) for point in product(*ranges.values())]
+        else:
+            raise self.problem(
+                location,
+                f"expected a count, a table such as {{i = 12}} or {{side = [-1, 1]}}, or a list of tables, got "
+                f"{quoted_value(repeat)}",
+            )
+        self.n_copies += len(rows)
+        if self.n_copies > MOST_COPIES:
+            raise self.problem(location, f"expected up to {MOST_COPIES} repeated tables in a file")
+        for row in rows:
+            yield {**local, **row}
+
+
+INDEX = "i"  #: name of the index where `repeat` is a count
+
+
+def is_count(value: Any) -> bool:
+    """Whether a value is a whole number of 0 or more."""
+    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
