@@ -6,21 +6,17 @@ from typing import Annotated
 import typer
 
 from cms.cli.arguments import ModalFile, Output, Workers
-from cms.cli.console import commands, guarded, say
+from cms.cli.console import commands, guarded, register, say
 from cms.cli.info import info_command, print_body
 from cms.cli.modes import view_command
 from cms.cli.reduce import Fleet, reduce_and_write_fleet, reduce_command
+from cms.cli.show import show_command
 
 __all__ = ["app"]
 
 app = commands("cms", "Component mode synthesis: a meshed part becomes a small, exact, portable flexible body.")
 
-app.command("reduce")(reduce_command)
-app.command("info")(info_command)
-app.command("view")(view_command)
 
-
-@app.command("job")
 @guarded
 def job_command(
     deck: Annotated[Path, typer.Argument(help="Deck: Abaqus, CalculiX (.inp), Nastran (.bdf), ANSYS (.cdb).")],
@@ -41,7 +37,9 @@ def job_command(
     ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Job file to write.")] = None,
 ) -> None:
-    """Write the complete job of a deck: materials, sections, masses, springs, couplings, supports, loads.
+    """Write the job of a deck of another program.
+
+    It holds materials, sections, masses, springs, couplings, supports and loads.
 
     The command prints every card that is not converted, with its consequence; a mass or a coupling is never dropped
     unless it is named. Without -o the job is written beside the deck: rod.inp gives rod.toml.
@@ -55,7 +53,6 @@ def job_command(
     write_job(DeckRequest(deck, output, units, program, tuple(density or ()), tuple(leave_out or ()), mass))
 
 
-@app.command("frame")
 @guarded
 def frame_command(
     file: ModalFile,
@@ -72,7 +69,9 @@ def frame_command(
     ] = True,
     output: Output = None,
 ) -> None:
-    """Convert a modal file to another body frame, from the file alone, and diagonalise its modes again.
+    """Convert a modal file to another body frame.
+
+    Only the file is needed; its modes are diagonalised again.
 
     Without -o the new file is written beside the old one: rod.h5 gives rod_tisserand.h5.
 
@@ -85,7 +84,6 @@ def frame_command(
     print_body(run_frame(FrameRequest(file, to, at, origin, axes, damping, units, output, geometric)))
 
 
-@app.command("faces")
 @guarded
 def faces_command(
     file: Annotated[Path, typer.Argument(help="CAD file: .step .stp .iges .igs .brep.")],
@@ -98,7 +96,9 @@ def faces_command(
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the list as JSON, for other programs.")] = False,
 ) -> None:
-    """List the faces of a CAD file: kind, area, centre, normal, radius, name, colour; needs the extra mesh.
+    """List the faces of a CAD file.
+
+    Kind, area, centre, normal, radius, name and colour are given. It needs the extra mesh.
 
     A job can select faces by these properties: faces = ["cylinder r=12"].
 
@@ -111,7 +111,6 @@ def faces_command(
     run_faces(FacesRequest(file, units, tuple(select or ()), output, json))
 
 
-@app.command("converge")
 @guarded
 def converge_command(
     job: Annotated[Path, typer.Argument(help="Job file (TOML) of a CAD file with [mesh_size].")],
@@ -119,7 +118,9 @@ def converge_command(
     modes: Annotated[int, typer.Option(help="Number of elastic free modes to compare.")] = 10,
     json: Annotated[bool, typer.Option("--json", help="Write the numbers as JSON, for other programs.")] = False,
 ) -> None:
-    """Mesh a CAD job with its own size and a coarser one; show free frequencies and the estimated mesh error.
+    """Mesh error of a CAD job, from two mesh sizes.
+
+    The free frequencies of the job's mesh and of a coarser one are compared.
 
     Example: cms converge part.toml
     """
@@ -128,13 +129,14 @@ def converge_command(
     run_converge(job, ratio=ratio, n_modes=modes, as_json=json)
 
 
-@app.command("modes")
 @guarded
 def modes_command(
     job: Annotated[Path, typer.Argument(help="Job file (TOML), see docs/job_file.md.")],
     json: Annotated[bool, typer.Option("--json", help="Write the list as JSON, for other programs.")] = False,
 ) -> None:
-    """Describe the modes of a job: its columns and shapes, their order, and the frame; writes no file.
+    """Describe the modes of a job; writes no file.
+
+    Its columns and shapes, their order, and the frame are given.
 
     Example: cms modes rod.toml
     """
@@ -143,13 +145,14 @@ def modes_command(
     list_modes(job, as_json=json)
 
 
-@app.command("formats")
 @guarded
 def formats_command(
     json: Annotated[bool, typer.Option("--json", help="Write the table as JSON, for other programs.")] = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="Write the table of docs/formats.md.")] = False,
 ) -> None:
-    """List the formats of other programs that are read and written, the versions tested, and what is lost.
+    """Formats of other programs, and what is lost.
+
+    The versions tested are given.
 
     Example: cms formats
     """
@@ -158,7 +161,6 @@ def formats_command(
     list_formats(as_json=json, as_markdown=markdown)
 
 
-@app.command("export")
 @guarded
 def export_command(
     file: ModalFile,
@@ -172,7 +174,9 @@ def export_command(
     ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write.")] = None,
 ) -> None:
-    """Write a modal file in the format of another program, and report data that the format cannot hold.
+    """Write a modal file in the format of another program.
+
+    The command reports data that the format cannot hold.
 
     Example: cms export rod.h5 --to exudyn --units m-kg-s -o rod_exudyn.npz
 
@@ -183,7 +187,6 @@ def export_command(
     run_export(ExportRequest(file, to, units, nodes, output, tuple(load or ())))
 
 
-@app.command("recovery")
 @guarded
 def recovery_command(
     file: ModalFile,
@@ -199,7 +202,9 @@ def recovery_command(
         Path | None, typer.Option("--output", "-o", help="File: .npz, .mat, .op4, .csv, or .h5 with the tables added.")
     ] = None,
 ) -> None:
-    """List the recovery rows of a modal file, or write them: accelerations, stress, element and interface forces.
+    """List or write the recovery rows of a modal file.
+
+    They give accelerations, stress, element and interface forces.
 
     Example: cms recovery tower.h5
 
@@ -212,7 +217,6 @@ def recovery_command(
     run_recovery(RecoveryCommand(file, table, rows, over, units, output))
 
 
-@app.command("import")
 @guarded
 def import_command(
     files: Annotated[list[str], typer.Argument(help="Files of one body, or of its matrices as K=FILE M=FILE.")],
@@ -244,7 +248,9 @@ def import_command(
     accept: Annotated[list[str] | None, typer.Option(help="Findings to accept: units.")] = None,
     output: Output = None,
 ) -> None:
-    """Make a modal file of a body that another program has reduced, and report what that program did not provide.
+    """Read a body that another program has reduced.
+
+    The command reports what that program did not provide.
 
     Example: cms import outboard.op4 --units mm-kg-s -o outboard.h5
 
@@ -279,7 +285,6 @@ def import_command(
     )
 
 
-@app.command("check")
 @guarded
 def check_command(
     file: ModalFile,
@@ -289,7 +294,9 @@ def check_command(
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the records as JSON, for other programs.")] = False,
 ) -> None:
-    """Check a modal file: one verdict per check, the reason, and what to do; the exit code is 1 if a check fails.
+    """Check a modal file: one verdict per check.
+
+    Each verdict has its reason and what to do; the exit code is 1 if a check fails.
 
     Without a job, the file is checked for consistency. With its job, it is compared with the full model.
 
@@ -302,7 +309,6 @@ def check_command(
     raise typer.Exit(check_file(file, job, band=band, as_json=json))
 
 
-@app.command("accept")
 @guarded
 def accept_command(
     file: ModalFile,
@@ -325,7 +331,9 @@ def accept_command(
         list[Path] | None, typer.Option("--output", "-o", help="Document: .pdf, .html or .json; repeatable.")
     ] = None,
 ) -> None:
-    """Make the acceptance document of a body: origin, every check, effective masses, range of validity.
+    """Acceptance document of a body, to sign.
+
+    It holds its origin, every check, effective masses and the range of validity.
 
     It works for own and received bodies. With a full model it also contains the comparison, and the cards of its deck
     that were left out. Exit code 0: accepted, 1: not accepted. Without -o: rod.h5 gives rod_acceptance.pdf; a PDF needs
@@ -344,7 +352,6 @@ def accept_command(
     )
 
 
-@app.command("frf")
 @guarded
 def frf_command(
     file: ModalFile,
@@ -366,7 +373,9 @@ def frf_command(
         list[Path] | None, typer.Option("--output", "-o", help="Picture (.png .svg .pdf) or table (.csv); repeatable.")
     ] = None,
 ) -> None:
-    """Compute the frequency response of the free body from a force at one interface to the motion of another.
+    """Frequency response between interfaces of the free body.
+
+    It leads from a force at one interface to the motion of another.
 
     Example: cms frf rod.h5 --from big_end --to small_end --band 10:5000 -c uz -o frf.png
 
@@ -379,7 +388,6 @@ def frf_command(
     )
 
 
-@app.command("compare")
 @guarded
 def compare_command(
     job: Annotated[Path, typer.Argument(help="Job file (TOML) of the body, see docs/job_file.md.")],
@@ -413,7 +421,9 @@ def compare_command(
         ),
     ] = None,
 ) -> None:
-    """Compare mode sets with the full model: which set is accurate enough, with how few modes, and why.
+    """Compare mode sets with the full model.
+
+    Which set is accurate enough, with how few modes, and why.
 
     The full model is solved once and stored in the folder of the report, so that a repetition is fast. To compare sets
     in the motion of a mechanism, with frames, stiffening and parts: floatframe study (docs/laboratory.md).
@@ -445,7 +455,6 @@ def study_command(context: typer.Context) -> None:
     )
 
 
-@app.command("correlate")
 @guarded
 def correlate_command(
     file: Annotated[Path, typer.Argument(help="Correlation file (TOML), see docs/test_and_model.md.")],
@@ -455,7 +464,9 @@ def correlate_command(
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the numbers as JSON, for other programs.")] = False,
 ) -> None:
-    """Compare measured modes with a model (points, pairs, MAC, COMAC, orthogonality), and update the job.
+    """Compare measured modes with a model, and update it.
+
+    Points, pairs, MAC, COMAC and orthogonality are compared.
 
     The job is updated if the file has a table [update]. Without -o the page is written beside the file: rod_test.html.
 
@@ -468,7 +479,6 @@ def correlate_command(
     run_correlate(CorrelateRequest(file, output, updated_job, json))
 
 
-@app.command("split")
 @guarded
 def split_command(
     job: Annotated[Path, typer.Argument(help="Job file (TOML) of the whole body.")],
@@ -482,7 +492,9 @@ def split_command(
     reduce: Annotated[bool, typer.Option("--reduce", help="Also reduce the parts.")] = False,
     workers: Workers = None,
 ) -> None:
-    """Split a body into parts with an interface at each cut, so that several frames can describe large deflections.
+    """Split a slender body into parts, for large deflections.
+
+    There is an interface at each cut; each part has a frame of its own.
 
     It writes a job for every part, and a system file that joins them. Without -o: rod.toml gives the folder rod_parts.
 
@@ -501,15 +513,46 @@ def split_command(
         reduce_and_write_fleet(Fleet(files[:-1], None, workers, None))
 
 
-@app.command("demo")
 @guarded
 def demo_command(
     folder: Annotated[Path, typer.Argument(help="Folder for the files of the demo.")] = Path("demo"),
 ) -> None:
-    """Run all steps with the included connecting rod: reduce, info, view, run, plot, animate; takes about a minute.
+    """Run all steps with the included connecting rod.
+
+    Reduce, info, view, run, plot, animate: about a minute.
 
     Example: cms demo
     """
     from cms.cli.demo import run_demo
 
     run_demo(folder)
+
+
+register(
+    app,
+    {
+        "Start": {"demo": demo_command},
+        "Model": {
+            "job": job_command,
+            "faces": faces_command,
+            "converge": converge_command,
+            "split": split_command,
+            "show": show_command,
+        },
+        "Reduce": {"reduce": reduce_command, "modes": modes_command, "frame": frame_command},
+        "Judge": {
+            "check": check_command,
+            "accept": accept_command,
+            "compare": compare_command,
+            "correlate": correlate_command,
+            "frf": frf_command,
+        },
+        "Exchange": {
+            "import": import_command,
+            "export": export_command,
+            "recovery": recovery_command,
+            "formats": formats_command,
+        },
+        "Look": {"info": info_command, "view": view_command},
+    },
+)

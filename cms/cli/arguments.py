@@ -1,11 +1,15 @@
 """Arguments that several commands share."""
 
+import tomllib
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-__all__ = ["Journal", "Memory", "ModalFile", "Output", "Solver", "Workers"]
+from cms.errors import CmsError
+
+__all__ = ["Journal", "Memory", "ModalFile", "Output", "SetValues", "Solver", "Workers", "changes_of"]
 
 ModalFile = Annotated[Path, typer.Argument(help="A modal file, as cms reduce writes it.")]
 
@@ -43,3 +47,32 @@ Journal = Annotated[
     Path | None,
     typer.Option("--journal", help="File that records every result, to resume from; default: beside the input file."),
 ]
+
+SetValues = Annotated[
+    list[str],
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help="Value of a parameter of the file, or of a key path such as run.h; may be repeated.",
+    ),
+]
+
+
+def changes_of(given: Sequence[str]) -> dict[str, Any]:
+    """Return the values of the options --set by name; a value that is not valid TOML is a text.
+
+    Raises
+    ------
+    CmsError
+        If an option has no name, or no "=".
+    """
+    changes: dict[str, Any] = {}
+    for each in given:
+        name, equals, value = each.partition("=")
+        if not name.strip() or not equals:
+            raise CmsError(f"--set {each}: expected NAME=VALUE, such as length=0.4")
+        try:
+            changes[name.strip()] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            changes[name.strip()] = value.strip()
+    return changes

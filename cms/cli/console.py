@@ -10,7 +10,7 @@ import os
 import sys
 import traceback
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any, ParamSpec, TypeVar
@@ -30,6 +30,7 @@ __all__ = [
     "output_path",
     "print_error",
     "print_table",
+    "register",
     "run",
     "say",
     "stages",
@@ -99,6 +100,13 @@ class Commands(typer.Typer):
     def command(self, name: str | None = None, **options: Any) -> Any:
         """Register a command."""
         return super().command(name, cls=options.pop("cls", PlainHelp), **options)
+
+
+def register(app: typer.Typer, groups: Mapping[str, Mapping[str, Callable[..., None]]]) -> None:
+    """Add the commands of a program, by the heading of their group in --help and by name, in the order of work."""
+    for heading, members in groups.items():
+        for name, command in members.items():
+            app.command(name, rich_help_panel=heading)(command)
 
 
 def commands(name: str, help: str) -> typer.Typer:

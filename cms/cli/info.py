@@ -189,7 +189,7 @@ def info_command(
         typer.Option("--effective-mass", help="Effective mass of every mode while this interface is held and driven."),
     ] = None,
 ) -> None:
-    """Show the content of a modal file: mass, inertia, units, frame, modes, interfaces, load cases, provenance.
+    """Content of a modal file: mass, frame, modes, provenance.
 
     Example: cms info rod.h5 --json
 

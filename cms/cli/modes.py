@@ -30,7 +30,9 @@ def view_command(
         float | None, typer.Option(help="Largest displacement drawn, as a share of the body's diagonal; default 0.09.")
     ] = None,
 ) -> None:
-    """Draw a mode on the real surface of the body, as a picture or a film; works without a display.
+    """Picture or film of a mode on the surface of the body.
+
+    It needs no display.
 
     Without -o and --animate, the picture is written beside the modal file: rod.h5 gives rod_mode3.png.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cms.cli.arguments import Memory, Solver, Workers
+from cms.cli.arguments import Memory, SetValues, Solver, Workers, changes_of
 from cms.cli.console import USER_ERROR, guarded, output_path, print_error, print_table, say, stages
 from cms.cli.info import print_body
 from cms.errors import JobError
@@ -133,6 +133,7 @@ def reduce_command(
     workers: Workers = None,
     solver: Solver = None,
     memory: Memory = None,
+    set_values: SetValues = [],  # noqa: B006
 ) -> None:
     """Reduce finite element bodies to modal files.
 
@@ -141,6 +142,8 @@ def reduce_command(
     there. For one job with the mode set multilevel, its substructures are the tasks.
 
     Example: cms reduce rod.toml -o rod.h5
+
+    Example: cms reduce rod.toml --set length=0.4 -o rod400.h5
 
     Example: cms reduce jobs/*.toml --workers 4
 
@@ -154,24 +157,26 @@ def reduce_command(
     if started_ranks() > 1:
 
         def question() -> list[Path | str]:
-            asked = read_job(jobs[0])
+            asked = read_job(jobs[0], changes_of(set_values))
             chosen = solver or asked.reduction.solver
             one_job_of_ranks(jobs, workers, chosen)
             return [f"solver {chosen}", *inputs_of(jobs[0], asked)]
 
         def work() -> None:
-            asked = read_job(jobs[0])
+            asked = read_job(jobs[0], changes_of(set_values))
             made = output_path(output, jobs[0].with_suffix(".h5"), JobError, overwrite_of=inputs_of(jobs[0], asked))
             reduce_and_write(asked, made, solver, memory)
 
         on_ranks(question, work)
         return
     job = jobs[0]
-    read = read_job(job) if len(jobs) == 1 else None
+    read = read_job(job, changes_of(set_values)) if len(jobs) == 1 else None
     if read is not None and read.reduction.set == "multilevel" and workers is not None and journal is None:
         read, workers = with_workers(read, workers), None
     if memory is not None and (read is None or workers is not None):
         raise JobError('--memory: belongs to one job; several have memory = "8GB" in their tables [reduction]')
+    if set_values and (read is None or workers is not None):
+        raise JobError("--set: belongs to one job without --workers")
     if read is None or workers is not None:
         reduce_and_write_fleet(Fleet(jobs, output, workers, journal, solver))
         return

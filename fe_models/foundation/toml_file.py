@@ -261,9 +261,7 @@ Range = Annotated[tuple[float, float], BeforeValidator(interval)]
 Matrix3 = Annotated[tuple[Vector3, Vector3, Vector3], BeforeValidator(rows)]
 
 
-def changed(
-    content: Mapping[str, Any], changes: Mapping[str, Any], where: str, error: type[Exception]
-) -> dict[str, Any]:
+def changed(content: FileContent, changes: Mapping[str, Any], where: str, error: type[Exception]) -> FileContent:
     """Return the content of a file with changed values at some key paths.
 
     The table that holds a key must be in the file; the key itself may be new. Keys that contain dots are found too: the
@@ -278,8 +276,6 @@ def changed(
     for path, value in changes.items():
         holder, key = holder_of(result, path, where, error)
         holder[key] = value
-    if not isinstance(content, FileContent):
-        return result
     return FileContent(
         result, content.path, files=content.files, origins=content.origins, parameters=content.parameters,
         outside=(*content.outside, *changes),

@@ -1,11 +1,13 @@
 """The commands that analyse a system without a motion: static, eig, campbell."""
 
 import json as json_module
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cms.cli.arguments import SetValues, changes_of
 from cms.cli.console import guarded, output_path, print_table, say, stages, vector_words
 
 if TYPE_CHECKING:
@@ -14,7 +16,7 @@ if TYPE_CHECKING:
     from floatframe.model.system import System
     from floatframe.pictures.body_colors import BodyColor
 
-__all__ = ["register"]
+__all__ = ["campbell_command", "eig_command", "static_command"]
 
 MOST_SPEEDS = 10_000
 GREATEST_SPEED = 1e100
@@ -31,16 +33,14 @@ Formulation = Annotated[
 Modes = Annotated[int, typer.Option("--modes", "-n", help="How many modes, by ascending frequency.")]
 
 
-def register(app: typer.Typer) -> None:
-    """Add the commands to an application."""
-    app.command("static")(static_command)
-    app.command("eig")(eig_command)
-    app.command("campbell")(campbell_command)
-
-
 @guarded
-def static_command(system: SystemArgument, formulation: Formulation = None, json: Json = False) -> None:
-    """Find the equilibrium of a system at rest: where its bodies are, reactions, and whether it is stable.
+def static_command(
+    system: SystemArgument,
+    formulation: Formulation = None,
+    json: Json = False,
+    set_values: SetValues = [],  # noqa: B006
+) -> None:
+    """Equilibrium at rest: positions, reactions, stability.
 
     Example: floatframe static crane.toml
     """
@@ -48,7 +48,7 @@ def static_command(system: SystemArgument, formulation: Formulation = None, json
     from floatframe.engine.compiling.system import compiled_system
     from floatframe.errors import ModelError
 
-    model, form = read_in_formulation(system, formulation)
+    model, form = read_in_formulation(system, formulation, set_values)
     rest = static_equilibrium(model, formulation=form)
     try:
         is_stable = system_modes(linearize(model, rest, formulation=form)).is_stable
@@ -115,8 +115,11 @@ def eig_command(
     color: Annotated[str, typer.Option(help="Colour of the film: displacement or von-mises.")] = "displacement",
     formulation: Formulation = None,
     json: Json = False,
+    set_values: SetValues = [],  # noqa: B006
 ) -> None:
-    """Vibration modes of a system about its equilibrium, or about a steady rotation: frequency, damping, what moves.
+    """Vibration modes: frequency, damping, shape.
+
+    The modes are those about the equilibrium, or about a steady rotation with --speed.
 
     With --animate 3 and without -o the film of mode 3 of crane.toml is crane.mode3.gif.
 
@@ -135,7 +138,7 @@ def eig_command(
         raise ModelError(f"--color {color}: expected one of {', '.join(BODY_COLORS)}{nearest(color, BODY_COLORS)}")
     if output is not None and len(animate) != 1:
         raise ModelError(f"--output {output}: expected --animate with the number of one mode, got {len(animate)}")
-    model, form = read_in_formulation(system, formulation)
+    model, form = read_in_formulation(system, formulation, set_values)
     films = {k: output_path(output, system.with_suffix(f".mode{k}.gif"), ModelError,
                             overwrite_of=(system, *model.files), needs_file=True) for k in animate}  # fmt: skip
     linear = linearized(model, speed, axis, center, formulation=form)
@@ -182,8 +185,11 @@ def campbell_command(
     outputs: Annotated[
         list[str], typer.Option("--out", "-m", help="A name of [outputs] or [sensors], sensor.column; repeatable.")
     ] = [],  # noqa: B006
+    set_values: SetValues = [],  # noqa: B006
 ) -> None:
-    """Campbell diagram: frequencies of a steadily rotating system over its speed, with the steady values of outputs.
+    """Campbell diagram of a rotating system.
+
+    It shows frequencies over the speed, with the steady values of outputs.
 
     Outputs are those of the table [outputs] of the system, unless named. Their steady values at the speeds, such as
     bearing forces, are printed, and written as columns of a .csv or as panels below the diagram.
@@ -203,7 +209,7 @@ def campbell_command(
     from floatframe.cli.channel_names import chosen
     from floatframe.errors import ModelError
 
-    model = read(system)
+    model, _ = read_in_formulation(system, None, set_values)
     path = output_path(output, system.with_suffix(".png"), ModelError, overwrite_of=(system, *model.files))
     kind = path.suffix.lower().removeprefix(".")
     if kind not in ("png", "svg", "pdf", "csv"):
@@ -263,17 +269,12 @@ def draw_mode_film(
     say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
 
 
-def read(path: Path) -> "System":
-    """Return the system of a file."""
-    return read_in_formulation(path, None)[0]
-
-
-def read_in_formulation(path: Path, formulation: str | None) -> "tuple[System, str]":
-    """Return the system of a file, and the requested formulation, else that of its table [run], else absolute."""
+def read_in_formulation(path: Path, formulation: str | None, set_values: Sequence[str] = ()) -> "tuple[System, str]":
+    """Return the system of a file with the values of --set, and its formulation: the option, [run], or absolute."""
     from floatframe.files.system_file.read_system import read_system
     from floatframe.files.system_file.run_section import formulation_of
 
-    system, run = read_system(path)
+    system, run = read_system(path, changes_of(set_values))
     tell_left_out(system)
     if system.fmus:
         names = ", ".join(unit.name for unit in system.fmus)

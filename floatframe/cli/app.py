@@ -16,7 +16,19 @@ import floatframe.cli.prepare as prepare
 import floatframe.cli.spectra as spectra
 import floatframe.cli.studies as studies
 import floatframe.cli.view as view
-from cms.cli.console import INTERRUPTED, commands, guarded, output_path, print_error, print_table, say, stages
+from cms.cli.arguments import SetValues, changes_of
+from cms.cli.console import (
+    INTERRUPTED,
+    commands,
+    guarded,
+    output_path,
+    print_error,
+    print_table,
+    register,
+    say,
+    stages,
+)
+from cms.cli.show import show_command
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -34,7 +46,6 @@ app = commands("floatframe", "Flexible multibody dynamics: bodies from modal fil
 ResultsFile = Annotated[Path, typer.Argument(help="A results file, as floatframe run writes it.")]
 
 
-@app.command("run")
 @guarded
 def run_command(
     system: Annotated[Path, typer.Argument(help="System file (TOML), see docs/system_file.md.")],
@@ -51,12 +62,15 @@ def run_command(
             "[run], else stop.",
         ),
     ] = None,
+    set_values: SetValues = [],  # noqa: B006
 ) -> None:
     """Compute the motion of a system.
 
     Without -o, the results are written next to the system file: swing.toml gives swing.h5.
 
     Example: floatframe run swing.toml -o swing.h5
+
+    Example: floatframe run swing.toml --set length=0.4 --set run.h=1e-4
     """
     from floatframe.errors import ResultsError
     from floatframe.files.cosimulation.coupled_motion import co_simulate
@@ -65,7 +79,7 @@ def run_command(
     from floatframe.integrators import in_formulation
     from floatframe.simulation.integrate import integrate
 
-    model, given = read_system(system)
+    model, given = read_system(system, changes_of(set_values))
     analyses.tell_left_out(model)
     options = required_run(given, system)
     integrator = options.integrator if formulation is None else in_formulation(options.integrator, formulation)
@@ -82,19 +96,21 @@ def run_command(
             if model.fmus
             else integrate(
                 model, integrator, options.t_end, options.h, output=path, output_every=options.output_every,
-                progress=on_progress, watch=options.watch if watch is None else watch,
+                progress=on_progress, watch=options.watch if watch is None else watch, state=options.start_state(model),
             )
         ),
     )  # fmt: skip
 
 
-@app.command("resume")
 @guarded
 def resume_command(
     system: Annotated[Path, typer.Argument(help="System file (TOML) of the run that was interrupted.")],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Results file of that run.")] = None,
+    set_values: SetValues = [],  # noqa: B006
 ) -> None:
-    """Continue a run that was interrupted or killed; the motion is that of an uninterrupted run.
+    """Continue an interrupted run.
+
+    The motion is that of an uninterrupted run.
 
     Without -o, the results are next to the system file: swing.toml gives swing.h5.
 
@@ -109,7 +125,7 @@ def resume_command(
             f"{system}: expected the system file (TOML) of the run, got its results; name them with -o: floatframe "
             f"resume {system.with_suffix('').with_suffix('.toml').name} -o {system}"
         )
-    model, _ = read_system(system)
+    model, _ = read_system(system, changes_of(set_values))
     path = output or system.with_suffix(".h5")
     compute(model.name, path, lambda on_progress: resume(model, path, progress=on_progress))
 
@@ -265,19 +281,19 @@ def integrator_words(run: dict[str, Any]) -> str:
         "gravity",
         "system_file",
         "system_file_digest",
+        "changes",
         "watch",
     }
     options = ", ".join(f"{key} = {value}" for key, value in run.items() if key not in known and value is not None)
     return f"{run.get('integrator', '')} ({options})"
 
 
-@app.command("info")
 @guarded
 def info_command(
     file: Annotated[Path, typer.Argument(help="A results file (.h5), a system file (.toml) or a robot (.urdf).")],
     json: Annotated[bool, typer.Option("--json", help="Write the same record as JSON, for other programs.")] = False,
 ) -> None:
-    """Show the contents of a results file: system, run, energy balance, constraint errors of the joints.
+    """Contents of a results file, energy balance, joint drift.
 
     For a system file, its mobility is shown; for a robot, its links and joints.
 
@@ -347,7 +363,6 @@ def print_mobility(path: Path, *, as_json: bool) -> None:
     )
 
 
-@app.command("plot")
 @guarded
 def plot_command(
     file: ResultsFile,
@@ -363,7 +378,9 @@ def plot_command(
     resolution: Annotated[float | None, typer.Option(help="For spectra: distance of lines [Hz].")] = None,
     rotation: Annotated[str, typer.Option(help="For orders: sensor with the angle or speed of the rotation.")] = "",
 ) -> None:
-    """Plot the motion: positions, energies, elastic displacement, reactions, energy error, joint drift, sensors.
+    """Plot a motion.
+
+    The plots show positions, energies, elastic displacement, reactions, energy error, joint drift and sensors.
 
     Without -o, the picture is written next to the results: swing.h5 gives swing.png.
 
@@ -413,7 +430,6 @@ def plot_command(
     say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
 
 
-@app.command("animate")
 @guarded
 def animate_command(
     file: ResultsFile,
@@ -427,7 +443,9 @@ def animate_command(
     fps: Annotated[float, typer.Option(help="Frames per second.")] = 25.0,
     color: Annotated[str, typer.Option(help="Colour of flexible bodies: displacement or von-mises.")] = "displacement",
 ) -> None:
-    """Make a film of the motion: deformed bodies, coloured by elastic displacement or stress; needs no display.
+    """Film of the deformed bodies, coloured by displacement or stress.
+
+    It needs no display.
 
     Without -o, the film is written next to the results: swing.h5 gives swing.gif.
 
@@ -460,7 +478,6 @@ def animate_command(
     say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
 
 
-@app.command("export")
 @guarded
 def export_command(
     file: ResultsFile,
@@ -473,7 +490,9 @@ def export_command(
     ] = [],  # noqa: B006
     every: Annotated[int, typer.Option(min=1, help="Use every n-th output time only (.pvd).")] = 1,
 ) -> None:
-    """Write a motion for other programs: a table with all sensors, or deformed surfaces with stress for ParaView.
+    """Write a motion as a table, for ParaView, or for a test rig.
+
+    The ending of -o decides: .csv holds all sensors, .pvd deformed surfaces with stress, .rsp, .drv or .tim signals.
 
     Without -o, a table is written next to the results: swing.h5 gives swing.csv.
 
@@ -513,20 +532,47 @@ def export_command(
         raise ResultsError(f"--output {path}: expected a file name that ends in .csv, .pvd, .rsp, .drv or .tim")
 
 
-analyses.register(app)
-linear.register(app)
-spectra.register(app)
-driven.register(app)
-studies.register_sweep(app)
-fits.register_optimize(app)
-fits.register_identify(app)
-studies.register_study(app)
-durability.register_shake(app)
-studies.register_gradient(app)
-durability.register_fatigue(app)
-exchange.register_fmu(app)
-prepare.register_machine(app)
-prepare.register_prepare(app)
-exchange.register_robot(app)
-exchange.register_generate(app)
-view.register(app)
+register(
+    app,
+    {
+        "Start": {"machine": prepare.machine_command},
+        "Compute": {
+            "run": run_command,
+            "resume": resume_command,
+            "static": analyses.static_command,
+            "eig": analyses.eig_command,
+            "campbell": analyses.campbell_command,
+            "response": linear.response_command,
+            "linearize": linear.linearize_command,
+            "kinematics": driven.kinematics_command,
+            "inverse": driven.inverse_command,
+        },
+        "Look": {
+            "info": info_command,
+            "plot": plot_command,
+            "animate": animate_command,
+            "view": view.view_command,
+            "spectrum": spectra.spectrum_command,
+            "show": show_command,
+        },
+        "Vary": {
+            "sweep": studies.sweep_command,
+            "optimize": fits.optimize_command,
+            "study": studies.study_command,
+            "gradient": studies.gradient_command,
+        },
+        "Assess": {
+            "shake": durability.shake_command,
+            "fatigue": durability.fatigue_command,
+            "identify": fits.identify_command,
+        },
+        "Exchange": {
+            "import": exchange.import_command,
+            "export": export_command,
+            "urdf": exchange.urdf_command,
+            "fmu": exchange.fmu_command,
+            "generate": exchange.generate_command,
+        },
+        "Set up": {"prepare": prepare.prepare_command},
+    },
+)

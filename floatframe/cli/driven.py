@@ -1,11 +1,13 @@
 """The commands for driven systems: kinematics, inverse."""
 
 import json as json_module
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cms.cli.arguments import SetValues, changes_of
 from cms.cli.console import guarded, output_path, print_table, say, stages
 
 if TYPE_CHECKING:
@@ -14,16 +16,10 @@ if TYPE_CHECKING:
     from floatframe.results.joint_coordinates import CoordinateMotion
     from floatframe.results.trajectory import Trajectory
 
-__all__ = ["register"]
+__all__ = ["inverse_command", "kinematics_command"]
 
 SystemArgument = Annotated[Path, typer.Argument(help="System file (TOML) whose drives decide the motion.")]
 Json = Annotated[bool, typer.Option("--json", help="Write the same record as JSON, for other programs.")]
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands to an application."""
-    app.command("kinematics")(kinematics_command)
-    app.command("inverse")(inverse_command)
 
 
 @guarded
@@ -34,8 +30,9 @@ def kinematics_command(
         str, typer.Option(help="Flexible bodies: frozen (keep their shape) or quasi-static (no vibrations).")
     ] = "frozen",
     json: Json = False,
+    set_values: SetValues = [],  # noqa: B006
 ) -> None:
-    """Positions, velocities and accelerations of a fully driven system, without integrating its motion.
+    """Motion of a fully driven system, without integration.
 
     The prescribed motions of the file must determine all positions; coordinates that they leave free are named. The
     output times are those of a run: t_end, h and output_every of [run]. The results, crank.kinematics.h5 for
@@ -43,7 +40,7 @@ def kinematics_command(
 
     Example: floatframe kinematics crank.toml
     """
-    model, motion, path = driven_motion(system, output, ".kinematics.h5", elastic)
+    model, motion, path = driven_motion(system, output, ".kinematics.h5", elastic, set_values)
     record = coordinates_record(model, motion)
     if json:
         typer.echo(json_module.dumps(record | {"results": str(path)}, indent=2))
@@ -61,8 +58,9 @@ def inverse_command(
         str, typer.Option(help="Flexible bodies: quasi-static (no vibrations), frozen, or dynamic (integrated).")
     ] = "quasi-static",
     json: Json = False,
+    set_values: SetValues = [],  # noqa: B006
 ) -> None:
-    """Inverse dynamics: the forces and torques that drives must exert in their motion, and the joint reactions.
+    """Inverse dynamics: loads of drives and joint reactions.
 
     The output times are those of a run: t_end, h and output_every of [run]. With --elastic dynamic, the motion is
     integrated as by floatframe run, including vibrations.
@@ -73,7 +71,7 @@ def inverse_command(
     """
     import numpy as np
 
-    model, motion, path = driven_motion(system, output, ".inverse.h5", elastic)
+    model, motion, path = driven_motion(system, output, ".inverse.h5", elastic, set_values)
     record = coordinates_record(model, motion)
     record["reactions"] = {
         name: {
@@ -106,7 +104,9 @@ def inverse_command(
     say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
 
 
-def driven_motion(file: Path, output: Path | None, suffix: str, elastic: str) -> "tuple[System, Trajectory, Path]":
+def driven_motion(
+    file: Path, output: Path | None, suffix: str, elastic: str, set_values: Sequence[str]
+) -> "tuple[System, Trajectory, Path]":
     """Compute the motion determined by the drives of a system file; return system, motion and path of the results."""
     from fe_models.foundation.words import nearest
     from floatframe.analyses.driven.driven_motion import ELASTICITY
@@ -119,7 +119,7 @@ def driven_motion(file: Path, output: Path | None, suffix: str, elastic: str) ->
     choices = [*ELASTICITY, *(["dynamic"] if suffix == ".inverse.h5" else [])]
     if elastic not in choices:
         raise ModelError(f"--elastic {elastic}: expected one of {', '.join(choices)}{nearest(elastic, choices)}")
-    model, given = read_system(file)
+    model, given = read_system(file, changes_of(set_values))
     run = required_run(given, file)
     path = output_path(output, file.with_suffix(suffix), ResultsError, overwrite_of=(file, *model.files))
     with stages(remaining=True) as clock, clock(f"{model.name}: motion of the drives") as advance:

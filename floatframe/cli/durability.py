@@ -14,18 +14,13 @@ if TYPE_CHECKING:
     from floatframe.durability.shaking.loads.levels import Level
     from floatframe.durability.shaking.shake import ShakeJob, ShakeResult
 
-__all__ = ["register_fatigue", "register_shake"]
+__all__ = ["fatigue_command", "shake_command"]
 
 
 # the command fatigue: damage and life on the surface of a body --------------------------------------------------------
 
 
 FATIGUE_KINDS = ("html", "json", "csv", "vtu", "png")
-
-
-def register_fatigue(app: typer.Typer) -> None:
-    """Add the command to an application."""
-    app.command("fatigue")(fatigue_command)
 
 
 @guarded
@@ -36,7 +31,9 @@ def fatigue_command(
     ] = [],  # noqa: B006
     json: Annotated[bool, typer.Option("--json", help="Write the same record as JSON, for other programs.")] = False,
 ) -> None:
-    """Damage and life on the surface of a flexible body, from results files of motions or from spectra.
+    """Fatigue damage and life on the surface of a flexible body.
+
+    The loads are results files of motions, or spectra.
 
     Without -o, a page, a table, a record and a surface are written next to the file: arm.toml gives arm.html, arm.csv,
     arm.json and arm.vtu.
@@ -147,11 +144,6 @@ SHAKE_KINDS = (".html", ".json", ".csv")
 SHOWN = 14  #: largest number of printed outputs of a run
 
 
-def register_shake(app: typer.Typer) -> None:
-    """Add the command to an application."""
-    app.command("shake")(shake_command)
-
-
 @guarded
 def shake_command(
     file: Annotated[Path, typer.Argument(help="A shake file (TOML), see docs/shake.md, or a modal file (.h5).")],
@@ -178,7 +170,9 @@ def shake_command(
         bool, typer.Option("--json", help="Write the record as JSON to the terminal, for other programs.")
     ] = False,
 ) -> None:
-    """Shake a structure on its base: sine, random, shock, transient; loads, stresses, spectra, notches.
+    """Shake a structure on its base: sine, random, shock, transient.
+
+    Results are loads, stresses, spectra and notches.
 
     Without -o, tower.toml gives tower.shake.html, .json and .csv. For a modal file, all other interfaces are observed.
 

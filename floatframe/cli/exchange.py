@@ -11,18 +11,13 @@ from cms.cli.console import guarded, output_path, print_table, say, stages
 if TYPE_CHECKING:
     from floatframe.files.importers.robot import Robot
 
-__all__ = ["print_robot", "register_fmu", "register_generate", "register_robot"]
+__all__ = ["fmu_command", "generate_command", "import_command", "print_robot", "urdf_command"]
 
 
 # the command generate: the equations of a system as code --------------------------------------------------------------
 
 
 MOST_ROWS = 60  #: largest number of printed rows
-
-
-def register_generate(app: typer.Typer) -> None:
-    """Add the command to an application."""
-    app.command("generate")(generate_command)
 
 
 @guarded
@@ -53,7 +48,9 @@ def generate_command(
     fmi: Annotated[int, typer.Option("--fmi", help="With --fmu: version of FMI, 2 or 3.")] = 2,
     step: Annotated[float, typer.Option("--step", help="With --fmu: longest step in co-simulation [s].")] = 1e-3,
 ) -> None:
-    """Write the equations of a system as code with its numbers: forces, mass matrix, accelerations, derivatives.
+    """Write the equations of a system as code.
+
+    The code holds its numbers; it computes forces, mass matrix, accelerations and derivatives.
 
     With --fmu, they become an FMU for model exchange and co-simulation: inputs are the forces along the joints, outputs
     are positions and rates. It is compiled by cc, or by the compiler in the environment variable CC.
@@ -135,12 +132,6 @@ def write_unit(system: Path, fmu: Path, fmi: int, step: float, parameters: list[
 # the commands import and urdf for robots, and the output of info for a robot ------------------------------------------
 
 
-def register_robot(app: typer.Typer) -> None:
-    """Add the commands to an application."""
-    app.command("import")(import_command)
-    app.command("urdf")(urdf_command)
-
-
 @guarded
 def import_command(
     robot: Annotated[Path, typer.Argument(help="A description of a robot (.urdf).")],
@@ -161,7 +152,9 @@ def import_command(
         list[str], typer.Option(help="LINK.JOINT=NAME, the interface of a flexible link at a joint; may be repeated.")
     ] = [],  # noqa: B006
 ) -> None:
-    """Write the system file of a robot, with its surfaces and modal files next to it.
+    """Read a robot (URDF, MJCF) as a system file.
+
+    Its surfaces and modal files are written next to it.
 
     Example: floatframe import arm.urdf -o arm --at elbow=0.5
     """
@@ -218,7 +211,9 @@ def urdf_command(
     effort: Annotated[float | None, typer.Option(help="Largest force or torque of joints with limits.")] = None,
     velocity: Annotated[float | None, typer.Option(help="Largest speed of joints with limits.")] = None,
 ) -> None:
-    """Write a system as a robot, with its surfaces next to it; features that URDF does not support are listed.
+    """Write a system as a URDF robot.
+
+    Its surfaces are written next to it; features that URDF does not support are listed.
 
     Stops become limits, for which URDF also requires effort and velocity.
 
@@ -330,11 +325,6 @@ def robot_record(robot: "Robot") -> dict[str, Any]:
 # the command fmu: a system as an FMU for other programs ---------------------------------------------------------------
 
 
-def register_fmu(app: typer.Typer) -> None:
-    """Add the command to an application."""
-    app.command("fmu")(fmu_command)
-
-
 @guarded
 def fmu_command(
     system: Annotated[Path, typer.Argument(help="System file (TOML), see docs/system_file.md.")],
@@ -348,7 +338,7 @@ def fmu_command(
         list[str], typer.Option("--parameter", "-p", help="NAME=KEY.PATH of a number in the file; repeatable.")
     ] = [],  # noqa: B006
 ) -> None:
-    """Write a system as an FMU for co-simulation with FMPy and other masters.
+    """Write a system as an FMU for co-simulation.
 
     Without -o, arm.toml gives arm.fmu. Inputs, outputs and parameters are those of the table [fmu], unless named here.
     Without both, they are the tables [inputs.NAME], constant forces and drives; all sensors; all numbers of bodies and

@@ -14,18 +14,13 @@ if TYPE_CHECKING:
     from floatframe.design.identification.regressors import LinearForm
     from floatframe.design.optimization.optimize import Evaluated, OptimizationResult
 
-__all__ = ["register_identify", "register_optimize"]
+__all__ = ["identify_command", "optimize_command"]
 
 
 # the command identify: inertial parameters of a tree from a measured motion -------------------------------------------
 
 
 IDENTIFY_KINDS = ("html", "json")
-
-
-def register_identify(app: typer.Typer) -> None:
-    """Add the command to an application."""
-    app.command("identify")(identify_command)
 
 
 @guarded
@@ -54,7 +49,9 @@ def identify_command(
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the result as JSON, for other programs.")] = False,
 ) -> None:
-    """Find the inertial parameters of a robot from a measured motion: base parameters with their deviations.
+    """Inertial parameters of a robot from a measured motion.
+
+    Base parameters are given with their deviations.
 
     Columns of the data are the positions of all coordinates, named as in results (joint1/angle), and their torques
     (joint1/angle torque) or the reactions at the base (base F_x to base M_z), or both. Rates and accelerations
@@ -166,11 +163,6 @@ def print_estimate(record: dict[str, Any]) -> None:
 OPTIMIZE_KINDS = ("csv", "json", "png", "svg", "pdf", "toml")
 
 
-def register_optimize(app: typer.Typer) -> None:
-    """Add the command to an application."""
-    app.command("optimize")(optimize_command)
-
-
 @guarded
 def optimize_command(
     design: Annotated[Path, typer.Argument(help="Design file (TOML), see docs/optimization.md.")],
@@ -186,7 +178,9 @@ def optimize_command(
     workers: Workers = None,
     json: Annotated[bool, typer.Option("--json", help="Write the result as JSON, for other programs.")] = False,
 ) -> None:
-    """Find the best values of parameters of a system: fits to tables, peaks, frequencies, damping, within limits.
+    """Find the best values of parameters within limits.
+
+    Objectives are fits to tables, peaks, frequencies and damping.
 
     Every evaluation is recorded in a journal (study.toml: study.journal); after an interruption, the same command
     continues. A failed evaluation is a row with its reason. Without -o, the history is written next to the design file

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cms.cli.arguments import SetValues
 from cms.cli.console import guarded, output_path, print_table, say
 from floatframe.cli.analyses import Axis, Center, Formulation, Speed, SystemArgument, linearized, read_in_formulation
 from floatframe.cli.channel_names import chosen
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from floatframe.analyses import LinearSystem
     from floatframe.analyses.linear.frequency_response import FrequencyResponse
 
-__all__ = ["register"]
+__all__ = ["linearize_command", "response_command"]
 
 MOST_LEFT_OUT = 6  #: largest number of omitted columns that are listed individually
 
@@ -28,12 +29,6 @@ Outputs = Annotated[
 ]
 
 
-def register(app: typer.Typer) -> None:
-    """Add the commands to an application."""
-    app.command("linearize")(linearize_command)
-    app.command("response")(response_command)
-
-
 @guarded
 def linearize_command(
     system: SystemArgument,
@@ -44,8 +39,11 @@ def linearize_command(
     axis: Axis = "z",
     center: Center = "0,0,0",
     formulation: Formulation = None,
+    set_values: SetValues = [],  # noqa: B006
 ) -> None:
-    """Linearise a system: the state space A, B, C, D with names, and M, C, K of its independent motions, in a file.
+    """State space A, B, C, D and M, C, K of the linearised system.
+
+    The file names states, inputs and outputs; M, C, K are those of the independent motions.
 
     Inputs and outputs are those of the tables [inputs] and [outputs] of the system, unless named here: sensors by name,
     or one of their columns as sensor.column; a point as body/interface:component, with x, y, z, rx, ry, rz. With
@@ -59,7 +57,7 @@ def linearize_command(
     from floatframe.analyses.linear.state_space import WRITERS, write_state_space
     from floatframe.errors import ModelError
 
-    model, form = read_in_formulation(system, formulation)
+    model, form = read_in_formulation(system, formulation, set_values)
     path = output_path(output, system.with_suffix(".npz"), ModelError, overwrite_of=(system, *model.files))
     if path.suffix.lower() not in WRITERS:
         raise ModelError(f"--output {path}: expected a file name that ends in {', '.join(WRITERS)}")
@@ -94,8 +92,11 @@ def response_command(
     axis: Axis = "z",
     center: Center = "0,0,0",
     formulation: Formulation = None,
+    set_values: SetValues = [],  # noqa: B006
 ) -> None:
-    """Frequency responses (Bode plot) of a system about its equilibrium, or about a steady rotation.
+    """Frequency responses (Bode plots).
+
+    They are those about the equilibrium, or about a steady rotation with --speed.
 
     Inputs and outputs as for linearize. Without -o, crane.toml gives crane.response.png.
 
@@ -110,7 +111,7 @@ def response_command(
     from floatframe.analyses.linear.plots import plot_frequency_response
     from floatframe.errors import ModelError
 
-    model, form = read_in_formulation(system, formulation)
+    model, form = read_in_formulation(system, formulation, set_values)
     path = output_path(output, system.with_suffix(".response.png"), ModelError, overwrite_of=(system, *model.files))
     kind = path.suffix.lower().removeprefix(".")
     if kind not in ("png", "svg", "pdf", "csv"):

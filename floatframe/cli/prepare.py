@@ -13,15 +13,10 @@ import typer
 from cms.cli.console import guarded, print_table, say, stages
 from cms.cli.demo import environment
 
-__all__ = ["prepare_parts", "register_machine", "register_prepare"]
+__all__ = ["machine_command", "prepare_command", "prepare_parts"]
 
 
 # the command machine: copies of ready machines ------------------------------------------------------------------------
-
-
-def register_machine(app: typer.Typer) -> None:
-    """Add the command to an application."""
-    app.command("machine")(machine_command)
 
 
 @guarded
@@ -31,7 +26,9 @@ def machine_command(
         Path | None, typer.Option("--output", "-o", help="Folder to copy it into; default: its name.")
     ] = None,
 ) -> None:
-    """Copy a ready machine with its jobs and systems into a folder, or list the machines.
+    """Copy a ready machine into a folder, or list the machines.
+
+    Its jobs and systems are copied.
 
     Example: floatframe machine antenna -o my_antenna
     """
@@ -55,16 +52,13 @@ RUN = "import sys; from floatframe.cli.compile_kernels import main; main(sys.arg
 LATER = {"relative": "motion", "schemes": "motion"}  #: parts that start after another part, whose kernels they need
 
 
-def register_prepare(app: typer.Typer) -> None:
-    """Add the command to an application."""
-    app.command("prepare")(prepare_command)
-
-
 @guarded
 def prepare_command(
     workers: Annotated[int, typer.Option(min=0, help="Processes at a time; 0: one per processor.")] = 0,
 ) -> None:
-    """Compile the code of motions and reductions in advance; otherwise it is compiled at first use.
+    """Compile the code of motions and reductions in advance.
+
+    Otherwise it is compiled at first use.
 
     This is needed once after an installation; code that is already compiled is kept.
 

@@ -12,15 +12,10 @@ if TYPE_CHECKING:
     from floatframe.files.signals.signals import Signal, Signals
     from floatframe.results.trajectory import Trajectory
 
-__all__ = ["plot_as", "register", "sensor_signals"]
+__all__ = ["plot_as", "sensor_signals", "spectrum_command"]
 
 PICTURES = ("png", "svg", "pdf")
 MOST_ROWS = 40  #: largest number of printed rows
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command to an application."""
-    app.command("spectrum")(spectrum_command)
 
 
 @guarded
@@ -45,7 +40,7 @@ def spectrum_command(
     input_name: Annotated[str, typer.Option("--input", help="Input channel of a response.")] = "",
     rate: Annotated[float | None, typer.Option(help="Sampling rate to resample to first [Hz].")] = None,
 ) -> None:
-    """Spectra of sensors of a motion, or of channels of a measured file, as a table or a picture.
+    """Spectra of sensors of a motion, or of measured channels.
 
     Without -o, the table is written next to the file: swing.h5 gives swing.psd.csv.
 

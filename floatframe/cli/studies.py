@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from floatframe.design.laboratory.laboratory import LaboratoryResult
     from floatframe.design.studies.study import StudyTable
 
-__all__ = ["register_gradient", "register_study", "register_sweep"]
+__all__ = ["gradient_command", "study_command", "sweep_command"]
 
 
 # the command sweep: parameter studies of a system ---------------------------------------------------------------------
@@ -22,11 +22,6 @@ __all__ = ["register_gradient", "register_study", "register_sweep"]
 
 SWEEP_KINDS = ("csv", "json", "png", "svg", "pdf")
 MOST_ROWS = 60  #: largest number of printed rows
-
-
-def register_sweep(app: typer.Typer) -> None:
-    """Add the command to an application."""
-    app.command("sweep")(sweep_command)
 
 
 @guarded
@@ -40,7 +35,9 @@ def sweep_command(
     workers: Workers = None,
     json: Annotated[bool, typer.Option("--json", help="Write the table as JSON, for other programs.")] = False,
 ) -> None:
-    """Vary parameters of a system: a run, an equilibrium or a set of modes for every point, by parallel workers.
+    """Vary parameters of a system, by parallel workers.
+
+    Each point is a run, an equilibrium or a set of modes.
 
     A failed point is a row with its reason; the others continue. Every point is recorded in a journal (study.toml:
     study.journal); after an interruption, the same command continues. Without -o, a table is written next to the study:
@@ -180,11 +177,6 @@ def sweep_csv(table: "StudyTable") -> str:
 STUDY_KINDS = (".csv", ".json", ".png", ".svg", ".pdf")
 
 
-def register_study(app: typer.Typer) -> None:
-    """Add the command to an application."""
-    app.command("study")(study_command)
-
-
 @guarded
 def study_command(
     file: Annotated[Path, typer.Argument(help="Laboratory file (TOML), see docs/laboratory.md.")],
@@ -192,7 +184,9 @@ def study_command(
         list[Path] | None, typer.Option("--output", "-o", help="A .csv, .json, .png, .svg or .pdf file; repeatable.")
     ] = None,
 ) -> None:
-    """Run a mechanism with many models of its flexible body: mode sets, frames, modes, stiffening, parts.
+    """Run a mechanism with many models of its flexible body.
+
+    Mode sets, body frames, numbers of modes, stiffening and parts are compared.
 
     The result contains error against a reference, cost, and the first limit that is exceeded. A failed case is a row
     with its reason. Without -o, a table and a picture are written next to the file: blade.toml gives blade.csv and
@@ -273,11 +267,6 @@ def print_result(result: "LaboratoryResult") -> None:
 # the command gradient: derivatives of outputs by parameters of a system file ------------------------------------------
 
 
-def register_gradient(app: typer.Typer) -> None:
-    """Add the command to an application."""
-    app.command("gradient")(gradient_command)
-
-
 @guarded
 def gradient_command(
     system: Annotated[Path, typer.Argument(help="System file (TOML), see docs/system_file.md.")],
@@ -294,7 +283,9 @@ def gradient_command(
     output: Annotated[Path | None, typer.Option("--output", "-o", help="A .csv or .json file.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the result as JSON, for other programs.")] = False,
 ) -> None:
-    """Derivatives of motions, equilibria, steady rotations or frequencies by numbers of the system file, in one run.
+    """Derivatives of results by numbers of the system file.
+
+    Results are motions, equilibria, steady rotations or frequencies; one run gives all derivatives.
 
     Sensors as `floatframe info` lists them. The cost of direct grows with the number of parameters, that of adjoint
     with the number of outputs.

@@ -6,15 +6,9 @@ from typing import Annotated
 import typer
 
 from cms.cli.console import guarded, output_path, say, stages
-from floatframe.cli.analyses import Axis, Center, Speed, linearized
-from floatframe.cli.analyses import read as read_model
+from floatframe.cli.analyses import Axis, Center, Speed, linearized, read_in_formulation
 
-__all__ = ["register"]
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command to an application."""
-    app.command("view")(view_command)
+__all__ = ["view_command"]
 
 
 @guarded
@@ -38,7 +32,9 @@ def view_command(
     axis: Axis = "z",
     center: Center = "0,0,0",
 ) -> None:
-    """Write a motion, or the modes or equilibrium of a system, as one page, turned while it plays; needs no network.
+    """3D page of a motion, modes or an equilibrium.
+
+    The view can be turned while it plays. The page needs no network.
 
     The page opens in every browser, also on a phone. It shows the machine in 3D with slider, speed, colours by
     displacement or stress, named views, and plots. Without -o, it is written next to the file: swing.h5 gives
@@ -66,7 +62,7 @@ def view_command(
 
         if sensors:
             raise ResultsError(f"--sensor: plots are those of a motion; expected results (.h5), got {file}")
-        model = read_model(file)
+        model, _ = read_in_formulation(file, None)
         path = page_path(output, file, (file, *model.files))
         with stages(remaining=True) as clock, clock("page"):
             linear = linearized(model, speed, axis, center)

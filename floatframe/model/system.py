@@ -101,6 +101,8 @@ class System:
     #: path of the system file, for the record; "": the system was made in Python
     source: str = field(default="", kw_only=True)
     data_files: Sequence[str] = field(default=(), kw_only=True)  #: paths of the signals, tyres and roads that were used
+    #: values that replaced those in the system file, by parameter or key path
+    changes: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
 
     def __post_init__(self) -> None:
         for part in (

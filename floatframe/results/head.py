@@ -155,6 +155,7 @@ def check_run(run: Any) -> None:
             require(is_number(run[name]), f"run.{name}", "a finite number", run[name])
     for name in ("integrator", "system_file", "system_file_digest", "digest", "floatframe"):
         require(isinstance(run.get(name, ""), str), f"run.{name}", "text", run.get(name))
+    require(isinstance(run.get("changes", {}), dict), "run.changes", "an object", run.get("changes"))
     every = run.get("output_every", 1)
     require(type(every) is int and every >= 1, "run.output_every", "a whole number above 0", every)
     gravity = run.get("gravity", [0, 0, 0])

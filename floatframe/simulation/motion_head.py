@@ -59,6 +59,7 @@ def head_of(system: System, integrator: Integrator, t_start: float, t_end: float
         "gravity": [float(x) for x in compiled.model.gravity],
         "system_file": system.source,
         "system_file_digest": file_digest(system.source),
+        "changes": dict(system.changes),
         "digest": system_digest(system, integrator),
         "floatframe": release,
     }

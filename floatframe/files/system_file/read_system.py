@@ -207,6 +207,7 @@ def read_system(
             fmus=[section.unit(key, path.parent) for key, section in data.fmus.items()],
             scene=[section.shape for section in data.scene],
             source=str(path.resolve()),
+            changes=dict(changes or {}),
             data_files=tuple(
                 dict.fromkeys(
                     [*map(str, content.files[1:]), *(str(each.file) for each in data.signals.values()), *element_files]

@@ -36,7 +36,7 @@ def recorded_system(trajectory: Trajectory, path: str | Path | None = None) -> S
     level = notes.level
     try:
         notes.setLevel(logging.ERROR)  # they were reported when the motion was computed
-        system, _ = read_system(source)
+        system, _ = read_system(source, run.get("changes"))
     finally:
         notes.setLevel(level)
     compiled = compiled_system(system)

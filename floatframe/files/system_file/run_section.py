@@ -1,29 +1,37 @@
 """The table [run] of a system file: the integrator of the motion and its options."""
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from inspect import signature
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.toml_file import Table, choice
 from fe_models.foundation.words import nearest
+from floatframe.analyses.equilibrium import static_equilibrium
+from floatframe.engine.compiling.file_frames import state_of_file
+from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.tree.formulation import FORMULATIONS
 from floatframe.errors import SystemFileError
 from floatframe.integrators import INTEGRATORS
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha, hht, newmark, trapezoidal
 from floatframe.integrators.integrator import Integrator
 from floatframe.integrators.relative import RelativeGeneralizedAlpha, in_formulation
+from floatframe.model.state import State
+from floatframe.model.system import System
+from floatframe.results.trajectory import read_results
 from floatframe.simulation.foreign_units import Coupling
 from floatframe.simulation.step_watch import WATCHES
 
 __all__ = ["RunOptions", "RunSection", "formulation_of", "required_run"]
 
 MOST_TIMES = 1e8  #: largest number of output times of a driven motion
-NOT_OF_A_METHOD = ("t_end", "h", "output_every", "scheme", "formulation", "watch")
+STARTS = ("placed", "equilibrium")
+NOT_OF_A_METHOD = ("t_end", "h", "output_every", "scheme", "formulation", "start", "continues", "watch")
 #: schemes that also work in joint coordinates
 OF_BOTH_FORMULATIONS = (GeneralizedAlpha, hht, newmark, trapezoidal)
 
@@ -83,10 +91,22 @@ class RunSection(Table):
         description="a number above 0, the smallest step when one that fails or meets a contact is divided",
     )
 
+    start: choice("start", lambda: STARTS) = Field(  # type: ignore[valid-type]
+        "placed",
+        description=f"one of {', '.join(STARTS)}: bodies as placed, or in static equilibrium with their velocities",
+    )
+    continues: Path | None = Field(
+        None, alias="from", description="a results file (.h5): the run begins in its last state, instead of start"
+    )
     watch: choice("watch", lambda: WATCHES) = Field(  # type: ignore[valid-type]
         "stop",
         description="stop, tell or off: what a run does if its steps distort the motion or add energy to it",
     )
+
+    @field_validator("continues", mode="before")
+    @classmethod
+    def _beside_the_file(cls, value: Any, info: ValidationInfo) -> Any:
+        return Path(info.context or ".") / value if isinstance(value, str) else value
 
     @model_validator(mode="after")
     def _fits_the_scheme(self) -> "RunSection":
@@ -104,7 +124,10 @@ class RunSection(Table):
             key: getattr(self, key) for key in keys_of(self.scheme) if getattr(self, key, None) is not None
         }
         integrator = in_formulation(INTEGRATORS[self.scheme](**parameters), self.formulation)
-        return RunOptions(self.t_end, self.h, self.output_every, integrator, watch=self.watch)
+        return RunOptions(
+            self.t_end, self.h, self.output_every, integrator,
+            watch=self.watch, start=self.start, continues=self.continues,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -117,6 +140,26 @@ class RunOptions:
     integrator: Integrator
     coupling: Coupling | None = None  #: coupling to FMUs of other programs; None: explicit, in steps of h
     watch: str = "stop"  #: what a run does if its steps distort the motion, see `integrate`
+    start: str = "placed"  #: "placed", or "equilibrium": at rest under all forces, with the velocities as placed
+    continues: Path | None = None  #: results file in whose last state the run begins
+
+    def start_state(self, system: System) -> State | None:
+        """Return the state in which a run of the system begins; None: the bodies as placed.
+
+        Raises
+        ------
+        ConvergenceError
+            If there is no equilibrium near the bodies as placed.
+        SystemFileError
+            If the results file has other bodies, or other modes.
+        """
+        if self.continues is not None:
+            return last_state_of(self.continues, system)
+        if self.start == "placed":
+            return None
+        compiled = compiled_system(system)
+        found = static_equilibrium(system, formulation=formulation_of(self))
+        return replace(found.state, u=state_of_file(compiled, compiled.placed).u)
 
     def output_times(self) -> Array:
         """Return the output times of a run, (n_t,) [s]; `SystemFileError` if there are too many for the memory."""
@@ -127,6 +170,18 @@ class RunOptions:
                 f"{wanted:.1e} times, expected up to {MOST_TIMES:.0e}; choose a smaller t_end or a greater h"
             )
         return np.linspace(0.0, self.t_end, max(1, round(wanted)) + 1)
+
+
+def last_state_of(path: Path, system: System) -> State:
+    """Return the last state in a results file; `SystemFileError` if it is that of other bodies."""
+    motion = read_results(path)
+    found = [(entry.name, entry.n_q) for entry in motion.head.bodies]
+    compiled = compiled_system(system)
+    expected = [(body.name, int(n)) for body, n in zip(system.bodies, compiled.model.bodies.n_q, strict=True)]
+    if found != expected:
+        words = [", ".join(f"{name} ({n} modes)" for name, n in each) for each in (expected, found)]
+        raise SystemFileError(f"run.from: {path}: expected the bodies {words[0]}; the file has {words[1]}")
+    return motion.state(-1)
 
 
 def formulation_of(run: RunOptions | None) -> str:

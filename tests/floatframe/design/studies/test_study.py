@@ -3,13 +3,14 @@
 import csv
 import json
 import socket
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
-from fe_models.foundation.toml_file import changed
+from fe_models.foundation.toml_file import FileContent, changed
 from floatframe import GeneralizedAlpha, SystemFileError, integrate
 from floatframe.cli.app import app
 from floatframe.design.studies.study import run_study
@@ -208,7 +209,7 @@ def test_column_of_a_sensor_is_named_with_its_choices(folder):
 
 
 def test_values_are_changed_by_key_path_and_names_may_hold_dots():
-    content = {"a": {"b.c": {"d": [1, [2, 3]]}, "b": 4}}
+    content = FileContent({"a": {"b.c": {"d": [1, [2, 3]]}, "b": 4}}, Path("file.toml"))
     found = changed(content, {"a.b.c.d.1.0": 9, "a.b": 5, "a.new": 6}, "file", SystemFileError)
     assert found == {"a": {"b.c": {"d": [1, [9, 3]]}, "b": 5, "new": 6}}
     assert content["a"]["b"] == 4

@@ -1,0 +1,134 @@
+"""Runs that begin in equilibrium or in the state of another run, and values that --set replaces."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from typer.testing import CliRunner
+
+from cms.cli.app import app as cms_app
+from floatframe.cli.app import app
+from floatframe.files.system_file.read_system import read_system
+from floatframe.files.system_file.recorded_system import recorded_system
+from floatframe.results.trajectory import read_results
+
+CART = """
+[parameters]
+stiffness = 500.0
+mass = 2.0
+
+[system]
+units = "m-kg-s"
+gravity = [0, 0, -9.81]
+
+[bodies.slider]
+mass = 1.0
+inertia = [[0.1, 0, 0], [0, 0.2, 0], [0, 0, 0.2]]
+velocity = [3.0, 0, 0]
+
+[bodies.cart]
+mass = "{mass}"
+inertia = [[0.1, 0, 0], [0, 0.2, 0], [0, 0, 0.2]]
+velocity = [3.0, 0, 0]
+
+[joints.rail]
+type = "prismatic"
+body_a = "ground"
+body_b = "slider"
+marker_a = [0, 0, 0]
+axis = [1, 0, 0]
+
+[joints.up]
+type = "prismatic"
+body_a = "slider"
+body_b = "cart"
+marker_a = [0, 0, 0]
+axis = [0, 0, 1]
+
+[forces.spring]
+type = "spring-damper"
+body_a = "slider"
+body_b = "cart"
+marker_a = [0, 0, -0.5]
+marker_b = [0, 0, 0.0]
+stiffness = "{stiffness}"
+free_length = 0.5
+
+[run]
+t_end = 0.05
+h = 1e-3
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "cart.toml").write_text(CART)
+    return tmp_path
+
+
+def run(*arguments, program=app):
+    result = CliRunner().invoke(program, [str(each) for each in arguments])
+    assert result.exit_code == 0, result.output
+    return result
+
+
+def heights(path):
+    motion = read_results(path)
+    return np.array([motion.state(k).r[1, 2] for k in range(len(motion.t))])
+
+
+@pytest.mark.parametrize("formulation", ["absolute", "relative"])
+def test_a_run_begins_in_equilibrium_with_its_velocities(folder, formulation):
+    (folder / "cart.toml").write_text(CART + f'start = "equilibrium"\nformulation = "{formulation}"\n')
+    run("run", folder / "cart.toml")
+    assert_allclose(heights(folder / "cart.h5"), -2.0 * 9.81 / 500.0, rtol=0, atol=1e-10)
+    assert_allclose(read_results(folder / "cart.h5").state(-1).r[:, 0], 0.15, rtol=1e-9)
+
+
+def test_a_run_begins_in_the_last_state_of_another(folder):
+    run("run", folder / "cart.toml", "--set", "run.t_end=0.1", "-o", folder / "whole.h5")
+    run("run", folder / "cart.toml", "-o", folder / "first.h5")
+    (folder / "next.toml").write_text('extends = "cart.toml"\n[run]\nfrom = "first.h5"\n')
+    run("run", folder / "next.toml")
+    whole, parts = heights(folder / "whole.h5")[50:], heights(folder / "next.h5")
+    assert_allclose(parts, whole, rtol=0, atol=1e-5 * np.ptp(whole))
+
+
+def test_a_run_from_other_bodies_is_refused(folder):
+    run("run", folder / "cart.toml", "-o", folder / "first.h5")
+    (folder / "next.toml").write_text(CART.replace("[bodies.cart]", "[bodies.car]").replace('"cart"', '"car"')
+                                      + 'from = "first.h5"\n')  # fmt: skip
+    result = CliRunner().invoke(app, ["run", str(folder / "next.toml")])
+    assert result.exit_code == 2
+    assert "run.from" in result.stderr
+    assert "expected the bodies slider (0 modes), car (0 modes); the file has slider" in result.stderr
+
+
+def test_set_replaces_parameters_and_keys_and_the_results_record_them(folder):
+    run("run", folder / "cart.toml", "--set", "mass=3.0", "--set", "run.h=5e-4", "--set", "bodies.slider.mass=4.0")
+    motion = read_results(folder / "cart.h5")
+    assert motion.head.run["changes"] == {"mass": 3.0, "run.h": 5e-4, "bodies.slider.mass": 4.0}
+    assert len(motion.t) == 101
+    system = recorded_system(motion)
+    assert [body.mass for body in system.bodies] == [4.0, 3.0]
+
+
+@pytest.mark.parametrize("command", ["static", "eig", "linearize"])
+def test_analyses_take_the_values_of_set(folder, command):
+    result = CliRunner().invoke(app, [command, str(folder / "cart.toml"), "--set", "nothing=1"])
+    assert result.exit_code == 2
+    assert "there is no parameter 'nothing'; choices: mass, stiffness" in " ".join(result.stderr.split())
+
+
+@pytest.mark.parametrize("given", ["mass", "=3"])
+def test_set_without_name_or_value_is_refused(folder, given):
+    result = CliRunner().invoke(app, ["run", str(folder / "cart.toml"), "--set", given])
+    assert result.exit_code == 2
+    assert "NAME=VALUE" in result.stderr
+
+
+@pytest.mark.parametrize("program", [app, cms_app])
+def test_the_shown_file_describes_the_same_system(folder, program):
+    shown = run("show", folder / "cart.toml", "--set", "mass=3", program=program).stdout
+    (folder / "shown.toml").write_text(shown)
+    assert "parameters" not in shown
+    assert [body.mass for body in read_system(folder / "shown.toml")[0].bodies] == [1.0, 3.0]
