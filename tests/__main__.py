@@ -10,8 +10,9 @@
     python -m tests --mutants 60 --seed 5    # lines of physics changed at random: do their tests notice
 
 A group is a row of stages. The checks of a stage run side by side, each as its own process, and each report is printed
-as a whole when its check ends; the first stage in which one fails ends the run. The last line says how long the group
-took, and what it may take on a machine with two cores.
+as a whole when its check ends; the first stage in which one fails ends the run. The checks of one process run beside the
+tests, so that no core waits for the end of another check. The last line says how long the group took, and what it may
+take on a machine with two cores.
 
 Tests and notebooks are spread over workers, a processor each (file by file, so that fixtures of a module are made
 once). A worker leaves the other processors to the other workers: the libraries in it have one thread, whatever the
@@ -60,19 +61,18 @@ SLOWEST = tuple(
         "pipeline/test_split_line", "floatframe/components/clearances/test_clearances",
     )
 )  # fmt: skip
+#: notebooks among the tests, so that no worker is idle at the end of either
 TESTS = (
-    "tests", "pytest", "-q", *SPREAD, "--no-loadscope-reorder", "-m", "not long and not external", *SLOWEST, "tests",
+    "tests and notebooks", "pytest", "-q", *SPREAD, "--no-loadscope-reorder", "-m", "not long and not external",
+    "--nbmake", "--nbmake-timeout=300", *SLOWEST, "notebooks", "tests",
 )  # fmt: skip
 LONG = ("long tests", "pytest", "-q", "--durations=0", "-m", "long and not external", "tests")
 RELATIVE = (
     "engine in joint coordinates", "pytest", "-q", *SPREAD, "--formulation", "relative",
     "-m", "not long and not external", "tests/floatframe",
 )  # fmt: skip
-RELATIVE_IN_SHORT = ("some in joint coordinates", "pytest", "-q", *SPREAD, "--formulation", "relative", *SHORT)
+RELATIVE_IN_SHORT = ("some in joint coordinates", "pytest", "-q", "--formulation", "relative", *SHORT)
 EXTERNAL = ("tests beside other programs", "pytest", "-q", "-rs", "-m", "external", "tests")
-NOTEBOOKS = (
-    "notebooks", "pytest", "-q", *SPREAD, "--nbmake", "--nbmake-timeout=300", "-o", "filterwarnings=", "notebooks",
-)  # fmt: skip
 DOCUMENTATION = ("documentation", "sphinx", "-W", "--keep-going", "-q", "-b", "html", "docs", "build/site")
 
 Check = tuple[str, ...]  #: its name, then the module of Python that makes it with its arguments
@@ -87,7 +87,7 @@ class Group:
 
 
 GROUPS = {
-    "ci": Group(((LINT,), (TYPES, KERNELS, DOCUMENTATION, PLAIN), (TESTS,), (RELATIVE_IN_SHORT, NOTEBOOKS)), 20),
+    "ci": Group(((LINT,), (TYPES, KERNELS), (TESTS, PLAIN, DOCUMENTATION, RELATIVE_IN_SHORT)), 20),
     "long": Group(((LONG,), (RELATIVE,)), 90),
     "relative": Group(((KERNELS,), (RELATIVE,)), 15),
     "external": Group(((EXTERNAL,),), 10),
@@ -171,10 +171,14 @@ def run_changed(words: list[str]) -> int:
 
 
 def environment(check: Check) -> dict[str, str]:
-    """Return the environment of a check; its workers, if there are several, have one thread each."""
-    threads = {"OMP_NUM_THREADS": "1"} if set(SPREAD) <= set(check) else {}
+    """Return the environment of a check: libraries have one thread, but in checks that run alone.
+
+    Modules are always stored as byte code: the tests start hundreds of processes, and each would compile what it imports.
+    """
+    threads = {} if check in (LONG, EXTERNAL) else {"OMP_NUM_THREADS": "1"}
     compiler = {"FLOATFRAME_COMPILER": "plain"} if check is PLAIN else {}
-    return {**threads, **os.environ, **compiler, "PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
+    inherited = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    return {**threads, **inherited, **compiler, "PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
 
 
 def run_alone(check: Check) -> int:

@@ -9,7 +9,7 @@ import textwrap
 
 import pytest
 
-from tests.__main__ import GROUPS, SLOWEST, Group, main, run
+from tests.__main__ import GROUPS, SLOWEST, TESTS, Group, environment, main, run
 from tests.floatframe.formulations import EXCEPTIONS, ROOMS, SHORT
 from tests.import_graph import modules, named_modules, used_modules
 from tests.root import ROOT
@@ -110,6 +110,11 @@ def test_the_first_check_that_fails_ends_a_group_with_its_exit_code(capfd, monke
     printed = capfd.readouterr().out
     assert "== bad failed with exit code" in printed
     assert "== next" not in printed
+
+
+def test_processes_of_a_check_store_the_byte_code_of_modules(monkeypatch):
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+    assert "PYTHONDONTWRITEBYTECODE" not in environment(TESTS)
 
 
 def test_checks_side_by_side_all_report_and_one_that_fails_ends_the_group(capfd):
