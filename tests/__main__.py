@@ -10,9 +10,9 @@
     python -m tests --mutants 60 --seed 5    # lines of physics changed at random: do their tests notice
 
 A group is a row of stages. The checks of a stage run side by side, each as its own process, and each report is printed
-as a whole when its check ends; the first stage in which one fails ends the run. The checks of one process run beside the
-tests, so that no core waits for the end of another check. The last line says how long the group took, and what it may
-take on a machine with two cores.
+as a whole when its check ends; the first stage in which one fails ends the run. The checks of one process run beside
+the tests, so that no core waits for the end of another check. The last line says how long the group took, and what it
+may take on a machine with two cores.
 
 Tests and notebooks are spread over workers, a processor each (file by file, so that fixtures of a module are made
 once). A worker leaves the other processors to the other workers: the libraries in it have one thread, whatever the
@@ -173,7 +173,7 @@ def run_changed(words: list[str]) -> int:
 def environment(check: Check) -> dict[str, str]:
     """Return the environment of a check: libraries have one thread, but in checks that run alone.
 
-    Modules are always stored as byte code: the tests start hundreds of processes, and each would compile what it imports.
+    Modules are always stored as byte code: tests start hundreds of processes, and each would compile what it imports.
     """
     threads = {} if check in (LONG, EXTERNAL) else {"OMP_NUM_THREADS": "1"}
     compiler = {"FLOATFRAME_COMPILER": "plain"} if check is PLAIN else {}
