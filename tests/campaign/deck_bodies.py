@@ -1,7 +1,7 @@
 """Random legal decks of Nastran beside an assembler of this file.
 
 Two chains of bars: axes of their own at points (CD), offsets along them, released ends, a product of inertia, added
-mass, point masses off their points, a bush, springs and dampers, and a rigid link in some components.
+mass, point masses off their points, a bush, springs and dampers, and a rigid link or a mean in some components.
 """
 
 from dataclasses import dataclass
@@ -131,10 +131,35 @@ class RandomDeck:
 
     def add_link(self, number: int, a: int, b: int) -> None:
         components = LINKS[int(self.rng.integers(len(LINKS)))]
+        if self.rng.random() > 0.6:
+            self.add_mean(number, b, components)
+            return
         self.lines.append(f"RBE2,{number},{a + 1},{components},{b + 1}")
         r = self.points[b] - self.points[a]
         motion = np.zeros((6, 6 * self.n))
         motion[:, self.on_dofs((b,))], motion[:, self.on_dofs((a,))] = np.eye(6), -arm(r)
+        turned = np.kron(np.eye(2), self.axes[b]) @ motion
+        self.rows = [turned[int(letter) - 1] for letter in components]
+
+    def add_mean(self, number: int, b: int, components: str) -> None:
+        """RBE3: components of a point, along its axes, follow weighted components of the points before it."""
+        members = range(b)
+        some = [("1245", "1356", "123456", "2346")[int(self.rng.integers(4))] for _ in members]
+        weights = self.rng.uniform(0.5, 3.0, b)
+        self.lines.append(f"RBE3,{number},,{b + 1},{components}")
+        for k in members:
+            self.lines.append(f",{float(weights[k])!r},{some[k]},{k + 1},,,,,")
+        arms = [self.points[k] - self.points[b] for k in members]
+        length = np.mean([np.linalg.norm(each) for each in arms]) or 1.0
+        G, along = np.zeros((6 * b, 6)), np.zeros((6 * b, 6 * self.n))
+        for k in members:
+            at = slice(6 * k, 6 * k + 6)
+            along[at, at] = np.kron(np.eye(2), self.axes[k])
+            weight = [weights[k] * (str(c + 1) in some[k]) for c in range(6)] * np.repeat([1.0, length**2], 3)
+            G[at] = np.sqrt(weight)[:, None] * (along[at, at] @ arm(arms[k]))
+            along[at] *= np.sqrt(weight)[:, None]
+        motion = -np.linalg.lstsq(G, along, rcond=None)[0]
+        motion[:, self.on_dofs((b,))] += np.eye(6)
         turned = np.kron(np.eye(2), self.axes[b]) @ motion
         self.rows = [turned[int(letter) - 1] for letter in components]
 

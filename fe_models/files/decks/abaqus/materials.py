@@ -13,6 +13,7 @@ from fe_models.foundation.words import nearest, quoted
 __all__ = ["materials_in_axes", "numbers", "read_material", "read_orientation", "read_transform"]
 
 COLLINEAR = 1e-8
+ON_AXIS = 1e-10  #: CalculiX's distance from the axis of *TRANSFORM, in the unit of the deck, that counts as on the axis
 
 
 def numbers(line: str) -> list[float]:
@@ -157,10 +158,24 @@ def read_transform(here: str, block: DeckBlock, draft: Draft) -> None:
     for node, point in zip(members.tolist(), draft.mesh.coordinates[draft.mesh.rows_of(members)], strict=True):
         arm = point - a
         radial = arm - axis * (axis @ arm)
-        if np.linalg.norm(radial) <= COLLINEAR * max(np.linalg.norm(arm), np.linalg.norm(b - a)):
+        if draft.program == "calculix" and np.linalg.norm(radial) < ON_AXIS:
+            radial = _across(axis)
+        elif np.linalg.norm(radial) <= COLLINEAR * max(np.linalg.norm(arm), np.linalg.norm(b - a)):
             raise ValueError(f"node {node} lies on the axis, where no direction is radial")
         axes = np.stack([radial, np.cross(axis, radial), axis])
         draft.transformed[node] = axes / np.linalg.norm(axes, axis=1)[:, None]
+
+
+def _across(axis: Array) -> Array:
+    """Return the direction that CalculiX calls radial at a node on the axis, where any direction is as good.
+
+    Its first component that the axis has makes it normal to the axis; the next one is 1, the third 0.
+    """
+    first = next((k for k in (0, 1) if abs(axis[k]) > ON_AXIS), 2)
+    radial = np.zeros(3)
+    radial[(first + 1) % 3] = 1.0
+    radial[first] = -axis[(first + 1) % 3] / axis[first]
+    return radial
 
 
 def materials_in_axes(draft: Draft) -> None:

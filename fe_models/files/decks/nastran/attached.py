@@ -4,7 +4,8 @@ from collections import Counter
 
 import numpy as np
 
-from fe_models.errors import MeshError
+from fe_models.assembly.constraints import weighted_motion
+from fe_models.errors import BodyError, MeshError
 from fe_models.files.bulk_data.cards import Card, real_of
 from fe_models.files.decks.deck import Coupling, DeckMass, Load, RigidGroup
 from fe_models.files.decks.equations import Row, solved_equations
@@ -188,14 +189,8 @@ def _mean(model: NastranModel, card: Card) -> None:
     words = [word for word in card.fields[4:] if word]
     ends = [k for k, word in enumerate(words) if word.upper() in ("UM", "ALPHA")]
     weights = _weights(card, words[: ends[0]] if ends else words)
-    turned = [
-        number
-        for number, six in weights.items()
-        if number in model.points.axes and not np.all(six == np.repeat(six[[0, 3]], 3))
-    ]
-    if any(words[k].upper() == "UM" for k in ends) or turned or not in_basic(model, [node], components):
-        why = "with UM, or with weights of single components along axes of their own (CD)"
-        model.ledger.refuse("RBE3", why)
+    if any(words[k].upper() == "UM" for k in ends):
+        model.ledger.refuse("RBE3", "with UM")
         return
     if not weights:
         raise MeshError(
@@ -204,6 +199,12 @@ def _mean(model: NastranModel, card: Card) -> None:
     if not all(np.array_equal(six, [six[0]] * 3 + [0.0] * 3) for six in weights.values()):
         why = "weights of rotations or of single components: the geometric stiffness takes their mean as linear"
         model.ledger.note("RBE3", why)
+    is_turned = any(
+        number in model.points.axes and not np.all(six == np.repeat(six[[0, 3]], 3)) for number, six in weights.items()
+    )
+    if is_turned or not in_basic(model, [node], components):
+        model.rows += _mean_rows(model, card, node, components, weights)
+        return
     name = f"rbe3_{card.text(1)}"
     alike: dict[tuple[float, ...], list[int]] = {}
     for number, six in weights.items():
@@ -213,6 +214,32 @@ def _mean(model: NastranModel, card: Card) -> None:
         for n, (six, nodes) in enumerate(alike.items(), start=1)
     )
     model.couplings.append(Coupling(name, model.group(card, [node]), groups, components))
+
+
+def _mean_rows(
+    model: NastranModel, card: Card, node: int, components: tuple[int, ...], weights: dict[int, Array]
+) -> list[tuple[tuple[int, int], Row]]:
+    """Return an equation for each component of a mean motion, with weights and components along the axes of points.
+
+    e · u = Σ A_i u_i, where e is the axis of the component and A that of `weighted_motion`.
+    """
+    points = np.array([model.point(card, number) for number in weights])
+    axes = np.array([model.axes(number) for number in weights])
+    try:
+        A = weighted_motion(
+            points, np.array([*weights.values()]), model.point(card, node), axes=axes, components=components,
+            triad=model.axes(node),
+        )  # fmt: skip
+    except BodyError as error:
+        raise MeshError(f"{card.where} {card.text(1)}: {error}") from error
+    names = [(number, c) for number in weights for c in ALL]
+    made = []
+    for c, part in zip(components, A, strict=True):
+        first = c - c % 3
+        row = {(node, first + j): float(value) for j, value in enumerate(model.axes(node)[:, c % 3])}
+        row |= {name: -float(a) for name, a in zip(names, part, strict=True) if a}
+        made.append(((node, first), row))
+    return made
 
 
 def _weights(card: Card, words: list[str]) -> dict[int, Array]:

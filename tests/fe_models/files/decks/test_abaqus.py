@@ -355,6 +355,18 @@ def test_equations_and_forces_in_axes_of_their_nodes_are_turned_to_basic_axes(tm
     assert any(name == "*EQUATION" and "the same twice" in why for name, _, why in deck.ledger.rows())
 
 
+@pytest.mark.parametrize(("end", "radial"), [
+    ("0., 0., 2.", (1, 0, 0)), ("0., 2., 0.", (0, 0, 1)), ("2., 0., 0.", (0, 1, 0)),
+    ("3., 4., 0.", (-0.8, 0.6, 0)), ("0., 3., 4.", (0, -0.8, 0.6)),
+])  # fmt: skip
+def test_a_node_on_the_axis_has_the_radial_direction_that_calculix_takes(tmp_path, end, radial):
+    """Node 1 is the first point of the axis; the expected directions are those of ccx 2.20 (`CLOAD` in a run of it)."""
+    extra = f"*NSET, NSET=pin\n1\n*TRANSFORM, NSET=pin, TYPE=C\n0., 0., 0., {end}\n"
+    text = DECK.replace("20, 2, 1., 7, 2, -1.\n", "20, 2, 1., 7, 2, -1.\n" + extra)
+    text = text.replace("*CLOAD\n20, 3, -4.\n", "*CLOAD\n1, 1, -4.\n")
+    assert_allclose(deck_of(tmp_path, text).loads[0].forces["node_1"][:3], -4 * np.array(radial), rtol=0, atol=1e-14)
+
+
 def test_axes_turn_with_their_instance(tmp_path):
     """Bar-2 stands turned by 90 degrees about z at x = 10: axes of its material and of its nodes are those of Bar-1."""
     axes = "*ORIENTATION, NAME=grain\n1., 1., 0., 0., 1., 0.\n*SOLID SECTION, ORIENTATION=grain, ELSET"
