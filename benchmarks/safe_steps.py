@@ -2,9 +2,9 @@
 
     python -m benchmarks.safe_steps [pairs]
 
-Systems: a rigid arm on a hinge, and those of `benchmarks.floatframe_step` (one flexible body on a hinge and a chain of
-ten, with 8, 20 and 50 modes), h = 1 ms. Both of a pair run in turn, `pairs` times (by default 20); printed is the least
-processor time of each and their ratio: of 1000 compiled steps (a tenth of it for the chain), and of whole runs of
+Systems: those of `benchmarks.step_against` (a rigid arm, a rigid slider-crank, one flexible body on a hinge and a chain
+of ten, with 8, 20 and 50 modes), h = 1 ms. Both of a pair run in turn, `pairs` times (by default 20); printed is the
+least processor time of each and their ratio: of 1000 compiled steps (a tenth of it for the chain), and of whole runs of
 20 000 steps (2000 for the chain; a fifth of the pairs), with every 100th step kept.
 """
 
@@ -14,25 +14,11 @@ import time
 
 import numpy as np
 
-from benchmarks.floatframe_step import H, chain
-from floatframe import GROUND, GeneralizedAlpha, Gravity, Marker, RevoluteJoint, RigidBody, System, integrate
+from benchmarks.floatframe_step import H
+from benchmarks.step_against import systems
+from floatframe import GeneralizedAlpha, integrate
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.kernels.work import new_work
-
-
-def arm():
-    """Return a rigid arm on a hinge."""
-    body = RigidBody("arm", 1.0, np.diag([1e-3, 0.01, 0.01]), position=(0.5, 0.0, 0.0))
-    pin = RevoluteJoint("pin", GROUND, Marker("arm", position=(-0.5, 0.0, 0.0)))
-    return System([body], [pin], [Gravity((0.0, -9.81, 0.0))])
-
-
-def systems():
-    """Yield the name of each system, a function that makes it, and its number of bodies."""
-    yield "rigid arm", arm, 1
-    for n_bodies in (1, 10):
-        for n_modes in (8, 20, 50):
-            yield f"bodies: {n_bodies}, modes: {n_modes}", lambda b=n_bodies, n=n_modes: chain(b, n), n_bodies
 
 
 def steps(make, n_steps, pairs):
