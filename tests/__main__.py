@@ -44,27 +44,10 @@ PLAIN = (
     "kernels by plain numba", "pytest", "-q", "-o", "timeout=3600", "-m", "not long", "tests/floatframe/engine/kernels",
     "tests/floatframe/integrators/test_pendulum.py",
 )  # fmt: skip
-#: files that take more than ten seconds of a processor, the longest first: begun last, one would keep a worker alone
-SLOWEST = tuple(
-    f"tests/{name}.py"
-    for name in (
-        "floatframe/engine/structure_preserving/test_every_element",
-        "floatframe/design/generation/units/test_generated_unit",
-        "floatframe/engine/structure_preserving/test_every_part",
-        "floatframe/engine/structure_preserving/test_connections",
-        "floatframe/engine/structure_preserving/test_every_force", "floatframe/simulation/test_jumps_of_laws",
-        "floatframe/simulation/test_wrong_motions_are_told", "floatframe/design/optimization/test_optimization",
-        "floatframe/design/gradients/test_sensitivities", "floatframe/general_position/test_every_part_in_other_units",
-        "floatframe/model/elements/test_element_faults", "fe_models/elements/shells/test_geometric",
-        "pipeline/test_line", "floatframe/cli/test_commands", "floatframe/design/laboratory/test_laboratory",
-        "floatframe/design/generation/test_generate", "floatframe/files/cosimulation/test_fmu",
-        "pipeline/test_split_line", "floatframe/components/clearances/test_clearances",
-    )
-)  # fmt: skip
 #: notebooks among the tests, so that no worker is idle at the end of either
 TESTS = (
-    "tests and notebooks", "pytest", "-q", *SPREAD, "--no-loadscope-reorder", "-m", "not long and not external",
-    "--nbmake", "--nbmake-timeout=300", *SLOWEST, "notebooks", "tests",
+    "tests and notebooks", "pytest", "-q", *SPREAD, "--no-loadscope-reorder", "-p", "tests.slowest",
+    "-m", "not long and not external", "--nbmake", "--nbmake-timeout=300", "notebooks", "tests",
 )  # fmt: skip
 LONG = ("long tests", "pytest", "-q", "--durations=0", "-m", "long and not external", "tests")
 RELATIVE = (

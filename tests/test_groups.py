@@ -9,10 +9,11 @@ import textwrap
 
 import pytest
 
-from tests.__main__ import GROUPS, SLOWEST, TESTS, Group, environment, main, run
+from tests.__main__ import GROUPS, TESTS, Group, environment, main, run
 from tests.floatframe.formulations import EXCEPTIONS, ROOMS, SHORT
 from tests.import_graph import modules, named_modules, used_modules
 from tests.root import ROOT
+from tests.slowest import SLOWEST
 
 
 def test_a_test_of_any_markers_is_in_one_check_of_one_group():
@@ -110,6 +111,17 @@ def test_the_first_check_that_fails_ends_a_group_with_its_exit_code(capfd, monke
     printed = capfd.readouterr().out
     assert "== bad failed with exit code" in printed
     assert "== next" not in printed
+
+
+def test_the_slowest_files_and_the_notebooks_start_first():
+    """Names alone, in a run of the plugin over files that are found in the order of the alphabet."""
+    quick, slow = "tests/test_errors.py", "tests/pipeline/test_line.py"
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "tests.slowest", "--collect-only",
+         "--nbmake", quick, "notebooks/kart.ipynb", slow], cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    files = list(dict.fromkeys(line.partition("::")[0] for line in done.stdout.splitlines() if "::" in line))
+    assert files == [slow, "notebooks/kart.ipynb", quick], done.stdout
 
 
 def test_processes_of_a_check_store_the_byte_code_of_modules(monkeypatch):
