@@ -119,3 +119,22 @@ def test_as_many_turns_as_a_block_has_make_one_block():
         orders = order_map(x, angle, max_order=5, resolution=0.25, overlap=0.75)
         assert len(orders.times) == n_blocks
         assert_allclose(order_cut(orders, 2.0), 1.0, rtol=1e-3)
+
+
+@pytest.mark.parametrize("is_rms", [False, True])
+@pytest.mark.parametrize("n", [64, 65])
+def test_lines_of_segments_are_the_amplitudes_of_cosines_up_to_half_the_rate(n, is_rms):
+    """The last line of an even number of samples is an alternation, whose amplitude is its rms value too."""
+    rate, k = 50.0, np.arange(5 * n)
+    x = 3 * np.cos(2 * np.pi * 8 / n * k + 0.4) + (0.7 * np.cos(np.pi * k) if n % 2 == 0 else 0.0)
+    found = frequency_map(Signal("a", 2 + k / rate, x, "g"), n_segment=n, overlap=0.75, is_rms=is_rms)
+    expected = np.zeros(n // 2 + 1)
+    expected[8] = 3 / np.sqrt(2) if is_rms else 3.0
+    expected[-1] = 0.7 if n % 2 == 0 else 0.0
+    assert_allclose(found.lines, np.arange(n // 2 + 1) * rate / n, rtol=1e-14, atol=0)
+    starts = np.arange(0, 4 * n + 1, round(n / 4))
+    assert_allclose(found.times, 2 + (starts + (n - 1) / 2) / rate, rtol=1e-13, atol=0)
+    assert found.amplitudes.shape == (len(starts), n // 2 + 1)
+    lines = np.setdiff1d(np.arange(n // 2 + 1), [7, 9, n // 2 - 1])  # beside a line, hann has half of it
+    for amplitudes in found.amplitudes:
+        assert_allclose(amplitudes[lines], expected[lines], rtol=0, atol=1e-12)

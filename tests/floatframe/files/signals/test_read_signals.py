@@ -160,6 +160,18 @@ def test_matlab_files_of_both_versions_hold_the_same(tmp_path):
     assert len(read_signals(tmp_path / "5.mat", rate=100.0).names) == 4
 
 
+def test_complex_channels_of_both_versions_are_refused(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    t, z = np.arange(50) / 100, np.exp(0.3j * np.arange(50))
+    scipy.io.savemat(tmp_path / "5.mat", {"t": t, "x": z})
+    with h5py.File(tmp_path / "73.mat", "w", userblock_size=512) as file:
+        file["t"] = t[None, :]
+        file["x"] = np.array(list(zip(z.real, z.imag, strict=True)), dtype=[("real", float), ("imag", float)])[None, :]
+    for name in ("5.mat", "73.mat"):
+        with pytest.raises(SignalError, match="x: expected real numbers, got complex ones"):
+            read_signals(tmp_path / name)
+
+
 def test_damaged_matlab_files_are_refused(tmp_path):
     t = np.arange(500) / 100
     scipy.io.savemat(tmp_path / "a.mat", {"t": t, "x": np.random.default_rng(0).normal(size=500)}, do_compression=True)

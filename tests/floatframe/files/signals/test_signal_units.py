@@ -1,8 +1,10 @@
+import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from fe_models.foundation.units import UNIT_SYSTEMS
 from floatframe import SignalError
+from floatframe.files.signals import Signal
 from floatframe.files.signals.signal_units import parsed_unit, per_hertz, system_factor, unit_factor
 from floatframe.results.sensors.measurement import unit_words
 
@@ -18,6 +20,12 @@ from floatframe.results.sensors.measurement import unit_words
 )  # fmt: skip
 def test_units_convert(unit, wanted, factor):
     assert_allclose(unit_factor(unit, wanted), factor, rtol=1e-14, atol=0)
+
+
+def test_a_signal_in_another_unit_is_the_same_quantity():
+    signal = Signal("v", np.arange(3.0), np.array([1.0, -20.0, 500.0]), "mm/s").to("km/h")
+    assert signal.unit == "km/h"
+    assert_allclose(signal.values, [0.0036, -0.072, 1.8], rtol=1e-14, atol=0)
 
 
 @pytest.mark.parametrize(
