@@ -27,6 +27,9 @@ def spring(path, x, k, c, parts, n=3 + 1):
     force = -k * x[1] + 1.5 * c
     force += x**2
     return force if c - k else A.T @ force
+
+def description(k):
+    return round(100 * k)
 '''
 LINES = {
     "force = -k * x[1] + 1.5 * c": {

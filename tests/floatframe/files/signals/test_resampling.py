@@ -67,6 +67,17 @@ def test_the_report_is_about_the_acceleration_of_a_position():
     assert "lay above 250 Hz" in report.description
 
 
+@pytest.mark.parametrize(("unit", "power"), [("mm", 3), ("deg", 3), ("m/s", 2), ("rad/s", 2), ("g", 1)])
+def test_the_report_has_the_largest_acceleration_where_it_is_at_an_end(unit, power):
+    """The acceleration of t³, of the rate t² and of t itself is straight; a spline of fifth order repeats it."""
+    a = {3: 6.0, 2: 2.0, 1: 1.0}[power] * t
+    _, report = resampled(Signal("a", t, t**power, unit), RATE / 2, anti_alias=False)
+    assert report.of == "acceleration"
+    sizes = [report.peak_before, report.peak_after, report.rms_before, report.rms_after]
+    rms = [np.sqrt(np.mean(x**2)) for x in (a, a[::2])]
+    assert_allclose(sizes, [a[-1], a[-1], *rms], rtol=1e-5, atol=0)
+
+
 def test_uneven_times_become_even_and_that_is_said():
     uneven = np.sort(np.random.default_rng(0).uniform(0, 2, 3000))
     found, _ = resampled(Signal("road", uneven, np.sin(20 * uneven), "mm"), 400.0)
