@@ -9,8 +9,8 @@
    bounds memory.
 2. A line is drawn at random, then one of its changes: another operator, sign, constant, index, or a dropped term.
 3. A copy of the checkout with that line runs the test files that guard the module (`guards`), at most `--guards` of
-   them: those first whose path shares most words with the path of the module, a rare word counting more, then those
-   with fewest imports between.
+   them: those first whose path shares most words with the path of the module, or half as much with the paths of those
+   that import it, a rare word counting more; then those with fewest imports between.
 4. The first test that fails catches the mutant, provided that the same test passes without the change. A mutant that
    passes all has survived: it is a hole in the tests, or the change means the same, which only a reader can judge. One
    that takes longer than `LIMIT` counts as survived.
@@ -35,7 +35,7 @@ from functools import cache
 from itertools import accumulate
 from pathlib import Path
 
-from tests.import_graph import guards, imported_modules, module_name, modules
+from tests.import_graph import graph, guards, imported_modules, module_name, modules
 from tests.root import ROOT
 
 __all__ = ["WINGS", "Mutant", "draw", "main", "physics"]
@@ -260,13 +260,17 @@ def words_of(path: str) -> set[str]:
 @cache
 def guarding_files(path: Path, n_files: int) -> list[str]:
     """Return the test files of a module in the order of step 3."""
+    name = module_name(path)
+    steps = guards([name])
+    files = [file for file in steps if not file.startswith(("tests/docs", "tests/external"))]
+    n_paths = Counter(word for file in files for word in words_of(file))
+    users = [str(modules()[user].relative_to(ROOT)) for user, used in graph().items() if name in used]
+    of_users = frozenset().union(*map(words_of, users))
     own = words_of(str(path.relative_to(ROOT)))
-    steps = guards([module_name(path)])
-    files = [name for name in steps if not name.startswith(("tests/campaign", "tests/docs", "tests/external"))]
-    n_paths = Counter(word for name in files for word in words_of(name))
 
-    def order(name: str) -> tuple[float, int, str]:
-        return -sum(1 / n_paths[word] for word in own & words_of(name)), steps[name], name
+    def order(file: str) -> tuple[float, int, str]:
+        shared = words_of(file) & (own | of_users)
+        return -sum((1.0 if word in own else 0.5) / n_paths[word] for word in shared), steps[file], file
 
     return sorted(files, key=order)[:n_files]
 
@@ -319,7 +323,7 @@ def main(words: list[str]) -> int:
     parser.add_argument("count", type=int)
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--wings", nargs="+", choices=WINGS, default=list(WINGS))
-    parser.add_argument("--guards", type=int, default=6, help="test files for a mutant at most")
+    parser.add_argument("--guards", type=int, default=8, help="test files for a mutant at most")
     parser.add_argument("--list", action="store_true", help="print the mutants, run nothing")
     given = parser.parse_args(words)
     counts: dict[str, Counter[str]] = {wing: Counter() for wing in given.wings}

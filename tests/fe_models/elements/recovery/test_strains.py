@@ -144,3 +144,66 @@ def test_the_strain_of_orthotropic_layups_at_nodes_is_refused():
     beam = straight(1)
     with pytest.raises(BodyError, match="node 0 is of no solid, shell or skin of a beam"):
         nodal_strain(beam, beam.mesh_displacement(np.ones((beam.n_dof, 1))), np.array([0]))
+
+
+def hooke(material, stress):
+    """Return the strain of an isotropic material, (n, 6, k)."""
+    xx, yy, zz, yz, xz, xy = np.moveaxis(stress, 1, 0)
+    E, nu = material.E, material.nu
+    normal = [(xx - nu * (yy + zz)) / E, (yy - nu * (xx + zz)) / E, (zz - nu * (xx + yy)) / E]
+    return np.stack([*normal, *(2 * (1 + nu) / E * shear for shear in (yz, xz, xy))], axis=1)
+
+
+ALUMINIUM = fm.Material("aluminium", E=70e9, nu=0.33, rho=2700.0)
+
+
+def strain_and_stress(body, nodes):
+    """Return the strain and stress of any displacements of all nodes and skins of the mesh."""
+    n_dof = body.recovery.matrix.shape[0]
+    u = np.random.default_rng(8).normal(size=(n_dof, 2))
+    return nodal_strain(body, u, nodes), body.element_model.nodal_stress(u)[nodes]
+
+
+def test_nodal_strains_of_welded_solids_are_those_of_their_own_material_and_motion():
+    blocks = []
+    for name, material, at, n in (("a", STEEL, 0.0, 2), ("b", ALUMINIUM, 1.0, 3)):
+        mesh = box_mesh(n, 1, 1, 1.0, 0.3, 0.2, "hexahedron")
+        mesh = replace(mesh, nodes=np.add(mesh.nodes, (at, 0, 0)))
+        ends = [fm.rigid_interface(mesh, f"{name}{x:g}", fm.Plane((x, 0, 0), (1, 0, 0))) for x in (at, at + 1)]
+        blocks.append(fm.couple(fm.solid_body(mesh, material, name=name, units=SI, interfaces=ends)))
+    body = fm.weld(blocks, [(("a", "a1"), ("b", "b1"))], name="both")
+    first = np.concatenate([np.arange(len(block.element_model.mesh.nodes)) + at
+                            for block, at in zip(blocks, (0, body.element_model.n_nodes[0]), strict=True)])  # fmt: skip
+    of_steel = first < body.element_model.n_nodes[0]
+    nodes = np.random.default_rng(1).permutation(first)
+    strain, stress = strain_and_stress(body, nodes)
+    expected = np.where(np.isin(nodes, first[of_steel])[:, None, None], hooke(STEEL, stress), hooke(ALUMINIUM, stress))
+    assert_allclose(strain, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+def test_nodal_strains_of_a_stiffened_plate_are_those_of_shell_and_beam():
+    mesh = fm.flat_plate(1.0, 0.5, 2, 1)
+    mesh = replace(mesh, lines=np.array([[0, 1], [1, 2]]), line_sets={"rib": np.arange(2)})
+    rib = fm.BeamProperty(fm.Rectangle(0.02, 0.03), ALUMINIUM)
+    body = fm.shell_body(mesh, fm.ShellProperty(0.01, STEEL), name="plate", units=SI, stiffeners={"rib": rib})
+    model = body.element_model
+    n_shell = model.shell.n_nodes + len(model.shell.skin.points)
+    on_rib = n_shell + model.frame.n_nodes + np.arange(len(model.frame.skin.points))
+    strain, stress = strain_and_stress(body, np.concatenate([on_rib, np.arange(n_shell)]))
+    n = len(on_rib)
+    expected = np.concatenate([hooke(ALUMINIUM, stress[:n]), hooke(STEEL, stress[n:])])
+    for part in (slice(0, n), slice(n, None)):
+        assert_allclose(strain[part], expected[part], rtol=0, atol=1e-12 * np.abs(expected[part]).max())
+
+
+def test_nodal_strains_of_a_layup_are_those_of_the_material_of_its_face():
+    """Steel below, twice as thick as aluminium above: at the two faces, and at the middle in steel."""
+    layup = fm.LaminateProperty((fm.Layer(STEEL, 2e-3, 0.0), fm.Layer(ALUMINIUM, 1e-3, 0.0)), direction=(1, 0, 0))
+    body = fm.shell_body(fm.flat_plate(1.0, 0.6, 2, 2, kind="quad"), layup, name="layup", units=SI)
+    nodes = np.arange(len(body.nodes))
+    strain, stress = strain_and_stress(body, nodes)
+    above = body.nodes[:, 2] > 1e-9
+    assert above.any()
+    assert (body.nodes[:, 2] < -1e-9).any()
+    expected = np.where(above[:, None, None], hooke(ALUMINIUM, stress), hooke(STEEL, stress))
+    assert_allclose(strain, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
