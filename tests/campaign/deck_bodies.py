@@ -145,6 +145,7 @@ class RandomDeck:
         """RBE3: components of a point, along its axes, follow weighted components of the points before it."""
         members = range(b)
         some = [("1245", "1356", "123456", "2346")[int(self.rng.integers(4))] for _ in members]
+        some[0] = "123456"  # alone it determines every motion
         weights = self.rng.uniform(0.5, 3.0, b)
         self.lines.append(f"RBE3,{number},,{b + 1},{components}")
         for k in members:

@@ -13,7 +13,7 @@ from tests.campaign.sound_bodies import sound_body
 from tests.campaign.verdicts import judged
 
 
-@pytest.mark.parametrize("seed", [120157, 120682])
+@pytest.mark.parametrize("seed", [120157, 120682, 170504, 170540])
 def test_stress_that_is_rounding_alone_is_judged_alike_in_all_units(seed):
     """Rows of the middle surface of a plate, which has no stress where it bends."""
     body = sound_body(seed).reduced
@@ -21,6 +21,13 @@ def test_stress_that_is_rounding_alone_is_judged_alike_in_all_units(seed):
     found = [check_recovery_forces(cms.convert_units(body, units)).value for units in systems]
     assert max(found) < 1e-6
     assert_allclose(found, found[0], rtol=1e-6)
+    table = body.recovery["all"]
+    dynamic = np.array(table.dynamic)
+    size = np.linalg.norm(np.ptp(body.nodes, axis=0))
+    stiffness = (np.diag(body.K) / np.abs(body.Phi).max(axis=(0, 1)) ** 2).max()
+    dynamic[0, table.quantities.index("stress"), 0] = 1e-2 * stiffness / size**2
+    wrong = replace(body, recovery={"all": replace(table, dynamic=dynamic)})
+    assert check_recovery_forces(wrong).verdict == "fail"
 
 
 @pytest.mark.parametrize("seed", [120160, 120251])

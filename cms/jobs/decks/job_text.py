@@ -52,10 +52,11 @@ def job_text(deck: Deck, request: JobRequest, deck_path: str) -> str:
     deck.ledger.require_whole(request.leave_out)
     if deck.is_plain_mesh:
         groups = dict.fromkeys(name for block in deck.mesh.blocks for name in block.groups)
+        sets = ", ".join(map(quoted, deck.mesh.node_sets)) or "none"
         raise JobError(
             f"deck {deck.path}: a plain mesh, without materials, sections and steps; write a job with [body] mesh = "
             f"{quoted(deck_path)} and tables [materials.NAME] and [interfaces.NAME]; its groups of elements are "
-            f"{', '.join(map(quoted, groups)) or 'none'}"
+            f"{', '.join(map(quoted, groups)) or 'none'}, its sets of nodes {sets}"
         )
     if not (deck.solids or deck.shells or deck.lines or deck.rods or deck.springs):
         raise JobError(f"deck {deck.path}: expected solids, shells, lines, rods or springs, got none")

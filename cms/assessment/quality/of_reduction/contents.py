@@ -242,7 +242,7 @@ def compare_frame(case: Case) -> Iterator[Compared]:
     scale = np.repeat([1.0, case.length], 3)[: len(C)]
     rigid = np.abs(scale[:, None] * C) / mode_size(case.reduced)
     k = int(np.argmax(rigid.max(axis=0, initial=0.0)))
-    words = f"mode {k + 1} moves rigidly as a {frame.kind} frame does not allow"
+    words = f"rigid motion of mode {k + 1}, which a {frame.kind} frame does not have"
     defect = float(rigid.max(initial=0.0))
     yield Compared("frame.kind", defect, words if defect else "")
     yield Compared("frame.at", defect, words if defect else "")

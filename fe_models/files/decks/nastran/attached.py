@@ -196,13 +196,13 @@ def _mean(model: NastranModel, card: Card) -> None:
         raise MeshError(
             f"{card.where} {card.text(1)}: expected weights, components and grids, got none; it is cut short"
         )
-    if not all(np.array_equal(six, [six[0]] * 3 + [0.0] * 3) for six in weights.values()):
-        why = "weights of rotations or of single components: the geometric stiffness takes their mean as linear"
-        model.ledger.note("RBE3", why)
-    is_turned = any(
+    along_axes = not in_basic(model, [node], components) or any(
         number in model.points.axes and not np.all(six == np.repeat(six[[0, 3]], 3)) for number, six in weights.items()
     )
-    if is_turned or not in_basic(model, [node], components):
+    if along_axes or not all(np.array_equal(six, [six[0]] * 3 + [0.0] * 3) for six in weights.values()):
+        why = "weights of rotations or of single components: the geometric stiffness takes their mean as linear"
+        model.ledger.note("RBE3", why)
+    if along_axes:
         model.rows += _mean_rows(model, card, node, components, weights)
         return
     name = f"rbe3_{card.text(1)}"

@@ -64,6 +64,9 @@ def test_a_plain_mesh_is_no_deck_and_the_message_says_how_to_use_it(path):
         job_text(deck, JobRequest("m-kg-s", {}), path.name)
     assert "[body] mesh = 'bar.inp'" in str(caught.value)
     assert "'Surface1'" in str(caught.value)
+    path.write_text(path.read_text() + "*NSET, NSET=foot\n1, 2\n")
+    with pytest.raises(JobError, match=r"its sets of nodes .*'foot'"):
+        job_text(read_deck(path), JobRequest("m-kg-s", {}), path.name)
     for more in ("*MATERIAL, NAME=M\n", "*STEP\n*FREQUENCY\n2\n*END STEP\n"):
         path.write_text(path.read_text() + more)
         assert not read_deck(path).is_plain_mesh
