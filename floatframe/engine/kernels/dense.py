@@ -1,8 +1,11 @@
 """Small dense matrices: LU factorisation with partial pivoting, and solves. Row-major, in place."""
 
 from floatframe.engine.kernels.compiler.compilation import matrix_loops
+from floatframe.engine.kernels.vector import add, put, scaled, sub, vector
 
-__all__ = ["add_products", "lu_factor", "lu_solve", "lu_solve_columns"]
+__all__ = ["add_products", "lu_factor", "lu_solve", "lu_solve_columns", "six_columns"]
+
+ENOUGH = 0.25  # ratio of a pivot to the largest number of its row at which the search for it ends
 
 
 @matrix_loops
@@ -26,7 +29,8 @@ def add_products(A, x, out):
 def lu_factor(A, pivot):
     """Overwrite A, (n, n), with its factors, the numbers on the diagonal of the upper one inverted.
 
-    Rows are compared after scaling by their largest number. Return False if a pivot is zero or not finite.
+    The pivot is the first number that is at least `ENOUGH` of the largest one of its row, or the one with the largest
+    ratio to it. Return False if a pivot is zero or not finite.
     """
     n = A.shape[0]
     for k in range(n):
@@ -38,6 +42,8 @@ def lu_factor(A, pivot):
             if size > 0.0 and abs(A[i, k]) / size > best:
                 best = abs(A[i, k]) / size
                 row = i
+                if best >= ENOUGH:
+                    break
         pivot[k] = row
         if row != k:
             for j in range(n):
@@ -102,22 +108,48 @@ def lu_solve(A, pivot, b):
 
 @matrix_loops
 def lu_solve_columns(A, pivot, B):
-    """Overwrite B, (n, m), with A⁻¹ B by the factors of `lu_factor`."""
+    """Overwrite B, (n, m), with A⁻¹ B by the factors of `lu_factor`; six columns at once, kept in registers."""
     n, m = B.shape
     for k in range(n):
         row = pivot[k]
         if row != k:
             for c in range(m):
                 B[k, c], B[row, c] = B[row, c], B[k, c]
+    for c in range(0, m - 5, 6):
+        for i in range(n):
+            x, y = vector(B[i, c:]), vector(B[i, c + 3 :])
+            for j in range(i):
+                x = sub(x, scaled(A[i, j], vector(B[j, c:])))
+                y = sub(y, scaled(A[i, j], vector(B[j, c + 3 :])))
+            put(B[i], c, x)
+            put(B[i], c + 3, y)
+        for i in range(n - 1, -1, -1):
+            x, y = vector(B[i, c:]), vector(B[i, c + 3 :])
+            for j in range(i + 1, n):
+                x = sub(x, scaled(A[i, j], vector(B[j, c:])))
+                y = sub(y, scaled(A[i, j], vector(B[j, c + 3 :])))
+            put(B[i], c, scaled(A[i, i], x))
+            put(B[i], c + 3, scaled(A[i, i], y))
     for i in range(1, n):
         for j in range(i):
             factor = A[i, j]
-            for c in range(m):
+            for c in range(m - m % 6, m):
                 B[i, c] -= factor * B[j, c]
     for i in range(n - 1, -1, -1):
         for j in range(i + 1, n):
             factor = A[i, j]
-            for c in range(m):
+            for c in range(m - m % 6, m):
                 B[i, c] -= factor * B[j, c]
-        for c in range(m):
+        for c in range(m - m % 6, m):
             B[i, c] *= A[i, i]
+
+
+@matrix_loops
+def six_columns(A, X, out):
+    """Write A X into out, (n_rows, 6), by the first n_rows rows of A, (., n), and X, (n, 6)."""
+    for r in range(out.shape[0]):
+        x, y = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        for j in range(X.shape[0]):
+            x, y = add(x, scaled(A[r, j], vector(X[j]))), add(y, scaled(A[r, j], vector(X[j, 3:])))
+        put(out[r], 0, x)
+        put(out[r], 3, y)

@@ -15,7 +15,7 @@ from floatframe.engine.kernels.connections.connection import (
     constraint_rates,
     write_velocity_gaps,
 )
-from floatframe.engine.kernels.dense import lu_factor, lu_solve, lu_solve_columns
+from floatframe.engine.kernels.dense import lu_factor, lu_solve, lu_solve_columns, six_columns
 from floatframe.engine.kernels.evaluation import linearize
 from floatframe.engine.kernels.model import MASS, STIFFNESS
 from floatframe.engine.kernels.vector import add, dot, put, put_sum, scaled, sub, turned, turned_back, vector
@@ -71,29 +71,12 @@ def factorize_tangents(model, work):
         row = work.solver.J_row[12 * o : 12 * (o + n)].reshape((12, n))
         o = model.markers.x0[column_marker]
         X = work.solver.X[6 * o : 6 * (o + n)].reshape((n, 6))
-        Z = work.solver.Z[p]
-        for r in range(12):
-            for k in range(6):
-                total = 0.0
-                for j in range(n):
-                    total += row[r, j] * X[j, k]
-                Z[r, k] = total
+        n_motion = 12 if model.connections.has_rates[model.markers.connection[row_marker]] else 6
+        six_columns(row, X, work.solver.Z[p, :n_motion])
         if model.markers.accelerated[row_marker] >= 0:
-            accelerate_pair(model, work, p, X, n)
+            o = model.markers.a0[row_marker]
+            six_columns(work.solver.J_a[6 * o : 6 * (o + n)].reshape((6, n)), X, work.solver.Z_a[p])
     return -1
-
-
-@inner
-def accelerate_pair(model, work, p, X, n):
-    """Write Z_a = J_a X of pair p."""
-    o, Z_a = model.markers.a0[model.elimination.pair_row[p]], work.solver.Z_a[p]
-    row = work.solver.J_a[6 * o : 6 * (o + n)].reshape((6, n))
-    for r in range(6):
-        for k in range(6):
-            total = 0.0
-            for j in range(n):
-                total += row[r, j] * X[j, k]
-            Z_a[r, k] = total
 
 
 @inner
@@ -119,17 +102,18 @@ def assemble(model, work, c_k):
             model.markers.sign[b],
         )
         n_motion = 12 if model.connections.has_rates[c] else 6
-        row = work.solver.row
         for r in range(rows):
-            for part in range(0, n_motion, 3):  # row r of P in body axes
-                put(row, part, turned_back(R, P[r, part:]))
-            for part in range(0, 6, 3):
-                w_part = model.markers.force[b] if part == 0 else model.markers.moment[b]
-                if w_part >= 0:
-                    x = (0.0, 0.0, 0.0)
-                    for k in range(n_motion):
-                        x = add(x, scaled(row[k], Z[k, part:]))
-                    put_sum(s, o + r * columns + w_part, scaled(sign, turned(R, x)))
+            by_force, by_moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+            for part in range(0, n_motion, 3):
+                if P[r, part] != 0.0 or P[r, part + 1] != 0.0 or P[r, part + 2] != 0.0:
+                    along = turned_back(R, P[r, part:])  # in body axes
+                    for k in range(3):
+                        by_force = add(by_force, scaled(along[k], Z[part + k]))
+                        by_moment = add(by_moment, scaled(along[k], Z[part + k, 3:]))
+            if model.markers.force[b] >= 0:
+                put_sum(s, o + r * columns + model.markers.force[b], scaled(sign, turned(R, by_force)))
+            if model.markers.moment[b] >= 0:
+                put_sum(s, o + r * columns + model.markers.moment[b], scaled(sign, turned(R, by_moment)))
             if model.markers.accelerated[a] >= 0:
                 add_accelerated(model, work, p, r, s, o + r * columns)
 

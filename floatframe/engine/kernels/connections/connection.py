@@ -17,7 +17,7 @@ from floatframe.engine.kernels.connections.element_law import law_derivatives, l
 from floatframe.engine.kernels.connections.pair_force import pair_derivatives, pair_rows
 from floatframe.engine.kernels.connections.spring_damper import spring_derivatives, spring_rows
 from floatframe.engine.kernels.connections.user_force import user_force_derivatives, user_force_rows
-from floatframe.engine.kernels.joints.relative_motion import direction, put_pair, relative_velocity
+from floatframe.engine.kernels.joints.relative_motion import direction, distance, put_pair, relative_velocity
 from floatframe.engine.kernels.joints.row_formulas import (
     held_by_place,
     held_rates,
@@ -65,18 +65,26 @@ def connection_rows(model, work, c, c_k):
     elif law == SPRING:
         spring_rows(model, work, c, c_k)
     else:
+        d = distance(work.markers, a, b)
         for k in range(w0, w0 + size):
-            joint_row(model, work, k, a, b, w, c_k)
+            joint_row(model, work, k, a, b, d, w, c_k)
 
 
 @small
-def joint_row(model, work, k, a, b, w, c_k):
-    """Write the residual of row k of a joint."""
+def joint_row(model, work, k, a, b, d, w, c_k):
+    """Write the residual of row k of a joint; d: distance of its markers. The formulas of most rows stand here too."""
+    kind, soft = model.rows.kind[k], model.rows.soft[k]
     if model.rows.holds[k] == NOTHING:
-        work.connections.g[k] = c_k * wrench_value(model.rows.kind[k], model, work, k, a, b, w)
+        work.connections.g[k] = c_k * wrench_value(kind, model, work, k, a, b, w)
         return
-    g, n, _, m_b = held_value(model.rows.kind[k], model, work, k, a, b)
-    soft = model.rows.soft[k]
+    if soft == 0.0 and kind == POINT:
+        work.connections.g[k] = -dot(vector(model.rows.x[k]), d)
+        return
+    if soft == 0.0 and kind == DOT:
+        E, D = direction(work.markers, a, model.rows.x[k]), direction(work.markers, b, model.rows.y[k])
+        work.connections.g[k] = dot(E, D) - model.rows.c[k]
+        return
+    g, n, _, m_b = held_value(kind, model, work, k, a, b)
     if soft > 0.0:
         g -= soft * c_k * (dot(n, vector(w)) + dot(m_b, vector(w[model.rows.part[k] :])))
     work.connections.g[k] = g
