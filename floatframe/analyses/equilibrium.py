@@ -316,7 +316,7 @@ def steady_rotation(
                 W, abs(parts.J).T @ np.where(holds, 0.0, noise)
             )  # springs relax to zero force
             error = 0.0 if is_nothing else size / scale_of_forces
-            is_closed = np.abs(gaps[holds]).max(initial=0.0) <= CLOSED * max(compiled.length, 1.0)
+            is_closed = bool((np.abs(gaps) <= CLOSED * compiled.gap_sizes + noise)[holds].all())
             told = tolerance * np.abs(w[~states.own]).max(initial=0.0) + noise
             is_told = bool((np.abs(gaps) <= told)[~holds & ~states.own].all())
             is_steady = slows <= SLOWER * float(np.linalg.norm(omega)) / (2 * np.pi)

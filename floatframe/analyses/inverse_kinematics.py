@@ -12,7 +12,7 @@ consists of
 If the targets are out of reach, the search ends where no allowed motion reduces the errors, and reports this.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,7 +33,7 @@ from floatframe.model.bodies.coordinates import JointCoordinate
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.checked_values import array_of_shape, number, rotation_of
 from floatframe.model.joints import SlidingJoint
-from floatframe.model.joints.rows import RelativePlace, is_held
+from floatframe.model.joints.rows import RelativePlace, RowCoordinate, is_held
 from floatframe.model.rotations import rotation_log
 from floatframe.model.state import State
 from floatframe.model.system import System
@@ -44,8 +44,11 @@ __all__ = ["ReachedPose", "Target", "inverse_kinematics"]
 
 FREE = 1e-9  #: singular value of the scaled constraint rows below which a motion is allowed
 MOST_TURN = 0.5  #: in one iteration: rotation [rad], and translation relative to the size of the system
-WITHIN = 1e-12  #: amount by which a coordinate may be beyond its limit [rad or m]
+WITHIN = 1e-12  #: amount by which a coordinate may be beyond its limit, in rad or relative to the size of the system
+PLACED = 1e-9  #: the same, for the pose in which the search begins
+AT_LIMIT = 1e-7  #: the same, for a coordinate that is reported at its limit, or relative to its magnitude
 MOST_RETURNS = 10  #: largest number of Newton iterations to bring a coordinate back to its limit
+ROUNDING = 4 * np.finfo(float).eps  #: of a coordinate, relative to the distance of bodies from the origin
 NO_WAY = 1e-11  #: size of an iteration below which the search has ended
 
 
@@ -148,20 +151,32 @@ class Search:
             if name not in values:
                 raise ModelError(f"{where}: limits: no coordinate {quoted(name)}{nearest(name, values)}")
         self.names = list(limits)
-        self.lower = np.array([-np.inf if low is None else low for low, _ in limits.values()], dtype=float)
-        self.upper = np.array([np.inf if high is None else high for _, high in limits.values()], dtype=float)
+        angles = {f"{joint}.{each.name}" for joint, each, _ in self.coordinates(self.state) if each.is_angle}
+        self.sizes = np.array([1.0 if name in angles else self.compiled.length for name in self.names])
+        lower = np.array([-np.inf if low is None else low for low, _ in limits.values()], dtype=float)
+        upper = np.array([np.inf if high is None else high for _, high in limits.values()], dtype=float)
+        self.lower, self.upper = lower / self.sizes, upper / self.sizes
         x = self.limited(values)
-        beyond = np.flatnonzero((x < self.lower - 1e-9) | (x > self.upper + 1e-9))
+        beyond = np.flatnonzero((x < self.lower - PLACED) | (x > self.upper + PLACED))
         if len(beyond):
             k = int(beyond[0])
             raise ModelError(
-                f"{where}: {self.names[k]} is placed at {x[k]:.6g}, beyond its limits {self.lower[k]:g} to "
-                f"{self.upper[k]:g}; place the bodies within them"
+                f"{where}: {self.names[k]} is placed at {values[self.names[k]]:.6g}, beyond its limits {lower[k]:g} "
+                f"to {upper[k]:g}; place the bodies within them"
             )
 
     def values(self, state: State, before: Mapping[str, float]) -> dict[str, float]:
         """Return all joint coordinates at a state; angles are counted on from those before."""
         found: dict[str, float] = {}
+        for joint, each, place in self.coordinates(state):
+            name, value = f"{joint}.{each.name}", float(each.value(place))
+            if each.is_angle:
+                value += 2 * np.pi * round((before.get(name, value) - value) / (2 * np.pi))
+            found[name] = value
+        return found
+
+    def coordinates(self, state: State) -> Iterator[tuple[str, RowCoordinate, RelativePlace]]:
+        """Yield the name of the joint, the coordinate, and its place at a state, for all joint coordinates."""
         placed = self.compiled.placed
         for joint in self.system.joints:
             if isinstance(joint, SlidingJoint):
@@ -170,17 +185,12 @@ class Search:
             (r_a, A_a), (r_b, A_b) = (marker_pose(end, placed, self.n_q) for end in ends)
             own = [row.coordinate for row in joint.rows(A_a, A_b, r_b - r_a) if row.coordinate is not None]
             (r_a, A_a), (r_b, A_b) = (marker_pose(end, state, self.n_q) for end in ends)
-            place = RelativePlace(A_a, A_b, r_b - r_a)
             for each in own:
-                name, value = f"{joint.name}.{each.name}", float(each.value(place))
-                if each.is_angle:
-                    value += 2 * np.pi * round((before.get(name, value) - value) / (2 * np.pi))
-                found[name] = value
-        return found
+                yield joint.name, each, RelativePlace(A_a, A_b, r_b - r_a)
 
     def limited(self, values: Mapping[str, float]) -> Array:
-        """Return the values of the coordinates that have limits, (n,)."""
-        return np.array([values[name] for name in self.names])
+        """Return the coordinates that have limits, in rad or relative to the size of the system, (n,)."""
+        return np.array([values[name] for name in self.names]) / self.sizes
 
     def errors(self, state: State) -> tuple[Array, float, float]:
         """Return weighted errors (distances relative to the system size), largest distance, and largest rotation."""
@@ -221,15 +231,17 @@ class Search:
                 J.append(weight * own[3:])
         by_name = coordinate_rows(self.system, compiled, work, state)
         X = np.array([by_name[name] @ N for name in self.names]).reshape(len(self.names), N.shape[1])
+        X /= self.sizes[:, None]
         return N, np.concatenate(J), X
 
     def within(self, state: State, before: Mapping[str, float]) -> State:
         """Return the state with coordinates brought back to their limits and restored joint constraints, step (3)."""
         model = self.compiled.model
+        noise = ROUNDING * float(np.abs(state.r).max()) / self.compiled.length
         for _ in range(MOST_RETURNS):
             x = self.limited(self.values(state, before))
             beyond = x - np.clip(x, self.lower, self.upper)
-            if not len(x) or np.abs(beyond).max() <= WITHIN:
+            if not len(x) or np.abs(beyond).max() <= WITHIN + noise:
                 break
             N, _, X = self.rows(state)
             y = N @ np.linalg.lstsq(X[beyond != 0], -beyond[beyond != 0], rcond=1e-9)[0]
@@ -270,7 +282,7 @@ class Search:
             values = self.values(state, values)
             rows = self.rows(state)
         x = self.limited(values)
-        near = 1e-7 * np.maximum(1.0, np.abs(x))
+        near = AT_LIMIT * np.maximum(1.0, np.abs(x))
         at = tuple(
             name for name, low, high in zip(self.names, x - self.lower < near, self.upper - x < near, strict=True)
             if low or high

@@ -46,6 +46,7 @@ from floatframe.simulation.stop_events import (
     stop_events,
     stop_values,
     sum_rows,
+    sum_size,
 )
 from floatframe.simulation.switch_events import SwitchEvent, beyond_zero, sign_of, switch_events, with_signs
 from floatframe.simulation.watched_values import direct_values
@@ -53,10 +54,10 @@ from floatframe.simulation.watched_values import direct_values
 __all__ = ["EventWatch"]
 
 BLOCK = 400  #: most steps of a block; blocks end at multiples of this step number
-STANDS = 1e-9  #: change of a watched value in a step, over its level or 1, below which it is constant
+STANDS = 1e-9  #: change of a watched value in a step, over its level and largest value, below which it is constant
 SHORT = 1e-7  #: part of a step that is extrapolated after an event: accelerations of such a step would be rounding
 MOST_NUMBERS = 2**23  #: most numbers in the results of a block
-SHUT = 1e-6  #: largest gap that a coupler closes when it engages, over the length of the system, or in rad
+SHUT = 1e-6  #: largest gap that a coupler or an element closes when it engages, over `gap_sizes`
 MOST_MADE = 8  #: most switched systems that are cached
 MOST_IN_A_STEP = 100  #: most events in one step; with more, events switch each other without end
 
@@ -129,7 +130,7 @@ class EventWatch:
         self.events = (*events_of(self.full), *stop_events(self.full), *switch_events(self.full))
         released = {coupler.name for coupler in self.full.couplers if not coupler.engaged}
         self.switch(off_at_start(events_of(self.full)) | released)
-        self.values = np.zeros(len(self.events))
+        self.values, self.largest = np.zeros(len(self.events)), np.zeros(len(self.events))
         is_own = [isinstance(each, StopEvent | SwitchEvent) for each in self.events]
         each_event = zip(self.events, is_own, strict=True)
         self.direct = [None if own else direct_values(self.full, each) for each, own in each_event]
@@ -192,7 +193,9 @@ class EventWatch:
             if name not in found:
                 raise ModelError(f"event {event.name!r}: column: expected one of {', '.join(found)}, got {name!r}")
             columns.append(found[name])
-        return np.array(columns).T
+        values = np.array(columns).T
+        self.largest = np.maximum(self.largest, np.abs(values).max(axis=0))
+        return values
 
     def in_files(self, row: Rows) -> Rows:
         """Return results in the frames of result files; single rows are cached, as the next step needs them again."""
@@ -225,7 +228,8 @@ class EventWatch:
             return False
         only_switches = bool(event.switch_on or event.switch_off) and not event.stop
         changes = bool(self.off.intersection(event.switch_on)) or not self.off.issuperset(event.switch_off)
-        return changes or not only_switches or abs(after - before) > STANDS * max(1.0, abs(event.level_passed))
+        size = max(abs(event.level_passed), float(self.largest[self.events.index(event)]))
+        return changes or not only_switches or abs(after - before) > STANDS * size
 
     def near_levels(self, values: Array) -> IntArray:
         """Return the steps in which a value, (n_times, n_events), is not clearly on one side of its level."""
@@ -462,7 +466,7 @@ class EventWatch:
                 self.caught[name] = caught
                 continue
             wanted = float(constant(t))  # type: ignore[operator]
-            if abs(caught - wanted) > SHUT * max(1.0, compiled.length):
+            if abs(caught - wanted) > SHUT * sum_size(compiled, name):
                 raise ModelError(
                     f"event {event.name!r} at t = {t:g}: coupler {name!r} is to hold {wanted:.6g}, but finds "
                     f"{caught:.6g}; leave its constant out, so that it holds what it catches, or let the event watch it"
@@ -478,7 +482,7 @@ class EventWatch:
             return None
         hit = impact(compiled_system(self.system), memory.state, t=t, known=memory.w, restitution={})
         for placed in holding:
-            require_shut(event, placed, hit.gap, t, compiled.length)
+            require_shut(event, placed, hit.gap, t, compiled.gap_sizes)
         cores = [sum_rows(compiled, name)[2] for name in engaged]
         impulse = {name: float(hit.impulse[k]) for name, k in zip(engaged, cores, strict=True)}
         for placed in holding:
@@ -613,10 +617,10 @@ def holds_alike(a: System, b: System) -> bool:
     return np.array_equal(compiled_system(a).model.rows.kind, compiled_system(b).model.rows.kind)
 
 
-def require_shut(event: Event, placed: PlacedLaw, gap: Array, t: float, length: float) -> None:
+def require_shut(event: Event, placed: PlacedLaw, gap: Array, t: float, sizes: Array) -> None:
     """Raise `ModelError` if an element that is switched on constrains a position that the motion does not have."""
     for name, row, holds in zip(placed.law.multipliers, placed.multipliers, placed.law.holds, strict=True):
-        if holds == POSITION and abs(gap[row]) > SHUT * max(1.0, length):
+        if holds == POSITION and abs(gap[row]) > SHUT * sizes[row]:
             raise ModelError(
                 f"event {event.name!r} at t = {t:g}: element {placed.element.name!r} is to hold the position of its "
                 f"multiplier {name!r}, but finds it open by {gap[row]:.6g}; let the event watch what it holds"

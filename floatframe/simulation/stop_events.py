@@ -22,10 +22,11 @@ __all__ = [
     "stop_events",
     "stop_values",
     "sum_rows",
+    "sum_size",
 ]
 
 INWARD = {"lower": 1.0, "upper": -1.0}  #: sign of the force of a stop along its coordinate
-#: allowed distance beyond a stop at the start of a motion, in radians or relative to the length of the system
+#: allowed distance beyond a stop at the start of a motion, relative to the size of the sum or of the limit
 BEYOND = 1e-9
 
 
@@ -74,6 +75,11 @@ def coupled_sum(compiled: CompiledSystem, name: str, w: Array) -> float:
     return float(factors @ w[rows])
 
 
+def sum_size(compiled: CompiledSystem, name: str) -> float:
+    """Return the size of the sum of a coupler: of its terms for the length of the system, and a radian."""
+    return float(compiled.gap_sizes[sum_rows(compiled, name)[2]])
+
+
 def stop_values(compiled: CompiledSystem, event: StopEvent, resting: Mapping[str, str], rows: Sequence[Rows]) -> Array:
     """Return the watched value of a stop event at the times of rows of results, (n_times,).
 
@@ -96,7 +102,7 @@ def require_within_limits(compiled: CompiledSystem, events: Sequence[Event], val
     for event, value in zip(events, values, strict=True):
         if isinstance(event, StopEvent) and event.side in INWARD:
             beyond = -INWARD[event.side] * (value - event.level)
-            if beyond > BEYOND * max(1.0, compiled.length, abs(event.level)):
+            if beyond > BEYOND * max(sum_size(compiled, event.coupler), abs(event.level)):
                 raise ModelError(
                     f"coupler {event.coupler!r}: the motion begins at {value:.6g}, beyond its {event.side} limit "
                     f"{event.level:.6g}; begin within the limits"
@@ -109,7 +115,8 @@ def require_off_stops(system: System, w: Array) -> None:
     for event in stop_events(system):
         if event.side in INWARD:
             value = coupled_sum(compiled, event.coupler, w)
-            if INWARD[event.side] * (value - event.level) < -BEYOND * max(1.0, compiled.length, abs(event.level)):
+            size = max(sum_size(compiled, event.coupler), abs(event.level))
+            if INWARD[event.side] * (value - event.level) < -BEYOND * size:
                 raise ModelError(
                     f"coupler {event.coupler!r}: the equilibrium would be at {value:.6g}, beyond its {event.side} "
                     f"limit {event.level:.6g}, where it rests on the stop: for statics give the coupler "

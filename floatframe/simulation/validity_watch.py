@@ -250,11 +250,17 @@ def lowest_frequency(M: Array, K: Array, G: Array) -> float:
     """Return the lowest angular frequency above zero of motions with G x = 0; motions of a rigid body come first in x.
 
     The pencil (M, K + s M) has no singular side: its eigenvalues are 1/(omega² + s), the largest of them those of the
-    rigid-body motions that G leaves free.
+    rigid-body motions that G leaves free. All motions are scaled to a mass of 1, or those of modes without mass to the
+    stiffness of the stiffest mode.
     """
+    mass, stiffness = np.diag(M), np.diag(K)
+    highest = np.max(stiffness[mass > 0] / mass[mass > 0]) or stiffness.max() or 1.0
+    scale = 1 / np.sqrt(np.where(mass > 0, mass, np.where(stiffness > 0, stiffness, highest) / highest))
+    G = G * scale
+    G = G / np.linalg.norm(G, axis=1, keepdims=True)
     Z = la.null_space(G) if len(G) else np.eye(len(K))
     n_rigid = 6 - (np.linalg.matrix_rank(G[:, :6]) if len(G) else 0)
-    M, K = Z.T @ M @ Z, Z.T @ K @ Z
+    M, K = Z.T @ (scale[:, None] * M * scale) @ Z, Z.T @ (scale[:, None] * K * scale) @ Z
     s = np.trace(K) / np.trace(M) / len(K)
     values = la.eigvalsh((M + M.T) / 2, (K + K.T) / 2 + s * (M + M.T) / 2)[::-1]
     elastic = values[n_rigid:]

@@ -27,6 +27,7 @@ from floatframe.engine.compiling.system import CompiledSystem
 from floatframe.engine.initial_conditions.constraint_words import open_joints
 from floatframe.engine.initial_conditions.initial import has_normal_friction
 from floatframe.engine.initial_conditions.newton_equations import (
+    balanced_scales,
     displaced,
     in_ground_axes,
     linearized,
@@ -35,7 +36,7 @@ from floatframe.engine.initial_conditions.newton_equations import (
 )
 from floatframe.engine.kernels.work import Work
 from floatframe.errors import ConvergenceError
-from floatframe.model.joints.rows import is_held, is_held_length
+from floatframe.model.joints.rows import is_held
 from floatframe.model.state import State
 
 __all__ = ["ELASTICITY", "Elasticity", "Instant", "frozen_bodies", "quasi_static_bodies", "rigid_columns"]
@@ -43,6 +44,7 @@ __all__ = ["ELASTICITY", "Elasticity", "Instant", "frozen_bodies", "quasi_static
 CLOSED = 1e-12  #: largest constraint error, relative to the size of the system
 ACCEPTED = 1e-9  #: the same, if rounding allows no smaller one
 MOST_ITERATIONS = 30
+FAR = 1e3  #: change of a position in one iteration, relative to the size of the system, or in rad, that ends it
 SETTLED = 1e-11  #: last change of q, relative to its magnitude
 LEAST_SHAPE = 1e-14  #: relative to the size of the system; a smaller deformation is taken as zero, if all loads vanish
 
@@ -60,6 +62,11 @@ class Instant:
 
 
 Elasticity = Callable[[CompiledSystem, Work, State, float], Instant]  #: (compiled, work, guess, t) -> Instant
+
+
+def rigid_scale(compiled: CompiledSystem) -> Array:
+    """Return scale lengths of translations, and 1 for rotations, (6 n_b,), which give all unknowns the same unit."""
+    return np.tile(np.repeat([compiled.length, 1.0], 3), len(compiled.body_names))
 
 
 def rigid_columns(compiled: CompiledSystem) -> np.ndarray:
@@ -169,8 +176,9 @@ class RigidEquations:
 
     def solved(self, forces: Array, rows: Array) -> tuple[Array, Array]:
         """Return y and w."""
-        matrix = np.block([[self.M, -self.J.T], [self.G, self.V]])
-        solution = np.linalg.solve(matrix, np.concatenate([forces, rows]))
+        of_columns, of_rows = balanced_scales(np.diag(self.M), abs(self.J), abs(self.G), abs(self.V))
+        matrix = of_rows[:, None] * np.block([[self.M, -self.J.T], [self.G, self.V]]) * of_columns
+        solution = of_columns * np.linalg.solve(matrix, of_rows * np.concatenate([forces, rows]))
         return solution[: len(forces)], solution[len(forces) :]
 
 
@@ -211,7 +219,7 @@ def closed(
     """Return the state that satisfies joints and drives by step (1), the equations at it, and the iterations."""
     model = compiled.model
     holds = is_held(model.rows.kind)
-    scale = np.where(is_held_length(model.rows.kind), compiled.length, 1.0)
+    scale = compiled.gap_sizes
     error = np.zeros(len(work.state.w))
     best = np.inf
     for n in range(MOST_ITERATIONS):
@@ -226,7 +234,7 @@ def closed(
             y, _ = equations.solved(np.zeros(int(rigid.sum())), -error)
         except np.linalg.LinAlgError:
             break
-        if not np.isfinite(y).all() or np.abs(y).max() > 1e3 * max(compiled.length, 1.0):
+        if not np.isfinite(y).all() or np.abs(y / rigid_scale(compiled)).max() > FAR:
             break
         x = np.zeros(len(rigid))
         x[rigid] = y

@@ -20,6 +20,7 @@ from floatframe.analyses.driven.driven_motion import (
     frozen_bodies,
     rigid_columns,
     rigid_equations,
+    rigid_scale,
 )
 from floatframe.analyses.observed_state import observed_state
 from floatframe.engine.compiling.file_frames import rows_of_file
@@ -91,11 +92,6 @@ def free_coordinates(system: System, state: State, *, t: float = 0.0) -> tuple[s
             f"{len(left)} motions of {', '.join(repr(name) for name in moving)} that change no joint coordinate"
         )
     return tuple(named)
-
-
-def rigid_scale(compiled: CompiledSystem) -> Array:
-    """Return scale lengths of translations, and 1 for rotations, (6 n_b,), which give all unknowns the same unit."""
-    return np.tile(np.repeat([compiled.length, 1.0], 3), len(compiled.body_names))
 
 
 def scaled_rows(compiled: CompiledSystem, G: Array) -> Array:

@@ -25,6 +25,7 @@ from floatframe.errors import ModelError
 __all__ = ["Rolling", "rolled", "rolling"]
 
 RANK = 1e-10  #: singular value of the scaled rows below which a row is redundant
+SAME = 1e-8  #: difference of two velocity constraints, relative to their terms, below which they are the same
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +67,8 @@ def rolling(parts: Tangents, Omega: Array, N: Array, inputs: Inputs) -> Rolling 
     rank = int((values > RANK * values[0]).sum())
     known = left[:, :rank].T @ (B / size[:, None])
     repeated = left[:, rank:].T @ (B / size[:, None])
-    if np.abs(repeated).max(initial=0.0) > 1e-8 * np.abs(B / size[:, None]).max(initial=1.0):
+    terms = (np.abs(parts.G_x[rows]) + np.abs(parts.G_v[rows]) @ np.abs(Omega)) @ np.abs(N) / size[:, None]
+    if np.abs(repeated).max(initial=0.0) > SAME * terms.max(initial=0.0):
         raise ModelError(
             "linearize: rolling joints contradict each other: their velocity constraints are redundant, but the "
             "positions that follow from them differ"

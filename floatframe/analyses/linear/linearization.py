@@ -530,14 +530,17 @@ def motions_of_inputs(
     E = by_inputs.E[parts.holds]
     Y = np.zeros((small.n_u, E.shape[1]))
     free, _ = parts.body_forces(by_inputs)
+    lengths, rows = small.compiled.motion_lengths, small.compiled.gap_sizes[parts.holds]
     for k, base in enumerate(small.bases):
         if base.moved:
             rigid = small.rigid(base)
-            if np.abs(parts.G @ rigid + E[:, k]).max(initial=0.0) <= RANK * max(1.0, np.abs(E[:, k]).max(initial=0.0)):
+            size = rows * np.abs(rigid * lengths).max() / small.compiled.length
+            if (np.abs(parts.G @ rigid + E[:, k]) <= RANK * size).all():
                 Y[:, k] = rigid
                 continue
         if moves[k] and E[:, k].any():
-            Y[:, k] = -np.linalg.lstsq(parts.G, E[:, k], rcond=RANK)[0]
+            G, moved = parts.G / lengths / rows[:, None], E[:, k] / rows
+            Y[:, k] = -np.linalg.lstsq(G, moved, rcond=RANK)[0] / lengths
     size = np.abs(Y)
     if moves.any():
         load = without_rounding(N, free[:, moves], D_0, Y[:, moves], size[:, moves])
@@ -564,7 +567,7 @@ def named_motions(
 ) -> NamedMotions:
     """Return the moving joint coordinates, the modal coordinates, and the motions of body frames, as rows over z."""
     length, found = system.units.length_symbol, []
-    sizes = sizes_as_lengths(system)
+    sizes = compiled_system(system).motion_lengths
     N, by_bodies = without_noise(N, sizes), without_noise(by_bodies, sizes)
     for name, row in of_joints.items():
         unit = "rad" if name.rpartition(".")[2].startswith("angle") else length
@@ -583,17 +586,6 @@ def named_motions(
     names, units, over_z, ranks = zip(*found, strict=True)
     rows = np.pad(np.array(over_z), ((0, 0), (0, n_states)))
     return NamedMotions(names, units, rows, ranks, system.units.time_symbol)
-
-
-def sizes_as_lengths(system: System) -> Array:
-    """Return a length for a unit of each motion, (n_u,): the system size for rotations, 1/sqrt(mass) for modes."""
-    compiled = compiled_system(system)
-    model = compiled.model
-    sizes = np.ones(int(model.bodies.u0[-1]))
-    for i, first in enumerate(map(int, model.bodies.u0[:-1])):
-        sizes[first + 3 : first + 6] = compiled.length
-        sizes[first + 6 : int(model.bodies.u0[i + 1])] = 1 / np.sqrt(model.body_types.mass[model.bodies.kind[i]])
-    return sizes
 
 
 def modes_among_motions(system: System) -> NDArray[np.bool_]:
@@ -623,7 +615,7 @@ def allowed_motions(system: System, G: Array) -> Array:
     Some motions d follow the others i, N_i = 1 and N_d = -G_d⁺ G_i. Bodies depend before modes do, so that stiff modes
     have columns of their own: in a mixed basis, the rounding of a stiffness of 1e10 hides motions of a few hertz.
     """
-    sizes = sizes_as_lengths(system)
+    sizes = compiled_system(system).motion_lengths
     is_mode = modes_among_motions(system)
     C = G / sizes
     size = np.linalg.norm(C, axis=1)

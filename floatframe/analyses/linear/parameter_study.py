@@ -169,9 +169,15 @@ def modes_at(linear: LinearSystem) -> Modes:
 
 
 def root_of(mass: Array) -> Array:
-    """Return the symmetric square root of the mass matrix of a body, which changes continuously with the matrix."""
-    values, vectors = np.linalg.eigh(mass)
-    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)
+    """Return a square root of the mass matrix of a body, which changes continuously with the matrix.
+
+    It is the symmetric one for motions of mass 1: in units of translations, rotations and modes, the eigenvalues of the
+    matrix lie too far apart for a small or large body.
+    """
+    size = np.sqrt(np.diag(mass))
+    scale = 1 / np.where(size > 0, size, 1.0)
+    values, vectors = np.linalg.eigh(scale[:, None] * mass * scale)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T * size)
 
 
 def follow(

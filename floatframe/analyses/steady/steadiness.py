@@ -105,9 +105,9 @@ def require_steady(
     N_later = turned.T @ N
     of_now = parts.full(*turning_matrices(model, work, about.omega))
     of_then = others.full(*turning_matrices(model, other, about.omega))
-    size = np.abs(parts.G).max(initial=0.0) * max(compiled.length, 1.0)
+    motions = np.abs(N_later * compiled.motion_lengths[:, None]).max(axis=0) / compiled.length
     gaps = others.G @ N_later
-    if np.abs(gaps).max(initial=0.0) > SAME * size:
+    if (np.abs(gaps) > SAME * np.outer(compiled.gap_sizes[parts.holds], motions)).any():
         raise ModelError(f"{NOT} {later:.3g} time units later, its joints allow other motions")
     for name, one, two in zip(("stiffness", "damping"), of_now, of_then, strict=False):
         first, second = S.T @ (N.T @ one @ N), S.T @ (N_later.T @ two @ N_later)
@@ -143,7 +143,9 @@ def carrier_of(compiled: CompiledSystem, state: State, omega: Array) -> Carrier:
     for i, u0 in enumerate(bodies.u0[:-1]):
         rates = state.u[u0 + 6 : bodies.u0[i + 1]]
         own = state.q[bodies.q0[i] : bodies.q0[i + 1]]
-        if np.abs(rates).max(initial=0.0) * compiled.length > ALONG * size * max(np.abs(own).max(initial=0.0), 1.0):
+        lengths = compiled.motion_lengths[u0 + 6 : bodies.u0[i + 1]]
+        shape = np.abs(own * lengths).max(initial=0.0) / compiled.length
+        if np.abs(rates * lengths).max(initial=0.0) > ALONG * size * max(shape, 1.0):
             raise ModelError(
                 f"{NOT} modal coordinates of body {compiled.body_names[i]!r} change; use the state of steady_motion, "
                 "or integrate until they are constant"

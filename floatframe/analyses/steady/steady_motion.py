@@ -17,6 +17,7 @@ from floatframe.analyses.equilibrium import (
     forces_at_work,
     largest_motion,
     notes_at,
+    rounding_of,
     size_of,
     worst_body,
 )
@@ -38,7 +39,7 @@ from floatframe.engine.initial_conditions.newton_equations import (
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import ConvergenceError, ModelError
 from floatframe.model.checked_values import unit_vector
-from floatframe.model.joints.rows import is_held, is_held_position
+from floatframe.model.joints.rows import is_held_position
 from floatframe.model.rotations import rotation_matrix, tilde
 from floatframe.model.state import State
 from floatframe.model.system import System
@@ -61,7 +62,10 @@ __all__ = ["Equations", "Family", "Place", "SteadyMotion", "Step", "Trial", "ste
 
 
 SINGULAR = 1e-12  #: singular value of the scaled equations below which a motion has no resistance
-DIFFERENCE = 1e-4  #: finite difference of an open parameter, relative to max(1, its magnitude)
+DIFFERENCE = 1e-4  #: first finite difference of an open parameter, relative to its magnitude, or of one that is zero
+#: change of forces by such a difference, relative to the acting forces: the wanted one, the smallest and the largest
+EFFECT, LEAST_EFFECT, MOST_EFFECT = 1e-5, 1e-9, 1e-2
+MOST_DIFFERENCES = 4  #: tried for each parameter
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,22 +195,23 @@ class Equations:
             trial.p + rest[len(rest) - len(trial.p) :],
         )
 
-    def change(self, here: Place, x: Array) -> float:
-        """Return the largest of the changes x, relative to the magnitudes of the unknowns."""
+    def change(self, here: Place, step: Step) -> float:
+        """Return the largest of the changes of a step, relative to the magnitudes of the unknowns."""
         trial, model, length = here.trial, here.compiled.model, here.compiled.length
-        after = self.moved(here, x)
+        after = self.moved(here, step.x)
         dw, of_states = after.w - trial.w, np.concatenate([model.states.row, model.laws.equation]).astype(int)
-        sizes = np.maximum(np.concatenate([model.states.size, model.laws.equation_size]), np.abs(trial.w[of_states]))
+        of_rows = np.maximum(np.concatenate([model.states.size, model.laws.equation_size]), np.abs(trial.w[of_states]))
+        sizes = step.sizes
         own = np.zeros(len(dw), dtype=bool)
         own[of_states] = True
         turning = float(np.linalg.norm(after.carrier.omega - trial.carrier.omega))
         changes = [
-            largest_motion(here.compiled, x[: len(here.now.f)]),
+            largest_motion(here.compiled, step.x[: len(here.now.f)]),
             largest(dw[~own]) / max(largest(trial.w[~own]), 1e-300),
-            largest(dw[of_states] / sizes),
+            largest(dw[of_states] / of_rows),
             largest(after.s - trial.s) / max(largest(trial.s), 1e-300),
             turning * length / max(self.path.speed, 1e-300),
-            largest((after.p - trial.p) / np.maximum(np.abs(trial.p), 1.0)),
+            largest((after.p - trial.p) / np.maximum(np.abs(trial.p), sizes[len(sizes) - len(trial.p) :])),
         ]
         return float(max(changes))
 
@@ -237,9 +242,9 @@ class Equations:
             forces_at_work(compiled, work, parts, W),
         )  # fmt: skip
 
-    def fastest(self, trial: Trial) -> float:
-        """Return the speed of the system, or of its fastest spin if it stands, in system sizes per unit of time."""
-        return self.path.speed or float(np.abs(trial.s).max(initial=0.0)) or 1.0
+    def fastest(self, trial: Trial, length: float) -> float:
+        """Return the speed of the system, or of points turned by its fastest spin if it stands."""
+        return self.path.speed or (float(np.abs(trial.s).max(initial=0.0)) or 1.0) * length
 
     def used_rows(self, compiled: CompiledSystem) -> tuple[IntArray, IntArray, IntArray]:
         """Return the rows that are equations, the unknowns of connections, and the rows that constrain positions."""
@@ -294,13 +299,13 @@ class Equations:
         sizes = self.sizes(compiled, trial, now, unknowns)
         of_rows = np.zeros(len(A))  # rates that depend on no spin are rounding errors
         of_rows[n_u + len(rows) : len(A) - len(gap)] = (
-            np.abs(G_x[held]) @ sizes[:n_u] * self.fastest(trial) / compiled.length
+            np.abs(G_x[held]) @ sizes[:n_u] * self.fastest(trial, compiled.length) / compiled.length
         )
         inverse, sizes = smallest_inverse(A, of_rows, sizes, len(trial.p))
         return Step(inverse @ self.residual(here), inverse, sizes)
 
     def sizes(self, compiled: CompiledSystem, trial: Trial, now: Evaluated, unknowns: IntArray) -> Array:
-        """Return typical magnitudes of the unknowns of a step."""
+        """Return typical magnitudes of the unknowns of a step; 1 for parameters, as their effect gives their size."""
         model = compiled.model
         motions = np.ones(len(now.f))
         force = max(float(np.abs(trial.w).max(initial=0.0)), weight_of(now), 1e-300)
@@ -311,20 +316,25 @@ class Equations:
         w = np.full(len(now.g), force)
         w[model.states.row] = np.maximum(model.states.size, np.abs(trial.w[model.states.row]))
         w[model.laws.equation] = model.laws.equation_size
-        speed = self.fastest(trial) / compiled.length
+        speed = self.fastest(trial, compiled.length) / compiled.length
         others = [*(speed,) * len(self.spins), *(1 / compiled.length,) * self.path.is_open]
-        return np.concatenate([motions, w[unknowns], others, np.maximum(np.abs(trial.p), 1.0)])
+        return np.concatenate([motions, w[unknowns], others, np.ones(len(trial.p))])
 
     def by_numbers(self, trial: Trial, now: Evaluated, rows: IntArray, held: IntArray, n_gaps: int) -> list[Array]:
         """Return the derivatives by the open parameters, step (4)."""
         columns = []
         for k, value in enumerate(trial.p):
-            h = DIFFERENCE * max(abs(value), 1.0)
-            p = trial.p.copy()
-            p[k] += h
-            compiled = compiled_system(self.family.at(p))
-            work = timed(new_work(compiled.model), self.t)
-            after = self.evaluated(compiled, work, replace(trial, p=p))
+            h = DIFFERENCE * (abs(value) or 1.0)
+            for _ in range(MOST_DIFFERENCES):
+                p = trial.p.copy()
+                p[k] += h
+                compiled = compiled_system(self.family.at(p))
+                work = timed(new_work(compiled.model), self.t)
+                after = self.evaluated(compiled, work, replace(trial, p=p))
+                effect = size_of(now.W, after.f - now.f) / now.scale if now.scale > 0 else 0.0
+                if not effect or LEAST_EFFECT <= effect <= MOST_EFFECT:
+                    break
+                h *= EFFECT / effect
             # rates are evaluated after the joints are satisfied again, as for motions
             parts = [after.f - now.f, (after.g - now.g)[rows], np.zeros(len(held) + n_gaps)]
             columns.append(np.concatenate(parts) / h)
@@ -332,9 +342,12 @@ class Equations:
 
     def is_closed(self, here: Place) -> bool:
         """Whether joint constraints and their rates are satisfied."""
-        holds, length, now = is_held(here.compiled.model.rows.kind), here.compiled.length, here.now
-        gap = largest(now.g[holds]) / max(length, 1.0)
-        return max(gap, largest(now.rate) / max(self.path.speed, self.path.speed / length, 1.0)) <= CLOSED
+        compiled, now, size = here.compiled, here.now, here.compiled.gap_sizes
+        pace = self.fastest(here.trial, compiled.length) / compiled.length
+        noise = rounding_of(compiled, now.parts, here.trial.state)
+        held = is_held_position(compiled.model.rows.kind)
+        is_closed = (np.abs(now.g) <= CLOSED * size + noise)[held].all()
+        return bool(is_closed and (np.abs(now.rate) <= pace * (CLOSED * size + noise)).all())
 
 
 def largest(values: Array) -> float:
@@ -489,7 +502,7 @@ class Search:
         errors, is_stuck = [np.inf], False
         for iteration in range(max_iterations + 1):
             step = equations.step(here)
-            change = equations.change(here, step.x)
+            change = equations.change(here, step)
             error = here.now.error
             if error <= self.tolerance and change <= SETTLED and equations.is_closed(here):
                 return self.result(here, iteration)

@@ -50,7 +50,7 @@ from floatframe.model.bodies.mean_axes import FrameMotion, MeanAxes
 from floatframe.model.bodies.rigid_body import RigidBody
 from floatframe.model.forces import Gravity, PointForce, SpringDamper
 from floatframe.model.functions.time_functions import TimeFunction
-from floatframe.model.joints.rows import MOMENT, NO_MOMENT, kind_of
+from floatframe.model.joints.rows import COUPLE, MOMENT, NO_MOMENT, RELEASED, is_held_length, kind_of
 from floatframe.model.joints.sliding import SlidingJoint, line_triad
 from floatframe.model.rotations import euler_parameters, rotation_matrix
 from floatframe.model.state import State
@@ -217,6 +217,28 @@ class CompiledSystem:
     length: float  #: size of the system as placed [m]; scales rotations against translations
     angles: tuple[CountedAngle, ...]  #: angles between bodies whose turns are counted
     angle_motions: tuple[TimeFunction | None, ...]  #: that prescribe them
+
+    @property
+    def gap_sizes(self) -> Array:
+        """The size by which the gap of each row is judged, (n_w,).
+
+        The length of the system for a length, 1 for an angle, and for the sum of a coupler that of its terms.
+        """
+        rows, coordinates = self.model.rows, self.model.coordinates
+        size = np.where(is_held_length(rows.kind), self.length, 1.0)
+        terms = np.abs(coordinates.factor) * np.where(rows.is_angle[coordinates.row], 1.0, self.length)
+        sums = np.bincount(coordinates.core, terms, minlength=len(size))[: len(size)]
+        is_sum = np.isin(rows.kind, (COUPLE, RELEASED)) & (sums > 0.0)
+        return np.where(is_sum, sums, size)
+
+    @property
+    def motion_lengths(self) -> Array:
+        """A length for a unit of each motion, (n_u,): the system size for rotations, 1/sqrt(mass) for modes."""
+        bodies, lengths = self.model.bodies, np.ones(int(self.model.bodies.u0[-1]))
+        for i, first in enumerate(map(int, bodies.u0[:-1])):
+            lengths[first + 3 : first + 6] = self.length
+            lengths[first + 6 : int(bodies.u0[i + 1])] = 1 / np.sqrt(self.model.body_types.mass[bodies.kind[i]])
+        return lengths
 
     @property
     def resting_model(self) -> Model:
@@ -514,11 +536,12 @@ def body_sizes(made: ConnectionLists, places: list[Array], placed: State, radii:
     for c, i in zip(made.connection_of, bodies, strict=True):
         if c >= 0 and i >= 0:
             together[head(i)] = head(first.setdefault(c, i))
-    size, low, high = np.zeros(n_b), np.full((n_b, 3), np.inf), np.full((n_b, 3), -np.inf)
+    size = np.zeros(n_b)
+    points: list[list[Array]] = [[] for _ in range(n_b)]  # of the bodies connected to each head
     for i in range(n_b):
         k = head(i)
         size[k] = max(size[k], radii[i])
-        low[k], high[k] = np.minimum(low[k], placed.r[i]), np.maximum(high[k], placed.r[i])
+        points[k].append(placed.r[i])
     for marker, c, place in zip(made.markers, made.connection_of, places, strict=True):
         i = marker.body if marker.body >= 0 else first.get(c, -1)
         if i < 0:
@@ -526,12 +549,22 @@ def body_sizes(made: ConnectionLists, places: list[Array], placed: State, radii:
         k = head(i)
         if marker.body >= 0:
             size[k] = max(size[k], float(np.linalg.norm(marker.shape.position)))
-        low[k], high[k] = np.minimum(low[k], place), np.maximum(high[k], place)
+        points[k].append(place)
     heads = [head(i) for i in range(n_b)]
-    return np.maximum(size, np.linalg.norm(high - low, axis=1))[heads]
+    return np.array([max(size[k], extent(np.array(points[k]))) for k in range(n_b)])[heads]
+
+
+def extent(points: Array) -> float:
+    """Return the largest distance between two points, (n, 3); it does not depend on the direction of the axes."""
+    if len(points) < 2:
+        return 0.0
+    radii = np.linalg.norm(points - points.mean(axis=0), axis=1)
+    least = float(np.linalg.norm(points - points[np.argmax(radii)], axis=1).max())
+    outer = points[radii >= least - radii.max()]  # two points nearer to the centre are no further apart than `least`
+    return max(least, *(float(np.linalg.norm(outer - each, axis=1).max()) for each in outer))
 
 
 def system_length(sizes: Array, places: list[Array], placed: State) -> float:
     """Return the largest size of connected bodies, or the extent of the whole system; 1 if all are 0."""
     points = np.array([*places, *placed.r])
-    return max(float(sizes.max()), float(np.linalg.norm(np.ptp(points, axis=0)))) or 1.0
+    return max(float(sizes.max()), extent(points)) or 1.0

@@ -42,7 +42,7 @@ from floatframe.engine.tree.tree_motions import coordinate_motions
 from floatframe.errors import ModelError
 from floatframe.model.bodies.rigid_body import euler_parameters_from_user
 from floatframe.model.checked_values import array_of_shape
-from floatframe.model.joints.rows import DOT, TURN, TURN_B, is_held, is_held_length, is_held_position
+from floatframe.model.joints.rows import DOT, TURN, TURN_B, is_held, is_held_position
 from floatframe.model.state import State
 from floatframe.model.system import System
 
@@ -223,7 +223,7 @@ def assembled(compiled: CompiledSystem, work: Work, state: State, known: Array |
 def closed(compiled: CompiledSystem, model: Model, work: Work, state: State, w: Array) -> tuple[State, Array]:
     """Return the state with the joints of a model closed, and the remaining gaps of its rows: (n_w,), zero if none."""
     holds = is_held_position(model.rows.kind)
-    scale = np.where(is_held_length(model.rows.kind), compiled.length, 1.0)
+    scale = compiled.gap_sizes
     for _ in range(MOST_ITERATIONS):
         set_iterate(work, state, w=w)
         parts = linearized(model, work, 1.0, 0.0, 0.0)

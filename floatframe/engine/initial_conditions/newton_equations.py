@@ -1,6 +1,7 @@
 """The linearised equations at one iterate, and their solution, for all computations done once per motion."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,6 +15,7 @@ from floatframe.model.state import State
 
 __all__ = [
     "Linearized",
+    "balanced_scales",
     "displaced",
     "highest_frequency",
     "in_body_axes",
@@ -110,7 +112,10 @@ def entries(parts: list[tuple[Array, int, int]]) -> tuple[Array, IntArray, IntAr
 
 
 def solve(H: tuple[Array, ...], parts: Linearized, forces: Array, rows: Array) -> tuple[Array, Array]:
-    """Solve H y - Jᵀ w = forces, G y + V w = rows; return y, (n_u,), and w, (n_w,)."""
+    """Solve H y - Jᵀ w = forces, G y + V w = rows; return y, (n_u,), and w, (n_w,).
+
+    The equations are scaled by `balanced_scales`: otherwise units and the size of the system would choose the pivots.
+    """
     n_u, n = len(forces), len(forces) + len(rows)
     first = np.cumsum([0, *(len(block) for block in H)]).tolist()
     values, row, column = entries([(block, k, k) for block, k in zip(H, first, strict=False)])
@@ -120,8 +125,28 @@ def solve(H: tuple[Array, ...], parts: Linearized, forces: Array, rows: Array) -
     values = np.concatenate([values[is_there], -J.data, G.data, V.data])
     row = np.concatenate([row[is_there], J.indices, n_u + G_row, n_u + V_row])
     column = np.concatenate([column[is_there], n_u + J_row, G.indices, n_u + V.indices])
-    solution = splu(sp.csc_array((values, (row, column)), shape=(n, n))).solve(np.concatenate([forces, rows]))
+    diagonal = np.concatenate([np.diag(block) for block in H]) if H else np.zeros(0)
+    of_columns, of_rows = balanced_scales(diagonal, abs(J), abs(G), abs(V))
+    matrix = sp.csc_array((of_rows[row] * values * of_columns[column], (row, column)), shape=(n, n))
+    solution = of_columns * splu(matrix).solve(of_rows * np.concatenate([forces, rows]))
     return solution[:n_u], solution[n_u:]
+
+
+def balanced_scales(diagonal: Array, J: Any, G: Any, V: Any) -> tuple[Array, Array]:
+    """Return scales of the unknowns (y, w) and of the equations for which H has a unit diagonal and rows have size one.
+
+    Parameters
+    ----------
+    diagonal
+        Diagonal of H, (n_u,).
+    J, G, V
+        Magnitudes of the other matrices, dense or sparse, (n_w, n_u) and (n_w, n_w).
+    """
+    of_y = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
+    of_w = J @ of_y
+    of_w = 1 / np.where(of_w > 0, of_w, 1.0)
+    of_rows = G @ of_y + V @ of_w
+    return np.concatenate([of_y, of_w]), np.concatenate([of_y, 1 / np.where(of_rows > 0, of_rows, 1.0)])
 
 
 def modal_diagonals(model: Model, i: int, which: int) -> Array:

@@ -44,17 +44,37 @@ from tests.floatframe.other_units import Other, in_units
 R = Rotation.from_rotvec([0.7, -0.4, 1.1]).as_matrix()
 PLACE = np.array([300.0, -200.0, 150.0])
 UNITS = ["mm-t-s", "mm-kg-ms", "in-slinch-s"]
+#: systems of other size in SI, of the same density under the same gravity: their numbers are those of such units
+SIZES = {
+    "micrometres": replace(unit_system("m-kg-s"), name="of micrometres", length=1e6, mass=1e18, time=1e3),
+    "1000 km": replace(unit_system("m-kg-s"), name="of 1000 km", length=1e-6, mass=1e-18, time=1e-3),
+}
+SI = unit_system("m-kg-s")
 TIMES = np.linspace(0, 0.3, 7)
 
 
-def elsewhere(system, other):
-    """Return a system in other units, turned and off the origin; in SI, as it is."""
-    return system if other.units == unit_system("m-kg-s") else in_units(system, other.units, R, PLACE)
+def other_units(name):
+    """Return other units, or other sizes, by name."""
+    return Other(SIZES.get(name) or unit_system(name))
+
+
+def elsewhere(system, other, turn=R, place=PLACE):
+    """Return a system in other units, or of another size, turned and off the origin; in SI, as it is."""
+    if other.units == SI:
+        return system
+    moved = in_units(system, other.units, turn, place)
+    if other.units not in SIZES.values():
+        return moved
+    bodies = [
+        replace(body, reduced=replace(body.reduced, units=SI)) if isinstance(body, FlexibleBody) else body
+        for body in moved.bodies
+    ]
+    return replace(moved, bodies=bodies, units=SI)
 
 
 def directions(other):
     """Return the rotation of the moved system and its place in its units; none in SI."""
-    return (np.eye(3), np.zeros(3)) if other.units == unit_system("m-kg-s") else (R, PLACE * other.factor("m"))
+    return (np.eye(3), np.zeros(3)) if other.units == SI else (R, PLACE * other.factor("m"))
 
 
 # driven motions -------------------------------------------------------------------------------------------------------
@@ -98,15 +118,15 @@ SYSTEMS = {"manipulator": manipulator, "crank": crank}
 
 @cache
 def driven(name, analysis, units):
-    other = Other(unit_system(units))
+    other = other_units(units)
     return analysis(elsewhere(SYSTEMS[name](), other), TIMES * other.factor("s"))
 
 
-@pytest.mark.parametrize("units", UNITS)
+@pytest.mark.parametrize("units", [*UNITS, *SIZES])
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_driven_bodies_move_alike_in_other_units(name, units):
     a, b = driven(name, kinematics, "m-kg-s"), driven(name, kinematics, units)
-    other = Other(unit_system(units))
+    other = other_units(units)
     for body in a.body_names:
         one, two = a.body(body), b.body(body)
         assert_allclose((two.r / other.factor("m") - PLACE) @ R, one.r, rtol=0, atol=1e-9)
@@ -117,11 +137,11 @@ def test_driven_bodies_move_alike_in_other_units(name, units):
         assert_allclose(two.omega_B / other.factor("1/s"), one.omega_B, rtol=0, atol=1e-8 * 10)
 
 
-@pytest.mark.parametrize("units", UNITS)
+@pytest.mark.parametrize("units", [*UNITS, *SIZES])
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_drives_and_reactions_are_alike_in_other_units(name, units):
     a, b = driven(name, inverse_dynamics, "m-kg-s"), driven(name, inverse_dynamics, units)
-    other = Other(unit_system(units))
+    other = other_units(units)
     assert set(a.drives) == set(b.drives) != set()
     for key, one in a.drives.items():
         value, force = ("rad", "N m") if key.endswith("angle") else ("m", "N")
@@ -138,23 +158,23 @@ def test_drives_and_reactions_are_alike_in_other_units(name, units):
             assert_allclose(found, expected, rtol=0, atol=1e-7 * np.abs(one.force).max(), err_msg=joint.name)
 
 
-@pytest.mark.parametrize("units", UNITS)
+@pytest.mark.parametrize("units", [*UNITS, *SIZES])
 @pytest.mark.parametrize("has_rotation", [False, True])
 def test_poses_that_reach_a_target_are_alike_in_other_units(has_rotation, units):
-    """Errors of place and rotation are weighed by the size of the system, a box along the ground axes: not turned."""
+    """Errors of place and rotation are weighed by the size of the system, which does not depend on its direction."""
     found = {}
     for name in ("m-kg-s", units):
-        other = Other(unit_system(name))
+        other = other_units(name)
         plain = manipulator()
         free = replace(plain, joints=[replace(joint, motions={}) for joint in plain.joints])
-        turn, place = (np.eye(3), np.zeros(3)) if has_rotation else directions(other)
+        turn, place = directions(other)
         goal = Target(Marker("block", position=np.array([0.1, 0.0, 0.05]) * other.factor("m")),
                       turn @ np.array([1.0, 0.3, 0.2]) * other.factor("m") + place,
-                      R if has_rotation else None)  # fmt: skip
-        moved = in_units(free, other.units, turn, np.zeros(3)) if has_rotation else elsewhere(free, other)
+                      turn @ R if has_rotation else None)  # fmt: skip
+        moved = elsewhere(free, other)
         limits = {"slide.distance": (-0.05 * other.factor("m"), 0.02 * other.factor("m"))}
         found[name] = inverse_kinematics(moved, goal, limits=limits)
-    a, b, other = found["m-kg-s"], found[units], Other(unit_system(units))
+    a, b, other = found["m-kg-s"], found[units], other_units(units)
     assert not a.is_reached
     assert a.at_limits == b.at_limits != ()
     assert_allclose(b.position_error / other.factor("m"), a.position_error, rtol=1e-7)
@@ -170,7 +190,7 @@ def test_poses_that_reach_a_target_are_alike_in_other_units(has_rotation, units)
 @cache
 def curve(units):
     """Return a car in a curve of 60 m: steer angle, push and small motions about it."""
-    other = Other(unit_system(units))
+    other = other_units(units)
 
     def car(steer, push):
         plain = Car().system(15.0, steer=steer)
@@ -182,9 +202,9 @@ def curve(units):
                          unknown={"steer": 0.04, "push": 10.0 * other.factor("N")}, axis=turn[:, 2])  # fmt: skip
 
 
-@pytest.mark.parametrize("units", UNITS)
+@pytest.mark.parametrize("units", [*UNITS, *SIZES])
 def test_a_steady_curve_is_alike_in_other_units(units):
-    a, b, other = curve("m-kg-s"), curve(units), Other(unit_system(units))
+    a, b, other = curve("m-kg-s"), curve(units), other_units(units)
     assert_allclose(b.found["steer"], a.found["steer"], rtol=1e-6)
     assert_allclose(b.found["push"] / other.factor("N"), a.found["push"], rtol=1e-6)
     assert_allclose(b.speed / other.factor("m/s"), a.speed, rtol=1e-12)
@@ -212,25 +232,25 @@ def rotor():
                                     tilt_stiffness=300.0, tilt_damping=0.03)])  # fmt: skip
 
 
-@pytest.mark.parametrize("units", UNITS)
+@pytest.mark.parametrize("units", [*UNITS, *SIZES])
 def test_campbell_diagrams_are_alike_in_other_units(units):
     speeds, found = np.array([0.0, 150.0, 400.0]), {}
     for name in ("m-kg-s", units):
-        other = Other(unit_system(name))
+        other = other_units(name)
         turn, place = directions(other)
         found[name] = campbell(elsewhere(rotor(), other), speeds * other.factor("1/s"), axis=turn[:, 2], center=place)
-    a, b = found["m-kg-s"].eigenvalues, found[units].eigenvalues / Other(unit_system(units)).factor("1/s")
+    a, b = found["m-kg-s"].eigenvalues, found[units].eigenvalues / other_units(units).factor("1/s")
     lines = [x[:, (np.abs(x) > 1.0).all(axis=0)] for x in (a, b)]  # without the turning, which costs nothing
     assert lines[0].shape == lines[1].shape == (3, 2)
     a, b = (x[:, np.argsort(x[-1].imag)] for x in lines)
     assert_allclose(b, a, rtol=0, atol=1e-6 * np.abs(a).max())
 
 
-@pytest.mark.parametrize("units", UNITS)
+@pytest.mark.parametrize("units", [*UNITS, *SIZES])
 def test_root_loci_are_alike_in_other_units(units):
     stiffness, found = np.array([50.0, 200.0, 900.0]), {}
     for name in ("m-kg-s", units):
-        other = Other(unit_system(name))
+        other = other_units(name)
         plain = manipulator()
         arm = replace(plain, joints=[replace(plain.joints[0], motions={}), *plain.joints[1:]])
 
@@ -239,7 +259,7 @@ def test_root_loci_are_alike_in_other_units(units):
             return linearize(elsewhere(replace(arm, forces=[arm.forces[0], stay]), other))
 
         found[name] = root_locus(at, stiffness * other.factor("N/m"))
-    a, b = found["m-kg-s"].eigenvalues, found[units].eigenvalues / Other(unit_system(units)).factor("1/s")
+    a, b = found["m-kg-s"].eigenvalues, found[units].eigenvalues / other_units(units).factor("1/s")
     assert_allclose(np.sort_complex(b), np.sort_complex(a), rtol=1e-6, atol=1e-7 * np.abs(a).max())
 
 
@@ -298,7 +318,7 @@ def test_sweeps_of_a_file_are_alike_in_other_units(analysis, of, take, unit, uni
     """Frequencies and decay stand in hertz and per second in any unit system; what sensors measure, in its units."""
     columns = {}
     for name in ("m-kg-s", units):
-        other, folder = Other(unit_system(name)), tmp_path / name
+        other, folder = other_units(name), tmp_path / name
         folder.mkdir()
         numbers = {"g": (-9.81, "m/s^2"), "mass": (1.5, "kg"), "J": (0.2, "kg m^2"), "half": (0.5, "m"),
                    "above": (1.0, "m"), "stiffness": (80.0, "N/m"), "damping": (3.0, "N s/m"),
