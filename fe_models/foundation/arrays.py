@@ -8,7 +8,17 @@ from numpy.typing import NDArray
 
 from fe_models.foundation.errors import BodyError
 
-__all__ = ["Array", "IntArray", "frozen", "frozen_int", "require_finite", "require_shape", "symmetric_csc", "tilde"]
+__all__ = [
+    "Array",
+    "IntArray",
+    "axial",
+    "frozen",
+    "frozen_int",
+    "require_finite",
+    "require_shape",
+    "symmetric_csc",
+    "tilde",
+]
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -83,3 +93,8 @@ def tilde(a: Array) -> Array:
     S = np.zeros((*a.shape, 3), np.result_type(a, float))
     S[..., 2, 1], S[..., 0, 2], S[..., 1, 0] = a[..., 0], a[..., 1], a[..., 2]
     return S - np.swapaxes(S, -1, -2)
+
+
+def axial(V: Array) -> Array:
+    """Return Σ o × f, (..., 3), from V = Σ f oᵀ, (..., 3, 3); this is twice a if V = tilde(a)."""
+    return np.stack([V[..., 2, 1] - V[..., 1, 2], V[..., 0, 2] - V[..., 2, 0], V[..., 1, 0] - V[..., 0, 1]], axis=-1)

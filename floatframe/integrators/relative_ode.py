@@ -375,7 +375,7 @@ class Motion:
         self.accelerations(t, x, rates)
         projected(self.model, self.work, self.tree, self.joints)
         state = self.work.state
-        p = np.array([euler_parameters(R) for R in state.R])
+        p = euler_parameters(state.R)
         p *= np.where((p * self.p).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]  # of the two signs, the nearer one
         self.p = p
         return State(state.r, p, state.q, state.u), state.u_dot.copy(), state.w.copy()

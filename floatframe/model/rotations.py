@@ -15,7 +15,7 @@ kernels in kernels/rotation.py contain the same formulas for one vector, compile
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array, tilde
+from fe_models.foundation.arrays import Array, axial, tilde
 
 __all__ = [
     "continued_rotation",
@@ -76,26 +76,20 @@ def rotation_matrix(p: Array) -> Array:
 
 
 def euler_parameters(R: Array) -> Array:
-    """Return p, (4,), with w >= 0, for a rotation matrix, (3, 3).
+    """Return p, (..., 4), with w >= 0, for rotation matrices, (..., 3, 3).
 
-    The largest of the four squares (from trace and diagonal) is computed first, so that no division by a small number
-    occurs.
+    From the row p_i p with the largest p_i of the products p_j p_k, so that no small number is divided by.
     """
     R = np.asarray(R, dtype=float)
-    trace = np.trace(R)
-    squares = np.array([1 + trace, *(1 + 2 * np.diag(R) - trace)]) / 4
-    largest = int(np.argmax(squares))
-    products = np.array(
-        [  # p_i p_j
-            [squares[0], (R[2, 1] - R[1, 2]) / 4, (R[0, 2] - R[2, 0]) / 4, (R[1, 0] - R[0, 1]) / 4],
-            [(R[2, 1] - R[1, 2]) / 4, squares[1], (R[0, 1] + R[1, 0]) / 4, (R[0, 2] + R[2, 0]) / 4],
-            [(R[0, 2] - R[2, 0]) / 4, (R[0, 1] + R[1, 0]) / 4, squares[2], (R[1, 2] + R[2, 1]) / 4],
-            [(R[1, 0] - R[0, 1]) / 4, (R[0, 2] + R[2, 0]) / 4, (R[1, 2] + R[2, 1]) / 4, squares[3]],
-        ]
-    )
-    p = products[largest] / np.sqrt(squares[largest])
-    p /= np.linalg.norm(p)
-    return p if p[0] >= 0 else -p
+    trace = np.trace(R, axis1=-2, axis2=-1)[..., None]
+    squares = np.concatenate([1 + trace, 1 + 2 * np.diagonal(R, axis1=-2, axis2=-1) - trace], axis=-1)
+    products = np.zeros((*squares.shape, 4))  # 4 p_j p_k
+    products[..., 0, 1:] = products[..., 1:, 0] = axial(R)
+    products[..., 1:, 1:] = R + np.swapaxes(R, -1, -2)
+    products[..., range(4), range(4)] = squares
+    p = np.take_along_axis(products, squares.argmax(axis=-1)[..., None, None], axis=-2)[..., 0, :]
+    p /= np.linalg.norm(p, axis=-1, keepdims=True)
+    return np.where(p[..., :1] < 0.0, -p, p)
 
 
 def euler_parameters_of_rotation_vector(theta: Array) -> Array:
@@ -212,7 +206,7 @@ def spin_rate(theta: Array, rate: Array, second: Array) -> Array:
 
 
 def rotation_log(R: Array) -> Array:
-    """Return the rotation vector, (3,) [rad], of a rotation matrix; its length is between 0 and pi."""
+    """Return the rotation vectors, (..., 3) [rad], of rotation matrices, (..., 3, 3); their lengths are at most pi."""
     return rotation_vector(euler_parameters(R))
 
 

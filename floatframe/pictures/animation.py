@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from cms.assessment.rendering import Drawing, Lines, Scene, Surface, Triad, render_animation
 from cms.assessment.rendering.drawing import OnFrame
@@ -14,6 +13,7 @@ from fe_models.foundation.arrays import Array, IntArray
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ResultsError
 from floatframe.model.bodies.rigid_body import RigidBody
+from floatframe.model.rotations import rotation_matrix
 from floatframe.model.shapes import Piece
 from floatframe.model.system import Body, System
 from floatframe.pictures.body_colors import DISPLACEMENT, VON_MISES, BodyColor
@@ -138,7 +138,7 @@ def motion_scene(
     named |= {} if system is None else {body.name: body for body in system.bodies}
     scalars = {name: color.values(body, motions[name].q[rows]) for name, body in flexible.items()}
     name_unit, unit_factor = color.unit(trajectory.units, largest_of(scalars))
-    frames = {name: (motion.r[rows], rotations(motion.p[rows])) for name, motion in motions.items()}
+    frames = {name: (motion.r[rows], rotation_matrix(motion.p[rows])) for name, motion in motions.items()}
     size = scene_size(flexible, frames)
     for name, (r, R) in frames.items():
         body = flexible.get(name)
@@ -253,11 +253,6 @@ def hides_flexible(
     return False
 
 
-def rotations(p: Array) -> Array:
-    """Return R_GB, (n, 3, 3), from Euler parameters (w, x, y, z), (n, 4)."""
-    return np.asarray(Rotation.from_quat(p[:, [1, 2, 3, 0]]).as_matrix())
-
-
 def count_nodes(bodies: Mapping[str, ReducedBody | RigidBody]) -> int:
     """Return the number of nodes in a frame."""
     return sum(len(body.nodes) if isinstance(body, ReducedBody) else 8 for body in bodies.values())
@@ -300,7 +295,7 @@ def largest_of(scalars: Mapping[str, Array]) -> float:
 def interface_path(motion: BodyMotion, interface: ReducedInterface, magnification: float) -> Array:
     """Return the positions of an interface in all rows, in ground axes, (n_t, 3)."""
     local = interface.position + magnification * (motion.q @ interface.Psi[:3].T)
-    return np.asarray(motion.r + np.einsum("tab,tb->ta", rotations(motion.p), local))
+    return np.asarray(motion.r + np.einsum("tab,tb->ta", rotation_matrix(motion.p), local))
 
 
 def trail(path: Array, rows: IntArray) -> Lines:

@@ -24,7 +24,7 @@ from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.errors import BodyError
 from cms.reduction.geometric_stiffness.unit_loads import unit_mass_loads
 from fe_models.body.mass_loads import MassLoads
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, axial
 
 __all__ = ["converted_geometric_stiffness", "require_convertible"]
 
@@ -254,8 +254,3 @@ def rotation_moments(reduced: ReducedBody) -> tuple[Array, Array, Array]:
         Psi[i, :3] = np.einsum("kab,b->ak", e, interface.position)
         Psi[i, 3:] = np.eye(3) if interface.has_rotation else 0.0
     return C1, P, Psi
-
-
-def axial(V: Array) -> Array:
-    """Return Σ o × f from V = Σ f oᵀ, (..., 3); this is twice theta if V = theta~."""
-    return np.stack([V[..., 2, 1] - V[..., 1, 2], V[..., 0, 2] - V[..., 2, 0], V[..., 1, 0] - V[..., 0, 1]], axis=-1)

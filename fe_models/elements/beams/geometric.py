@@ -22,7 +22,7 @@ import numpy as np
 from fe_models.body.mass_loads import MassLoads, rotation_work
 from fe_models.elements.beams.attachments import Spring, spring_matrix
 from fe_models.elements.beams.slices import Slices
-from fe_models.foundation.arrays import Array, tilde
+from fe_models.foundation.arrays import Array, axial, tilde
 
 __all__ = [
     "BeamLines", "line_geometric_stiffness", "point_geometric_stiffness", "slice_forces", "spring_geometric_stiffness",
@@ -59,11 +59,6 @@ def slice_forces(slices: Slices, loads: MassLoads) -> Array:
     k, n, p, _ = wrench.shape
     motion = slices.motion.reshape(n, 6 * p, -1).transpose(0, 2, 1)
     return np.asarray(motion @ wrench.transpose(1, 2, 3, 0).reshape(n, 6 * p, k))
-
-
-def axial(V: Array) -> Array:
-    """Return Σ o × f from V = Σ f oᵀ, (..., 3)."""
-    return np.stack([V[..., 2, 1] - V[..., 1, 2], V[..., 0, 2] - V[..., 2, 0], V[..., 1, 0] - V[..., 0, 1]], axis=-1)
 
 
 def line_geometric_stiffness(lines: BeamLines, end_forces: Array, loads: MassLoads) -> Array:

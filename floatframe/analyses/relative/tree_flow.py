@@ -144,7 +144,7 @@ class TreeFlow:
         x[self.tree.column[~is_mode]] = ds[~is_mode]
         work.state.q[self.tree.mode[is_mode]] += ds[is_mode]
         moved(self.model, work, self.tree, joints, x)
-        p = np.array([euler_parameters(R) for R in work.state.R]).reshape(-1, 4)
+        p = euler_parameters(work.state.R)
         p = np.where((p * state.p).sum(axis=1, keepdims=True) < 0, -p, p)
         return replace(state, r=work.state.r.copy(), p=p, q=work.state.q.copy())
 

@@ -10,6 +10,7 @@ from fe_models.foundation.arrays import Array
 from floatframe.machines.antenna.closed_forms import mechanism
 from floatframe.machines.antenna.description import FINE, Antenna, HingePlay
 from floatframe.model.bodies.markers import Marker
+from floatframe.model.rotations import rotation_log
 from floatframe.model.system import System
 from floatframe.results.place_motion import PlaceMotion
 from floatframe.results.sensors.places import place_motion
@@ -73,16 +74,9 @@ def about(axis: str, angle: float) -> np.ndarray:
     return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]] if axis == "y" else [[c, -s, 0], [s, c, 0], [0, 0, 1]])
 
 
-def rotation_vector(R: np.ndarray) -> np.ndarray:
-    """Return the rotation vector of a matrix."""
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_matrix(R).as_rotvec())
-
-
 def place_text(position: np.ndarray, R: np.ndarray) -> str:
     """Return the keys for the position and orientation of a body."""
-    return f"position = {numbers(*position)}\nrotation_vector = {numbers(*rotation_vector(R))}\n"
+    return f"position = {numbers(*position)}\nrotation_vector = {numbers(*rotation_log(R))}\n"
 
 
 def leaf(antenna: Antenna, k: int, theta: float) -> str:

@@ -79,7 +79,7 @@ class Carriers:
             back = np.swapaxes(R, -1, -2)
             rho = rotated(back, place.position[self.rows] - motion.r[self.rows])
             axes = back @ place.axes[self.rows]
-            theta = np.array([rotation_log(A @ axes[0].T) for A in axes])
+            theta = rotation_log(axes @ axes[0].T)
             self.add(key, Carrier(end.body, rho[0], axes[0], np.concatenate([rho - rho[0], theta], axis=1)))
         return self.numbers[key]
 

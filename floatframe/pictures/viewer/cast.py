@@ -7,9 +7,10 @@ import numpy as np
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.bodies.rigid_body import RigidBody
+from floatframe.model.rotations import rotation_matrix
 from floatframe.model.shapes import Piece, Plane
 from floatframe.model.shapes.drawn import StretchedPiece
-from floatframe.pictures.animation import GLASS, LARGEST, RIGID_COLOR, connections, hides_flexible, rotations
+from floatframe.pictures.animation import GLASS, LARGEST, RIGID_COLOR, connections, hides_flexible
 from floatframe.pictures.element_looks import dressed_bodies
 from floatframe.pictures.looks import looks_of
 from floatframe.pictures.stage import box_of
@@ -87,7 +88,7 @@ def bodies_cast(cast: Cast, bodies: dict[str, RigidBody | FlexibleBody | None], 
     carriers = cast.carriers
     trajectory, rows = carriers.trajectory, carriers.rows
     motions = {name: trajectory.body(name) for name in bodies}
-    frames = {name: (motion.r[rows[:1]], rotations(motion.p[rows[:1]])) for name, motion in motions.items()}
+    frames = {name: (motion.r[rows[:1]], rotation_matrix(motion.p[rows[:1]])) for name, motion in motions.items()}
     flexible = {name: body.reduced for name, body in bodies.items() if isinstance(body, FlexibleBody)}
     dressed = dressed_bodies(carriers.system)
     for i, (name, body) in enumerate(bodies.items()):

@@ -24,7 +24,7 @@ from floatframe.model.shapes import Arrow, Box, Cylinder, MarkerShapes, Piece, P
 from floatframe.model.shapes.piece import shifted
 from floatframe.model.shapes.rounds import axes_about
 from floatframe.model.system import System
-from floatframe.pictures.animation import diagonal, rotations, up_of
+from floatframe.pictures.animation import diagonal, up_of
 from floatframe.pictures.body_colors import BODY_COLORS
 from floatframe.pictures.element_looks import drawn_pieces, shown_of
 from floatframe.pictures.film_times import round_below
@@ -182,7 +182,7 @@ def stage_of(shown: Shown, cast: Cast) -> Stage:
         low, high = nodes.min(axis=0), nodes.max(axis=0)
         corners = np.array([[a, b, c] for a in (low[0], high[0]) for b in (low[1], high[1]) for c in (low[2], high[2])])
         some = rows[:: max(len(rows) // 200, 1)]
-        at = motion.r[some][:, None] + corners @ rotations(motion.p[some]).transpose(0, 2, 1)
+        at = motion.r[some][:, None] + corners @ rotation_matrix(motion.p[some]).transpose(0, 2, 1)
         lows.append(at.min(axis=(0, 1)))
         highs.append(at.max(axis=(0, 1)))
         first.append(at[0])

@@ -14,6 +14,7 @@ from fe_models.foundation.units import Units
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.checked_values import array_of_shape, unit_vector
+from floatframe.model.rotations import rotation_log
 from floatframe.model.system import System
 from floatframe.results.joint_coordinates import joint_coordinate
 from floatframe.results.sensors.linear_columns import scalar_columns
@@ -63,9 +64,6 @@ class Channel:
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return the motion along the direction over time; displacements and rotations start at zero."""
-        # imported late, because motions are computed without scipy.spatial
-        from scipy.spatial.transform import Rotation
-
         total = np.zeros(len(trajectory.t))
         for sign, marker in self.markers:
             where = f"channel {self.name!r}: marker"
@@ -75,7 +73,7 @@ class Channel:
             if self.quantity == "translation":
                 moved = (place.position - place.position[0], place.velocity, place.acceleration)[self.rate]
             elif self.rate == 0:
-                moved = Rotation.from_matrix(place.axes @ place.axes[0].T).as_rotvec()
+                moved = rotation_log(place.axes @ place.axes[0].T)
             else:
                 alpha = np.zeros_like(place.omega) if place.alpha is None else place.alpha
                 moved = (place.omega, alpha)[self.rate - 1]

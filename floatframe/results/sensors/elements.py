@@ -18,7 +18,7 @@ from floatframe.errors import ModelError
 from floatframe.model.forces import Bushing, UserForce
 from floatframe.model.forces.bushing import AXES, DEFORMATIONS
 from floatframe.model.joints.rows import kind_of
-from floatframe.model.rotations import continued_rotation, tilde
+from floatframe.model.rotations import continued_rotation, rotation_exp, rotation_log, tilde
 from floatframe.model.system import System
 from floatframe.results.coordinate_elements import coupler_motion, user_force_motion
 from floatframe.results.element_motion import element_motion
@@ -249,15 +249,12 @@ class BushingSensor:
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return deformations and rates over time."""
-        # imported late, because motions are computed without scipy.spatial
-        from scipy.spatial.transform import Rotation
-
         ends, share = self.ends(system), AXES[self.bushing(system).axes]
         a, b = (end_motion(system, trajectory, end) for end in ends)
-        theta = Rotation.from_matrix(np.swapaxes(a.axes, -1, -2) @ b.axes).as_rotvec()
+        theta = rotation_log(np.swapaxes(a.axes, -1, -2) @ b.axes)
         if self.bushing(system).counts_turns:
             theta = counted(trajectory, rotation_of(*ends), theta)
-        C = a.axes @ Rotation.from_rotvec(share * theta).as_matrix()
+        C = a.axes @ rotation_exp(share * theta)
         e = np.einsum("tba,tb->ta", C, b.position - a.position)
         u = np.einsum("tba,tb->ta", C, b.omega - a.omega)
         mean = np.einsum("tba,tb->ta", C, (1 - share) * a.omega + share * b.omega)
@@ -271,13 +268,10 @@ class BushingSensor:
 
     def linear(self, small: SmallMotions) -> LinearColumns:
         """Return de = Cᵀ dd + e × dc and dtheta = S u; the rows of the rates are their derivatives."""
-        # imported late, because motions are computed without scipy.spatial
-        from scipy.spatial.transform import Rotation
-
         share = AXES[self.bushing(small.system).axes]
         a, b = (small.place(end, self.of) for end in self.ends(small.system))
-        theta = Rotation.from_matrix(a.axes.T @ b.axes).as_rotvec()
-        C = a.axes @ Rotation.from_rotvec(share * theta).as_matrix()
+        theta = rotation_log(a.axes.T @ b.axes)
+        C = a.axes @ rotation_exp(share * theta)
         e = C.T @ (b.position - a.position)
         alpha, beta, tau = (float(x[0]) for x in scalars(np.array([theta @ theta]), share))
         u = (b.rotation - a.rotation).mapped(C.T)

@@ -249,10 +249,8 @@ def relative_rows(place: SmallPlace, other: SmallPlace, quantity: str) -> Rows:
 
 def absolute(place: PlaceMotion, quantity: str) -> Array:
     """Return a quantity of a point in ground axes, (n_t, 3)."""
-    from scipy.spatial.transform import Rotation  # imported late, because motions are computed without scipy.spatial
-
     if quantity == "rotation-vector":
-        return np.asarray(Rotation.from_matrix(place.axes).as_rotvec())
+        return rotation_log(place.axes)
     return np.asarray(
         {
             "position": place.position,
@@ -265,8 +263,6 @@ def absolute(place: PlaceMotion, quantity: str) -> Array:
 
 def relative(place: PlaceMotion, other: PlaceMotion, quantity: str) -> Array:
     """Return a quantity of a point relative to another point, in the axes of the latter, (n_t, 3)."""
-    from scipy.spatial.transform import Rotation  # imported late, because motions are computed without scipy.spatial
-
     d = place.position - other.position
     if quantity == "position":
         seen = d
@@ -275,8 +271,7 @@ def relative(place: PlaceMotion, other: PlaceMotion, quantity: str) -> Array:
     elif quantity == "angular-velocity":
         seen = place.omega - other.omega
     elif quantity == "rotation-vector":
-        turned = np.einsum("tba,tbc->tac", other.axes, place.axes)
-        return np.asarray(Rotation.from_matrix(turned).as_rotvec())
+        return rotation_log(np.swapaxes(other.axes, -1, -2) @ place.axes)
     else:  # acceleration of the point relative to the rotating axes
         alpha = np.zeros_like(d) if other.alpha is None else other.alpha
         slip = place.velocity - other.velocity - np.cross(other.omega, d)
