@@ -42,7 +42,18 @@ from floatframe.engine.kernels.vector import (
     vector,
 )
 
-__all__ = ["body_forces", "body_mass_product", "body_tangent", "modal_term"]
+__all__ = [
+    "body_forces",
+    "body_mass_product",
+    "body_tangent",
+    "coupling",
+    "inertia_rate",
+    "modal_block",
+    "modal_term",
+    "moved_inertia",
+    "put_rigid_blocks",
+    "put_rigid_row",
+]
 
 
 @view
@@ -90,6 +101,31 @@ def trace_less(W):
 def axial(W):
     """Return (W_zy - W_yz, W_xz - W_zx, W_yx - W_xy)."""
     return W[2][1] - W[1][2], W[0][2] - W[2][0], W[1][0] - W[0][1]
+
+
+@loops
+def coupling(second, W, n, k):
+    """Return B_k, from the blocks of 2C and W."""
+    return add(column(second, n, k), axial(tensor(W, n, k)))
+
+
+@loops
+def inertia_rate(third, W, n, k):
+    """Return D_k, from the blocks of 3C and W; dJ/dq_k = D_k + D_kᵀ."""
+    return matrix_sum(tensor(third, n, k), trace_less(tensor(W, n, k)))
+
+
+@loops
+def moved_inertia(m, s, J, p):
+    """Return first moment and inertia about a point from which p leads to the one before."""
+    y = add(s, scaled(0.5 * m, p))
+    d = 2.0 * dot(p, y)
+    rows = (
+        sub(J[0], add(scaled(y[0], p), scaled(p[0], y))),
+        sub(J[1], add(scaled(y[1], p), scaled(p[1], y))),
+        sub(J[2], add(scaled(y[2], p), scaled(p[2], y))),
+    )
+    return add(s, scaled(m, p)), matrix_sum(rows, ((d, 0.0, 0.0), (0.0, d, 0.0), (0.0, 0.0, d)))
 
 
 @loops
@@ -179,10 +215,8 @@ def modal_forces(model, work, i, a):
     zero = (0.0, 0.0, 0.0)
     tau, G, D_q_dot = zero, (zero, zero, zero), (zero, zero, zero)
     for k in range(n):
-        W_k, C_k = tensor(W, n, k), tensor(third, n, k)
-        T_k = trace_less(W_k)
-        D_k, B_k = matrix_sum(C_k, T_k), add(column(second, n, k), axial(W_k))
-        G = matrix_sum(G, scaled_matrix(q[k], matrix_sum(C_k, scaled_matrix(0.5, T_k))))
+        D_k, B_k = inertia_rate(third, W, n, k), coupling(second, W, n, k)
+        G = matrix_sum(G, scaled_matrix(0.5 * q[k], matrix_sum(tensor(third, n, k), D_k)))  # C_k + T_k/2
         D_q_dot = matrix_sum(D_q_dot, scaled_matrix(q_dot[k], D_k))
         tau = add(tau, scaled(q_ddot[k], B_k))
         h[k] = (
@@ -219,7 +253,7 @@ def body_mass_product(model, work, i, v, out):
     if n > 0:
         W, second = bodies.W[9 * q0 : 9 * (q0 + n)], block(types, t, C2, 3 * n)
         for k in range(n):
-            B_k = add(column(second, n, k), axial(tensor(W, n, k)))
+            B_k = coupling(second, W, n, k)
             put_sum(out, 3, scaled(q_dot[k], B_k))
             out[6 + k] = dot(column(first, n, k), v_O) + dot(B_k, omega)
         modal_term(types, t, n, MASS, q_dot, out[6:])
@@ -231,6 +265,14 @@ def put_block(H, row, column, A):
     put(H[row], column, A[0])
     put(H[row + 1], column, A[1])
     put(H[row + 2], column, A[2])
+
+
+@loops
+def add_block(H, row, column, A):
+    """Add a matrix to H at (row, column)."""
+    put_sum(H[row], column, A[0])
+    put_sum(H[row + 1], column, A[1])
+    put_sum(H[row + 2], column, A[2])
 
 
 @loops
@@ -258,31 +300,44 @@ def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
         d(1) = m da - tilde(s) dalpha - (2 tilde(v) + tilde(omega × s) + tilde(omega) tilde(s)) domega + ...
         d(2) = tilde(s) da + J dalpha + (2 Σ q_dot_k D_k + tilde(omega) J - tilde(J omega)) domega + ...
     """
-    bodies, t, n, u0 = work.bodies, model.bodies.kind[i], model.bodies.n_q[i], model.bodies.u0[i]
-    q0, m, a, s, J = (
-        model.bodies.q0[i],
-        model.body_types.mass[t],
-        vector(bodies.a_B[i]),
-        vector(bodies.s[i]),
-        bodies.J[i],
-    )
-    omega, q_dot = vector(work.state.u[u0 + 3 :]), work.state.u[u0 + 6 : u0 + 6 + n]
-    v = column_sum(bodies.C1[3 * q0 : 3 * (q0 + n)], n, q_dot)
+    a, s = vector(work.bodies.a_B[i]), vector(work.bodies.s[i])
     H[:, :] = 0.0
     turn[:, :] = 0.0
-    spin = matrix_sum(tilde(add(scaled(2.0, v), cross(omega, s))), product(tilde(omega), tilde(s)))
-    gyro = matrix_sum(product(tilde(omega), J), tilde(scaled(-1.0, turned(J, omega))))
-    by_omega = matrix_sum(scaled_matrix(2.0, matrix(bodies.D_q_dot[i])), gyro)
-    put_block(H, 0, 0, scaled_matrix(c_m * m, unit_matrix()))
-    put_block(H, 3, 0, tilde(scaled(c_m, s)))
-    put_block(H, 0, 3, matrix_sum(tilde(scaled(-c_m, s)), scaled_matrix(-c_d, spin)))
-    put_block(H, 3, 3, matrix_sum(scaled_matrix(c_m, matrix(J)), scaled_matrix(c_d, by_omega)))
-    put_block(turn, 0, 0, tilde(scaled(m, a)))
+    put_rigid_blocks(model, work, i, c_m, c_d, 3, H)
+    put_block(turn, 0, 0, tilde(scaled(model.body_types.mass[model.bodies.kind[i]], a)))
     put_block(turn, 3, 0, product(tilde(s), tilde(a)))
-    if n > 0:
+    if model.bodies.n_q[i] > 0:
         modal_tangent(model, work, i, c_m, c_d, c_k, H, turn)
     if work.state.spins[i] != 0:
         spin_columns(model, work, i, c_d, H)
+
+
+@loops
+def put_rigid_blocks(model, work, i, c_m, c_d, first, H):
+    """Write the derivatives of (1) and (2) by a and alpha, times c_m, from columns 0 and 3 of H on.
+
+    c_d times those by omega are added from column `first` on, where H is zero or the columns are those of alpha.
+    """
+    bodies, t, n, u0 = work.bodies, model.bodies.kind[i], model.bodies.n_q[i], model.bodies.u0[i]
+    q0, m, s, J = model.bodies.q0[i], model.body_types.mass[t], vector(bodies.s[i]), matrix(bodies.J[i])
+    omega, q_dot = vector(work.state.u[u0 + 3 :]), work.state.u[u0 + 6 : u0 + 6 + n]
+    v = column_sum(bodies.C1[3 * q0 : 3 * (q0 + n)], n, q_dot)
+    spin = matrix_sum(tilde(add(scaled(2.0, v), cross(omega, s))), product(tilde(omega), tilde(s)))
+    gyro = matrix_sum(product(tilde(omega), J), tilde(scaled(-1.0, turned(J, omega))))
+    put_block(H, 0, 0, scaled_matrix(c_m * m, unit_matrix()))
+    put_block(H, 3, 0, tilde(scaled(c_m, s)))
+    put_block(H, 0, 3, tilde(scaled(-c_m, s)))
+    put_block(H, 3, 3, scaled_matrix(c_m, J))
+    add_block(H, 0, first, scaled_matrix(-c_d, spin))
+    add_block(H, 3, first, scaled_matrix(c_d, matrix_sum(scaled_matrix(2.0, matrix(bodies.D_q_dot[i])), gyro)))
+
+
+@loops
+def put_rigid_row(row, c_m, c_d, first, b, B, Y, J_omega):
+    """Write the derivatives of (3) of one mode by a, alpha and omega as `put_rigid_blocks`; J_omega: dJ/dq_k omega."""
+    put(row, 0, scaled(c_m, b))
+    put(row, 3, scaled(c_m, B))
+    put_sum(row, first, scaled(c_d, sub(scaled(2.0, Y), J_omega)))
 
 
 @loops
@@ -301,7 +356,7 @@ def spin_columns(model, work, i, c_d, H):
         put_sum(H[3 + r], 3, cross(turn, vector(bodies.J[i, r])))
     W, second = bodies.W[9 * q0 : 9 * (q0 + n)], block(types, t, C2, 3 * n)
     for k in range(n):
-        put_sum(H[6 + k], 3, cross(turn, add(column(second, n, k), axial(tensor(W, n, k)))))
+        put_sum(H[6 + k], 3, cross(turn, coupling(second, W, n, k)))
 
 
 @loops
@@ -316,16 +371,14 @@ def modal_tangent(model, work, i, c_m, c_d, c_k, H, turn):
     second, third = block(types, t, C2, 3 * n), block(types, t, C3, 9 * n)
     a, omega, alpha = vector(bodies.a_B[i]), vector(work.state.u[u0 + 3 :]), vector(work.state.u_dot[u0 + 3 :])
     for k in range(n):
-        W_k, b = tensor(W, n, k), column(first, n, k)
-        D_k, B_k = matrix_sum(tensor(third, n, k), trace_less(W_k)), add(column(second, n, k), axial(W_k))
+        b, D_k, B_k = column(first, n, k), inertia_rate(third, W, n, k), coupling(second, W, n, k)
         J_k = matrix_sum(D_k, transposed(D_k))  # dJ/dq_k
         D_omega, J_omega, turning = turned(D_k, omega), turned(J_k, omega), cross(omega, b)
         by_q = add(cross(alpha, b), cross(omega, turning))
         put_column(H, 0, 6 + k, add(scaled(c_m, b), add(scaled(2 * c_d, turning), scaled(c_k, by_q))))
         by_q = add(cross(b, a), add(turned(J_k, alpha), cross(omega, J_omega)))
         put_column(H, 3, 6 + k, add(scaled(c_m, B_k), add(scaled(2 * c_d, D_omega), scaled(c_k, by_q))))
-        put(H[6 + k], 0, scaled(c_m, b))
-        put(H[6 + k], 3, add(scaled(c_m, B_k), scaled(c_d, sub(scaled(2.0, column(Y, n, k)), J_omega))))
+        put_rigid_row(H[6 + k], c_m, c_d, 3, b, B_k, column(Y, n, k), J_omega)
         put(turn[6 + k], 0, cross(b, a))
     modal_columns(model, work, i, c_d, c_k, H)
     if types.is_stiffened[t]:

@@ -9,6 +9,7 @@ from floatframe.engine.kernels.compiler.compilation import small
 
 __all__ = [
     "add",
+    "congruent",
     "cross",
     "dot",
     "matrix",
@@ -20,6 +21,7 @@ __all__ = [
     "put_sum",
     "scaled",
     "scaled_matrix",
+    "solved",
     "sub",
     "tilde",
     "transposed",
@@ -135,6 +137,20 @@ def turned_back(A, x):
 def product(A, B):
     """Return A B."""
     return turned_back(B, A[0]), turned_back(B, A[1]), turned_back(B, A[2])
+
+
+@small
+def congruent(R, J):
+    """Return R J Rᵀ."""
+    return product(product(R, J), transposed(R))
+
+
+@small
+def solved(A, x):
+    """Return A⁻¹ x by Cramer's rule."""
+    c_0, c_1, c_2 = cross(A[1], A[2]), cross(A[2], A[0]), cross(A[0], A[1])
+    both = add(scaled(x[0], c_0), add(scaled(x[1], c_1), scaled(x[2], c_2)))
+    return scaled(1.0 / dot(A[0], c_0), both)
 
 
 @small

@@ -17,9 +17,19 @@ import math
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.vector import add, cross, dot, norm, put, scaled, sub, turned, vector
 
-__all__ = ["contact_energy", "contact_power", "contact_state", "contact_variation"]
+__all__ = ["contact_energy", "contact_gap", "contact_power", "contact_state", "contact_variation"]
 
 V_0 = 9  # index of the approach speed among the unknowns, after F, M, N
+
+
+@inner
+def contact_gap(model, r, A, c):
+    """Return the gap of contact c for positions r and axes A of the markers."""
+    a, b, i, own = model.connections.a[c], model.connections.b[c], model.connections.item[c], model.contacts
+    d = sub(vector(r[b]), vector(r[a]))
+    if own.is_sphere[i]:
+        return norm(d) - own.radius_a[i] - own.radius_b[i]
+    return dot(turned(A[a], vector(model.rows.x[model.connections.w0[c]])), d) - own.radius_b[i]
 
 
 @inner

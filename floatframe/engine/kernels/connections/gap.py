@@ -17,9 +17,11 @@ than it.
 
 import math
 
+from floatframe.engine.kernels.body import moved_inertia
 from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.connections.contact import contact_gap
 from floatframe.engine.kernels.connections.element_law import law_values
-from floatframe.engine.kernels.marker import marker_acceleration, marker_motion
+from floatframe.engine.kernels.marker import marker_acceleration, marker_motion, shape
 from floatframe.engine.kernels.model import ELEMENT, MASS, STIFFNESS
 from floatframe.engine.kernels.rotation import exp_matrix
 from floatframe.engine.kernels.vector import (
@@ -33,6 +35,7 @@ from floatframe.engine.kernels.vector import (
     put_matrix,
     put_sum,
     scaled,
+    solved,
     sub,
     turned,
     turned_back,
@@ -68,11 +71,7 @@ def gap_of_markers(model, work, g):
         law_values(model, work, c)
         head = model.laws.head[i]
         return work.laws.outputs[6 * head[0] + head[2] + head[3] + model.gaps.output[g]]
-    a, b, own = model.connections.a[c], model.connections.b[c], model.contacts
-    d = sub(vector(work.markers.r[b]), vector(work.markers.r[a]))
-    if own.is_sphere[i]:
-        return norm(d) - own.radius_a[i] - own.radius_b[i]
-    return dot(turned(work.markers.A[a], vector(model.rows.x[model.connections.w0[c]])), d) - own.radius_b[i]
+    return contact_gap(model, work.markers.r, work.markers.A, c)
 
 
 @inner
@@ -296,15 +295,8 @@ def body_mobility(model, t, f, tau):
     m, J = model.body_types.mass[t], matrix(model.body_types.J0[t])
     s = scaled(1.0 / m, vector(model.body_types.S[t]))
     tau = sub(tau, cross(s, f))
-    # about the centre of mass: J - m (s² 1 - s sᵀ)
-    x = add(sub(J[0], scaled(m * dot(s, s), unit(0))), scaled(m * s[0], s))
-    y = add(sub(J[1], scaled(m * dot(s, s), unit(1))), scaled(m * s[1], s))
-    z = add(sub(J[2], scaled(m * dot(s, s), unit(2))), scaled(m * s[2], s))
-    volume = dot(x, cross(y, z))
-    turning = 0.0
-    if volume > 0.0:
-        across = add(add(scaled(tau[0], cross(y, z)), scaled(tau[1], cross(z, x))), scaled(tau[2], cross(x, y)))
-        turning = dot(tau, across) / volume
+    _, J = moved_inertia(m, scaled(m, s), J, scaled(-1.0, s))  # about the centre of mass
+    turning = dot(tau, solved(J, tau)) if dot(J[0], cross(J[1], J[2])) > 0.0 else 0.0
     return dot(f, f) / m + turning
 
 
@@ -325,8 +317,8 @@ def modal_mobility(model, work, g, stiffness):
                 if model.markers.body[j] == i and o >= 0:
                     f, moment = wrench_in_body(work, i, j)
                     psi, s = work.markers.psi[o : o + 6 * n], turned_back(work.markers.T_left[j], moment)
-                    Q += psi[k] * f[0] + psi[n + k] * f[1] + psi[2 * n + k] * f[2]
-                    Q += psi[3 * n + k] * s[0] + psi[4 * n + k] * s[1] + psi[5 * n + k] * s[2]
+                    d, th = shape(psi, n, k)
+                    Q += dot(d, f) + dot(th, s)
             M, K = modal_number(model, t, n, MASS, k), modal_number(model, t, n, STIFFNESS, k)
             if Q != 0.0 and M > 0.0:
                 total += Q * Q / M * stiffness * Q * Q / (stiffness * Q * Q + K)

@@ -9,7 +9,7 @@ since all bodies of a subtree move alike by what moves its first. Derivatives of
 of the forces that stay in axes of bodies or ground are all there.
 """
 
-from floatframe.engine.kernels.body import axial, block, column, column_sum, put_block, tensor, trace_less
+from floatframe.engine.kernels.body import block, column, coupling, inertia_rate, put_rigid_blocks, put_rigid_row
 from floatframe.engine.kernels.compiler.compilation import inner, loops, small
 from floatframe.engine.kernels.connections.connection import connection_derivatives
 from floatframe.engine.kernels.evaluation import tangent_of_body
@@ -22,13 +22,10 @@ from floatframe.engine.kernels.vector import (
     dot,
     matrix,
     matrix_sum,
-    product,
     put,
     put_matrix,
     scaled,
-    scaled_matrix,
     sub,
-    tilde,
     transposed,
     turned,
     turned_back,
@@ -53,33 +50,18 @@ __all__ = [
 
 @loops
 def rigid_columns(model, work, i, A):
-    """Write the derivative of the residual of body i by a, alpha, omega, body axes, into A, (6 + n, 9).
-
-    As `kernels.body.body_tangent`, column by column.
-    """
-    bodies, t, n, u0 = work.bodies, model.bodies.kind[i], model.bodies.n_q[i], model.bodies.u0[i]
-    q0, s, J = model.bodies.q0[i], vector(bodies.s[i]), bodies.J[i]
-    first = bodies.C1[3 * q0 : 3 * (q0 + n)]
-    omega, q_dot = vector(work.state.u[u0 + 3 :]), work.state.u[u0 + 6 : u0 + 6 + n]
-    v = column_sum(first, n, q_dot)
-    spin = matrix_sum(tilde(add(scaled(2.0, v), cross(omega, s))), product(tilde(omega), tilde(s)))
-    gyro = matrix_sum(product(tilde(omega), J), tilde(scaled(-1.0, turned(J, omega))))
-    put_block(A, 0, 0, scaled_matrix(model.body_types.mass[t], unit_matrix()))
-    put_block(A, 0, 3, tilde(scaled(-1.0, s)))
-    put_block(A, 0, 6, scaled_matrix(-1.0, spin))
-    put_block(A, 3, 0, tilde(s))
-    put_block(A, 3, 3, matrix(J))
-    put_block(A, 3, 6, matrix_sum(scaled_matrix(2.0, matrix(bodies.D_q_dot[i])), gyro))
-    if n > 0:
-        W, Y = bodies.W[9 * q0 : 9 * (q0 + n)], bodies.Y[3 * q0 : 3 * (q0 + n)]
-        second, third = block(model.body_types, t, C2, 3 * n), block(model.body_types, t, C3, 9 * n)
-        for k in range(n):
-            W_k = tensor(W, n, k)
-            D_k, B_k = matrix_sum(tensor(third, n, k), trace_less(W_k)), add(column(second, n, k), axial(W_k))
-            J_omega = turned(matrix_sum(D_k, transposed(D_k)), omega)
-            put(A[6 + k], 0, column(first, n, k))
-            put(A[6 + k], 3, B_k)
-            put(A[6 + k], 6, sub(scaled(2.0, column(Y, n, k)), J_omega))
+    """Write the derivative of the residual of body i by a, alpha, omega, body axes, into A, (6 + n, 9)."""
+    bodies, t, n, q0 = work.bodies, model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i]
+    for r in range(6 + n):
+        put(A[r], 6, (0.0, 0.0, 0.0))
+    put_rigid_blocks(model, work, i, 1.0, 1.0, 6, A)
+    omega, first = vector(work.state.u[model.bodies.u0[i] + 3 :]), bodies.C1[3 * q0 : 3 * (q0 + n)]
+    W, Y = bodies.W[9 * q0 : 9 * (q0 + n)], bodies.Y[3 * q0 : 3 * (q0 + n)]
+    second, third = block(model.body_types, t, C2, 3 * n), block(model.body_types, t, C3, 9 * n)
+    for k in range(n):
+        D_k, b, B_k = inertia_rate(third, W, n, k), column(first, n, k), coupling(second, W, n, k)
+        J_omega = turned(matrix_sum(D_k, transposed(D_k)), omega)
+        put_rigid_row(A[6 + k], 1.0, 1.0, 6, b, B_k, column(Y, n, k), J_omega)
 
 
 @inner

@@ -4,21 +4,17 @@ Corrections are measured as in absolute coordinates, by how bodies and modes mov
 turn of a joint near the root that those behind it take back is no large one.
 """
 
+from floatframe.engine.kernels.body import moved_inertia
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.vector import (
     add,
+    congruent,
     cross,
     dot,
     matrix,
-    matrix_sum,
-    product,
     put,
     put_sum,
-    scaled,
-    scaled_matrix,
     sub,
-    tilde,
-    transposed,
     turned,
     turned_back,
     vector,
@@ -36,12 +32,9 @@ def weigh(model, work, tree, joints, tangent):
     mass, origin = tangent.mass, vector(work.state.r[tree.order[0]])
     for i in range(tree.parent.shape[0]):
         R, p, m = matrix(work.state.R[i]), sub(work.state.r[i], origin), model.body_types.mass[model.bodies.kind[i]]
-        s, arm = turned(R, work.bodies.s[i]), tilde(p)
-        J = product(product(R, matrix(work.bodies.J[i])), transposed(R))
-        cross_terms = matrix_sum(product(arm, tilde(s)), product(tilde(s), arm))
-        J = matrix_sum(J, scaled_matrix(-1.0, matrix_sum(cross_terms, scaled_matrix(m, product(arm, arm)))))
+        s, J = moved_inertia(m, turned(R, work.bodies.s[i]), congruent(R, matrix(work.bodies.J[i])), p)
         mass[i, 0, 0] = m
-        put(mass[i, 1], 0, add(scaled(m, p), s))
+        put(mass[i, 1], 0, s)
         for a in range(3):
             put(mass[i, 3 + a], 0, J[a])
     for place in range(tree.order.shape[0] - 1, -1, -1):

@@ -10,11 +10,12 @@ In ground axes, of each node k about its own origin, p from the origin of the pa
 Sources: Walker & Orin (1982); Featherstone (2008), chapter 6.
 """
 
-from floatframe.engine.kernels.body import axial, block, body_forces, column, modal_term, tensor
+from floatframe.engine.kernels.body import block, body_forces, column, coupling, modal_block, moved_inertia
 from floatframe.engine.kernels.compiler.compilation import loops, small
 from floatframe.engine.kernels.model import C2, MASS
 from floatframe.engine.kernels.vector import (
     add,
+    congruent,
     cross,
     dot,
     matrix,
@@ -35,20 +36,12 @@ __all__ = [
     "add_carried",
     "along",
     "along_rate",
-    "congruent",
     "evaluate_flexible",
     "flexible_column",
     "mass_matrix",
     "moments_in_ground",
-    "moved_inertia",
     "shifted_blocks",
 ]
-
-
-@small
-def congruent(R, J):
-    """Return R J Rᵀ."""
-    return product(product(R, J), transposed(R))
 
 
 @loops
@@ -87,18 +80,13 @@ def flexible_mass(nodes, work, model, marker_work, k):
         put(H[3 + a], 3, vector(work.J[k, a]))
     first = marker_work.bodies.C1[3 * q0 : 3 * (q0 + n)]
     W, second, R = marker_work.bodies.W[9 * q0 : 9 * (q0 + n)], block(types, t, C2, 3 * n), work.R_G[k]
-    unit = work.local
     for j in range(n):
-        b, B = turned(R, column(first, n, j)), turned(R, add(column(second, n, j), axial(tensor(W, n, j))))
+        b, B = turned(R, column(first, n, j)), turned(R, coupling(second, W, n, j))
         put(H[6 + j], 0, b)
         put(H[6 + j], 3, B)
         for a in range(3):
             H[a, 6 + j], H[3 + a, 6 + j] = b[a], B[a]
-            unit[a] = 0.0
-        for a in range(n):
-            unit[a] = 0.0
-        unit[j] = 1.0
-        modal_term(types, t, n, MASS, unit, H[6 + j, 6:])
+    modal_block(types, t, n, MASS, 1.0, H)
 
 
 @small
@@ -143,19 +131,6 @@ def add_carried(H, A, B, C, p, above):
         for a in range(3):
             H[a, 6 + j] += f[a]
             H[3 + a, 6 + j] += t[a]
-
-
-@small
-def moved_inertia(m, s, J, p):
-    """Return first moment and inertia about a point from which p leads to the one before."""
-    y = add(s, scaled(0.5 * m, p))
-    d = 2.0 * dot(p, y)
-    rows = (
-        sub(J[0], add(scaled(y[0], p), scaled(p[0], y))),
-        sub(J[1], add(scaled(y[1], p), scaled(p[1], y))),
-        sub(J[2], add(scaled(y[2], p), scaled(p[2], y))),
-    )
-    return add(s, scaled(m, p)), matrix_sum(rows, ((d, 0.0, 0.0), (0.0, d, 0.0), (0.0, 0.0, d)))
 
 
 @loops

@@ -20,14 +20,23 @@ turning), and seen from the ground by S ×* f more. So
 Sources: Carpentier & Mansard (2018); Singh, Russell & Wensing (2022) for rigid bodies; derived anew for flexible ones.
 """
 
-from floatframe.engine.kernels.body import axial, block, body_tangent, column, column_sum, tensor, trace_less
+from floatframe.engine.kernels.body import (
+    block,
+    body_tangent,
+    column,
+    column_sum,
+    coupling,
+    inertia_rate,
+    moved_inertia,
+)
 from floatframe.engine.kernels.compiler.compilation import loops, small
 from floatframe.engine.kernels.dense import add_products
-from floatframe.engine.kernels.marker import shape
+from floatframe.engine.kernels.marker import shape, shape_sum
 from floatframe.engine.kernels.model import C2, C3
 from floatframe.engine.kernels.rotation import left_jacobian_derivative
 from floatframe.engine.kernels.vector import (
     add,
+    congruent,
     cross,
     dot,
     matrix,
@@ -48,7 +57,7 @@ from floatframe.engine.kernels.vector import (
 from floatframe.engine.tree.kernels.elastic_turning import turning_bias_by_angle, turning_bias_by_rate
 from floatframe.engine.tree.kernels.spatial import pair_sum, put_pair_of, spatial_cross, spatial_motion
 from floatframe.engine.tree.recursion.columns import marker_columns_in_ground
-from floatframe.engine.tree.recursion.composite import along, congruent, moved_inertia
+from floatframe.engine.tree.recursion.composite import along
 from floatframe.engine.tree.recursion.newton_euler import elastic_carrier
 
 __all__ = ["carried_change", "force_tangents", "put_marker_changes"]
@@ -202,8 +211,7 @@ def mode_rows(nodes, work, dense, model, marker_work, k):
     W, Y, first = bodies.W[9 * q0 : 9 * (q0 + n)], bodies.Y[3 * q0 : 3 * (q0 + n)], bodies.C1[3 * q0 : 3 * (q0 + n)]
     second, third = block(types, t, C2, 3 * n), block(types, t, C3, 9 * n)
     for j in range(n):
-        W_j, b = tensor(W, n, j), column(first, n, j)
-        D, B = matrix_sum(tensor(third, n, j), trace_less(W_j)), add(column(second, n, j), axial(W_j))
+        b, D, B = column(first, n, j), inertia_rate(third, W, n, j), coupling(second, W, n, j)
         turning = turned(matrix_sum(D, transposed(D)), omega)
         # 2 b·(y × v) - B·(omega × y) + 2 Y·y - omega·(D + Dᵀ) y
         row = add(scaled(2.0, cross(v, b)), sub(scaled(2.0, column(Y, n, j)), add(cross(B, omega), turning)))
@@ -436,11 +444,8 @@ def put_marker_changes(model, marker_work, m, body, R, arm, sign, out, scratch):
     v, omega_P, a, alpha_P, omega, alpha = body
     psi, T = markers.psi[o : o + 6 * n], markers.T_left[m]
     th, th_dot, zero = vector(markers.angle[m]), vector(markers.angle_dot[m]), (0.0, 0.0, 0.0)
-    th_ddot = zero
     q_ddot, q_dot = marker_work.state.u_dot[u0 : u0 + n], marker_work.state.u[u0 : u0 + n]
-    for k in range(n):
-        _, r = shape(psi, n, k)
-        th_ddot = add(th_ddot, scaled(q_ddot[k], r))
+    _, th_ddot = shape_sum(psi, n, q_ddot)
     bend, bend_dot = scratch[0, : 6 * n], scratch[1, : 6 * n]
     if first >= 0:
         K = model.markers.bend[first : first + 6 * n * n]
@@ -448,9 +453,8 @@ def put_marker_changes(model, marker_work, m, body, R, arm, sign, out, scratch):
             bend[j], bend_dot[j] = 0.0, 0.0
         add_products(K, q_dot, bend)
         add_products(K, q_ddot, bend_dot)
-        for k in range(n):
-            _, r = shape(bend, n, k)
-            th_ddot = sub(th_ddot, scaled(q_dot[k], r))
+        _, by_rates = shape_sum(bend, n, q_dot)
+        th_ddot = sub(th_ddot, by_rates)
     by_angle, by_second = left_jacobian_derivative(th, th_dot, 1.0), left_jacobian_derivative(th, th_ddot, 1.0)
     for k in range(n):
         d, r = shape(psi, n, k)
