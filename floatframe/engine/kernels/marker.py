@@ -79,7 +79,7 @@ def elastic_motion(model, work, m, i):
     n, q0, u0, o = model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i], model.markers.psi0[m]
     is_bent = model.markers.bend0[m] >= 0
     if is_bent:
-        bent_shapes(model, work, m, i)
+        bent_shapes(model, m, n, work.state.q[q0 : q0 + n], 1.0, work.markers.psi[o : o + 6 * n])
     for a in range(3):
         d, d_dot, th, th_dot = 0.0, 0.0, 0.0, 0.0
         t = work.markers.psi[o + a * n : o + (a + 1) * n]
@@ -105,15 +105,19 @@ def elastic_motion(model, work, m, i):
 
 
 @loops
-def bent_shapes(model, work, m, i):
-    """Write Psi(q) = Psi - K_P q."""
-    n, q0, o, first = model.bodies.n_q[i], model.bodies.q0[i], model.markers.psi0[m], model.markers.bend0[m]
-    psi, own = work.markers.psi[o : o + 6 * n], model.markers.psi[o : o + 6 * n]
-    for j in range(6 * n):
-        psi[j] = -own[j]
-    add_products(model.markers.bend[first : first + 6 * n * n], work.state.q[q0 : q0 + n], psi)
-    for j in range(6 * n):
-        psi[j] = -psi[j]
+def bent_shapes(model, m, n, q, factor, psi):
+    """Write Psi - factor K_P q of a marker of a flexible body, [6, k]; with factor 1: Psi(q)."""
+    o, first, scale = model.markers.psi0[m], model.markers.bend0[m], 1.0 / factor
+    own = model.markers.psi[o : o + 6 * n]
+    if first < 0:
+        for k in range(6 * n):
+            psi[k] = own[k]
+        return
+    for k in range(6 * n):
+        psi[k] = -scale * own[k]
+    add_products(model.markers.bend[first : first + 6 * n * n], q, psi[: 6 * n])
+    for k in range(6 * n):
+        psi[k] *= -factor
 
 
 @loops

@@ -21,6 +21,7 @@ from floatframe.engine.kernels.model import (
     n_pairs,
     n_q,
     n_states,
+    n_stations,
     n_u,
     n_w,
 )  # fmt: skip
@@ -124,6 +125,8 @@ class LineWork(NamedTuple):
     kappa: Array = real(n_lines, 3, unit="rad/m")  #: rotation of the axes by s
     curve: Array = real(n_lines, 3, unit="1/m")  #: r''
     slope_dot: Array = real(n_lines, 3, unit="1/s")  #: rate of r' at a place
+    d: Array = real(n_stations, 3, unit="m")  #: displacement of a station, body axes
+    th: Array = real(n_stations, 3, unit="rad")  #: its rotation
     turning: Array = real(n_lines, 3, unit="rad/s²")  #: angular acceleration of the axes by s_dot
     bent: Array = real(n_lines, 6, unit="m/s², rad/s²")  #: `marker.bent_bias` of the line at the place
 

@@ -23,7 +23,7 @@ Described in `floatframe.model.joints.sliding`.
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.joints.held_rows import turned_twice
 from floatframe.engine.kernels.joints.relative_motion import direction, distance, prescribed, relative_velocity
-from floatframe.engine.kernels.marker import bent_bias, pose_on_body
+from floatframe.engine.kernels.marker import bent_bias, pose_on_body, shape
 from floatframe.engine.kernels.rotation import left_jacobian, left_jacobian_derivative
 from floatframe.engine.kernels.vector import (
     add,
@@ -36,6 +36,7 @@ from floatframe.engine.kernels.vector import (
     sub,
     turned,
     turned_back,
+    unit,
     vector,
 )
 from floatframe.model.joints.rows.kinds import FORCE, MOMENT
@@ -113,36 +114,36 @@ def combined(e, weight, d_1, th_1, d_2, th_2):
 
 
 @inner
-def station_displacement(model, work, m):
-    """Return displacement and rotation vector of marker m, body axes."""
-    d = sub(vector(work.markers.rho[m]), vector(model.markers.position[m]))
-    return d, vector(work.markers.angle[m])
+def displacement(model, d, th, k, s, order):
+    """Return D, D', D'' or D''' at s for displacements and rotations of all stations, (n, 3); body axes."""
+    j, h = piece(model.lines, model.stations, k, s)
+    weight = weights(model.stations, j, h, s, order)
+    return combined(
+        vector(model.lines.axis[k]), weight, vector(d[j]), vector(th[j]), vector(d[j + 1]), vector(th[j + 1])
+    )
 
 
 @inner
-def displacement(model, work, k, s, order):
-    """Return D, D', D'' or D''' at s, body axes."""
-    stations = model.stations
-    j, h = piece(model.lines, stations, k, s)
-    d_1, th_1 = station_displacement(model, work, stations.marker[j])
-    d_2, th_2 = station_displacement(model, work, stations.marker[j + 1])
-    return combined(vector(model.lines.axis[k]), weights(stations, j, h, s, order), d_1, th_1, d_2, th_2)
+def twist(model, th, k, s, order):
+    """Return e (e · Σ l_j th_j) at s, or its derivative."""
+    e = vector(model.lines.axis[k])
+    j, h = piece(model.lines, model.stations, k, s)
+    l_2, slope = linear_weight(model.stations, j, h, s)
+    if order == 0:
+        return scaled(dot(e, mean(l_2, vector(th[j]), vector(th[j + 1]))), e)
+    return scaled(slope * dot(e, sub(vector(th[j + 1]), vector(th[j]))), e)
 
 
 @inner
-def place_of(model, work, k, b):
-    """Return the place s nearest to the point of marker b."""
-    m, e = model.lines.marker[k], vector(model.lines.axis[k])
-    i = model.markers.body[m]
-    x = turned_back(work.state.R[i], sub(vector(work.markers.r[b]), vector(work.state.r[i])))
-    x = sub(x, vector(model.markers.position[m]))  # from s = 0
+def place_of(model, d, th, k, x):
+    """Return the place s nearest to a point x from that of s = 0, body axes."""
+    e = vector(model.lines.axis[k])
     s = dot(x, e)
     length = model.stations.s[model.lines.station0[k + 1] - 1]
     for _ in range(MOST):
-        tangent = add(e, displacement(model, work, k, s, 1))
-        gap = sub(sub(x, scaled(s, e)), displacement(model, work, k, s, 0))
-        slope = dot(tangent, tangent) - dot(gap, displacement(model, work, k, s, 2))
-        change = dot(gap, tangent) / slope
+        tangent = add(e, displacement(model, d, th, k, s, 1))
+        gap = sub(sub(x, scaled(s, e)), displacement(model, d, th, k, s, 0))
+        change = dot(gap, tangent) / (dot(tangent, tangent) - dot(gap, displacement(model, d, th, k, s, 2)))
         s += change
         if abs(change) <= CLOSE * length:
             break
@@ -154,24 +155,24 @@ def slide_marker(model, work, k):
     """Move the sliding marker of line k to its position and write its motion; all other markers are known."""
     m, b, row = model.lines.marker[k], model.lines.other[k], model.lines.row[k]
     i, e, markers = model.markers.body[m], vector(model.lines.axis[k]), work.markers
+    stations, origin, d, th = model.stations, vector(model.markers.position[m]), work.lines.d, work.lines.th
+    for j in range(model.lines.station0[k], model.lines.station0[k + 1]):
+        station = stations.marker[j]
+        put(d[j], 0, sub(vector(markers.rho[station]), vector(model.markers.position[station])))
+        put(th[j], 0, vector(markers.angle[station]))
     is_driven = row >= 0
     if is_driven:
         s, rate, _ = prescribed(model, work, row)
     else:
-        s, rate = place_of(model, work, k, b), 0.0
-    stations = model.stations
+        x = turned_back(work.state.R[i], sub(vector(markers.r[b]), vector(work.state.r[i])))
+        s, rate = place_of(model, d, th, k, sub(x, origin)), 0.0
     j, h = piece(model.lines, stations, k, s)
     m_1, m_2 = stations.marker[j], stations.marker[j + 1]
-    th_1, th_2 = vector(markers.angle[m_1]), vector(markers.angle[m_2])
     l_2, by_s = linear_weight(stations, j, h, s)
-    D, D_1, D_2 = (
-        displacement(model, work, k, s, 0),
-        displacement(model, work, k, s, 1),
-        displacement(model, work, k, s, 2),
-    )
-    put(markers.rho[m], 0, add(add(vector(model.markers.position[m]), scaled(s, e)), D))
-    angle = add(cross(e, D_1), scaled(dot(e, mean(l_2, th_1, th_2)), e))
-    by_place = add(cross(e, D_2), scaled(by_s * dot(e, sub(th_2, th_1)), e))  # th'
+    D_1, D_2 = displacement(model, d, th, k, s, 1), displacement(model, d, th, k, s, 2)
+    put(markers.rho[m], 0, add(add(origin, scaled(s, e)), displacement(model, d, th, k, s, 0)))
+    angle = add(cross(e, D_1), twist(model, th, k, s, 0))
+    by_place = add(cross(e, D_2), twist(model, th, k, s, 1))  # th'
     value, slopes = weights(stations, j, h, s, 0), weights(stations, j, h, s, 1)
     v_1, v_2 = vector(markers.rho_dot[m_1]), vector(markers.rho_dot[m_2])
     o_1, o_2 = vector(markers.angle_dot[m_1]), vector(markers.angle_dot[m_2])
@@ -188,7 +189,11 @@ def slide_marker(model, work, k):
     put(markers.angle_dot[m], 0, angle_dot)
     put_matrix(markers.T_left[m], T)
     put(markers.spin[m], 0, turned(T, angle_dot))
-    shapes(model, work, m, m_1, m_2, e, value, slopes, l_2)
+    n, psi, psi0 = model.bodies.n_q[i], markers.psi, model.markers.psi0
+    own = psi[psi0[m] : psi0[m] + 6 * n]
+    for q in range(6 * n):
+        own[q] = 0.0
+    add_shapes(model, k, s, psi[psi0[m_1] :], psi[psi0[m_2] :], n, 1.0, own)
     pose_on_body(model, work, m)
     # the line in ground axes
     R = work.state.R[i]
@@ -205,7 +210,7 @@ def slide_marker(model, work, k):
     put(line.slope_dot[k], 0, turned(R, add(cross(omega, tangent), D_1_dot)))
     by_place_dot = add(cross(e, combined(e, weights(stations, j, h, s, 2), v_1, o_1, v_2, o_2)),
                        scaled(by_s * dot(e, sub(o_2, o_1)), e))  # fmt: skip
-    bending = cross(e, displacement(model, work, k, s, 3))  # th''
+    bending = cross(e, displacement(model, d, th, k, s, 3))  # th''
     change = turning_change(T, angle, rate, angle_dot, by_place, by_place_dot, bending)
     put(line.turning[k], 0, turned(R, scaled(rate, add(cross(omega, turned(T, by_place)), change))))
 
@@ -222,37 +227,37 @@ def turning_change(T, th, s_dot, th_t, th_s, th_st, th_ss):
 
 
 @inner
-def column(psi, n, q):
-    """Return displacement and rotation by coordinate q of shapes [6, n]."""
-    return (psi[q], psi[n + q], psi[2 * n + q]), (psi[3 * n + q], psi[4 * n + q], psi[5 * n + q])
-
-
-@inner
-def shapes(model, work, m, m_1, m_2, e, value, slopes, l_2):
-    """Write the derivatives of displacement and rotation of the sliding marker by q."""
-    n, psi, psi0 = model.bodies.n_q[model.markers.body[m]], work.markers.psi, model.markers.psi0
-    own = psi[psi0[m] : psi0[m] + 6 * n]
-    first, second = psi[psi0[m_1] : psi0[m_1] + 6 * n], psi[psi0[m_2] : psi0[m_2] + 6 * n]
+def add_shapes(model, k, s, first, second, n, factor, out):
+    """Add the derivatives of displacement and rotation at s by q, [6, n], from those of the stations around s."""
+    e, stations = vector(model.lines.axis[k]), model.stations
+    j, h = piece(model.lines, stations, k, s)
+    value, slopes = weights(stations, j, h, s, 0), weights(stations, j, h, s, 1)
+    l_2, _ = linear_weight(stations, j, h, s)
     for q in range(n):
-        d_1, th_1 = column(first, n, q)
-        d_2, th_2 = column(second, n, q)
+        d_1, th_1 = shape(first, n, q)
+        d_2, th_2 = shape(second, n, q)
         d = combined(e, value, d_1, th_1, d_2, th_2)
         th = add(cross(e, combined(e, slopes, d_1, th_1, d_2, th_2)), scaled(dot(e, mean(l_2, th_1, th_2)), e))
         for a in range(3):
-            own[a * n + q], own[(3 + a) * n + q] = d[a], th[a]
+            out[a * n + q] += factor * d[a]
+            out[(3 + a) * n + q] += factor * th[a]
+
+
+@inner
+def unit_normal(part, n_0, y):
+    """Return n_i of a line along the unit vector n_0: 0 along it, 1 nearest to y, 2 normal to both."""
+    if part == 0:
+        return n_0
+    y = sub(y, scaled(dot(y, n_0), n_0))
+    y = scaled(1.0 / norm(y), y)
+    return y if part == 1 else cross(n_0, y)
 
 
 @inner
 def normal(model, work, row, a):
-    """Return n_i of row k, ground axes: 0 along the line, 1 nearest to y of the marker, 2 normal to both."""
-    part, n_0 = model.rows.part[row], vector(work.lines.n_0[model.markers.line[a]])
-    if part == 0:
-        return n_0
-    A = work.markers.A[a]
-    y = (A[0, 1], A[1, 1], A[2, 1])
-    y = sub(y, scaled(dot(y, n_0), n_0))
-    y = scaled(1.0 / norm(y), y)
-    return y if part == 1 else cross(n_0, y)
+    """Return n_i of row k, ground axes, y being the second axis of the marker."""
+    n_0 = vector(work.lines.n_0[model.markers.line[a]])
+    return unit_normal(model.rows.part[row], n_0, direction(work.markers, a, unit(1)))
 
 
 @inner

@@ -15,6 +15,7 @@ __all__ = [
     "loaded_axis",
     "loaded_coordinate",
     "prescribed",
+    "prescribed_at",
     "put_pair",
     "relative_velocity",
     "slip",
@@ -24,13 +25,16 @@ __all__ = [
 
 @inner
 def prescribed(model, work, k):
-    """Return the motion of row k at the time of the iterate, its rate and its second rate.
+    """Return the motion of row k at the time of the iterate, its rate and its second rate."""
+    return prescribed_at(model, k, work.state.time)
 
-    Its constant if not driven.
-    """
+
+@inner
+def prescribed_at(model, k, t):
+    """Return the motion of row k at time t, its rate and its second rate; its constant if not driven."""
     if model.rows.motion[k] < 0:
         return model.rows.c[k], 0.0, 0.0
-    return time_function(model.functions, model.rows.motion[k], work.state.time)
+    return time_function(model.functions, model.rows.motion[k], t)
 
 
 @small

@@ -10,7 +10,16 @@ with J, B, M of theory.md §6 about the frame origin, of degree two in q. Betwee
 product rule with means, so that w_0ᵀ (M_c(q_1) - M_c(q_0)) w_1 = 2 Σ (q_1 - q_0)_k N_k exactly, N from `inertia_force`.
 """
 
-from floatframe.engine.kernels.body import block, column, column_sum
+from floatframe.engine.kernels.body import (
+    axial,
+    block,
+    column,
+    column_sum,
+    coupling,
+    tensor,
+    tensor_sum,
+    trace_less,
+)
 from floatframe.engine.kernels.compiler.compilation import inner, loops
 from floatframe.engine.kernels.dense import add_products
 from floatframe.engine.kernels.rotation import matrix_of_euler_parameters
@@ -80,12 +89,6 @@ def center(discrete, t, n, q, C):
 
 
 @loops
-def moment(V, n, k):
-    """Return epsilon_abc V_cb,k."""
-    return V[7 * n + k] - V[5 * n + k], V[2 * n + k] - V[6 * n + k], V[3 * n + k] - V[n + k]
-
-
-@loops
 def products(discrete, t, n, q, which, out):
     """Write V_ab,k = Σ_l S_ab,kl q_l."""
     for k in range(9 * n):
@@ -121,20 +124,13 @@ def momenta(model, discrete, step, t, n, q, omega, q_dot, Y):
     Pi = sub(Pi, cross(s, a))
     C_2, J_k = block(discrete, t, C2, 3 * n), block(discrete, t, INERTIA, 9 * n)
     matrix_product(discrete, t, MASS, n, q_dot, Y)
-    trace = 0.0
-    x, y, z = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)  # P = V q
     for k in range(n):
-        B = add(column(C_2, n, k), moment(V, n, k))
+        B = coupling(C_2, V, n, k)
         Y[k] += dot(B, omega) - dot(column(C, n, k), a)
         Pi = add(Pi, scaled(q_dot[k], B))
         Pi = add(Pi, scaled(q[k], turned(matrix(J_k[9 * k : 9 * k + 9].reshape((3, 3))), omega)))
-        x = add(x, (V[k] * q[k], V[n + k] * q[k], V[2 * n + k] * q[k]))
-        y = add(y, (V[3 * n + k] * q[k], V[4 * n + k] * q[k], V[5 * n + k] * q[k]))
-        z = add(z, (V[6 * n + k] * q[k], V[7 * n + k] * q[k], V[8 * n + k] * q[k]))
-    trace = x[0] + y[1] + z[2]
-    P = (x, y, z)
-    both = add(turned(P, omega), turned_back(P, omega))
-    return sub(add(Pi, scaled(trace, omega)), scaled(0.5, both))
+    P = trace_less(tensor_sum(V, n, q))
+    return add(Pi, scaled(0.5, add(turned(P, omega), turned_back(P, omega))))
 
 
 @loops
@@ -144,16 +140,9 @@ def inertia_force(model, discrete, step, t, n, q_0, q_1, q_mean, C_mean, omega_0
     V, W, C = step.V, step.W, step.C
     products(discrete, t, n, q_mean, PRODUCTS, V)
     J_k = block(discrete, t, INERTIA, 9 * n)
-    both = dot(omega_0, omega_1)
     for k in range(n):
-        J = matrix(J_k[9 * k : 9 * k + 9].reshape((3, 3)))
-        A = (
-            (V[k], V[n + k], V[2 * n + k]),
-            (V[3 * n + k], V[4 * n + k], V[5 * n + k]),
-            (V[6 * n + k], V[7 * n + k], V[8 * n + k]),
-        )
-        total = dot(omega_0, turned(J, omega_1)) + 2.0 * both * (A[0][0] + A[1][1] + A[2][2])
-        out[k] = total - dot(omega_0, add(turned(A, omega_1), turned_back(A, omega_1)))
+        J, T = matrix(J_k[9 * k : 9 * k + 9].reshape((3, 3))), trace_less(tensor(V, n, k))
+        out[k] = dot(omega_0, add(turned(J, omega_1), add(turned(T, omega_1), turned_back(T, omega_1))))
     shapes(discrete, t, n, q_0, C)
     s_0, a_rate_0, a_rate_1 = center(discrete, t, n, q_0, C), column_sum(C, n, rate_0), column_sum(C, n, rate_1)
     shapes(discrete, t, n, q_1, C)
@@ -167,7 +156,7 @@ def inertia_force(model, discrete, step, t, n, q_0, q_1, q_mean, C_mean, omega_0
         products(discrete, t, n, other_rate, TURNED_PRODUCTS, W)
         across = cross(a, other)
         for k in range(n):
-            out[k] += dot(omega, moment(W, n, k)) - dot(column(C_mean, n, k), across)
+            out[k] += dot(omega, axial(tensor(W, n, k))) - dot(column(C_mean, n, k), across)
         if discrete.is_bent[t]:
             for k in range(3 * n):
                 C[k] = 0.0

@@ -93,7 +93,7 @@ def counted(model, k, x, known):
 def ends_of_step(model, step, k, a, b):
     """Return the coordinate of row k, counted, at both ends of the step itself."""
     begin = counted(model, k, coordinate_at(model, step.x_0, step.A_0, k, a, b), step.known[k])
-    return begin, counted(model, k, coordinate_at(model, step.x_1, step.A_1, k, a, b), begin)
+    return begin, counted(model, k, coordinate_at(model, step.end.markers.r, step.end.markers.A, k, a, b), begin)
 
 
 @inner

@@ -28,15 +28,15 @@ import math
 
 from floatframe.engine.kernels.compiler.compilation import inner, loops
 from floatframe.engine.kernels.joints.deformed_line import (
-    CLOSE,
-    MOST,
-    column,
-    combined,
-    linear_weight,
-    mean,
+    add_shapes,
+    displacement,
     piece,
-    weights,
+    place_of,
+    twist,
+    unit_normal,
 )
+from floatframe.engine.kernels.joints.relative_motion import direction
+from floatframe.engine.kernels.marker import shape
 from floatframe.engine.kernels.rotation import exp_matrix
 from floatframe.engine.kernels.vector import (
     add,
@@ -53,6 +53,7 @@ from floatframe.engine.kernels.vector import (
     sub,
     turned,
     turned_back,
+    unit,
     vector,
 )
 from floatframe.engine.structure_preserving.kernels.coordinates import add_pair
@@ -77,50 +78,12 @@ def put_stations(model, step, k, end, q, s):
 
 
 @inner
-def station(step, end, j):
-    """Return displacement and rotation of station j at one end of the step, or their means."""
-    if end == MEAN:
-        d = scaled(0.5, add(vector(step.station_d[BEGIN, j]), vector(step.station_d[END, j])))
-        return d, scaled(0.5, add(vector(step.station_th[BEGIN, j]), vector(step.station_th[END, j])))
-    return vector(step.station_d[end, j]), vector(step.station_th[end, j])
-
-
-@inner
-def displacement(model, step, k, end, s, order):
-    """Return D, D' or D'' at s, body axes."""
-    j, h = piece(model.lines, model.stations, k, s)
-    d_1, th_1 = station(step, end, j)
-    d_2, th_2 = station(step, end, j + 1)
-    return combined(vector(model.lines.axis[k]), weights(model.stations, j, h, s, order), d_1, th_1, d_2, th_2)
-
-
-@inner
-def twist(model, step, k, end, s, order):
-    """Return e (e · Σ l_j th_j) at s, or its derivative."""
-    e = vector(model.lines.axis[k])
-    j, h = piece(model.lines, model.stations, k, s)
-    _, th_1 = station(step, end, j)
-    _, th_2 = station(step, end, j + 1)
-    l_2, slope = linear_weight(model.stations, j, h, s)
-    if order == 0:
-        return scaled(dot(e, mean(l_2, th_1, th_2)), e)
-    return scaled(slope * dot(e, sub(th_2, th_1)), e)
-
-
-@inner
-def place_of(model, step, k, end, x):
-    """Return the place nearest to a point x from that of s = 0, body axes."""
-    e = vector(model.lines.axis[k])
-    s = dot(x, e)
-    length = model.stations.s[model.lines.station0[k + 1] - 1]
-    for _ in range(MOST):
-        tangent = add(e, displacement(model, step, k, end, s, 1))
-        gap = sub(sub(x, scaled(s, e)), displacement(model, step, k, end, s, 0))
-        change = dot(gap, tangent) / (dot(tangent, tangent) - dot(gap, displacement(model, step, k, end, s, 2)))
-        s += change
-        if abs(change) <= CLOSE * length:
-            break
-    return s
+def put_mean_stations(model, step, k):
+    """Write the means of displacements and rotations of the stations of line k."""
+    for j in range(model.lines.station0[k], model.lines.station0[k + 1]):
+        d, th = step.station_d, step.station_th
+        put(d[MEAN, j], 0, scaled(0.5, add(vector(d[BEGIN, j]), vector(d[END, j]))))
+        put(th[MEAN, j], 0, scaled(0.5, add(vector(th[BEGIN, j]), vector(th[END, j]))))
 
 
 @inner
@@ -130,16 +93,17 @@ def found_place(model, step, k, end, t, R, center, way):
         value, _ = held(model, model.lines.row[k], t)
         return value
     origin = vector(model.markers.position[model.lines.marker[k]])
-    return place_of(model, step, k, end, sub(add(turned_back(R, way), center), origin))
+    x = sub(add(turned_back(R, way), center), origin)
+    return place_of(model, step.station_d[end], step.station_th[end], k, x)
 
 
 @inner
 def on_line(model, step, k, end, s, center):
     """Return the point of line k at s from the centre of mass, the rotation there and r', body axes."""
-    e = vector(model.lines.axis[k])
-    D, slope = displacement(model, step, k, end, s, 0), displacement(model, step, k, end, s, 1)
+    e, d, th = vector(model.lines.axis[k]), step.station_d[end], step.station_th[end]
+    D, slope = displacement(model, d, th, k, s, 0), displacement(model, d, th, k, s, 1)
     sigma = sub(add(add(vector(model.markers.position[model.lines.marker[k]]), scaled(s, e)), D), center)
-    return sigma, add(cross(e, slope), twist(model, step, k, end, s, 0)), add(e, slope)
+    return sigma, add(cross(e, slope), twist(model, th, k, s, 0)), add(e, slope)
 
 
 @inner
@@ -150,7 +114,7 @@ def begin_lines(model, step):
         i = model.markers.body[m]
         q0, R, s_c = model.bodies.q0[i], matrix(step.R_0[i]), vector(step.s_0[i])
         put_stations(model, step, k, BEGIN, step.q_0[q0 : q0 + model.bodies.n_q[i]], s_c)
-        t = step.t_1 if step.is_closing else step.t_0
+        t = step.end.state.time if step.is_closing else step.t_0
         s = found_place(model, step, k, BEGIN, t, R, s_c, sub(vector(step.x_0[b]), vector(step.c_0[i])))
         sigma, angle, tangent = on_line(model, step, k, BEGIN, s, s_c)
         step.line_s[k, BEGIN] = s
@@ -183,11 +147,12 @@ def line_step(model, discrete, step, k):
         c_1, R_1 = add(vector(step.c_0[i]), vector(step.d[i])), matrix(step.R_1[i])
         s_c = vector(step.s_1[i])
         put_stations(model, step, k, END, step.q_1[q0 : q0 + n], s_c)
-        s_1 = found_place(model, step, k, END, step.t_1, R_1, s_c, sub(vector(step.x_1[b]), c_1))
+        put_mean_stations(model, step, k)
+        s_1 = found_place(model, step, k, END, step.end.state.time, R_1, s_c, sub(vector(step.end.markers.r[b]), c_1))
         sigma, th_1, tangent = on_line(model, step, k, END, s_1, s_c)
         arm_1, E_1 = turned(R_1, sigma), product(exp_matrix(th_1), matrix(model.markers.triad[m]))
-        put(step.x_1[m], 0, add(c_1, arm_1))
-        put_matrix(step.A_1[m], product(R_1, E_1))
+        put(step.end.markers.r[m], 0, add(c_1, arm_1))
+        put_matrix(step.end.markers.A[m], product(R_1, E_1))
         put(step.line_end[k], 0, turned(R_1, tangent))
     end = MEAN
     if step.is_still:
@@ -200,7 +165,7 @@ def line_step(model, discrete, step, k):
     psi, dq = step.psi[6 * discrete.psi0[m] :], step.dq[q0 : q0 + n]
     by_q, turn_by_q = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for q in range(n):
-        d, th = column(psi, n, q)
+        d, th = shape(psi, n, q)
         by_q, turn_by_q = add(by_q, scaled(dq[q], d)), add(turn_by_q, scaled(dq[q], th))
     Gamma = mean_jacobian(th_0, th_1)
     put_matrix(step.Gamma[m], Gamma)
@@ -214,33 +179,23 @@ def line_step(model, discrete, step, k):
 @loops
 def put_shapes(model, discrete, step, k, s_0, s_1):
     """Write the derivatives of position and rotation of the sliding marker by q, as means over both places."""
-    m, e = model.lines.marker[k], vector(model.lines.axis[k])
-    n, psi = model.bodies.n_q[model.markers.body[m]], step.psi
+    m, psi = model.lines.marker[k], step.psi
+    n = model.bodies.n_q[model.markers.body[m]]
     own = psi[6 * discrete.psi0[m] : 6 * discrete.psi0[m] + 6 * n]
     for q in range(6 * n):
         own[q] = 0.0
     for end in range(2):
         s = s_0 if end == 0 else s_1
-        j, h = piece(model.lines, model.stations, k, s)
-        value, slopes = weights(model.stations, j, h, s, 0), weights(model.stations, j, h, s, 1)
-        l_2, _ = linear_weight(model.stations, j, h, s)
+        j, _ = piece(model.lines, model.stations, k, s)
         first = psi[6 * discrete.psi0[model.stations.marker[j]] :]
         second = psi[6 * discrete.psi0[model.stations.marker[j + 1]] :]
-        for q in range(n):
-            d_1, th_1 = column(first, n, q)
-            d_2, th_2 = column(second, n, q)
-            d = combined(e, value, d_1, th_1, d_2, th_2)
-            slope = cross(e, combined(e, slopes, d_1, th_1, d_2, th_2))
-            th = add(slope, scaled(dot(e, mean(l_2, th_1, th_2)), e))
-            for a in range(3):
-                own[a * n + q] += 0.5 * d[a]
-                own[(3 + a) * n + q] += 0.5 * th[a]
+        add_shapes(model, k, s, first, second, n, 0.5, own)
 
 
 @inner
 def ways_by_place(model, step, k, end, s_0, s_1):
     """Return T and T_r by Gauss' rule with two points between the passed stations."""
-    e, way = vector(model.lines.axis[k]), s_1 - s_0
+    e, way, d, th = vector(model.lines.axis[k]), s_1 - s_0, step.station_d[end], step.station_th[end]
     T, slope = e, (0.0, 0.0, 0.0)
     T_r = (0.0, 0.0, 0.0)
     done, first, n = 0.0, model.lines.station0[k], model.lines.station0[k + 1] - model.lines.station0[k]
@@ -254,33 +209,25 @@ def ways_by_place(model, step, k, end, s_0, s_1):
         half = 0.5 * (part - done)
         for g in range(2):
             s = s_0 + (done + (NEAR if g == 0 else FAR) * (part - done)) * way
-            T = add(T, scaled(half, displacement(model, step, k, end, s, 1)))
-            slope = add(slope, scaled(half, displacement(model, step, k, end, s, 2)))
-            T_r = add(T_r, scaled(half, twist(model, step, k, end, s, 1)))
+            T = add(T, scaled(half, displacement(model, d, th, k, s, 1)))
+            slope = add(slope, scaled(half, displacement(model, d, th, k, s, 2)))
+            T_r = add(T_r, scaled(half, twist(model, th, k, s, 1)))
         done = part
     return T, add(T_r, cross(e, slope))
-
-
-@inner
-def normal(model, k, along, y):
-    """Return the unit vector of row k: along a direction, normal to it nearest to y, or normal to both."""
-    n_0 = scaled(1.0 / norm(along), along)
-    if model.rows.part[k] == 0:
-        return n_0
-    y = sub(y, scaled(dot(y, n_0), n_0))
-    y = scaled(1.0 / norm(y), y)
-    return y if model.rows.part[k] == 1 else cross(n_0, y)
 
 
 @inner
 def line_value(model, step, k, a, b):
     """Return the value of row k, LINE or LINE_TURN, at the end of a step."""
     if model.rows.kind[k] == LINE_TURN:
-        E, D = turned(step.A_1[a], vector(model.rows.x[k])), turned(step.A_1[b], vector(model.rows.y[k]))
+        E, D = (
+            turned(step.end.markers.A[a], vector(model.rows.x[k])),
+            turned(step.end.markers.A[b], vector(model.rows.y[k])),
+        )
         return dot(E, D)
-    A = step.A_1[a]
-    n = normal(model, k, vector(step.line_end[model.markers.line[a]]), (A[0, 1], A[1, 1], A[2, 1]))
-    return dot(n, sub(vector(step.x_1[b]), vector(step.x_1[a])))
+    along, y = vector(step.line_end[model.markers.line[a]]), direction(step.end.markers, a, unit(1))
+    n = unit_normal(model.rows.part[k], scaled(1.0 / norm(along), along), y)
+    return dot(n, sub(vector(step.end.markers.r[b]), vector(step.end.markers.r[a])))
 
 
 @inner
@@ -294,7 +241,8 @@ def turn_by_place(model, step, k, a, b):
 @inner
 def mean_normal(model, step, k, a):
     """Return N of row k over the step."""
-    return normal(model, k, vector(step.line_t[model.markers.line[a]]), mean_direction(step, a, (0.0, 1.0, 0.0)))
+    along = vector(step.line_t[model.markers.line[a]])
+    return unit_normal(model.rows.part[k], scaled(1.0 / norm(along), along), mean_direction(step, a, unit(1)))
 
 
 @inner

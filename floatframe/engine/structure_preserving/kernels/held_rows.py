@@ -3,7 +3,7 @@
 import math
 
 from floatframe.engine.kernels.compiler.compilation import inner
-from floatframe.engine.kernels.vector import add, cross, dot, norm, scaled, sub, turned, vector
+from floatframe.engine.kernels.vector import add, cross, dot, norm, scaled, sub, vector
 from floatframe.engine.structure_preserving.kernels import deformed_lines, rows
 from floatframe.engine.structure_preserving.kernels.coordinates import (
     add_coordinate_force,
@@ -23,7 +23,6 @@ __all__ = [
     "coupler_change",
     "coupler_rate",
     "coupler_value",
-    "height_value",
     "roll_value",
     "row_change",
     "row_rate",
@@ -37,8 +36,6 @@ def row_value(model, step, c, k):
     kind, a, b = model.rows.kind[k], model.connections.a[c], model.connections.b[c]
     if kind == COUPLE:
         return coupler_value(model, step, c)
-    if kind == RIM_HEIGHT:
-        return height_value(model, step, k, a, b)
     if kind == ROLL:
         return roll_value(model, step, k, a, b)
     if kind == LINE or kind == LINE_TURN:
@@ -95,7 +92,7 @@ def coupler_value(model, step, c):
     """Return the value of the row of coupler c at the end of the step."""
     i = model.connections.item[c]
     k = model.elements.core[i]
-    constant, _ = held(model, k, step.t_1)
+    constant, _ = held(model, k, step.end.state.time)
     total = -constant
     for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
         row, a, b = model.coordinates.row[p], model.coordinates.a[p], model.coordinates.b[p]
@@ -139,15 +136,6 @@ def coupler_rate(model, c, t):
 #     t · (dx_B - dx_A + phi_B × rho - phi_A × (d + rho)) = 0
 #
 # by a force along t at the rim, whose work it is: none. Forces and moments on A and B balance about any point.
-
-
-@inner
-def height_value(model, step, k, a, b):
-    """Return the height of the rim above the plane at the end of the step."""
-    N, n = turned(step.A_1[a], vector(model.rows.z[k])), turned(step.A_1[b], vector(model.rows.y[k]))
-    c = dot(N, n)
-    height = dot(N, sub(vector(step.x_1[b]), vector(step.x_1[a])))
-    return height - model.rows.c[k] * math.sqrt(1.0 - c * c)
 
 
 @inner

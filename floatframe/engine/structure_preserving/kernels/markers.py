@@ -22,8 +22,9 @@ Gonzalez (1996), Journal of Nonlinear Science 6, 449-467, of the map th -> exp(t
 
 import math
 
+from floatframe.engine.kernels.body import column_sum
 from floatframe.engine.kernels.compiler.compilation import inner, loops
-from floatframe.engine.kernels.dense import add_products
+from floatframe.engine.kernels.marker import bent_shapes, shape, shape_sum
 from floatframe.engine.kernels.rotation import exp_matrix, left_jacobian
 from floatframe.engine.kernels.vector import (
     add,
@@ -60,34 +61,8 @@ def deformation(model, step, m, i, q, s):
         return sigma, NONE
     psi = step.shape
     bent_shapes(model, m, n, q, 0.5, psi)
-    return add(sigma, times(psi, n, q)), times(psi[3 * n :], n, q)
-
-
-@loops
-def bent_shapes(model, m, n, q, factor, psi):
-    """Write Psi - factor K_P q, [6, k]."""
-    o, first = model.markers.psi0[m], model.markers.bend0[m]
-    own = model.markers.psi[o : o + 6 * n]
-    if first < 0:
-        for k in range(6 * n):
-            psi[k] = own[k]
-        return
-    for k in range(6 * n):
-        psi[k] = -own[k] / factor
-    add_products(model.markers.bend[first : first + 6 * n * n], q, psi[: 6 * n])
-    for k in range(6 * n):
-        psi[k] *= -factor
-
-
-@loops
-def times(A, n, x):
-    """Return A x for A [3, k]."""
-    a, b, c = 0.0, 0.0, 0.0
-    for k in range(n):
-        a += A[k] * x[k]
-        b += A[n + k] * x[k]
-        c += A[2 * n + k] * x[k]
-    return a, b, c
+    d, th = shape_sum(psi, n, q)
+    return add(sigma, d), th
 
 
 @inner
@@ -98,10 +73,10 @@ def begin_markers(model, discrete, step):
         if i < 0:
             x, A = vector(model.markers.position[m]), matrix(model.markers.triad[m])
             put(step.x_0[m], 0, x)
-            put(step.x_1[m], 0, x)
+            put(step.end.markers.r[m], 0, x)
             put(step.x_f[m], 0, x)
             put_matrix(step.A_0[m], A)
-            put_matrix(step.A_1[m], A)
+            put_matrix(step.end.markers.A[m], A)
             put_matrix(step.A_f[m], A)
             put_matrix(step.E_mean[m], A)
             put_matrix(step.Gamma[m], unit_matrix())
@@ -141,8 +116,8 @@ def marker_step(model, discrete, step, m):
         arm_1 = turned(R_1, sigma)
         if discrete.turns[m]:
             E_1 = product(exp_matrix(th_1), matrix(model.markers.triad[m]))
-        put(step.x_1[m], 0, add(add(vector(step.c_0[i]), vector(step.d[i])), arm_1))
-        put_matrix(step.A_1[m], product(R_1, E_1))
+        put(step.end.markers.r[m], 0, add(add(vector(step.c_0[i]), vector(step.d[i])), arm_1))
+        put_matrix(step.end.markers.A[m], product(R_1, E_1))
     if step.is_still:
         arm_1, th_1, E_1 = arm_0, th_0, E_0
     put_end_of_forces(step, m)
@@ -160,11 +135,11 @@ def marker_step(model, discrete, step, m):
                 psi[k] = 0.0
         for k in range(3 * n):
             psi[k] -= C[k]
-        dx = add(dx, turned(R_m, times(psi, n, dq)))
+        dx = add(dx, turned(R_m, column_sum(psi, n, dq)))
         if discrete.turns[m]:
             Gamma = mean_jacobian(th_0, th_1)
             put_matrix(step.Gamma[m], Gamma)
-            put(step.dpsi[m], 0, turned(Gamma, times(psi[3 * n :], n, dq)))
+            put(step.dpsi[m], 0, turned(Gamma, column_sum(psi[3 * n :], n, dq)))
     put(step.dx[m], 0, dx)
 
 
@@ -175,8 +150,8 @@ def put_end_of_forces(step, m):
         put(step.x_f[m], 0, vector(step.x_0[m]))
         put_matrix(step.A_f[m], matrix(step.A_0[m]))
         return
-    put(step.x_f[m], 0, vector(step.x_1[m]))
-    put_matrix(step.A_f[m], matrix(step.A_1[m]))
+    put(step.x_f[m], 0, vector(step.end.markers.r[m]))
+    put_matrix(step.A_f[m], matrix(step.end.markers.A[m]))
 
 
 @inner
@@ -275,9 +250,7 @@ def marker_loads(model, discrete, step, m):
     if n == 0:
         return
     psi, F_B = step.psi[6 * discrete.psi0[m] :], turned_back(step.R_m[i], F)
+    T = turned_back(step.Gamma[m], vector(step.m[m])) if discrete.turns[m] else NONE
     for k in range(n):
-        step.load[u0 + 6 + k] += psi[k] * F_B[0] + psi[n + k] * F_B[1] + psi[2 * n + k] * F_B[2]
-    if discrete.turns[m]:
-        T = turned_back(step.Gamma[m], vector(step.m[m]))
-        for k in range(n):
-            step.load[u0 + 6 + k] += psi[3 * n + k] * T[0] + psi[4 * n + k] * T[1] + psi[5 * n + k] * T[2]
+        d, th = shape(psi, n, k)
+        step.load[u0 + 6 + k] += dot(d, F_B) + dot(th, T)

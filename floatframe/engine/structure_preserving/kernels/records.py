@@ -70,13 +70,32 @@ class Discrete(NamedTuple):
     pattern: Pattern = Pattern()
 
 
+class Clock(NamedTuple):
+    """The time, as `kernels.work` has it."""
+
+    time: Array = real(unit="s")
+
+
+class MarkerPlaces(NamedTuple):
+    """Positions and axes of all markers, as `kernels.work` has them."""
+
+    r: Array = real(n_m, 3, unit="m")
+    A: Array = real(n_m, 3, 3)
+
+
+class Configuration(NamedTuple):
+    """All that the values of constraint rows depend on (`kernels.joints.held_rows`)."""
+
+    state: Clock = Clock()
+    markers: MarkerPlaces = MarkerPlaces()
+
+
 @tabled
 class StepWork(NamedTuple):
     """Working arrays of a step, ground axes where nothing else is said; 0 at its beginning, 1 at its end."""
 
     h: Array = real(unit="s")
     t_0: Array = real(unit="s")
-    t_1: Array = real(unit="s")
     t_force: Array = real(unit="s")  #: time of the forces
     is_still: IntArray = integer()  #: whether forces act at one configuration
     is_closing: IntArray = integer()  #: 0 while positions are closed, 1 for forces at the end, 2 for velocities
@@ -118,9 +137,8 @@ class StepWork(NamedTuple):
     E_0: Array = real(n_m, 3, 3)  #: axes in the body
     x_0: Array = real(n_m, 3, unit="m")
     A_0: Array = real(n_m, 3, 3)
-    x_1: Array = real(n_m, 3, unit="m")
-    A_1: Array = real(n_m, 3, 3)
-    x_f: Array = real(n_m, 3, unit="m")  #: end of the force interval: x_1, or x_0 if still
+    end: Configuration = Configuration()
+    x_f: Array = real(n_m, 3, unit="m")  #: end of the force interval: that of the step, or x_0 if still
     A_f: Array = real(n_m, 3, 3)
     E_mean: Array = real(n_m, 3, 3)  #: mean axes in the body
     lever: Array = real(n_m, 3, unit="m")
@@ -133,8 +151,8 @@ class StepWork(NamedTuple):
     T: Array = real(n_m, 3, unit="N m")
     m: Array = real(n_m, 3, unit="N m")  #: on the elastic rotation, body axes
     # deformed lines
-    station_d: Array = real(2, n_stations, 3, unit="m")  #: displacements of stations at both ends, body axes
-    station_th: Array = real(2, n_stations, 3, unit="rad")  #: and rotations
+    station_d: Array = real(3, n_stations, 3, unit="m")  #: displacements of stations at both ends, and means, body axes
+    station_th: Array = real(3, n_stations, 3, unit="rad")  #: and rotations
     line_s: Array = real(n_lines, 2, unit="m")  #: places at both ends
     line_t: Array = real(n_lines, 3)  #: displacement of the sliding marker by its place
     line_kappa: Array = real(n_lines, 3, unit="rad/m")  #: rotation of its axes by its place, body axes

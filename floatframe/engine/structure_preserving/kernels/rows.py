@@ -9,21 +9,38 @@ configurations that fulfil it, and adds no linear or angular momentum.
 import math
 
 from floatframe.engine.kernels.compiler.compilation import inner
-from floatframe.engine.kernels.time_function import time_function
+from floatframe.engine.kernels.joints.relative_motion import prescribed_at
+from floatframe.engine.kernels.joints.row_formulas import HELD, by_code
 from floatframe.engine.kernels.vector import add, cross, dot, scaled, sub, turned, vector
 from floatframe.engine.structure_preserving.kernels.markers import add_direction, add_force, change, ends
-from floatframe.model.joints.rows.kinds import DISTANCE, EQUAL_TURN, POINT, SCREW, SLIDE, TURN, TURN_B
+from floatframe.model.joints.rows.kinds import (
+    DISTANCE,
+    DOT,
+    EQUAL_TURN,
+    POINT,
+    RIM_HEIGHT,
+    SCREW,
+    SLIDE,
+    TURN,
+    TURN_B,
+)
 
 __all__ = ["add_reaction", "angle_change", "angle_loads", "angle_of", "end_angle", "force_of_row", "held",
            "mean_direction", "mean_distance", "row_change", "row_rate", "row_value", "slip_change"]  # fmt: skip
 
 
+#: the value of a row that depends on places and time alone, as in all other formulations
+value_of_places = by_code(
+    "value_of_places",
+    {code: HELD[code].value for code in (DOT, TURN, TURN_B, SLIDE, DISTANCE, SCREW, RIM_HEIGHT, EQUAL_TURN)},
+    "model, work, k, a, b",
+)
+
+
 @inner
 def held(model, k, t):
     """Return the value that row k holds at time t, and its rate."""
-    if model.rows.motion[k] < 0:
-        return model.rows.c[k], 0.0
-    value, rate, _ = time_function(model.functions, model.rows.motion[k], t)
+    value, rate, _ = prescribed_at(model, k, t)
     return value, rate
 
 
@@ -69,29 +86,11 @@ def mean_direction(step, m, e):
 @inner
 def row_value(model, step, k, a, b):
     """Return the value of row k at the end of a step."""
-    kind, x, y = model.rows.kind[k], vector(model.rows.x[k]), vector(model.rows.y[k])
-    d = sub(vector(step.x_1[b]), vector(step.x_1[a]))
-    if kind == POINT:
+    if model.rows.kind[k] == POINT:
+        d = sub(vector(step.end.markers.r[b]), vector(step.end.markers.r[a]))
         return dot(d, point_axis(model, step, k, a, b))
-    if kind == SLIDE:
-        value, _ = held(model, k, step.t_1)
-        return dot(turned(step.A_1[a], x), d) - value
-    if kind == DISTANCE:
-        value, _ = held(model, k, step.t_1)
-        return 0.5 * (dot(d, d) / value - value)
-    if kind == SCREW:
-        slope, along = model.rows.c[k], dot(turned(step.A_1[a], slide_axis(model, k)), d)
-        angle = angle_of(model, step.A_1, k, a, b)
-        turns = math.floor((along / slope - angle) / (2 * math.pi) + 0.5)
-        return along - slope * (angle + 2 * math.pi * turns)
-    if kind == TURN:
-        return dot(turned(step.A_1[a], turn_direction(model, k, step.t_1)), turned(step.A_1[b], y))
-    if kind == TURN_B:
-        return dot(turned(step.A_1[b], turn_direction(model, k, step.t_1)), turned(step.A_1[a], y))
-    if kind == EQUAL_TURN:
-        U, D = turned(step.A_1[b], vector(model.rows.u[k])), turned(step.A_1[b], y)
-        return dot(turned(step.A_1[a], x), U) - dot(turned(step.A_1[a], vector(model.rows.z[k])), D)
-    return dot(turned(step.A_1[a], x), turned(step.A_1[b], y)) - model.rows.c[k]
+    value, _, _, _ = value_of_places(model.rows.kind[k], model, step.end, k, a, b)
+    return value
 
 
 @inner
@@ -119,16 +118,23 @@ def add_reaction(model, discrete, step, k, a, b, f):
         if kind == SCREW:
             angle_loads(model, discrete, step, k, a, b, -model.rows.c[k] * f)
         return
-    y = vector(model.rows.y[k])
+    first, e, second, d = factors(model, step, k, a, b)
+    add_product(model, discrete, step, first, e, second, d, f)
+    if kind == EQUAL_TURN:
+        add_product(model, discrete, step, a, vector(model.rows.z[k]), b, vector(model.rows.y[k]), -f)
+
+
+@inner
+def factors(model, step, k, a, b):
+    """Return marker and direction of both factors of a row that holds a product of directions; EQUAL_TURN: E and U."""
+    kind, x, y = model.rows.kind[k], vector(model.rows.x[k]), vector(model.rows.y[k])
     if kind == TURN_B:
-        add_product(model, discrete, step, b, turn_direction(model, k, step.t_force), a, y, f)
-    elif kind == TURN:
-        add_product(model, discrete, step, a, turn_direction(model, k, step.t_force), b, y, f)
+        return b, turn_direction(model, k, step.t_force), a, y
+    if kind == TURN:
+        x = turn_direction(model, k, step.t_force)
     elif kind == EQUAL_TURN:
-        add_product(model, discrete, step, a, vector(model.rows.x[k]), b, vector(model.rows.u[k]), f)
-        add_product(model, discrete, step, a, vector(model.rows.z[k]), b, y, -f)
-    else:
-        add_product(model, discrete, step, a, vector(model.rows.x[k]), b, y, f)
+        y = vector(model.rows.u[k])
+    return a, x, b, y
 
 
 @inner
@@ -159,15 +165,11 @@ def row_change(model, discrete, step, k, a, b):
         if kind == SCREW:
             slip -= model.rows.c[k] * angle_change(model, discrete, step, k, a, b)
         return slip
-    y = vector(model.rows.y[k])
-    if kind == TURN_B:
-        return product_change(model, discrete, step, b, turn_direction(model, k, step.t_force), a, y)
-    if kind == TURN:
-        return product_change(model, discrete, step, a, turn_direction(model, k, step.t_force), b, y)
+    first, e, second, d = factors(model, step, k, a, b)
+    total = product_change(model, discrete, step, first, e, second, d)
     if kind == EQUAL_TURN:
-        one = product_change(model, discrete, step, a, vector(model.rows.x[k]), b, vector(model.rows.u[k]))
-        return one - product_change(model, discrete, step, a, vector(model.rows.z[k]), b, y)
-    return product_change(model, discrete, step, a, vector(model.rows.x[k]), b, y)
+        total -= product_change(model, discrete, step, a, vector(model.rows.z[k]), b, vector(model.rows.y[k]))
+    return total
 
 
 @inner

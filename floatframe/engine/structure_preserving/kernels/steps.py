@@ -8,6 +8,7 @@ import math
 from floatframe.engine.kernels.body import block
 from floatframe.engine.kernels.compiler.compilation import inner, kept_entry
 from floatframe.engine.kernels.compiler.structure import converter
+from floatframe.engine.kernels.connections.contact import contact_gap
 from floatframe.engine.kernels.connections.gap import next_step, step_before_contact
 from floatframe.engine.kernels.entry import CompiledEntry, Order
 from floatframe.engine.kernels.generalized_alpha import load_state
@@ -24,7 +25,6 @@ from floatframe.engine.structure_preserving.kernels.bodies import (
     keep_bodies,
     move_bodies,
 )
-from floatframe.engine.structure_preserving.kernels.connections.contacts import gap_at
 from floatframe.engine.structure_preserving.kernels.connections.public_elements import element_gap
 from floatframe.engine.structure_preserving.kernels.deformed_lines import begin_lines
 from floatframe.engine.structure_preserving.kernels.held_rows import row_change
@@ -130,7 +130,7 @@ def solve_both_ways(model, work, discrete, step, order, stage):
 @inner
 def conserving_step(model, work, discrete, step, memory, order):
     """Advance the memory by one step of the conserving or decaying scheme; return the status."""
-    step.t_force, step.is_still, step.is_closing = 0.5 * (step.t_0 + step.t_1), 0, 0
+    step.t_force, step.is_still, step.is_closing = 0.5 * (step.t_0 + step.end.state.time), 0, 0
     begin(model, discrete, step, memory)
     status = solve_both_ways(model, work, discrete, step, order, 0)
     if status != CONVERGED:
@@ -188,7 +188,7 @@ def variational_step(model, work, discrete, step, memory, order):
         interval(model, discrete, step, i)
         put_elastic(model, step, i)
     move_bodies(model, step)
-    step.t_force = step.t_1
+    step.t_force = step.end.state.time
     expect_angles(memory, step)
     step.is_closing = 1
     begin_markers(model, discrete, step)
@@ -262,7 +262,7 @@ def is_too_long(model, work, discrete, step):
         return False
     for g in range(model.gaps.connection.shape[0]):
         if model.gaps.output[g] < 0:
-            work.gaps.end[g] = gap_at(model, step.x_1, step.A_1, model.gaps.connection[g])
+            work.gaps.end[g] = contact_gap(model, step.end.markers.r, step.end.markers.A, model.gaps.connection[g])
         else:
             work.gaps.end[g] = element_gap(model, work, discrete, step, g)
     return next_step(model, work, step.t_0, step.h) < step.h
@@ -310,7 +310,7 @@ def take_parts(model, work, discrete, step, memory, order, t_0, t_1):
                 part = max(step_before_contact(model, work, t_1 - left, part), order.h_min)
             is_last = part >= left
             part = min(part, left)
-        step.t_0, step.t_1 = t_0 if left == h else t_1 - left, t_1 if is_last else t_1 - (left - part)
+        step.t_0, step.end.state.time = t_0 if left == h else t_1 - left, t_1 if is_last else t_1 - (left - part)
         take_size(step, part)
         if discrete.scheme == CONSERVING:
             status = conserving_step(model, work, discrete, step, memory, order)

@@ -13,26 +13,16 @@ The speed of approach v_0 is that of the step before the contact began.
 import math
 
 from floatframe.engine.kernels.compiler.compilation import inner
-from floatframe.engine.kernels.connections.contact import V_0
-from floatframe.engine.kernels.vector import add, cross, dot, norm, scaled, sub, turned, vector
+from floatframe.engine.kernels.connections.contact import V_0, contact_gap
+from floatframe.engine.kernels.vector import add, cross, dot, norm, scaled, sub, vector
 from floatframe.engine.structure_preserving.kernels.coordinates import add_pair, span_lengths
 from floatframe.engine.structure_preserving.kernels.markers import add_direction, add_moment, turning
 from floatframe.engine.structure_preserving.kernels.rows import mean_direction, mean_distance, slip_change
 
-__all__ = ["contact_load", "gap_at", "speed_of_approach"]
+__all__ = ["contact_load", "speed_of_approach"]
 
 ALIKE = 0.02  # difference of depths relative to their sum, below which the quotient is the mean force
 POINT = math.sqrt(0.6)  # of Gauss, exact to degree five
-
-
-@inner
-def gap_at(model, x, A, c):
-    """Return the gap of contact c for places x and axes A of the markers."""
-    a, b, i, own = model.connections.a[c], model.connections.b[c], model.connections.item[c], model.contacts
-    d = sub(vector(x[b]), vector(x[a]))
-    if own.is_sphere[i]:
-        return norm(d) - own.radius_a[i] - own.radius_b[i]
-    return dot(turned(A[a], vector(model.rows.x[model.connections.w0[c]])), d) - own.radius_b[i]
 
 
 @inner
@@ -68,7 +58,7 @@ def known_speed(model, step, c):
 def contact_load(model, discrete, step, c):
     """Add the loads of contact c, and return the work that restitution and friction dissipate."""
     a, b, i, own = model.connections.a[c], model.connections.b[c], model.connections.item[c], model.contacts
-    gap_0, gap_1 = gap_at(model, step.x_0, step.A_0, c), gap_at(model, step.x_f, step.A_f, c)
+    gap_0, gap_1 = contact_gap(model, step.x_0, step.A_0, c), contact_gap(model, step.x_f, step.A_f, c)
     f_s = spring_force(own.stiffness[i], own.exponent[i], gap_0, gap_1)
     if f_s == 0.0:
         return 0.0
@@ -106,7 +96,8 @@ def contact_load(model, discrete, step, c):
 @inner
 def speed_of_approach(model, step, c):
     """Return v_0 for the next step: in contact v_0, otherwise minus the speed at which the gap closes."""
-    begin, end = gap_at(model, step.x_0, step.A_0, c), gap_at(model, step.x_1, step.A_1, c)
+    begin = contact_gap(model, step.x_0, step.A_0, c)
+    end = contact_gap(model, step.end.markers.r, step.end.markers.A, c)
     if end >= 0.0:
         return min((end - begin) / step.h, -model.contacts.slow[model.connections.item[c]])
     return known_speed(model, step, c)

@@ -1,5 +1,6 @@
 """Loads of bushings and user forces in a structure-preserving step."""
 
+from floatframe.engine.kernels.body import axial
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.bushing import continued, law, rotation_vector
 from floatframe.engine.kernels.connections.user_force import element_of, user_outputs
@@ -8,13 +9,13 @@ from floatframe.engine.kernels.time_function import time_function
 from floatframe.engine.kernels.vector import (
     add,
     cross,
-    dot,
     matrix,
     matrix_sum,
     product,
     put,
     scaled,
     scaled_matrix,
+    solved,
     sub,
     tilde,
     transposed,
@@ -60,20 +61,6 @@ __all__ = ["bushing_load", "user_force_load", "user_state_residual"]
 
 
 @inner
-def solved(A, x):
-    """Return A⁻¹ x by Cramer's rule."""
-    c_0, c_1, c_2 = cross(A[1], A[2]), cross(A[2], A[0]), cross(A[0], A[1])
-    both = add(scaled(x[0], c_0), add(scaled(x[1], c_1), scaled(x[2], c_2)))
-    return scaled(1.0 / dot(A[0], c_0), both)
-
-
-@inner
-def axial(A):
-    """Return x with tilde(x) = (A - Aᵀ)/2."""
-    return 0.5 * (A[2][1] - A[1][2]), 0.5 * (A[0][2] - A[2][0]), 0.5 * (A[1][0] - A[0][1])
-
-
-@inner
 def axes_change(model, discrete, step, m, mean):
     """Return the change of the axes of a marker over the step; mean: their mean."""
     rows = transposed(mean)
@@ -111,7 +98,7 @@ def bushing_load(model, discrete, step, c):
     # change of the deformations due to the motion over the step
     dA, dB = axes_change(model, discrete, step, a, A), axes_change(model, discrete, step, b, B)
     turning = matrix_sum(product(transposed(dA), B), product(transposed(A), dB))
-    dtheta = solved(Gamma, axial(product(turning, transposed(P))))
+    dtheta = solved(Gamma, scaled(0.5, axial(product(turning, transposed(P)))))
     ds = add(turned_back(dA, d), turned_back(A, sub(vector(step.dx[b]), vector(step.dx[a]))))
     put(step.dxi, 0, add(turned(Q, ds), cross(scaled(-share, turned(part, dtheta)), arm)))
     put(step.dxi, 3, dtheta)
@@ -185,7 +172,7 @@ def user_state_residual(model, work, discrete, step, c):
     i, u = element_of(model, c), model.connections.item[c]
     first, last = model.elements.coordinate0[i], model.elements.coordinate0[i + 1]
     n, inputs = last - first, work.users.inputs
-    inputs[0] = 0.5 * (step.t_0 + step.t_1)
+    inputs[0] = 0.5 * (step.t_0 + step.end.state.time)
     for p in range(first, last):
         k, a, b = model.coordinates.row[p], model.coordinates.a[p], model.coordinates.b[p]
         begin, end = ends_of_step(model, step, k, a, b)

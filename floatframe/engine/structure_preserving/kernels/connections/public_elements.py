@@ -27,6 +27,7 @@ each marker by itself. lambda = delta/(|motion|² + (1e-6 L)²): what is left un
 
 import math
 
+from floatframe.engine.kernels.body import axial
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.element_law import law_call, note_what_is_no_number
 from floatframe.engine.kernels.rotation import exp_matrix
@@ -85,7 +86,7 @@ def begin_motion(model, discrete, step, c):
 def way_turned(Q):
     """Return the Cayley vector of a rotation."""
     trace = Q[0][0] + Q[1][1] + Q[2][2]
-    return scaled(2.0 / (1.0 + trace), (Q[2][1] - Q[1][2], Q[0][2] - Q[2][0], Q[1][0] - Q[0][1]))
+    return scaled(2.0 / (1.0 + trace), axial(Q))
 
 
 @inner
@@ -106,7 +107,7 @@ def put_inputs(model, work, discrete, step, c, t, where, s, part):
         elif where == BEGIN:
             r, A = vector(step.x_0[m]), matrix(step.A_0[m])
         else:
-            r, A = vector(step.x_1[m]), matrix(step.A_1[m])
+            r, A = vector(step.end.markers.r[m]), matrix(step.end.markers.A[m])
         put(x, o, r)
         for k in range(3):
             put(x, o + 3 + 3 * k, A[k])
@@ -128,7 +129,7 @@ def element_gap(model, work, discrete, step, g):
     i = model.connections.item[c]
     head = model.laws.head[i]
     begin_motion(model, discrete, step, c)
-    put_inputs(model, work, discrete, step, c, step.t_1, END, 0.0, 1.0)
+    put_inputs(model, work, discrete, step, c, step.end.state.time, END, 0.0, 1.0)
     law_call(model, work, i, work.laws.trial)
     return work.laws.trial[6 * head[0] + head[2] + head[3] + model.gaps.output[g]]
 
@@ -368,7 +369,7 @@ def element_residual(model, work, discrete, step, c):
         return
     out, row, first = work.laws.trial, first_row_of_multipliers(model, c), n_u + discrete.first[c]
     begin_in_middle(model, discrete, step, c)
-    put_inputs(model, work, discrete, step, c, 0.5 * (step.t_0 + step.t_1), ALONG, 0.0, 0.5)
+    put_inputs(model, work, discrete, step, c, 0.5 * (step.t_0 + step.end.state.time), ALONG, 0.0, 0.5)
     law_call(model, work, i, out)
     for s in range(head[2]):
         step.residual[state0 + s] = step.z[state0 + s] - h * out[6 * head[0] + s]
@@ -380,7 +381,7 @@ def element_residual(model, work, discrete, step, c):
             step.residual[first + j] = (h if holds == VELOCITY else 1.0) * out[6 * head[0] + head[2] + j]
     if not holds_position:
         return
-    put_inputs(model, work, discrete, step, c, step.t_1, END, 0.0, 1.0)
+    put_inputs(model, work, discrete, step, c, step.end.state.time, END, 0.0, 1.0)
     law_call(model, work, i, out)
     for j in range(head[3]):
         if model.rows.holds[row + j] == POSITION:
@@ -392,10 +393,10 @@ def begin_in_middle(model, discrete, step, c):
     """Write the motion of the markers of element c from the beginning to the end of the step, in its middle."""
     a = model.connections.a[c]
     for m in range(a, a + model.laws.head[model.connections.item[c], 0]):
-        Q = product(matrix(step.A_1[m]), transposed(matrix(step.A_0[m])))
+        Q = product(matrix(step.end.markers.A[m]), transposed(matrix(step.A_0[m])))
         turn = way_turned(Q)
         half = scaled(1.0 / (1.0 + math.sqrt(1.0 + 0.25 * dot(turn, turn))), turn)
         put(step.turn[m], 0, turn)
-        put(step.d_law[m], 0, sub(vector(step.x_1[m]), vector(step.x_0[m])))
-        put(step.r_law[m], 0, scaled(0.5, add(vector(step.x_0[m]), vector(step.x_1[m]))))
+        put(step.d_law[m], 0, sub(vector(step.end.markers.r[m]), vector(step.x_0[m])))
+        put(step.r_law[m], 0, scaled(0.5, add(vector(step.x_0[m]), vector(step.end.markers.r[m]))))
         put_matrix(step.A_law[m], product(cayley(half), matrix(step.A_0[m])))
