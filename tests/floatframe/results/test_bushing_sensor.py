@@ -22,6 +22,7 @@ from floatframe import (
     static_equilibrium,
     steady_rotation,
 )
+from floatframe.results.sensors.elements import scalars
 from tests.floatframe.analyses.examples import compare, machine, rotor
 
 K = np.diag([40.0, 50, 60, 3, 4, 5]) + 0.3
@@ -85,3 +86,15 @@ def test_a_bushing_that_is_not_there(motion):
     system, run = motion
     with pytest.raises(ModelError, match="no bushing 'mout'; did you mean 'mount'"):
         measured(system, run, [BushingSensor("s", "mout")])
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_series_at_small_angles_are_the_closed_forms(share):
+    """Closed forms in long double on both sides of the angle below which series stand for them."""
+    t2 = np.array([1e-4, 1e-3, 0.99e-2, 1.01e-2, 0.5, 4.0, 9.0])
+    t = np.sqrt(t2.astype(np.longdouble))
+    is_half = share == 0.5
+    alpha = t / 2 / (np.sin(t / 2) if is_half else np.tan(t / 2))
+    tau = np.tan(t / 4) / (2 * t) if is_half else 0 * t
+    for found, expected in zip(scalars(t2, share), (alpha, (1 - alpha) / t**2, tau), strict=True):
+        assert_allclose(found, expected.astype(float), rtol=2e-12, atol=0)
