@@ -10,7 +10,7 @@
 2. A line is drawn at random, then one of its changes: another operator, sign, constant, index, or a dropped term.
 3. A copy of the checkout with that line runs the test files that guard the module (`guards`), at most `--guards` of
    them: those first whose path shares most words with the path of the module, or half as much with the paths of those
-   that import it, a rare word counting more; then those with fewest imports between.
+   in its folder that import it; then those with fewest imports between.
 4. The first test that fails catches the mutant, provided that the same test passes without the change. A mutant that
    passes all has survived: it is a hole in the tests, or the change means the same, which only a reader can judge. One
    that takes longer than `LIMIT` counts as survived.
@@ -252,9 +252,20 @@ def draw(n_mutants: int, seed: int, wings: tuple[str, ...]) -> Iterator[tuple[st
 # the tests ------------------------------------------------------------------------------------------------------------
 
 
+COMMON = {"test", "fe", "model", "cm", "floatframe", "file", "py"}  #: words of so many paths that they say little
+
+
 def words_of(path: str) -> set[str]:
-    """Return the words of a path, without plurals and the names of packages."""
-    return {word.rstrip("s") for word in re.split(r"[/_.]", path)} - {"test", "fe", "model", "cm", "floatframe", "py"}
+    """Return the words of a path, without plurals and those of `COMMON`."""
+    return {word.rstrip("s") for word in re.split(r"[/_.]", path)} - {
+        "test",
+        "fe",
+        "model",
+        "cm",
+        "floatframe",
+        "file",
+        "py",
+    }
 
 
 @cache
@@ -263,14 +274,14 @@ def guarding_files(path: Path, n_files: int) -> list[str]:
     name = module_name(path)
     steps = guards([name])
     files = [file for file in steps if not file.startswith(("tests/docs", "tests/external"))]
-    n_paths = Counter(word for file in files for word in words_of(file))
-    users = [str(modules()[user].relative_to(ROOT)) for user, used in graph().items() if name in used]
-    of_users = frozenset().union(*map(words_of, users))
+    users = [modules()[user] for user, used in graph().items() if name in used]
+    near = [str(user.relative_to(ROOT)) for user in users if user.is_relative_to(path.parent)]
+    of_users = frozenset().union(*map(words_of, near))
     own = words_of(str(path.relative_to(ROOT)))
 
     def order(file: str) -> tuple[float, int, str]:
         shared = words_of(file) & (own | of_users)
-        return -sum((1.0 if word in own else 0.5) / n_paths[word] for word in shared), steps[file], file
+        return -sum(1.0 if word in own else 0.5 for word in shared), steps[file], file
 
     return sorted(files, key=order)[:n_files]
 
