@@ -1,8 +1,10 @@
 """The compiled law of a wheelset: eigenvalues, exact derivatives, energy, curves, defects, both sides alike."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import eig
 
 from floatframe.components.rails.assembly import ContactLaws, Wheel, law_numbers, output_names
@@ -55,6 +57,22 @@ def height(law, load=LOAD, y=0.0, V=10.0):
         seen = law.seen([0, y, z], np.eye(3), [V, 0, 0], [0, V / 0.46, 0])
         low, high = (z, high) if seen["left_Q"] + seen["right_Q"] > 2 * load else (low, z)
     return z
+
+
+def test_wheels_of_different_pairs_find_the_tables_that_they_have_alone():
+    """Four wheels of three pairs; the place of a table is the fifth number of a wheel, behind a head of 21."""
+    pairs = [CONE, replace(CONE, radius=0.5), CONE, replace(CONE, radius=0.4)]
+    wheels = [Wheel(1, 0.75, pair) for pair in pairs]
+    together = law_numbers(wheels, Track(), ContactLaws())
+    ends = [21 + 6 * len(wheels) + Track().cells.size]
+    for k, wheel in enumerate(wheels):
+        alone = law_numbers([wheel], Track(), ContactLaws())
+        table = alone[int(alone[21 + 4]) :]
+        first = int(together[21 + 6 * k + 4])
+        assert first in ends
+        assert_array_equal(together[first : first + len(table)], table)
+        ends.append(first + len(table))
+    assert max(ends) == len(together)
 
 
 def test_eigenvalues_of_a_suspended_wheelset_are_those_of_the_textbook():
