@@ -9,6 +9,7 @@ from cms.body.reduced_body import ReducedBody
 from cms.errors import BodyError
 from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.foundation.arrays import Array, IntArray, frozen
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.words import quoted
 
 __all__ = ["KINDS_OF_ADDRESS", "Address", "FoundNodes"]
@@ -17,6 +18,7 @@ KINDS_OF_ADDRESS = ("node", "element", "set", "position")
 NEAREST = 3  #: how many nodes a message lists
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class FoundNodes:
     """The kept nodes that an address selects."""

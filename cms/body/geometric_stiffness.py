@@ -9,6 +9,7 @@ import numpy as np
 from cms.errors import BodyError
 from fe_models.foundation.arrays import SYMMETRY_DEFECT, Array, IntArray, frozen, require_finite, require_shape
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.units import Units
 
 __all__ = ["SPIN_PAIRS", "UNIT_LOADS", "GeometricStiffness", "RotatedLoads", "SpreadLoads", "stiffness_of_loads"]
@@ -19,6 +20,7 @@ UNIT_LOADS = ("translation", "rotation", "spin", "interfaces")
 SPIN_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))  #: (a, b) of omega_a omega_b, in the order of `spin`
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class RotatedLoads:
@@ -39,6 +41,7 @@ class RotatedLoads:
             put_array(self, f"turned loads: {name}", name, (*first, 3, n))
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class SpreadLoads:
@@ -60,6 +63,7 @@ class SpreadLoads:
         put_array(self, "spread loads: turned_rigid", "turned_rigid", (6, 3, 3))
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class GeometricStiffness:

@@ -9,6 +9,7 @@ import numpy as np
 from cms.errors import BodyError
 from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["INERTIA_TERMS", "NEGATIVITY", "Moments", "NodalSums", "known_P", "known_S_kl", "moments_from_gram"]
@@ -21,6 +22,7 @@ INERTIA_TERMS = ("3C", "4C", "5C")
 NEGATIVITY = "negativity of the moments"
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Moments:

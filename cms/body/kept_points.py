@@ -7,6 +7,7 @@ import numpy as np
 from cms.errors import BodyError
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, require_finite, require_shape
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["SOURCES", "KeptPoints"]
@@ -18,6 +19,7 @@ SOURCES = {
 }  #: origin of the rotations of a point
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class KeptPoints:

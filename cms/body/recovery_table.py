@@ -19,6 +19,7 @@ from cms.body.geometric_stiffness import SPIN_PAIRS
 from cms.errors import BodyError
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, require_finite, require_shape
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.units import Dimensions, Units, unit_words
 from fe_models.foundation.words import nearest, quoted
 
@@ -29,6 +30,7 @@ ORDERS = ("position", "velocity", "acceleration")  #: derivatives of z, in the o
 TEXTS = ("labels", "quantities", "entities", "components")
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class RecoveryTable:

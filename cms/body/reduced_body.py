@@ -15,6 +15,7 @@ from cms.errors import BodyError
 from fe_models.body.load_cases import ReducedLoadCase
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, require_finite, require_shape
 from fe_models.foundation.copies import FrozenMapping, frozen_copies
+from fe_models.foundation.presentation import Summary, presented
 from fe_models.foundation.tall.on_disk import row_slices
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
@@ -68,6 +69,7 @@ class BodyFrame:
             raise BodyError("body frame: axes: expected right-handed axes as columns")
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ReducedInterface:
@@ -93,6 +95,7 @@ class ReducedInterface:
         require_orthonormal(f"{where}: triad", self.triad)
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ReducedBody:
@@ -211,6 +214,24 @@ class ReducedBody:
             require_shape(f"{where}: interface {interface.name!r}: Psi", interface.Psi, (6, n))
             if interface.members.size and (interface.members.min() < 0 or interface.members.max() >= n_kept):
                 raise BodyError(f"{where}: interface {interface.name!r}: members outside 0..{n_kept - 1}")
+
+    def summary(self) -> Summary:
+        """Return what `repr` and notebooks show: units, mass, frame and interfaces, and the modes with their labels."""
+        center = ", ".join(f"{x:.6g}" for x in self.moments.center_of_mass)
+        shown = ", ".join(each.name for each in self.interfaces[:6]) + ", ..." * (len(self.interfaces) > 6)
+        rows = [
+            ("units", self.units.name),
+            ("mass", f"{self.moments.m:.6g} {self.units.mass_symbol}"),
+            ("centre of mass", f"({center}) {self.units.length_symbol} in the frame"),
+            ("frame", self.frame.kind),
+            ("interfaces", f"{len(self.interfaces)}: {shown}" if self.interfaces else "none"),
+        ]
+        scale = 1 / self.units.time
+        modes = [
+            (str(k + 1), f"{f * scale:.6g}", label)
+            for k, (f, label) in enumerate(zip(self.frequencies, self.labels, strict=True))
+        ]
+        return Summary(f"ReducedBody {self.name!r}: {self.n_q} modes", rows, ("mode", "Hz", "energy from"), modes)
 
     @property
     def n_q(self) -> int:

@@ -9,12 +9,14 @@ import numpy as np
 
 from cms.errors import ModeSetError
 from fe_models.foundation.arrays import Array, frozen, require_finite
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.ranks.spread_columns import SpreadColumns, on_rows
 from fe_models.foundation.tall.on_disk import row_slices
 
 __all__ = ["ModeSet"]
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class ModeSet:
     """Columns over all dofs of a coupled body, before the finishing step of `reduce`."""

@@ -20,6 +20,7 @@ from fe_models.foundation.arrays import (
     symmetric_csc,
 )
 from fe_models.foundation.errors import BodyError
+from fe_models.foundation.presentation import Summary, presented
 from fe_models.foundation.ranks.row_layout import RowLayout
 from fe_models.foundation.ranks.spread_columns import SpreadColumns, spread_parts
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
@@ -163,6 +164,7 @@ class StressPointModel(Protocol):
         """
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class Interface:
     """A named place at which neighbours connect to the body.
@@ -258,6 +260,7 @@ class MeanNode:
         return replace(self, members=self.members + first_node, follows=follows)
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class FEBody:
     """Finite element model of one body, free or intentionally held to the ground.
@@ -295,6 +298,18 @@ class FEBody:
     mean_nodes: tuple[MeanNode, ...] = ()  #: nodes inside the body that follow the mean motion of others
     #: nodes that the reduced body keeps with translations and rotations, in addition to surface and interfaces, (n,)
     kept: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    def summary(self) -> Summary:
+        """Return what `repr` and notebooks show: units, size of the model, and the interfaces."""
+        rows = [
+            ("units", self.units.name),
+            ("nodes", str(len(self.nodes))),
+            ("dofs", str(len(self.dofs))),
+            ("support", "held to the ground" if self.is_held else "free"),
+            *([("load cases", ", ".join(case.name for case in self.load_cases[:6]))] if self.load_cases else []),
+        ]
+        interfaces = [(each.name, each.kind) for each in self.interfaces]
+        return Summary(f"FEBody {self.name!r}", rows, ("interface", "kind"), interfaces)
 
     def __post_init__(self) -> None:
         where = f"body {self.name!r}"

@@ -8,12 +8,14 @@ import numpy as np
 from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.errors import BodyError
+from fe_models.foundation.presentation import presented
 
 __all__ = ["LOAD_CASE_KINDS", "LoadCase", "ReducedLoadCase", "check_load_cases", "load_columns"]
 
 LOAD_CASE_KINDS = ("pressure", "gravity", "force")  #: kinds in the job file; a body accepts any text
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class LoadCase:
@@ -35,6 +37,7 @@ class LoadCase:
         require_finite(f"load case {self.name!r}: f", self.f)
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ReducedLoadCase:

@@ -16,6 +16,7 @@ from fe_models.checks.report import Finding, Report
 from fe_models.checks.unit_check import implausible_units
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.units import Units, unit_system
 from fe_models.meshes.cell_shapes import CELL_SHAPES, cell_jacobians, quadrature, shape_values
 from fe_models.meshes.connectivity import Connectivity, coincident_nodes, connectivity
@@ -87,6 +88,7 @@ class CellGeometry:
     flatness: Array  #: volume divided by the cube of the largest extent, (n_cells,)
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class MeshReport(Report):
     """Numbers of a mesh and findings about it."""

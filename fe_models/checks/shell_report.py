@@ -14,6 +14,7 @@ from fe_models.checks.unit_check import implausible_units
 from fe_models.elements.beams.attachments import RigidLink, Spring
 from fe_models.elements.shells.quality import WARP_LIMIT, cell_quality
 from fe_models.elements.shells.skin import cell_edges
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.units import Units
 from fe_models.meshes.objects.as_mesh import as_shell_mesh
 from fe_models.meshes.shell_mesh import ShellMesh
@@ -25,6 +26,7 @@ WARP_NOTED = 10.0  #: angle between the two halves of a quad above which a warni
 ASPECT_NOTED = 20.0  #: ratio of longest to shortest side above which a warning is given
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class ShellReport(Report):
     """Numbers of a mesh of shells, and findings about it."""

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from fe_models.errors import BeamError
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 from fe_models.foundation.copies import FrozenMapping, frozen_copies
+from fe_models.foundation.presentation import presented
 
 __all__ = ["LineMesh", "divide_lines", "straight_line"]
 
@@ -16,6 +17,7 @@ __all__ = ["LineMesh", "divide_lines", "straight_line"]
 # line mesh ------------------------------------------------------------------------------------------------------------
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class LineMesh:

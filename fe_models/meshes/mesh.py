@@ -7,6 +7,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 from fe_models.foundation.copies import FrozenMapping, frozen_copies
+from fe_models.foundation.presentation import presented
 
 __all__ = ["FACE_TYPES", "SOLID_TYPES", "Mesh"]
 
@@ -25,6 +26,7 @@ SOLID_TYPES = (
 FACE_TYPES = ("triangle", "triangle6", "quad", "quad8", "quad9")
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Mesh:

@@ -7,10 +7,12 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 from fe_models.foundation.copies import FrozenMapping, frozen_copies
+from fe_models.foundation.presentation import presented
 
 __all__ = ["NodeCloud"]
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class NodeCloud:

@@ -13,6 +13,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array, IntArray, frozen_int
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.errors import BodyError
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["NONE", "NamedSet", "Numbering", "no_numbers", "node_place", "numbering_side_by_side"]
@@ -45,6 +46,7 @@ class NamedSet:
             raise BodyError(f"set {self.name!r}: members: expected (n,), got {self.members.shape}")
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Numbering:

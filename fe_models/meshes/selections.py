@@ -8,6 +8,7 @@ import numpy as np
 
 from fe_models.errors import InterfaceError
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.words import nearest
 from fe_models.meshes.boundary import CORNERS, boundary_facets, boundary_nodes, first_of_equal_rows
 from fe_models.meshes.line_mesh import LineMesh
@@ -105,6 +106,7 @@ class NodeSet:
         return nodes
 
 
+@presented
 @dataclass(frozen=True)
 class NodeNumbers:
     """Nodes selected by their numbers in the file."""

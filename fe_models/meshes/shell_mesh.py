@@ -8,12 +8,14 @@ import numpy as np
 from fe_models.errors import ShellError
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 from fe_models.foundation.copies import FrozenMapping, frozen_copies
+from fe_models.foundation.presentation import presented
 
 __all__ = ["FLAT_TYPES", "ShellMesh", "flat_plate", "mapped_shell"]
 
 FLAT_TYPES = ("triangle", "quad")  #: meshio names and node order
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ShellMesh:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray, frozen
+from fe_models.foundation.presentation import presented
 from fe_models.meshes.boundary import area_centroid, boundary_facets
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.mesh import Mesh
@@ -38,6 +39,7 @@ class Cut:
         object.__setattr__(self, "point", frozen(self.point))
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class Split(Generic[AnyMesh]):
     """A mesh in parts along an axis; cut k is between parts k and k + 1, counted from 1."""

@@ -24,6 +24,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.presentation import presented
 from floatframe.analyses.led_equilibrium import LARGEST, Balance, LoadPathEnd, is_left_by_none, led_equilibrium
 from floatframe.analyses.observed_state import observed_state
 from floatframe.analyses.relative.tree_flow import tree_flow
@@ -87,6 +88,7 @@ CLOSED = 1e-10  #: largest constraint error of a joint, relative to the size of 
 PATIENCE = 40
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
     """A state in which all forces balance."""

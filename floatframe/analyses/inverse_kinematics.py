@@ -20,6 +20,7 @@ import scipy.linalg as la
 from scipy.optimize import nnls
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.driven.driven_motion import rigid_columns
 from floatframe.engine.compiling.file_frames import state_of_file
@@ -62,6 +63,7 @@ class Target:
     weight: float = 1.0  #: relative to other targets, above zero
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class ReachedPose:
     """The result of inverse kinematics."""

@@ -8,10 +8,12 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.copies import FrozenMapping, frozen_copies
+from fe_models.foundation.presentation import presented
 
 __all__ = ["State"]
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class State:

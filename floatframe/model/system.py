@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any, Protocol, TypeVar, cast
 
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.presentation import Summary, presented
 from fe_models.foundation.units import Quantity, Units, unit_system
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
@@ -70,6 +71,7 @@ class Named(Protocol):
         """Unique name."""
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class System:
@@ -141,6 +143,20 @@ class System:
                     f"the system in {self.units.name!r}; give the system the units of the body, or read the body in "
                     f"those of the system: cms.read(file, units={self.units.name!r})"
                 )
+
+    def summary(self) -> Summary:
+        """Return what `repr` and notebooks show: bodies with their mass and modes, and the names of all else."""
+        rows = [("units", self.units.name)]
+        for kind in ("joints", "couplers", "forces", "elements", "sensors", "inputs", "outputs", "events", "fmus"):
+            if names := [getattr(each, "name", type(each).__name__) for each in getattr(self, kind)]:
+                shown = ", ".join(names[:6]) + (f", ... and {len(names) - 6} more" if len(names) > 6 else "")
+                rows.append((kind, f"{len(names)}: {shown}"))
+        bodies = []
+        for body in self.bodies:
+            mass, n_q = (body.mass, 0) if isinstance(body, RigidBody) else (body.reduced.moments.m, body.reduced.n_q)
+            bodies.append((body.name, f"{mass:.6g}", str(n_q)))
+        title = f"System {self.name!r}: {len(bodies)} {'body' if len(bodies) == 1 else 'bodies'}"
+        return Summary(title, rows, ("body", f"mass [{self.units.mass_symbol}]", "modes"), bodies)
 
     @cached_property
     def _derived(self) -> dict[Any, Any]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.words import nearest, quoted
 from floatframe.engine.compiling.callbacks import raise_errors_of
 from floatframe.engine.compiling.callbacks.law_functions import called_law, law_callbacks
@@ -23,6 +24,7 @@ from floatframe.results.trajectory import Trajectory
 __all__ = ["ElementMotion", "element_motion", "placed_law"]
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class ElementMotion:
     """Outputs, states and multipliers of an element over time, by name, (n_t,) each, and its wrenches."""

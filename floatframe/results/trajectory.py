@@ -9,6 +9,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.presentation import Summary, presented, text_of
 from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ResultsError
@@ -80,6 +81,7 @@ class Drift:
     angle_rate: Array  #: [rad/s]
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Trajectory:
@@ -90,6 +92,22 @@ class Trajectory:
     is_complete: bool  #: False for a run that was interrupted
     path: Path | None = None  #: results file, or None for a motion in memory
     validity: tuple[ValidityNote, ...] = ()  #: notes of the run about its own validity, see `ValidityNote`
+
+    def summary(self) -> Summary:
+        """Return what `repr` and notebooks show: times, bodies, joints and notes of the run."""
+        second, t = self.units.time_symbol, self.t
+        rows = [
+            ("time", f"{t[0]:.6g} to {t[-1]:.6g} {second}, {len(t)} outputs" if len(t) else "no outputs"),
+            ("units", self.units.name),
+            ("joints and springs", text_of(self.connection_names)),
+            *([("file", str(self.path))] if self.path is not None else []),
+            *([("complete", "no: the run ended early")] if not self.is_complete else []),
+            *(("note", text_of(note.words)) for note in self.validity[:3]),
+        ]
+        return Summary(
+            f"Trajectory of {self.head.system!r}", rows, ("body", "modes"),
+            [(body.name, str(body.n_q)) for body in self.head.bodies],
+        )  # fmt: skip
 
     @cached_property
     def t(self) -> Array:

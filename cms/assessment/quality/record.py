@@ -13,6 +13,7 @@ import numpy as np
 
 from cms.assessment.quality.errors import QualityError
 from cms.assessment.quality.limits import LIMITS
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["VERDICTS", "QualityRecord", "Verdict", "has_failed", "information", "judge", "plain", "worst"]
@@ -21,6 +22,7 @@ Verdict = Literal["pass", "warn", "fail", "info"]
 VERDICTS: tuple[Verdict, ...] = ("info", "pass", "warn", "fail")  #: from harmless to bad
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class QualityRecord:
     """One question about a reduced body, and its answer."""

@@ -16,6 +16,7 @@ from fe_models.elements.solids.body import solid_body
 from fe_models.files.matrices.foreign_matrices import ForeignMatrices
 from fe_models.files.matrices.given import ScalarMassModel, scalar_mass_of
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.units import Units
 from fe_models.meshes.mesh import Mesh
 
@@ -31,6 +32,7 @@ OTHER_BODY = {"mass": 0.02, "first moment": 0.1, "second moment": 0.1}
 Shapes = Callable[[IntArray], Array]  #: (node number, component) rows -> shapes in basic axes, (n_rows, n_q)
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class FullMass:
     """The mass matrix of the full model, over dofs that the superelement recovers."""
@@ -40,6 +42,7 @@ class FullMass:
     places: Mapping[int, Array]  #: node number -> place, basic axes
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class NodalMasses:
     """Point masses at nodes that the superelement recovers, such as its lumped mass."""
@@ -48,6 +51,7 @@ class NodalMasses:
     masses: Array  #: (n,)
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class MeshMass:
     """The mesh behind the superelement, whose node numbers it recovers, and its density."""

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from cms.errors import RecoveryError
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.units import Dimensions
 from fe_models.foundation.words import nearest, quoted
 
@@ -19,6 +20,7 @@ QUANTITIES = (*OF_NODES, *OF_ELEMENTS, *OF_INTERFACES)
 Place = str | int
 
 
+@presented
 @dataclass(frozen=True)
 class Rows:
     """Rows of one quantity at some places.

@@ -9,12 +9,14 @@ from fe_models.body.fe_body import Interface
 from fe_models.errors import InterfaceError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
+from fe_models.foundation.presentation import presented
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.selections import AnyMesh, Selection
 
 __all__ = ["NodeIndices", "line_interface", "node_interface"]
 
 
+@presented
 @dataclass(frozen=True)
 class NodeIndices:
     """Selection of nodes by their index in the mesh."""

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from fe_models.errors import MatrixError
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 from fe_models.foundation.copies import FrozenMapping, frozen_copies
+from fe_models.foundation.presentation import presented
 
 __all__ = ["SCALAR", "ForeignMatrices", "pair_keys"]
 
@@ -17,6 +18,7 @@ SCALAR = -1  #: component of a dof without place: a scalar point, a modal coordi
 ROLES = ("K", "M", "D")
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ForeignMatrices:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from floatframe.analyses.driven.driven_motion import Elasticity, quasi_static_bodies
 from floatframe.analyses.driven.kinematics import kinematics
 from floatframe.errors import ModelError
@@ -28,6 +29,7 @@ from floatframe.results.trajectory import Trajectory
 __all__ = ["InverseDynamics", "drive_forces", "inverse_dynamics", "with_motors"]
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class InverseDynamics:
     """A prescribed motion and the forces it requires."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from floatframe.analyses.linear.linearization import LinearSystem
 from floatframe.analyses.linear.system_modes import system_modes
 from floatframe.errors import ModelError
@@ -16,6 +17,7 @@ POINTS_AROUND = 40  #: even, so that none is at the middle, where an undamped re
 LEAST_DAMPING = 1e-4  #: least damping used for the width of a resonance, because an undamped one has zero width
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class FrequencyResponse:
     """Responses y/s at frequencies."""

@@ -25,6 +25,7 @@ import scipy.linalg as la
 from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array, frozen
+from fe_models.foundation.presentation import presented
 from floatframe.analyses.equilibrium import Equilibrium, static_equilibrium
 from floatframe.analyses.linear.channels import (
     AnyInput,
@@ -94,6 +95,7 @@ def empty() -> Array:
     return np.zeros((0, 0))
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class LinearSystem:
     """Small motions z about a steady motion, with n_s inputs s, and outputs y.

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from floatframe.analyses.equilibrium import Equilibrium, steady_rotation
 from floatframe.analyses.linear.channels import AnyOutput, outputs_of
 from floatframe.analyses.linear.linearization import LinearSystem, linearize
@@ -30,6 +31,7 @@ ROUNDING = float(np.sqrt(np.finfo(float).eps))  #: error of a double eigenvalue,
 MOST_HALVINGS = 3  #: largest number of halvings of a step between values in which a mode is lost
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class Locus:
     """Eigenvalues as functions of a parameter; each column follows one mode."""

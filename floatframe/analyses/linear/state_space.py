@@ -18,6 +18,7 @@ import scipy.linalg as la
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.extras import extra_module
 from fe_models.foundation.paths import replace_file
+from fe_models.foundation.presentation import presented
 from floatframe.analyses.linear.linearization import LinearSystem, NamedMotions
 from floatframe.analyses.system_matrices import settled
 from floatframe.errors import ModelError
@@ -31,6 +32,7 @@ CLEAR = 0.02  #: smallest independent part of a motion that makes a well conditi
 NEW = 1e-9  #: smallest independent part that is not a rounding error, used if no motion reaches `CLEAR`
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class NamedStateSpace:
     """A state space x_dot = A x + B u,  y = C x + D u, with the name and unit of each state, input and output."""

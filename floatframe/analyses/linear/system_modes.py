@@ -6,6 +6,7 @@ import numpy as np
 import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import Summary, presented
 from floatframe.analyses.linear.linearization import LinearSystem
 
 __all__ = ["SystemModes", "system_modes"]
@@ -17,6 +18,7 @@ FREE = 1e-7  #: rate of a unit motion, relative to the highest frequency, below 
 LEAST_BODY_MOTION = 1e-9  #: motion of bodies, relative to the change of states, below which a mode has only states
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class SystemModes:
     """Modes exp(lambda t) by ascending |lambda|; only one mode of each conjugate pair is listed.
@@ -33,6 +35,17 @@ class SystemModes:
     #: changes of states, scaled like the shapes, (n_states, n_modes) complex
     state_shapes: Array = field(default_factory=lambda: np.zeros((0, 0)))
     errors: Array = field(default_factory=lambda: np.zeros(0))  #: error bounds of lambda, (n_modes,) [1/s]
+
+    def summary(self) -> Summary:
+        """Return what `repr` and notebooks show: frequency, damping and the bodies that move, of each mode."""
+        rows = [
+            (str(k + 1), f"{f:.6g}", f"{ratio + 0.0:.3g}", self.bodies[int(np.argmax(shares))] if len(shares) else "")
+            for k, (f, ratio, shares) in enumerate(
+                zip(self.frequencies, self.damping_ratios, self.energy_shares, strict=True)
+            )
+        ]
+        title = f"SystemModes: {len(rows)} modes, {'stable' if self.is_stable else 'unstable'}"
+        return Summary(title, (), ("mode", "Hz", "damping ratio", "moves most"), rows)
 
     @property
     def frequencies(self) -> Array:

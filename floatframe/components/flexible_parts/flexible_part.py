@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
@@ -15,6 +16,7 @@ from floatframe.model.system import Body
 __all__ = ["FlexiblePart", "PartMaker"]
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class FlexiblePart:
     """Bodies, joints and forces for a system, and markers at named points of the part."""

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.equilibrium import static_equilibrium
 from floatframe.analyses.linear.linearization import linearize
@@ -65,6 +66,7 @@ TOLERANCE = 1e-12  #: tolerance of Newton's method in the differentiated steps
 SLOPE_STEP = 2e-4  #: step of differences of sensors, relative to the magnitude of the state
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class Sensitivities:
     """Values of outputs and their derivatives by parameters."""

@@ -19,6 +19,7 @@ import numpy as np
 import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from floatframe.design.identification.base_parameters import BaseParameters, base_parameters
 from floatframe.design.identification.regressors import LinearForm
 from floatframe.design.identification.tree_samples import TreeSamples
@@ -38,6 +39,7 @@ ROUNDS = 30  #: largest number of updates of weights
 BASE = ("base F_x", "base F_y", "base F_z", "base M_x", "base M_y", "base M_z")
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class Measured:
     """A motion with its measurements."""

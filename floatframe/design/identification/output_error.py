@@ -28,6 +28,7 @@ import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ReportedError
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.words import nearest, quoted
 from floatframe.design.gradients.outputs import columns_of, wanted_of
 from floatframe.errors import FloatframeError, ModelError
@@ -51,6 +52,7 @@ WHITE = 2.6  #: largest correlation of neighbouring residuals of white noise, in
 TOLERANCE = 1e-10  #: tolerance of Newton iterations in compared runs
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class MeasuredOutputs:
     """Outputs measured at equidistant times, from the beginning of the run."""

@@ -33,6 +33,7 @@ from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffnes
 from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.body.mass_loads import MassLoads
 from fe_models.foundation.arrays import Array, IntArray, frozen
+from fe_models.foundation.presentation import presented
 from floatframe.errors import ModelError
 
 __all__ = ["FrameAcceleration", "FullTransient", "full_transient"]
@@ -50,6 +51,7 @@ class FrameAcceleration:
     origin: Array = field(default_factory=lambda: np.zeros(3))  #: reference point in mesh coordinates, (3,) [m]
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class FullTransient:
     """Motion of the selected rows, and forces at the interfaces with prescribed motion."""

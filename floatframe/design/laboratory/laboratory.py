@@ -32,6 +32,7 @@ from cms.reduction.geometric_stiffness.unit_states import UnitStates, require_ge
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ReportedError
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.stages import Stages
 from floatframe.design.laboratory.cases import Case
 from floatframe.design.laboratory.exact_beam import ExactBeam, with_exact_beams
@@ -106,6 +107,7 @@ class CaseResult:
         return "truncation" if self.truncation > self.description else "description"
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class LaboratoryResult:
     """All cases, compared with the reference."""

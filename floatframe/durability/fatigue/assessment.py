@@ -11,6 +11,7 @@ from cms.body.address import Address
 from cms.body.modal_file.file import digest, read
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.words import nearest, quoted
 from floatframe.durability.fatigue.criteria import Criterion
 from floatframe.durability.fatigue.fatigue_file import (
@@ -45,6 +46,7 @@ __all__ = ["Assessment", "assess", "equivalent_repeats", "shaken_damage", "shake
 SAME_PLACE = 1e-9  #: distance, relative to the size of the body, within which a stress point is at a node
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class Assessment:
     """A fatigue result with its programme."""

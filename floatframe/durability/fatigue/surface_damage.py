@@ -12,6 +12,7 @@ import numpy as np
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.presentation import presented
 from fe_models.meshes.numbering import NONE
 from floatframe.durability.fatigue.criteria import Criterion
 from floatframe.durability.fatigue.history_damage import RESIDUES, Counted, Progress, count_histories
@@ -35,6 +36,7 @@ __all__ = ["FatigueResult", "history_damage", "spectral_damage"]
 MOST_BEYOND = 0.01
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class FatigueResult:

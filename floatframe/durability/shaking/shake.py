@@ -7,6 +7,7 @@ import numpy as np
 
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from floatframe.durability.shaking.loads.inputs import band_notes
 from floatframe.durability.shaking.loads.notching import DEEPEST, Limit, NotchedRun, notched_random, notched_sine
 from floatframe.durability.shaking.loads.random_vibration import RandomRun, RandomTest, random_runs
@@ -36,6 +37,7 @@ class NotchRequest:
     deepest: float = DEEPEST  #: largest allowed depth of a notch [dB]
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class ShakeJob:
     """The structure, its bases and damping, the tests, and the requested outputs."""
@@ -80,6 +82,7 @@ class EffectiveMasses:
         return np.asarray(np.cumsum(self.share, axis=0))
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class ShakeResult:
     """All runs of a job."""

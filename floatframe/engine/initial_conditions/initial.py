@@ -17,6 +17,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.presentation import presented
 from floatframe.engine.compiling.callbacks import raise_errors_of
 from floatframe.engine.compiling.file_frames import motion_of_file, state_of_engine
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
@@ -93,6 +94,7 @@ def mobility(system: System) -> Mobility:
     return constraint_mobility(compiled, work, assembled(compiled, work, compiled.placed))
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class ConsistentState:
     """A state that fulfils the joints, with its accelerations and reactions."""

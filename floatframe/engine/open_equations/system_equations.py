@@ -21,6 +21,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from floatframe.engine.compiling.callbacks import raise_errors_of
 from floatframe.engine.compiling.file_frames import state_of_engine, state_of_file
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
@@ -58,6 +59,7 @@ class Tangents:
     by_a: Array  #: the mass matrix
 
 
+@presented
 @dataclass(frozen=True, eq=False, repr=False)
 class Equations:
     """Open equations of a system; positions, velocities and multipliers as in `layout`, in units of the system.

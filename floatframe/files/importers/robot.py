@@ -12,6 +12,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.words import nearest, quoted, shortened
 from floatframe.errors import UrdfError
 from floatframe.model.checked_values import array_of_shape, number, unit_vector
@@ -148,6 +149,7 @@ class RobotJoint:
         return self.type in WITH_VALUE
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Robot:

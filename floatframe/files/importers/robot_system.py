@@ -23,6 +23,7 @@ import numpy as np
 
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError, UrdfError
@@ -49,6 +50,7 @@ __all__ = ["FlexibleLink", "RobotSystem", "robot_system"]
 PLACE = 1e-3  #: farthest an interface may be from its joint, of the size of the flexible body
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class FlexibleLink:
     """A reduced body in the place of a link.
@@ -63,6 +65,7 @@ class FlexibleLink:
     rotation_vector: Array = field(default_factory=lambda: np.zeros(3))  #: of the mesh axes in it, (3,) [rad]
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class RobotSystem:
     """A robot as a system, and where its links are in it."""

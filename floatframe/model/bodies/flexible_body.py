@@ -9,6 +9,7 @@ import numpy as np
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.presentation import presented
 from floatframe.errors import ModelError
 from floatframe.model.bodies.mean_axes import MeanAxes, mean_axes
 from floatframe.model.bodies.rigid_body import euler_parameters_from_user
@@ -19,6 +20,7 @@ from floatframe.model.shapes.shape import Geometry, Shape, shape_tuple
 __all__ = ["FlexibleBody"]
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class FlexibleBody:

@@ -7,6 +7,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.presentation import presented
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import array_of_shape, number
 from floatframe.model.shapes.shape import Geometry, Shape, shape_tuple
@@ -17,6 +18,7 @@ __all__ = ["RigidBody"]
 TRIANGLE_DEFECT = 1e-6
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class RigidBody:

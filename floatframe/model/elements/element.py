@@ -25,6 +25,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.units import Units
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
@@ -63,6 +64,7 @@ class GapSpring:
         object.__setattr__(self, "exponent", number("law: gaps: exponent", self.exponent, at_least=1.0))
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ElementLaw:

@@ -10,6 +10,7 @@ from cms.body.recovery_table import RecoveryTable
 from cms.errors import BodyError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.words import nearest, quoted
 from floatframe.engine.compiling.interface_loads import Load, amplitudes, in_body, interface_number, loads_on_interfaces
 from floatframe.engine.compiling.markers import MarkerData, find_marker
@@ -251,6 +252,7 @@ class SpringSensor:
                 "tension": unit_words(system.units, "force")}  # fmt: skip
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class RecoverySensor:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.presentation import presented
 from floatframe.errors import FatigueError
 
 __all__ = ["ORDERS", "ModalSpectra", "modal_moments", "spectra_of_history"]
@@ -17,6 +18,7 @@ ORDERS = (0.0, 1.0, 2.0, 4.0)  #: orders of the spectral moments that the method
 HERMITIAN = 1e-8  #: largest defect of a cross spectrum, and its most negative eigenvalue, relative to its largest entry
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ModalSpectra:

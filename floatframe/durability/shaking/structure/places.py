@@ -11,6 +11,7 @@ from cms.body.reduced_body import ReducedBody
 from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 
@@ -21,6 +22,7 @@ WAYS = ("interface", "node", "element", "set", "position", "point", "sensor", "r
 MOST_NODES = 500  #: largest number of nodes of an element or set
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class Observed:
     """A place at which something is observed; one of interface, node, element, set, position and point says where.

@@ -1,0 +1,141 @@
+"""How public objects show themselves: a few lines as text, a small table in a notebook."""
+
+import html
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, dataclass, fields, is_dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import scipy.sparse as sp
+
+__all__ = ["Summary", "presented", "text_of"]
+
+Class = TypeVar("Class", bound=type)
+
+LONGEST_VALUE = 70  #: characters of a value
+MOST_ROWS = 12  #: rows of the table of a summary
+SMALL_ARRAY = 12  #: entries of an array that is shown with its numbers
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What is shown of an object.
+
+    Parameters
+    ----------
+    title
+        Its kind and name.
+    rows
+        Labels and values.
+    headings
+        Headings of a table below, if there is one.
+    table
+        Rows of this table; the first `MOST_ROWS` are shown.
+    """
+
+    title: str
+    rows: Sequence[tuple[str, str]] = ()
+    headings: Sequence[str] = ()
+    table: Sequence[Sequence[str]] = ()
+
+    def text(self) -> str:
+        """Return the summary as text."""
+        width = max((len(label) for label, _ in self.rows), default=0)
+        lines = [self.title, *(f"  {label:<{width}}  {value}" for label, value in self.rows)]
+        shown = [list(self.headings), *(list(row) for row in self.table[:MOST_ROWS])] if self.table else []
+        widths = [max(len(row[k]) for row in shown) for k in range(len(self.headings))] if shown else []
+        lines += [
+            "  " + "  ".join(f"{cell:<{n}}" for cell, n in zip(row, widths, strict=True)).rstrip() for row in shown
+        ]
+        if len(self.table) > MOST_ROWS:
+            lines.append(f"  ... and {len(self.table) - MOST_ROWS} more")
+        return "\n".join(lines)
+
+    def html(self) -> str:
+        """Return the summary as tables of HTML."""
+        cell = lambda kind, text: f"<{kind} style='text-align:left'>{html.escape(text)}</{kind}>"  # noqa: E731
+        rows = [f"<tr>{cell('th', label)}{cell('td', value)}</tr>" for label, value in self.rows]
+        parts = [f"<b>{html.escape(self.title)}</b>", *(["<table>", *rows, "</table>"] if rows else [])]
+        if self.table:
+            parts.append("<table><tr>" + "".join(cell("th", heading) for heading in self.headings) + "</tr>")
+            parts += [f"<tr>{''.join(cell('td', each) for each in row)}</tr>" for row in self.table[:MOST_ROWS]]
+            parts.append("</table>")
+        if len(self.table) > MOST_ROWS:
+            parts.append(f"... and {len(self.table) - MOST_ROWS} more")
+        return "".join(parts)
+
+
+def presented(kind: Class) -> Class:
+    """Decorate a data class: `repr` and notebooks show its `summary`, or else its fields that differ from defaults."""
+
+    def show(self: Any) -> Summary:
+        found: Summary = self.summary() if hasattr(kind, "summary") else summary_of_fields(self)
+        return found
+
+    def text(self: Any) -> str:
+        found = show(self)
+        if not hasattr(kind, "summary") and len(found.title) + sum(len(a) + len(b) + 3 for a, b in found.rows) < 100:
+            return f"{type(self).__name__}({', '.join(f'{label}={value}' for label, value in found.rows)})"
+        return found.text()
+
+    kind.__repr__ = text  # type: ignore[method-assign, assignment]
+    kind._repr_html_ = lambda self: show(self).html()  # type: ignore[attr-defined]
+    return kind
+
+
+def summary_of_fields(value: Any) -> Summary:
+    """Return the summary of a data class: its name, and the fields that differ from their defaults."""
+    rows = []
+    for part in fields(value):
+        if not part.repr:
+            continue
+        found = getattr(value, part.name, None)
+        default = part.default if part.default_factory is MISSING else part.default_factory()
+        if default is not MISSING and is_same(found, default):
+            continue
+        rows.append((part.name, text_of(found)))
+    return Summary(type(value).__name__, rows)
+
+
+def is_same(a: Any, b: Any) -> bool:
+    """Whether a value is the default."""
+    if a is b:
+        return True
+    try:
+        return type(a) is type(b) and bool(np.array_equal(a, b) if isinstance(a, np.ndarray) else a == b)
+    except (ValueError, TypeError):
+        return False
+
+
+def text_of(value: Any) -> str:
+    """Return a value in one short line."""
+    if isinstance(value, np.ndarray):
+        if not 0 < value.size <= SMALL_ARRAY:
+            return f"array {value.shape}"
+        numbers = np.array2string(value, separator=", ", formatter={"float_kind": "{:.6g}".format})
+        return shortened(" ".join(numbers.split()))
+    if sp.issparse(value):
+        return f"sparse {value.shape}, {value.nnz} entries"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, Path):
+        return shortened(str(value))
+    if isinstance(value, Mapping):
+        if len(value) > 4:
+            return f"{len(value)} entries"
+        return shortened("{" + ", ".join(f"{key!r}: {text_of(each)}" for key, each in value.items()) + "}")
+    if isinstance(value, tuple | list):
+        if len(value) > 6:
+            return f"{len(value)} items"
+        inner = ", ".join(text_of(each) for each in value)
+        return shortened(f"[{inner}]" if isinstance(value, list) else f"({inner}{',' * (len(value) == 1)})")
+    if is_dataclass(value) and not isinstance(value, type):
+        name = getattr(value, "name", None)
+        return f"{type(value).__name__}({name!r})" if isinstance(name, str) else type(value).__name__
+    return shortened(repr(value).replace("\n", " "))
+
+
+def shortened(text: str) -> str:
+    """Return a text of at most `LONGEST_VALUE` characters."""
+    return text if len(text) <= LONGEST_VALUE else f"{text[: LONGEST_VALUE - 3]}..."
