@@ -19,8 +19,7 @@ from cms.assessment.quality.reference.port_model import (
 )
 from cms.body.reduced_body import ReducedBody
 from cms.cli.console import output_path, print_table, say
-from fe_models.foundation.arrays import Array
-from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
 from fe_models.foundation.paths import replace_file
 from fe_models.foundation.words import nearest, quoted
 

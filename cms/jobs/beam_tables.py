@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, StringConstraints, model_validator
 
-from fe_models.foundation.components import MOTION_COMPONENTS as COMPONENTS
+from fe_models.foundation.arrays import MOTION_COMPONENTS as COMPONENTS
 from fe_models.foundation.toml_file import Matrix3, Table, Vector3, choice
 from fe_models.foundation.words import nearest, quoted
 

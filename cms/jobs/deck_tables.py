@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, Field, StringConstraints
 from cms.jobs.beam_tables import component_numbers, names
 from cms.jobs.shell_tables import check_layups
 from fe_models.elements.solids.elements import INTEGRATIONS, MASSES
-from fe_models.foundation.components import MOTION_COMPONENTS as COMPONENTS
+from fe_models.foundation.arrays import MOTION_COMPONENTS as COMPONENTS
 from fe_models.foundation.toml_file import Table, choice, is_no_number
 from fe_models.foundation.words import nearest, quoted
 

@@ -22,7 +22,7 @@ from cms.reduction.basis.damping import (
     RampDamping,
     RayleighDamping,
 )
-from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.arrays import MOTION_COMPONENTS
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.tasks.task_map import WorkerError
 from fe_models.foundation.tasks.workers import WORKERS_HELP, checked_workers

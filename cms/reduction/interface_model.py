@@ -25,8 +25,7 @@ from cms.body.reduced_body import ReducedBody, ReducedInterface
 from cms.errors import ExportError
 from cms.reduction.frame_conversion import rigid_mass, six_motions
 from fe_models.body.rigid_motion import rigid_motion_of_points
-from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, IntArray
 
 __all__ = ["BoundaryNode", "InterfaceModel", "interface_model"]
 

@@ -1,4 +1,4 @@
-"""Arrays of the frozen types: float64, C order, finite, read-only."""
+"""Arrays of the frozen types: float64, C order, finite, read-only; names of their components."""
 
 from typing import Any
 
@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from fe_models.foundation.errors import BodyError
 
 __all__ = [
+    "MOTION_COMPONENTS",
+    "STRESS_COMPONENTS",
     "Array",
     "IntArray",
     "axial",
@@ -22,6 +24,11 @@ __all__ = [
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+
+#: components of a node or interface: translations, then rotations; component k of `FEBody.dofs`
+MOTION_COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz")
+
+STRESS_COMPONENTS = ("xx", "yy", "zz", "yz", "xz", "xy")  #: components of a symmetric tensor, in Voigt's order
 
 SYMMETRY_DEFECT = 1e-8  #: largest |A - A.T| / |A| that counts as rounding
 

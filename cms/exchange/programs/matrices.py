@@ -12,8 +12,7 @@ from cms.body.reduced_body import ReducedBody
 from cms.errors import ExportError
 from cms.exchange.exporters.writer import Request, WrittenFiles, in_ascii
 from cms.reduction.interface_model import BoundaryNode, InterfaceModel, interface_model
-from fe_models.foundation.arrays import Array
-from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
 from fe_models.meshes.numbering import NONE
 
 __all__ = ["make_abaqus", "make_mat5", "make_mat73", "make_matrix_market", "make_simscape"]

@@ -11,7 +11,7 @@ import numpy as np
 
 from cms.errors import JobError
 from fe_models.files.decks.deck import Deck, LineSection, RodSection, ShellSection, SolidSection, Support
-from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.arrays import MOTION_COMPONENTS
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["JobRequest", "job_text"]

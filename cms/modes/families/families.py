@@ -30,8 +30,7 @@ from cms.modes.families.static_modes import (
 )
 from cms.modes.families.vibration_modes import elastic_modes, fixed_interface_modes, no_modes
 from fe_models.body.fe_body import FEBody
-from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, IntArray
 from fe_models.foundation.ranks.spread_columns import SpreadColumns
 from fe_models.foundation.ranks.spread_matrix import largest_entry
 from fe_models.foundation.solver import Solver

@@ -11,8 +11,7 @@ from cms.linear_algebra.solvers.tall import combine
 from cms.modes.families.fixed_interface import FixedInterfaceBody
 from cms.modes.families.flexibility import Flexibility
 from fe_models.body.fe_body import MULTIPLIER, FEBody
-from fe_models.foundation.arrays import Array
-from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
 from fe_models.foundation.ranks.spread_columns import spread_parts
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 from fe_models.foundation.tall.on_disk import of_this_process, on_disk, release

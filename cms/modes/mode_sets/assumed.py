@@ -12,8 +12,7 @@ from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets.axis_functions import AXIS_FUNCTIONS, AxisFunctions, axis_functions
 from cms.modes.mode_sets.mesh_field import coupled_field
 from fe_models.body.fe_body import FEBody
-from fe_models.foundation.arrays import Array
-from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
 from fe_models.foundation.words import nearest, quoted
 
 if TYPE_CHECKING:

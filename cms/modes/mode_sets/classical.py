@@ -26,8 +26,7 @@ from cms.modes.mode_sets.blocks import (
     vibration_block,
 )
 from fe_models.body.fe_body import FEBody, Interface
-from fe_models.foundation.arrays import Array
-from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = [

@@ -18,8 +18,7 @@ from cms.linear_algebra.solvers.tall import inner, rows_times
 from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.node_motion import node_weights, weighted_rigid_modes
 from fe_models.body.fe_body import FEBody
-from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, IntArray
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.numbering import Numbering
 

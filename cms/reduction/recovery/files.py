@@ -23,8 +23,7 @@ from cms.reduction.recovery.interface_rows import node_words
 from cms.reduction.recovery.load_columns import WRENCH, forces_of_loads, on_coordinates
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.files.nastran_matrices.write_op4 import op4_parts
-from fe_models.foundation.arrays import Array
-from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
 from fe_models.foundation.paths import replace_files
 from fe_models.foundation.seal import reason
 from fe_models.foundation.units import Dimensions, Units, unit_text

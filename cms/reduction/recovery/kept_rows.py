@@ -13,8 +13,7 @@ from cms.reduction.recovery.interface_rows import PartOfTable
 from cms.reduction.recovery.load_columns import SPIN, LoadColumns
 from cms.reduction.recovery.request import OF_MOTION, Rows, motion_dimensions
 from fe_models.body.rigid_motion import rigid_motion_of_points
-from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.components import MOTION_COMPONENTS, STRESS_COMPONENTS
+from fe_models.foundation.arrays import MOTION_COMPONENTS, STRESS_COMPONENTS, Array, IntArray
 from fe_models.foundation.units import Dimensions
 from fe_models.foundation.words import nearest, quoted
 

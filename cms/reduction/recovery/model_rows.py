@@ -13,8 +13,7 @@ from cms.reduction.recovery.request import OF_ELEMENTS, OF_MOTION, Rows, motion_
 from fe_models.body.fe_body import FEBody
 from fe_models.elements.recovery.element_forces import ElementGroup, element_groups
 from fe_models.elements.recovery.strain import nodal_strain
-from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.components import MOTION_COMPONENTS, STRESS_COMPONENTS
+from fe_models.foundation.arrays import MOTION_COMPONENTS, STRESS_COMPONENTS, Array, IntArray
 from fe_models.foundation.units import Dimensions
 from fe_models.foundation.words import nearest, quoted
 

@@ -18,8 +18,7 @@ from fe_models.elements.shells.model import ShellModel
 from fe_models.elements.shells.stiffeners import StiffenedModel
 from fe_models.elements.solids.body import SolidModel
 from fe_models.elements.solids.elements import reference_centre
-from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.components import STRESS_COMPONENTS
+from fe_models.foundation.arrays import STRESS_COMPONENTS, Array, IntArray
 from fe_models.foundation.units import Dimensions
 from fe_models.meshes.numbering import NONE
 

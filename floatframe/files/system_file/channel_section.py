@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from fe_models.body.kept_nodes import TOLERANCE
-from fe_models.foundation.components import STRESS_COMPONENTS
+from fe_models.foundation.arrays import STRESS_COMPONENTS
 from fe_models.foundation.toml_file import Table, Vector3, choice
 from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.linear.channels import AnyInput, AnyOutput, Column

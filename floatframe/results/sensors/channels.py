@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
-from fe_models.foundation.components import STRESS_COMPONENTS
+from fe_models.foundation.arrays import STRESS_COMPONENTS, Array
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.units import Units
 from floatframe.errors import ModelError

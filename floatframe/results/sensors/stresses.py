@@ -9,8 +9,7 @@ from cms.body.reduced_body import ReducedBody
 from cms.body.stress import stress_of, von_mises
 from cms.errors import BodyError
 from fe_models.body.kept_nodes import TOLERANCE
-from fe_models.foundation.arrays import Array
-from fe_models.foundation.components import STRESS_COMPONENTS
+from fe_models.foundation.arrays import STRESS_COMPONENTS, Array
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError

@@ -7,8 +7,7 @@ from cms.assessment.quality.record import QualityRecord, information, judge
 from cms.assessment.quality.reference.free_pencil import port_rows, stiffness_scale
 from cms.body.reduced_body import ReducedBody, ReducedInterface
 from fe_models.body.rigid_motion import rigid_motion_of_points
-from fe_models.foundation.arrays import Array
-from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
 
 __all__ = ["check_interface_motions", "check_interface_places", "check_rigid_interfaces", "missing_motions"]
 

@@ -7,8 +7,7 @@ import numpy as np
 from cms.assessment.quality.errors import QualityError
 from cms.assessment.quality.reference.free_pencil import free_elastic_modes, free_pencil, port_rows
 from cms.body.reduced_body import ReducedBody
-from fe_models.foundation.arrays import Array, frozen
-from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, frozen
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = [

@@ -10,8 +10,7 @@ from cms.assessment.quality.errors import QualityError
 from cms.reduction.basis.node_motion import interface_node_motion
 from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.fe_body import FEBody, Interface
-from fe_models.foundation.arrays import Array
-from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
 
 __all__ = ["Ports"]
 

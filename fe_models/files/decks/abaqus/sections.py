@@ -16,8 +16,7 @@ from fe_models.files.decks.abaqus.thickness import read_nodal_thickness
 from fe_models.files.decks.abaqus.uneven_box import uneven_box
 from fe_models.files.decks.deck import DeckMass, DeckSpring, LineSection, RodSection, ShellSection, SolidSection
 from fe_models.files.decks.spring_axes import as_triad, axes_along
-from fe_models.foundation.arrays import IntArray
-from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.arrays import MOTION_COMPONENTS, IntArray
 
 __all__ = ["ellipses_in_numbers", "read_section"]
 

@@ -6,8 +6,7 @@ from fe_models.files.bulk_data.cards import Card
 from fe_models.files.decks.deck import DeckSpring
 from fe_models.files.decks.nastran.model import ALL, ALONG, NastranModel
 from fe_models.files.decks.spring_axes import as_triad, axes_along
-from fe_models.foundation.arrays import Array
-from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
 
 __all__ = ["read_springs", "scalar_ends", "springs_to_ground"]
 

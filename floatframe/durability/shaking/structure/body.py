@@ -16,8 +16,7 @@ from cms.assessment.quality.reference.free_pencil import whole_pencil
 from cms.body.reduced_body import ReducedBody, ReducedInterface
 from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
 from fe_models.body.rigid_motion import rigid_motion_of_points
-from fe_models.foundation.arrays import Array
-from fe_models.foundation.components import STRESS_COMPONENTS
+from fe_models.foundation.arrays import STRESS_COMPONENTS, Array
 from fe_models.foundation.units import Units
 from floatframe.durability.shaking.structure.damping import Damping
 from floatframe.durability.shaking.structure.model import DIRECTIONS, Base, Output, ShakenModel, rigid_rows

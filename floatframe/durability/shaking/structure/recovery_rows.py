@@ -11,8 +11,7 @@ import scipy.linalg as la
 
 from cms.body.recovery_table import RecoveryTable
 from cms.body.reduced_body import ReducedBody
-from fe_models.foundation.arrays import Array
-from fe_models.foundation.components import STRESS_COMPONENTS
+from fe_models.foundation.arrays import STRESS_COMPONENTS, Array
 from fe_models.foundation.words import nearest, quoted
 from floatframe.durability.shaking.structure.model import DIRECTIONS, Base, Output, rigid_rows
 from floatframe.durability.shaking.structure.places import Observed

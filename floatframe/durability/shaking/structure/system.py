@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
-from fe_models.foundation.arrays import Array
-from fe_models.foundation.components import STRESS_COMPONENTS
+from fe_models.foundation.arrays import STRESS_COMPONENTS, Array
 from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.equilibrium import Equilibrium, static_equilibrium
 from floatframe.analyses.linear.channels import Column
