@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from cms.cli.arguments import ModalFile, Output, Workers
+from cms.cli.arguments import ModalFile, Output, SetValues, Workers
 from cms.cli.console import commands, guarded, register, say
 from cms.cli.info import info_command, print_body
 from cms.cli.modes import view_command
@@ -51,6 +51,29 @@ def job_command(
     from cms.cli.job import DeckRequest, write_job
 
     write_job(DeckRequest(deck, output, units, program, tuple(density or ()), tuple(leave_out or ()), mass))
+
+
+@guarded
+def run_command(
+    file: Annotated[Path, typer.Argument(help="Job or correlation file (TOML).")],
+    output: Output = None,
+    set_values: SetValues = [],  # noqa: B006
+) -> None:
+    """Run a file by its kind: reduce a job, correlate a test.
+
+    Files of kind "job", or without `kind`, are reduced; files of kind "correlation" are compared with their model.
+
+    Example: cms run rod.toml
+    """
+    from cms.errors import JobError
+    from fe_models.foundation.toml_file import read_toml
+
+    if read_toml(file, JobError).get("kind", "job") == "correlation":
+        if set_values:
+            raise JobError(f'{file}: kind = "correlation": --set belongs to jobs')
+        correlate_command(file, output)
+        return
+    reduce_command([file], output, set_values=set_values)
 
 
 @guarded
@@ -539,7 +562,7 @@ register(
             "split": split_command,
             "show": show_command,
         },
-        "Reduce": {"reduce": reduce_command, "modes": modes_command, "frame": frame_command},
+        "Reduce": {"run": run_command, "reduce": reduce_command, "modes": modes_command, "frame": frame_command},
         "Judge": {
             "check": check_command,
             "accept": accept_command,

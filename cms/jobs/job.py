@@ -37,7 +37,7 @@ from fe_models.body.fe_body import INTERFACE_KINDS
 from fe_models.body.load_cases import LOAD_CASE_KINDS
 from fe_models.foundation.parametric_file import read_parametric
 from fe_models.foundation.paths import near_file
-from fe_models.foundation.toml_file import Matrix3, Range, Table, Vector3, choice, is_no_number, validated
+from fe_models.foundation.toml_file import Matrix3, Range, Table, Vector3, choice, is_no_number, kind_field, validated
 from fe_models.foundation.units import UNIT_SYSTEMS
 from fe_models.foundation.words import nearest, quoted
 
@@ -363,6 +363,7 @@ class LoadCaseSection(Table):
 class Job(Table):
     """A reduction job: one body, its materials, its interfaces, and how to reduce it."""
 
+    kind: str = kind_field("job")
     body: BodySection = Field(description="a table [body] with mesh and units")
     materials: dict[str, MaterialSection] = Field({}, description="tables [materials.NAME]")
     mesh_size: MeshSizeSection | None = Field(None, description="a table [mesh_size] with size, for CAD files")

@@ -11,15 +11,15 @@ from math import inf, isfinite
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
 
 from fe_models.foundation.paths import is_stream, near_file
 from fe_models.foundation.words import nearest, quoted, shortened
 
 __all__ = [
-    "FileContent", "Location", "Matrix3", "Range", "Table", "Vector3", "changed", "choice", "describe", "files_named",
-    "first_key", "read_toml", "validated", "value_of",
+    "KINDS", "FileContent", "Location", "Matrix3", "Range", "Table", "Vector3", "changed", "choice", "describe",
+    "files_named", "first_key", "kind_field", "read_toml", "validated", "value_of",
 ]  # fmt: skip
 
 
@@ -31,6 +31,17 @@ class Table(BaseModel):
 
 Model = TypeVar("Model", bound=Table)
 Location = tuple[str | int, ...]  #: a key path: keys of tables, and indices in lists
+KINDS = {  #: the command that runs a file of each kind
+    "job": "cms reduce",
+    "correlation": "cms correlate",
+    "recovery": "cms recovery",
+    "system": "floatframe run",
+    "sweep": "floatframe sweep",
+    "optimization": "floatframe optimize",
+    "laboratory": "floatframe study",
+    "shake": "floatframe shake",
+    "fatigue": "floatframe fatigue",
+}
 DEEPEST = 20  #: largest depth of nested tables and lists in a file
 GREATEST = 1e100  #: largest number in a file: products of three stay finite, and no physical quantity is larger
 MOST_PROBLEMS = 20  #: largest number of problems in one message
@@ -134,7 +145,16 @@ def require_usable(content: Any, path: Path, error: type[Exception]) -> None:
 def validated(
     model: type[Model], data: Mapping[str, Any], path: Path, error: type[Exception], context: Any = None
 ) -> Model:
-    """Return the validated model; raise `error` that lists every problem on a line of its own."""
+    """Return the validated model; raise `error` that lists every problem on a line of its own.
+
+    A file that states another `kind` is refused in one line with the command for that kind.
+    """
+    kind, expected = data.get("kind"), model.model_fields.get("kind")
+    if kind is not None and expected is not None and kind != expected.default:
+        where = f"{path}: kind = {quoted_value(kind)}"
+        if kind not in KINDS:
+            raise error(f"{where}: there is no such kind of file{nearest(str(kind), KINDS)}")
+        raise error(f'{where}: expected a file of kind "{expected.default}"; run this one by {KINDS[kind]} {path.name}')
     try:
         return model.model_validate(data, context=context)
     except ValidationError as problem:
@@ -209,6 +229,11 @@ def quoted_value(value: Any) -> str:
     if isinstance(value, int) and abs(value) > GREATEST:  # Python does not print integers with thousands of digits
         return "a whole number of more than 100 digits"
     return shortened(f'"{value}"' if isinstance(value, str) else str(value), 60)
+
+
+def kind_field(kind: str) -> Any:
+    """Return the field `kind` of the model of a file: optional, and of this value."""
+    return Field(kind, description=f'the kind of the file, "{kind}"')
 
 
 def choice(what: str, choices: Callable[[], Sequence[str]]) -> Any:

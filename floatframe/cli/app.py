@@ -66,19 +66,27 @@ def run_command(
 ) -> None:
     """Compute the motion of a system.
 
-    Without -o, the results are written next to the system file: swing.toml gives swing.h5.
+    Without -o, the results are written next to the system file: swing.toml gives swing.h5. A file with another `kind`
+    (sweep, optimization, laboratory, shake, fatigue) is run by the command for it.
 
     Example: floatframe run swing.toml -o swing.h5
 
     Example: floatframe run swing.toml --set length=0.4 --set run.h=1e-4
     """
-    from floatframe.errors import ResultsError
+    from fe_models.foundation.toml_file import read_toml
+    from floatframe.errors import ResultsError, SystemFileError
     from floatframe.files.cosimulation.coupled_motion import co_simulate
     from floatframe.files.system_file.read_system import read_system
     from floatframe.files.system_file.run_section import required_run
     from floatframe.integrators import in_formulation
     from floatframe.simulation.integrate import integrate
 
+    kind = read_toml(system, SystemFileError).get("kind", "system")
+    if kind in OTHER_KINDS:
+        if set_values or formulation or watch:
+            raise SystemFileError(f"{system}: kind = {kind!r}: --set, --formulation and --watch belong to systems")
+        OTHER_KINDS[kind](system, **({} if output is None else {"outputs": [output]}))
+        return
     model, given = read_system(system, changes_of(set_values))
     analyses.tell_left_out(model)
     options = required_run(given, system)
@@ -100,6 +108,16 @@ def run_command(
             )
         ),
     )  # fmt: skip
+
+
+#: what `floatframe run` does with files of other kinds than systems
+OTHER_KINDS: "dict[str, Callable[..., None]]" = {
+    "sweep": studies.sweep_command,
+    "optimization": fits.optimize_command,
+    "laboratory": studies.study_command,
+    "shake": durability.shake_command,
+    "fatigue": durability.fatigue_command,
+}
 
 
 @guarded

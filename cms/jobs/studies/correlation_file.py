@@ -23,7 +23,7 @@ from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.parametric_file import read_parametric
 from fe_models.foundation.stages import Stages
-from fe_models.foundation.toml_file import Table, Vector3, read_toml, validated, value_of
+from fe_models.foundation.toml_file import Table, Vector3, kind_field, read_toml, validated, value_of
 from fe_models.foundation.units import Units, unit_system
 from fe_models.meshes.mesh import Mesh
 
@@ -130,6 +130,7 @@ class UpdateTable(Table):
 class CorrelationFile(Table):
     """A complete correlation file."""
 
+    kind: str = kind_field("correlation")
     model: ModelTable = Field(description="a table [model]")
     test: TestTable = Field(description="a table [test]")
     band: float | None = Field(

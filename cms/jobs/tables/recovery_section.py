@@ -7,7 +7,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from cms.errors import RecoveryError
 from cms.reduction.recovery.request import QUANTITIES, RecoveryRequest, Rows
-from fe_models.foundation.toml_file import Table, Vector3, choice
+from fe_models.foundation.toml_file import Table, Vector3, choice, kind_field
 
 __all__ = ["RecoveryFile", "RecoverySection", "requests_of"]
 
@@ -69,6 +69,7 @@ class RecoverySection(Table):
 class RecoveryFile(Table):
     """A file that only contains tables [recovery.NAME]."""
 
+    kind: str = kind_field("recovery")
     recovery: dict[str, RecoverySection] = Field(min_length=1, description="tables [recovery.NAME] with rows")
 
 

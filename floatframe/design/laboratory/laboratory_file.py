@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 
 from cms.assessment.compare.mode_counts import mode_counts
 from fe_models.foundation.stages import Stages
-from fe_models.foundation.toml_file import Table, read_toml, validated
+from fe_models.foundation.toml_file import Table, kind_field, read_toml, validated
 from floatframe.design.laboratory.cases import Case, grid
 from floatframe.design.laboratory.exact_beam import ExactBeam
 from floatframe.design.laboratory.full_model import MOST_DOFS, FullModel
@@ -102,6 +102,7 @@ class ReferenceTable(Table):
 class LaboratoryFile(Table):
     """A whole file."""
 
+    kind: str = kind_field("laboratory")
     system: Path = Field(description="the path of a system file with [run] and sensors")
     body: str = Field(description="the name of its flexible body")
     job: Path = Field(description="the path of the job that body is reduced by")

@@ -12,7 +12,7 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.parametric_file import read_parametric
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.tasks.workers import WORKERS_HELP
-from fe_models.foundation.toml_file import Table, choice, interval, read_toml, validated, value_of
+from fe_models.foundation.toml_file import Table, choice, interval, kind_field, read_toml, validated, value_of
 from floatframe.design.optimization.design import Design, DesignParameter, Quantity
 from floatframe.design.studies.study_file import (
     ANALYSES,
@@ -163,6 +163,7 @@ class ConstraintSection(QuantitySection):
 class DesignFile(Table):
     """An optimisation of a system."""
 
+    kind: str = kind_field("optimization")
     system: Path = Field(description="the path of a system file, relative to this file")
     analysis: choice("analysis", lambda: (*ANALYSES, RESPONSE)) = Field(  # type: ignore[valid-type]
         "run", description=f"one of {', '.join((*ANALYSES, RESPONSE))}"

@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.tasks.task_map import WorkerError
 from fe_models.foundation.tasks.workers import WORKERS_HELP, checked_workers
-from fe_models.foundation.toml_file import Table, choice, read_toml, validated
+from fe_models.foundation.toml_file import Table, choice, kind_field, read_toml, validated
 from floatframe.errors import SystemFileError
 
 __all__ = ["ANALYSES", "TAKES", "Output", "Parameter", "Study", "read_study", "workers_of_file"]
@@ -99,6 +99,7 @@ class OutputSection(Table):
 class StudyFile(Table):
     """A parameter study of a system."""
 
+    kind: str = kind_field("sweep")
     system: Path = Field(description="the path of a system file, relative to this file")
     analysis: choice("analysis", lambda: ANALYSES) = Field(  # type: ignore[valid-type]
         "run", description=f"one of {', '.join(ANALYSES)}"

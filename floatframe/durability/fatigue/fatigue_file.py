@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, ValidationError, ValidationInfo, model_validator
 
 from fe_models.foundation.paths import near_file
-from fe_models.foundation.toml_file import Range, Table, choice, describe, read_toml, validated
+from fe_models.foundation.toml_file import Range, Table, choice, describe, kind_field, read_toml, validated
 from fe_models.foundation.words import nearest, quoted
 from floatframe.durability.fatigue.criteria import CRITERIA, TENSORS
 from floatframe.durability.fatigue.history_damage import RESIDUES
@@ -451,6 +451,7 @@ class OutputsSection(Table):
 class FatigueFile(Table):
     """A fatigue file."""
 
+    kind: str = kind_field("fatigue")
     body: InputFile = Field(description="the path of a modal file, relative to this file")
     material: MaterialSection | None = Field(None, description="the table [material]")
     materials: dict[str, PlacesSection] = Field({}, description="tables [materials.NAME], of the places they name")

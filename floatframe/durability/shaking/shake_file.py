@@ -13,7 +13,7 @@ import cms
 from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.paths import near_file
-from fe_models.foundation.toml_file import Table, Vector3, choice, read_toml, validated
+from fe_models.foundation.toml_file import Table, Vector3, choice, kind_field, read_toml, validated
 from floatframe.durability.shaking.loads.levels import ACCELERATIONS, OF_OUTPUT, Level, read_level
 from floatframe.durability.shaking.loads.notching import DEEPEST, ForceLimit, Limit, ResponseLimit
 from floatframe.durability.shaking.loads.pulses import DECAY, EDGE, PULSES, SHAPES, damped_sines, pulse, synthesised
@@ -289,6 +289,7 @@ class ModesSection(Table):
 class ShakeFile(Table):
     """A shake file."""
 
+    kind: str = kind_field("shake")
     body: Annotated[Path, BeforeValidator(file_beside)] | None = Field(None, description="the path of a modal file")
     system: Annotated[Path, BeforeValidator(file_beside)] | None = Field(None, description="the path of a system file")
     units: str | None = Field(None, description="a unit system for numbers and results; default: that of the body")

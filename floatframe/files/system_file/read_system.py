@@ -21,7 +21,7 @@ from pydantic import Field, model_validator
 from cms.body.reduced_body import ReducedBody
 from cms.errors import CmsError
 from fe_models.foundation.parametric_file import read_parametric
-from fe_models.foundation.toml_file import Table, Vector3, choice, validated
+from fe_models.foundation.toml_file import Table, Vector3, choice, kind_field, validated
 from fe_models.foundation.units import UNIT_SYSTEMS, unit_system
 from fe_models.foundation.words import nearest
 from floatframe.engine.compiling.system import compiled_system
@@ -123,6 +123,7 @@ class SystemSection(Table):
 class SystemFile(Table):
     """A system and its run."""
 
+    kind: str = kind_field("system")
     system: SystemSection = Field(description="a table [system] with units and gravity")
     bodies: dict[str, BodySection] = Field(description="tables [bodies.NAME]")
     joints: dict[str, JointSection] = Field({}, description="tables [joints.NAME]")

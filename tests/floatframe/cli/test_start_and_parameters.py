@@ -132,3 +132,30 @@ def test_the_shown_file_describes_the_same_system(folder, program):
     (folder / "shown.toml").write_text(shown)
     assert "parameters" not in shown
     assert [body.mass for body in read_system(folder / "shown.toml")[0].bodies] == [1.0, 3.0]
+
+
+def test_a_file_of_another_kind_is_refused_with_its_command(folder):
+    (folder / "cart.toml").write_text('kind = "system"\n' + CART)
+    result = CliRunner().invoke(cms_app, ["reduce", str(folder / "cart.toml")])
+    assert result.exit_code == 2
+    assert result.stderr.count("\n") == 1
+    assert 'expected a file of kind "job"; run this one by floatframe run cart.toml' in result.stderr
+
+
+def test_an_unknown_kind_is_refused_with_the_nearest(folder):
+    (folder / "cart.toml").write_text('kind = "sytem"\n' + CART)
+    result = CliRunner().invoke(app, ["run", str(folder / "cart.toml")])
+    assert result.exit_code == 2
+    assert "did you mean 'system'?" in result.stderr
+
+
+def test_run_runs_a_sweep_by_its_kind(folder):
+    (folder / "sweep.toml").write_text(
+        'kind = "sweep"\nsystem = "cart.toml"\nanalysis = "eig"\n[parameters.stiffness]\npath = "stiffness"\n'
+        "values = [125.0, 500.0]\n[outputs.f]\nof = \"frequency 2\"\n"
+    )
+    result = run("run", folder / "sweep.toml", "-o", folder / "sweep.csv")
+    rows = np.loadtxt(folder / "sweep.csv", delimiter=",", skiprows=1, usecols=(0, 1))
+    assert_allclose(rows[:, 0], [125.0, 500.0])
+    assert_allclose(rows[1, 1] / rows[0, 1], 2.0, rtol=1e-6)
+    assert result.exit_code == 0
