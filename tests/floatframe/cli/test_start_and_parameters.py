@@ -152,7 +152,7 @@ def test_an_unknown_kind_is_refused_with_the_nearest(folder):
 def test_run_runs_a_sweep_by_its_kind(folder):
     (folder / "sweep.toml").write_text(
         'kind = "sweep"\nsystem = "cart.toml"\nanalysis = "eig"\n[parameters.stiffness]\npath = "stiffness"\n'
-        "values = [125.0, 500.0]\n[outputs.f]\nof = \"frequency 2\"\n"
+        'values = [125.0, 500.0]\n[outputs.f]\nof = "frequency 2"\n'
     )
     result = run("run", folder / "sweep.toml", "-o", folder / "sweep.csv")
     rows = np.loadtxt(folder / "sweep.csv", delimiter=",", skiprows=1, usecols=(0, 1))
