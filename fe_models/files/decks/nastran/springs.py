@@ -198,7 +198,12 @@ def _scalar_spring(model: NastranModel, card: Card) -> None:
 
 
 def _without_balance(model: NastranModel, card: Card, ends: list[tuple[int, int]], value: float) -> None:
-    """Take a scalar element whose forces do not balance where the deck holds an end of it: it acts to the ground."""
+    """Take a scalar element whose forces do not balance where the deck holds an end of it: it acts to the ground.
+
+    Between two free ends it is legal, but holds the body: what its forces lack acts on the ground. A free body has no
+    such tie, and to leave the element out with a note would take stiffness from within the body. So it is refused; its
+    ends become interfaces, for those who leave it out knowingly and put it into the system file.
+    """
     free = [(node, c) for node, c in ends if c not in model.held.get(node, set())]
     if not free:
         model.ledger.note(card.name, "between components that are held: without effect in the deck, left out")
@@ -206,8 +211,14 @@ def _without_balance(model: NastranModel, card: Card, ends: list[tuple[int, int]
         at = next(node for node, c in ends if (node, c) not in free)
         _ground(model, card, free[0][0], (free[0][1],), f" with {value:g}, at grid point {at}, which is held there")
     else:
-        why = "between different components, grid points of different axes, or apart across its direction"
-        model.ledger.refuse(card.name, f"{why}: its forces do not balance")
+        for node, c in free:
+            model.grounded.setdefault(node, set()).add(c)
+        why = (
+            "between different components, grid points of different axes, or apart across its direction: its forces do "
+            "not balance, and the rest acts on the ground, which a free body does not have. Use a CBUSH, which reaches "
+            "its place by rigid arms, or leave it out and put it into the system file: its ends become interfaces"
+        )
+        model.ledger.refuse(card.name, why)
 
 
 def _bush_1d(model: NastranModel, card: Card) -> None:

@@ -295,6 +295,22 @@ def test_an_element_to_the_ground_becomes_an_interface_of_the_free_body(tmp_path
     assert np.sum(eigh(body.K.toarray(), eigvals_only=True) < 1e-3) == 12  # two free bars
 
 
+@pytest.mark.parametrize(("card", "components"), [("CELAS2,11,5.+3,2,1,3,1", (0, 0)), ("CDAMP2,11,5.,2,1,3,2", (0, 1))])
+def test_an_element_without_balance_that_is_left_out_leaves_interfaces_at_its_ends(tmp_path, card, components):
+    """Points apart across its direction, or along two directions: the body is that of the deck without the card."""
+    text = PAIR.format(x="1.", y=".4") + SECTION + MATERIAL
+    body, deck = body_of(tmp_path, text + card + "\n", leave_out=(card.partition(",")[0],))
+    expected, _ = body_of(tmp_path, text)
+    assert_allclose(body.K.toarray(), expected.K.toarray(), rtol=1e-14)
+    held = {
+        (int(node), c)
+        for support in deck.supports
+        for node in deck.mesh.node_numbers[deck.mesh.node_sets[support.nodes]]
+        for c in support.components
+    }
+    assert held == {(2, components[0]), (3, components[1])}
+
+
 @pytest.mark.parametrize("at", ["3,1", "3,2", "4,1"])
 def test_a_spring_to_a_component_that_is_held_acts_to_the_ground(tmp_path, at):
     """Apart across its direction or along another component: the deck has k u² / 2 of the free end alone."""
