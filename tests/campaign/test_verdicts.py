@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
 import cms
 from cms.assessment.quality.of_body.recovery_rows import check_recovery_forces
 from cms.assessment.quality.reference.full_reference import FullReference
+from cms.linear_algebra.solvers.factorization import factorize
 from tests.campaign.sound_bodies import sound_body
 from tests.campaign.verdicts import judged
 
@@ -28,6 +30,18 @@ def test_stress_that_is_rounding_alone_is_judged_alike_in_all_units(seed):
     dynamic[0, table.quantities.index("stress"), 0] = 1e-2 * stiffness / size**2
     wrong = replace(body, recovery={"all": replace(table, dynamic=dynamic)})
     assert check_recovery_forces(wrong).verdict == "fail"
+
+
+@pytest.mark.parametrize("seed", [170049, 170157])
+def test_a_well_conditioned_matrix_with_multipliers_is_not_called_singular(seed):
+    """Matched pivots grew without bound: ten negative pivots for six multipliers, and solutions of no digit."""
+    body = sound_body(seed).body
+    inner = np.setdiff1d(np.arange(body.n_dof), body.b)
+    K_ii = sp.csc_array(body.K)[inner][:, inner]
+    x = np.random.default_rng(1).normal(size=len(inner))
+    with factorize(K_ii, definite=False) as factor:
+        assert factor.inertia.n_negative == np.sum(np.linalg.eigvalsh(K_ii.toarray()) < 0) == 6
+        assert_allclose(factor.solve(K_ii @ x), x, rtol=0, atol=1e-8 * np.abs(x).max())
 
 
 @pytest.mark.parametrize("seed", [120160, 120251])

@@ -28,6 +28,8 @@ ANALYSE_AND_FACTORIZE, SOLVE, RELEASE = 12, 33, -1  # phase
 CHUNK = 64  #: right-hand sides per call; more are not faster, and PARDISO's workspace grows with them
 #: pivots below 1e-13 of the matrix norm are set to this bound and counted; PARDISO then refines
 PIVOT_PERTURBATION = 13
+#: backward error of a stable factorisation, far above rounding (1e-15) and far below a lost one (1e-3 and more)
+STABLE = 1e-9
 
 NOT_FACTORIZED = {
     -2: "not enough memory for the factor",
@@ -93,7 +95,26 @@ class PardisoFactor:
         self._ja = np.ascontiguousarray(lower.indices, dtype=np.int32)
         self._pt = np.zeros(64, np.int64)
         self._mtype = POSITIVE_DEFINITE if definite else INDEFINITE
-        self._iparm = settings(definite=definite)
+        self._factorize(definite=definite, matching=not definite)
+        if not definite and not (first := self._backward_error()) < STABLE:
+            # matching fixes pairs of pivots by the size of their entries, and the rest may then grow without bound
+            self.close()
+            self._factorize(definite=False, matching=False)
+            if not self._backward_error() < first:
+                self.close()
+                self._factorize(definite=False, matching=True)
+        self.n_negative = 0 if definite else int(self._iparm[22])
+        self.n_positive = self.n if definite else int(self._iparm[21])
+        self.n_perturbed = 0 if definite else int(self._iparm[13])
+        matched = ", scaling and matching" if self._iparm[12] else ""
+        kind = "L Lᵀ" if definite else f"L D Lᵀ, Bunch-Kaufman pivots{matched}"
+        bitwise = ", bitwise repeatable" if is_bitwise() else ""
+        self.description = f"PARDISO (MKL {mkl_version()}; {kind}; no refinement; {n_threads()} threads{bitwise})"
+
+    def _factorize(self, *, definite: bool, matching: bool) -> None:
+        """Make the factor; raise `FactorizationError` if PARDISO cannot."""
+        self._pt = np.zeros(64, np.int64)
+        self._iparm = settings(definite=definite, matching=matching)
         self.is_open = True
         error = self._call(ANALYSE_AND_FACTORIZE)
         if error:
@@ -103,12 +124,21 @@ class PardisoFactor:
             raise (FactorRoomError if error in NO_ROOM else FactorizationError)(
                 f"PARDISO: {NOT_FACTORIZED.get(error, f'error {error}')}{at}; n = {self.n}, {len(self._a)} entries"
             )
-        self.n_negative = 0 if definite else int(self._iparm[22])
-        self.n_positive = self.n if definite else int(self._iparm[21])
-        self.n_perturbed = 0 if definite else int(self._iparm[13])
-        kind = "L Lᵀ" if definite else "L D Lᵀ, Bunch-Kaufman pivots, scaling and matching"
-        bitwise = ", bitwise repeatable" if is_bitwise() else ""
-        self.description = f"PARDISO (MKL {mkl_version()}; {kind}; no refinement; {n_threads()} threads{bitwise})"
+
+    def _backward_error(self) -> float:
+        """Return max |A x - b| / (|A| |x| + |b|) over the rows, of two solves from a random column.
+
+        It is rounding whatever the condition of A, unless pivots grow.
+        """
+        b = self.solve(np.random.default_rng(0).standard_normal((self.n, 1)))
+        b /= np.linalg.norm(b)
+        x = self.solve(b)
+        if not np.isfinite(x).all():
+            return np.inf
+        upper = sp.csr_array((self._a, self._ja, self._ia), shape=(self.n, self.n))
+        size = sp.csr_array((np.abs(self._a), self._ja, self._ia), shape=(self.n, self.n))
+        Ax, size_x = (A @ v + A.T @ v - A.diagonal()[:, None] * v for A, v in ((upper, x), (size, np.abs(x))))
+        return float((np.abs(Ax - b) / (size_x + np.abs(b))).max())
 
     @property
     def n_factor_entries(self) -> int:
@@ -158,7 +188,7 @@ class PardisoFactor:
         return error.value
 
 
-def settings(*, definite: bool) -> np.ndarray:
+def settings(*, definite: bool, matching: bool) -> np.ndarray:
     """Return iparm, (64,) int32: parallel nested dissection, no refinement, 0-based indices; other entries see [1]_."""
     iparm = np.zeros(64, np.int32)
     iparm[0] = 1  # use the values given here instead of defaults
@@ -166,8 +196,9 @@ def settings(*, definite: bool) -> np.ndarray:
     iparm[9] = PIVOT_PERTURBATION
     iparm[17] = -1  # report the number of entries of the factor
     iparm[34] = 1  # 0-based
-    if not definite:
+    if matching:
         iparm[10] = iparm[12] = 1  # scaling and matching, for multipliers with a zero diagonal
+    if not definite:
         iparm[20] = 1  # Bunch-Kaufman pivots
     if is_bitwise():
         iparm[33] = n_threads()
