@@ -12,24 +12,30 @@ compilation. Inner functions are never called from Python and own no memory, so 
     Python does not look for garbage; numba does not collect warnings about each statement, nor look for `with` and
     dictionaries of arguments, and finds the variables of a statement by the exact types of its parts;
 (4) the passes of numba are those that kernels need (no closures, lists, array expressions, `raise`);
-(5) variables, operations and calls become lean code of LLVM, see kernels/compiler/lowering.py.
+(5) variables, operations and calls become lean code of LLVM, see kernels/compiler/lowering.py;
+(6) the code of an inner function is stored on disk, see kernels/compiler/stored.py.
 """
 
 import types
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
+from typing import ClassVar
 
-from llvmlite.binding import Linkage, parse_assembly
+from llvmlite.binding import Linkage, parse_assembly, parse_bitcode
 from numba import njit
 from numba.core import cgutils
+from numba.core.bytecode import FunctionIdentity
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase
+from numba.core.compiler import CompilerBase, compile_result
 from numba.core.compiler_machinery import FunctionPass, PassManager, register_pass
 from numba.core.errors import WarningsFixer  # type: ignore[attr-defined]
+from numba.core.funcdesc import FunctionDescriptor
 from numba.core.interpreter import Interpreter
 from numba.core.ir import Inst, Loc, Var
 from numba.core.ir_utils import build_definitions
+from numba.core.lowering import Environment
 from numba.core.rewrites.static_getitem import RewriteConstGetitems
+from numba.core.runtime.nrt import rtsys
 from numba.core.ssa import reconstruct_ssa
 from numba.core.typed_passes import (
     IRLegalization,
@@ -39,11 +45,13 @@ from numba.core.typed_passes import (
     PreLowerStripPhis,
 )
 from numba.core.types.functions import BaseFunction
-from numba.core.untyped_passes import FixupArgs, IRProcessing, TranslateByteCode
+from numba.core.typing import signature
+from numba.core.untyped_passes import ExtractByteCode, FixupArgs, IRProcessing, TranslateByteCode
 
 from floatframe.engine.kernels.compiler.block import Block, make_block
 from floatframe.engine.kernels.compiler.garbage import without_garbage_collection
 from floatframe.engine.kernels.compiler.lowering import KernelContext, KernelLower
+from floatframe.engine.kernels.compiler.stored import StoredCode, code_key, delete_old, read_code, write_code
 
 __all__ = [
     "ENTRY",
@@ -163,6 +171,32 @@ class WithoutEngine:
 class InnerLibrary(JITCodeLibrary):
     """The intermediate code of an inner function (1)."""
 
+    attributes: tuple[str, ...] = ()  #: of LLVM
+    key: str | None = None  #: of its code on disk (6)
+    known: ClassVar[dict[str, "InnerLibrary"]] = {}  #: by key
+
+    @classmethod
+    def stored(cls, codegen, key, code):
+        """Return the library of stored code with those that it calls; None if one of them is missing."""
+        called = [cls.found(codegen, each) for each in code.called]
+        if None in called:
+            return None
+        library = cls(codegen, key)
+        module = parse_bitcode(code.bitcode)
+        module.data_layout = codegen._data_layout
+        library._final_module = module
+        library._linking_libraries = called
+        library.key, cls.known[key] = key, library
+        library.finalize()
+        return library
+
+    @classmethod
+    def found(cls, codegen, key):
+        """Return the library of a key, of this process or from disk, or None."""
+        if key not in cls.known and (code := read_code(key)) is not None:
+            cls.stored(codegen, key, code)
+        return cls.known.get(key)
+
     def add_ir_module(self, ir_module):
         """Parse the code of the function, the only module here, without linking it into an empty one first."""
         self._raise_if_finalized()
@@ -170,6 +204,20 @@ class InnerLibrary(JITCodeLibrary):
         module.name = ir_module.name
         module.data_layout = self._codegen._data_layout
         self._final_module = module
+
+    def store(self, key, result):
+        """Write the code to disk, if all kernels that it calls are there too."""
+        libraries = [each for each in dict.fromkeys(self._linking_libraries) if each is not rtsys.library]
+        called = [each for each in libraries if isinstance(each, InnerLibrary)]
+        keys = tuple(each.key for each in called if each.key is not None)
+        if self._reload_init or len(keys) < len(called):
+            return
+        module = self._final_module.clone()
+        for library in libraries:
+            if library not in called:  # of numba, such as `max`: a part of this code, whose name nobody else sees
+                add_internal(module, library._get_module_for_linking())
+        self.key, self.known[key] = key, self
+        write_code(key, StoredCode(result, keys, module.as_bitcode()))
 
     def _get_module_for_linking(self):
         """Return the code itself, no copy: an entry links it once."""
@@ -196,6 +244,15 @@ class InnerLibrary(JITCodeLibrary):
     def codegen(self):
         """Stand-in for the generator of machine code."""
         return WithoutEngine
+
+
+def add_internal(module, other):
+    """Link a copy of another module into one; its functions cannot be seen from outside."""
+    names = {function.name for function in other.functions if not function.is_declaration}
+    module.link_in(other, preserve=True)  # without those that are not called
+    for function in module.functions:
+        if function.name in names:
+            function.linkage = Linkage.internal
 
 
 class EntryLibrary(JITCodeLibrary):
@@ -293,6 +350,15 @@ def remembered_calls() -> Iterator[None]:
         BaseFunction.get_call_type = plain  # type: ignore[method-assign]
 
 
+def identity(function, key):
+    """Return the identity of a function, from whose number its name in LLVM is made: the same in every process."""
+    known = FunctionIdentity.from_function(function)
+    if key is not None:
+        known.unique_id = key
+        known.unique_name = f"{known.func_qualname}${key}"
+    return known
+
+
 class InnerCompiler(CompilerBase):
     """The pipeline of an inner function."""
 
@@ -304,11 +370,44 @@ class InnerCompiler(CompilerBase):
         return [pipeline(self.state, INNER)]
 
     def compile_extra(self, func):
-        """Compile into an `InnerLibrary`."""
-        self.state.targetctx = KernelContext.of(self.state.targetctx)
-        self.state.library = InnerLibrary(self.state.targetctx.codegen(), func.__qualname__)
-        self.state.library.attributes = self.attributes
-        return super().compile_extra(func)
+        """Compile into an `InnerLibrary`, or take its code from disk (6)."""
+        state = self.state
+        state.targetctx = context = KernelContext.of(state.targetctx)
+        key = code_key(func, state.args, f"{self.attributes} {state.flags}") if state.return_type is None else None
+        if key is not None and (code := read_code(key)) is not None:
+            library = InnerLibrary.known.get(key) or InnerLibrary.stored(context.codegen(), key, code)
+            if library is not None:
+                return self.stored_result(func, key, code.result, library)
+        state.library = library = InnerLibrary(context.codegen(), func.__qualname__)
+        library.attributes = self.attributes
+        state.func_id = identity(func, key)
+        ExtractByteCode().run_pass(state)
+        state.lifted = ()
+        result = self._compile_bytecode()
+        if key is not None:
+            library.store(key, result.signature.return_type)
+        return result
+
+    def stored_result(self, func, key, kind, library):
+        """Return what a compilation returns, with a library from disk."""
+        state = self.state
+        context, known = state.targetctx, identity(func, key)
+        described = FunctionDescriptor(
+            True, func.__module__, known.func_qualname, known.unique_name, "", None, kind, None, known.arg_names, (),
+            mangler=context.mangler, argtypes=tuple(state.args), inline=state.flags.forceinline,
+            noalias=state.flags.noalias, global_dict=func.__globals__, abi_tags=[state.flags.get_mangle_string()],
+            uid=known.unique_id,
+        )  # fmt: skip
+        library.get_function(described.mangled_name)  # an error here rather than a call of nothing
+        environment = Environment.from_fndesc(described)
+        function = context.get_executable(library, described, environment)
+        context.insert_user_function(function, described, [library])
+        return compile_result(
+            typing_context=state.typingctx, target_context=context, entry_point=function, typing_error=None,
+            type_annotation=None, library=library, call_helper=None, signature=signature(kind, *state.args),
+            objectmode=False, lifted=(), fndesc=described, environment=environment, metadata=state.metadata,
+            reload_init=[],
+        )  # fmt: skip
 
 
 class EntryCompiler(CompilerBase):
@@ -323,7 +422,9 @@ class EntryCompiler(CompilerBase):
         self.state.library = EntryLibrary(self.state.targetctx.codegen(), func.__qualname__)
         self.state.library.enable_object_caching()
         with remembered_calls(), shorter_ways(), without_garbage_collection():
-            return super().compile_extra(func)
+            result = super().compile_extra(func)
+        delete_old()
+        return result
 
 
 class LoopCompiler(InnerCompiler):
