@@ -183,7 +183,13 @@ def held_rate(model, work, k, a, b, v):
     kind, markers = model.rows.kind[k], work.markers
     _, n, m_a, m_b = held_value(kind, model, work, k, a, b)
     rate, _ = held_rates(kind, model, work, k, a, b)
-    return rate + dot(n, v) + dot(m_a, vector(markers.omega[a])) + dot(m_b, vector(markers.omega[b]))
+    return rate + along(n, m_a, m_b, v, vector(markers.omega[a]), vector(markers.omega[b]))
+
+
+@small
+def along(n, m_a, m_b, v, omega_a, omega_b):
+    """Return n · v + m_a · omega_A + m_b · omega_B."""
+    return dot(n, v) + dot(m_a, omega_a) + dot(m_b, omega_b)
 
 
 @inner
@@ -198,11 +204,10 @@ def row_rates(model, work, k, a, b):
     kind, markers = rows.kind[k], work.markers
     _, n, m_a, m_b = held_value(kind, model, work, k, a, b)
     rate, second = held_rates(kind, model, work, k, a, b)
-    rate += dot(n, relative_velocity(markers, a, b))
-    rate += dot(m_a, vector(markers.omega[a])) + dot(m_b, vector(markers.omega[b]))
+    v = relative_velocity(markers, a, b)
+    rate += along(n, m_a, m_b, v, vector(markers.omega[a]), vector(markers.omega[b]))
     bias_a, bias_b = markers.bias[a], markers.bias[b]
-    second += dot(n, sub(vector(bias_b), vector(bias_a)))
-    second += dot(m_a, vector(bias_a[3:])) + dot(m_b, vector(bias_b[3:]))
+    second += along(n, m_a, m_b, sub(bias_b, bias_a), vector(bias_a[3:]), vector(bias_b[3:]))
     return rate, second
 
 

@@ -18,17 +18,19 @@ import math
 
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.joints.relative_motion import (
+    add_coordinate_gradient,
+    add_pair,
     distance,
     loaded_axis,
     loaded_coordinate,
     relative_velocity,
-    slip,
     turned_angle,
 )
 from floatframe.engine.kernels.vector import add, cross, dot, norm, put, put_sum, scaled, sub, unit, vector
 from floatframe.model.joints.rows.kinds import PUSH, SPAN, TWIST_B
 
 __all__ = [
+    "clear_derivatives",
     "coordinate_derivatives",
     "coordinate_gradient",
     "coordinate_motion",
@@ -107,36 +109,31 @@ def coordinate_rows(model, work, p, Q, c_k):
 
 
 @inner
-def add_pair(P_a, P_b, r, column, x):
-    """Add x to a row of P at A, and its opposite at B."""
-    put_sum(P_a[r], column, x)
-    put_sum(P_b[r], column, scaled(-1.0, x))
+def coordinate_gradient(model, work, p, r, by_x, by_v):
+    """Add by_x dx + by_v dv of coordinate p to row r of P at both markers."""
+    markers = work.markers
+    a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
+    P_a, P_b = work.connections.P[a], work.connections.P[b]
+    if model.rows.kind[k] != SPAN:
+        add_coordinate_gradient(model.rows, markers, k, a, b, P_a, P_b, r, by_x, by_v)
+        return
+    e, d, v = force_direction(model, work, p), distance(markers, a, b), relative_velocity(markers, a, b)
+    across = sub(v, scaled(dot(e, v), e))
+    add_pair(P_a, P_b, r, 0, sub(scaled(-by_x, e), scaled(by_v / dot(e, d), across)))
+    add_pair(P_a, P_b, r, 6, scaled(-by_v, e))
 
 
 @inner
-def coordinate_gradient(model, work, p, r, by_x, by_v):
-    """Add by_x dx + by_v dv of coordinate p to row r of P at both markers; see kernels/joints/loaded_rows.py."""
-    markers = work.markers
-    a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
-    P_a, P_b, kind = work.connections.P[a], work.connections.P[b], model.rows.kind[k]
-    e, d = force_direction(model, work, p), distance(markers, a, b)
-    if kind == SPAN:
-        v = relative_velocity(markers, a, b)
-        across = sub(v, scaled(dot(e, v), e))
-        add_pair(P_a, P_b, r, 0, sub(scaled(-by_x, e), scaled(by_v / dot(e, d), across)))
-        add_pair(P_a, P_b, r, 6, scaled(-by_v, e))
-    elif kind == PUSH:
-        omega_a = vector(markers.omega[a])
-        arm, seen = cross(e, d), slip(markers, a, b, d)
-        add_pair(P_a, P_b, r, 0, sub(scaled(by_v, cross(e, omega_a)), scaled(by_x, e)))
-        add_pair(P_a, P_b, r, 6, scaled(-by_v, e))
-        put_sum(P_a[r], 3, add(scaled(by_x, arm), scaled(by_v, cross(e, seen))))
-        put_sum(P_a[r], 9, scaled(by_v, arm))
-    else:
-        add_pair(P_a, P_b, r, 3, scaled(by_x, turning_gradient(model, work, k, a, b)))
-        add_pair(P_a, P_b, r, 9, scaled(-by_v, e))
-        P = P_b if kind == TWIST_B else P_a  # index of the marker with the axis
-        put_sum(P[r], 3, scaled(by_v, cross(e, relative_rotation(markers, a, b))))
+def clear_derivatives(model, work, c, i):
+    """Set V of connection c, and P at the markers of all coordinates of element i, to zero."""
+    size, V = model.connections.size[c], work.connections.V[c]
+    for r in range(size):
+        for j in range(size):
+            V[r, j] = 0.0
+        for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
+            for j in range(12):
+                work.connections.P[model.coordinates.a[p], r, j] = 0.0
+                work.connections.P[model.coordinates.b[p], r, j] = 0.0
 
 
 @inner

@@ -9,6 +9,7 @@ Described in `floatframe.model.joints.coordinate_coupler`.
 
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.coordinate import (
+    clear_derivatives,
     coordinate_derivatives,
     coordinate_gradient,
     coordinate_motion,
@@ -43,16 +44,9 @@ def coupler_rows(model, work, c, c_k):
 @inner
 def coupler_derivatives(model, work, c, c_k):
     """Write P at the markers and V of coupler c."""
-    i, size = model.connections.item[c], model.connections.size[c]
+    i, V = model.connections.item[c], work.connections.V[c]
     k = model.elements.core[i]
-    V = work.connections.V[c]
-    for r in range(size):
-        for j in range(size):
-            V[r, j] = 0.0
-        for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
-            for j in range(12):
-                work.connections.P[model.coordinates.a[p], r, j] = 0.0
-                work.connections.P[model.coordinates.b[p], r, j] = 0.0
+    clear_derivatives(model, work, c, i)
     for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
         factor = model.coordinates.factor[p]
         coordinate_derivatives(model, work, c, p, factor * work.state.w[k], k, factor, c_k)

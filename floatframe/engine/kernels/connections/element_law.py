@@ -22,12 +22,13 @@ import math
 
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.compiler.user_call import call_law
+from floatframe.engine.kernels.connections.user_force import put_state_derivatives, state_rows
 from floatframe.engine.kernels.marker import marker_acceleration
 from floatframe.engine.kernels.rotation import exp_matrix
 from floatframe.engine.kernels.vector import add, dot, matrix, norm, product, put, put_sum, scaled, vector
 from floatframe.model.joints.rows.kinds import NOTHING, POSITION, VELOCITY
 
-__all__ = ["law_derivatives", "law_power", "law_rates", "law_rows", "law_values"]
+__all__ = ["FIRST", "law_derivatives", "law_power", "law_rates", "law_rows", "law_values", "n_results", "note_stops"]
 
 #: steps of differences in time, if the time over which a law changes is unknown: how many are tried, the first of them
 #: relative to `REACH`, and the ratio of the next to the one before
@@ -79,6 +80,21 @@ def law_call(model, work, i, outputs):
 
 
 @inner
+def n_results(head):
+    """Return the number of wrench components, rates of states and held quantities; outputs follow them."""
+    return 6 * head[0] + head[2] + head[3]
+
+
+@inner
+def note_stops(model, work, i):
+    """Note the first output of law i that ends the run."""
+    first = n_results(model.laws.head[i])
+    for k in range(model.laws.stop0[i], model.laws.stop0[i + 1]):
+        if work.laws.outputs[first + model.laws.stop[k]] > 0.0 and work.counted.stopped == 0:
+            work.counted.stopped = k + 1
+
+
+@inner
 def law_values(model, work, c):
     """Write the outputs of element c at the iterate into work.laws.outputs."""
     law_inputs(model, work, c)
@@ -103,10 +119,8 @@ def law_rows(model, work, c, c_k):
         k += 1
     o, s = 6 * laws.head[i, 0], laws.state0[i]
     for _ in range(laws.head[i, 2]):
-        g[k] = c_k * (w[k] - work.states.base[s] - work.states.kappa[s] * w[k + 1])
-        g[k + 1] = c_k * (w[k + 1] - out[o])
+        state_rows(work, s, k, out[o], c_k)
         total += g[k + 1]
-        g[k + 2] = c_k * (w[k + 2] - work.states.rate_base[s] - work.states.rho * w[k + 1])
         o, s, k = o + 1, s + 1, k + 3
     for _ in range(laws.head[i, 3]):
         g[k] = out[o] * (c_k if model.rows.holds[k] == NOTHING else 1.0)
@@ -121,7 +135,7 @@ def note_what_is_no_number(model, work, c):
     """Record the first element of a step whose law is not finite for a finite motion."""
     head = model.laws.head[model.connections.item[c]]
     total = 0.0
-    for k in range(6 * head[0] + head[2] + head[3]):
+    for k in range(n_results(head)):
         total += work.laws.outputs[k]
     if math.isfinite(total) or work.counted.no_number > 0:
         return
@@ -164,9 +178,7 @@ def law_derivatives(model, work, c, c_k):
     o = 6 * n
     for s in range(laws.state0[i], laws.state0[i] + n_z):
         own = slopes[o * n_columns : (o + 1) * n_columns]
-        V[r, r], V[r, r + 1] = 1.0, -work.states.kappa[s]
-        V[r + 1, r + 1] = 1.0
-        V[r + 2, r + 2], V[r + 2, r + 1] = 1.0, -work.states.rho
+        put_state_derivatives(work, V, s, r)
         add_slopes(model, work, V, a, n, n_z, n_lam, per, states, r + 1, -c_k, -1.0, own)
         for m in range(a, a + n):
             for j in range(12):
@@ -340,10 +352,8 @@ def law_power(model, work, c):
     if energy < 0 and given < 0 and lost < 0 and laws.stop0[i] == laws.stop0[i + 1]:
         return 0.0, power_on_bodies(model, work, c), 0.0
     law_values(model, work, c)
-    seen = 6 * laws.head[i, 0] + laws.head[i, 2] + laws.head[i, 3]
-    for k in range(laws.stop0[i], laws.stop0[i + 1]):
-        if work.laws.outputs[seen + laws.stop[k]] > 0.0 and work.counted.stopped == 0:
-            work.counted.stopped = k + 1
+    note_stops(model, work, i)
+    seen = n_results(laws.head[i])
     P_given = work.laws.outputs[seen + given] if given >= 0 else 0.0
     P_lost = work.laws.outputs[seen + lost] if lost >= 0 else 0.0
     if energy >= 0:

@@ -20,7 +20,7 @@ import math
 from floatframe.engine.kernels.body import moved_inertia
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.contact import contact_gap
-from floatframe.engine.kernels.connections.element_law import law_values
+from floatframe.engine.kernels.connections.element_law import law_values, n_results
 from floatframe.engine.kernels.marker import marker_acceleration, marker_motion, shape
 from floatframe.engine.kernels.model import ELEMENT, MASS, STIFFNESS
 from floatframe.engine.kernels.rotation import exp_matrix
@@ -69,8 +69,7 @@ def gap_of_markers(model, work, g):
     i = model.connections.item[c]
     if model.connections.law[c] == ELEMENT:
         law_values(model, work, c)
-        head = model.laws.head[i]
-        return work.laws.outputs[6 * head[0] + head[2] + head[3] + model.gaps.output[g]]
+        return work.laws.outputs[n_results(model.laws.head[i]) + model.gaps.output[g]]
     return contact_gap(model, work.markers.r, work.markers.A, c)
 
 

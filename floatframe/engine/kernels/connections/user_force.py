@@ -14,6 +14,7 @@ import math
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.compiler.user_call import call_user_function
 from floatframe.engine.kernels.connections.coordinate import (
+    clear_derivatives,
     coordinate_derivatives,
     coordinate_gradient,
     coordinate_motion,
@@ -52,7 +53,9 @@ from floatframe.model.functions.expressions import (
 __all__ = [
     "begin_states",
     "element_of",
+    "put_state_derivatives",
     "resize_states",
+    "state_rows",
     "tape_gradient",
     "tape_value",
     "user_force_derivatives",
@@ -297,33 +300,40 @@ def user_force_rows(model, work, c, c_k):
         work.connections.g[k + j] = c_k * (work.state.w[k + j] - work.users.outputs[j])
     k += model.users.n_forces[u]
     for s in range(model.users.n_states[u]):
-        i = model.users.state0[u] + s
-        rate = work.state.w[k + 1]
-        work.connections.g[k] = c_k * (work.state.w[k] - work.states.base[i] - work.states.kappa[i] * rate)
-        work.connections.g[k + 1] = c_k * (rate - work.users.outputs[model.users.n_forces[u] + s])
-        work.connections.g[k + 2] = c_k * (work.state.w[k + 2] - work.states.rate_base[i] - work.states.rho * rate)
-        k += 3
+        state_rows(work, model.users.state0[u] + s, k + 3 * s, work.users.outputs[model.users.n_forces[u] + s], c_k)
+
+
+@inner
+def state_rows(work, s, k, output, c_k):
+    """Write the residual of state s, whose rows begin at k; output: its rate by the law."""
+    w, g, states = work.state.w, work.connections.g, work.states
+    g[k] = c_k * (w[k] - states.base[s] - states.kappa[s] * w[k + 1])
+    g[k + 1] = c_k * (w[k + 1] - output)
+    g[k + 2] = c_k * (w[k + 2] - states.rate_base[s] - states.rho * w[k + 1])
+
+
+@inner
+def put_state_derivatives(work, V, s, r):
+    """Write the rows of state s, from r on, into V, without the derivatives of its law."""
+    V[r, r], V[r, r + 1] = 1.0, -work.states.kappa[s]
+    V[r + 1, r + 1] = 1.0
+    V[r + 2, r + 2], V[r + 2, r + 1] = 1.0, -work.states.rho
 
 
 @inner
 def user_force_derivatives(model, work, c, c_k):
     """Write P at the markers and V of user force c."""
-    i, u, size, w0 = element_of(model, c), model.connections.item[c], model.connections.size[c], model.connections.w0[c]
+    i, u, V = element_of(model, c), model.connections.item[c], work.connections.V[c]
     first, last = model.elements.coordinate0[i], model.elements.coordinate0[i + 1]
-    V = work.connections.V[c]
-    for r in range(size):
-        for j in range(size):
-            V[r, j] = 0.0
-        for p in range(first, last):
-            for j in range(12):
-                work.connections.P[model.coordinates.a[p], r, j] = 0.0
-                work.connections.P[model.coordinates.b[p], r, j] = 0.0
+    clear_derivatives(model, work, c, i)
     for p in range(first, last):
         k = model.coordinates.core[p]
         coordinate_derivatives(model, work, c, p, work.state.w[k], k, 1.0, c_k)
     n, n_in, n_out = user_gradients(model, work, c)
     n_forces, n_states = model.users.n_forces[u], model.users.n_states[u]
-    core = model.elements.core[i] - w0
+    core = model.elements.core[i] - model.connections.w0[c]
+    for s in range(n_states):
+        put_state_derivatives(work, V, model.users.state0[u] + s, core + n_forces + 3 * s)
     for j in range(n_out):
         r = core + j if j < n_forces else core + n_forces + 3 * (j - n_forces) + 1
         V[r, r] = 1.0
@@ -332,10 +342,6 @@ def user_force_derivatives(model, work, c, c_k):
             coordinate_gradient(model, work, p, r, -c_k * slopes[1 + p - first], -c_k * slopes[1 + n + p - first])
         for s in range(n_states):
             V[r, core + n_forces + 3 * s] -= slopes[1 + 2 * n + s]
-    for s in range(n_states):
-        r = core + n_forces + 3 * s
-        V[r, r], V[r, r + 1] = 1.0, -work.states.kappa[model.users.state0[u] + s]
-        V[r + 2, r + 2], V[r + 2, r + 1] = 1.0, -work.states.rho
 
 
 @inner

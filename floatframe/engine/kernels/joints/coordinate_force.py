@@ -8,7 +8,7 @@ import math
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.time_function import time_function
 
-__all__ = ["coordinate_force", "coordinate_power", "coordinate_strain"]
+__all__ = ["coordinate_force", "coordinate_power", "coordinate_strain", "excess", "given_force"]
 
 
 @inner
@@ -19,25 +19,32 @@ def excess(forces, i, is_angle, x):
 
 
 @inner
+def given_force(model, i, t, d):
+    """Return preload, motor and characteristic of force i at the excess d, and the slope of the characteristic."""
+    f, functions, slope = model.joint_forces, model.functions, 0.0
+    Q = f.preload[i]
+    if f.motor[i] >= 0:
+        value, _, _ = time_function(functions, f.motor[i], t)
+        Q += value
+    if f.table[i] >= 0:
+        value, slope, _ = time_function(functions, f.table[i], d)
+        Q += value
+    return Q, slope
+
+
+@inner
 def coordinate_force(model, work, k, is_angle, x, v, normal):
     """Return the force of row k in the direction of its coordinate x, and its derivatives by x, v and `normal`.
 
     -k x - c v + preload + motor(t) + characteristic(x) - (T + mu normal) tanh(v/v_0), summed over the forces there.
     """
-    Q, Q_x, Q_v, Q_n = 0.0, 0.0, 0.0, 0.0
-    f, functions = model.joint_forces, model.functions
+    Q, Q_x, Q_v, Q_n, f = 0.0, 0.0, 0.0, 0.0, model.joint_forces
     for i in range(model.rows.force0[k], model.rows.force1[k]):
         d = excess(f, i, is_angle, x)
-        Q += f.preload[i] - f.stiffness[i] * d - f.damping[i] * v
-        Q_x -= f.stiffness[i]
+        given, slope = given_force(model, i, work.state.time, d)
+        Q += given - f.stiffness[i] * d - f.damping[i] * v
+        Q_x += slope - f.stiffness[i]
         Q_v -= f.damping[i]
-        if f.motor[i] >= 0:
-            value, _, _ = time_function(functions, f.motor[i], work.state.time)
-            Q += value
-        if f.table[i] >= 0:
-            value, slope, _ = time_function(functions, f.table[i], d)
-            Q += value
-            Q_x += slope
         if f.friction[i] > 0.0 or f.coefficient[i] > 0.0:
             ratio = math.tanh(v / f.speed[i])
             most = f.friction[i] + f.coefficient[i] * normal
@@ -60,16 +67,10 @@ def coordinate_strain(model, k, is_angle, x):
 @inner
 def coordinate_power(model, work, k, is_angle, x, v, Q):
     """Return the power supplied by row k, and the power dissipated by dampers and friction; Q: its total force."""
-    given, springs = 0.0, 0.0
-    f, functions = model.joint_forces, model.functions
+    given, springs, f = 0.0, 0.0, model.joint_forces
     for i in range(model.rows.force0[k], model.rows.force1[k]):
         d = excess(f, i, is_angle, x)
         springs -= f.stiffness[i] * d
-        given += f.preload[i]
-        if f.motor[i] >= 0:
-            value, _, _ = time_function(functions, f.motor[i], work.state.time)
-            given += value
-        if f.table[i] >= 0:
-            value, _, _ = time_function(functions, f.table[i], d)
-            given += value
+        own, _ = given_force(model, i, work.state.time, d)
+        given += own
     return given * v, (given + springs - Q) * v

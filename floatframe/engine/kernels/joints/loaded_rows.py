@@ -12,15 +12,8 @@ import math
 
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.joints.coordinate_force import coordinate_force
-from floatframe.engine.kernels.joints.relative_motion import (
-    distance,
-    loaded_axis,
-    loaded_coordinate,
-    put_pair,
-    slip,
-    turned_angle,
-)
-from floatframe.engine.kernels.vector import add, cross, dot, put, put_sum, scaled, sub, vector
+from floatframe.engine.kernels.joints.relative_motion import add_coordinate_gradient, loaded_axis, loaded_coordinate
+from floatframe.engine.kernels.vector import cross, dot, put, put_sum, scaled, sub, vector
 from floatframe.model.joints.rows.kinds import PUSH, TWIST_B
 
 __all__ = ["loaded_derivatives", "loaded_value", "normal_force"]
@@ -50,7 +43,6 @@ def loaded_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
     """PUSH, TWIST, TWIST_B."""
     rows, markers = model.rows, work.markers
     part, is_angle = rows.part[k], rows.kind[k] != PUSH
-    omega_a, omega_b = vector(markers.omega[a]), vector(markers.omega[b])
     e = loaded_axis(rows, markers, k, a, b)
     x, v = loaded_coordinate(rows, markers, k, a, b)
     normal, along = normal_force(w, e)
@@ -61,18 +53,7 @@ def loaded_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
         f, F = Q_n / normal, vector(w)
         put_sum(V[r], 0, scaled(f, sub(F, scaled(along, e))))
         turn = sub(turn, scaled(f * along, cross(e, F)))
-    if is_angle:
-        _, t = turned_angle(rows, markers, k, a, b)
-        put_pair(P_a, P_b, r, 3, scaled(c_k * Q_x, t))
-        put_pair(P_a, P_b, r, 9, scaled(-c_k * Q_v, e))
-        turn = add(turn, scaled(Q_v, cross(e, sub(omega_b, omega_a))))
-    else:
-        d = distance(markers, a, b)
-        arm, s = cross(e, d), slip(markers, a, b, d)
-        put_pair(P_a, P_b, r, 0, scaled(c_k, sub(scaled(Q_v, cross(e, omega_a)), scaled(Q_x, e))))
-        put_pair(P_a, P_b, r, 6, scaled(-c_k * Q_v, e))
-        put(P_a[r], 9, scaled(c_k * Q_v, arm))
-        turn = add(turn, add(scaled(Q_x, arm), scaled(Q_v, cross(e, s))))
+    add_coordinate_gradient(rows, markers, k, a, b, P_a, P_b, r, c_k * Q_x, c_k * Q_v)
     if rows.kind[k] == TWIST_B:
         put_sum(P_b[r], 3, scaled(c_k, turn))
     else:

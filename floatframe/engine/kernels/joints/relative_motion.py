@@ -4,10 +4,12 @@ import math
 
 from floatframe.engine.kernels.compiler.compilation import inner, small
 from floatframe.engine.kernels.time_function import time_function
-from floatframe.engine.kernels.vector import add, cross, dot, put, scaled, sub, turned, vector
+from floatframe.engine.kernels.vector import add, cross, dot, put, put_sum, scaled, sub, turned, vector
 from floatframe.model.joints.rows.kinds import PUSH, TWIST_B
 
 __all__ = [
+    "add_coordinate_gradient",
+    "add_pair",
     "angle_between",
     "axis_between",
     "direction",
@@ -112,6 +114,31 @@ def loaded_coordinate(rows, markers, k, a, b):
         return angle, dot(e, sub(vector(markers.omega[b]), vector(markers.omega[a])))
     d = distance(markers, a, b)
     return dot(e, d), dot(e, slip(markers, a, b, d))
+
+
+@inner
+def add_coordinate_gradient(rows, markers, k, a, b, P_a, P_b, r, by_x, by_v):
+    """Add by_x dx + by_v dv of the coordinate of row k to row r of P; see kernels/joints/loaded_rows.py."""
+    e = loaded_axis(rows, markers, k, a, b)
+    add_pair(P_a, P_b, r, 9 if rows.kind[k] != PUSH else 6, scaled(-by_v, e))
+    if rows.kind[k] != PUSH:
+        _, t = turned_angle(rows, markers, k, a, b)
+        add_pair(P_a, P_b, r, 3, scaled(by_x, t))
+        turn = cross(e, sub(vector(markers.omega[b]), vector(markers.omega[a])))
+        put_sum(P_b[r] if rows.kind[k] == TWIST_B else P_a[r], 3, scaled(by_v, turn))
+        return
+    d = distance(markers, a, b)
+    arm, s = cross(e, d), slip(markers, a, b, d)
+    add_pair(P_a, P_b, r, 0, sub(scaled(by_v, cross(e, vector(markers.omega[a]))), scaled(by_x, e)))
+    put_sum(P_a[r], 3, add(scaled(by_x, arm), scaled(by_v, cross(e, s))))
+    put_sum(P_a[r], 9, scaled(by_v, arm))
+
+
+@small
+def add_pair(P_a, P_b, r, column, x):
+    """Add x to a row of P at A, and its opposite at B."""
+    put_sum(P_a[r], column, x)
+    put_sum(P_b[r], column, scaled(-1.0, x))
 
 
 @small

@@ -9,6 +9,7 @@ import math
 
 from floatframe.engine.kernels.body import column
 from floatframe.engine.kernels.compiler.compilation import inner, loops
+from floatframe.engine.kernels.joints.coordinate_force import excess, given_force
 from floatframe.engine.kernels.time_function import time_function
 from floatframe.engine.kernels.vector import (
     add,
@@ -128,16 +129,8 @@ def coordinate_load(model, discrete, step, k, a, b, normal):
     rate, f = coordinate_rate(model, discrete, step, k, a, b), model.joint_forces
     Q, spring, given, taken = 0.0, 0.0, 0.0, 0.0
     for i in range(model.rows.force0[k], model.rows.force1[k]):
-        mean = 0.5 * (begin + end) - f.free[i]
-        if is_angle:
-            mean -= 2 * math.pi * math.floor(mean / (2 * math.pi) + 0.5)
-        entering = f.preload[i]
-        if f.motor[i] >= 0:
-            value, _, _ = time_function(model.functions, f.motor[i], step.t_force)
-            entering += value
-        if f.table[i] >= 0:
-            value, _, _ = time_function(model.functions, f.table[i], mean)
-            entering += value
+        mean = excess(f, i, is_angle, 0.5 * (begin + end))
+        entering, _ = given_force(model, i, step.t_force, mean)
         resisting = f.damping[i] * rate
         if f.friction[i] > 0.0 or f.coefficient[i] > 0.0:
             resisting += (f.friction[i] + f.coefficient[i] * normal) * math.tanh(rate / f.speed[i])

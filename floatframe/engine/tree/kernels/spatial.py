@@ -12,6 +12,7 @@ __all__ = [
     "spatial_motion",
     "turned_power",
     "world_screw",
+    "wrench_of_column",
 ]
 
 
@@ -58,6 +59,13 @@ def world_screw(R, p, S):
     """Return a spatial vector in the ground from one about the point p and in the axes R of a frame."""
     ang = turned(R, S[1])
     return add(turned(R, S[0]), cross(p, ang)), ang
+
+
+@small
+def wrench_of_column(H, c, R, p):
+    """Return the wrench of column c of a matrix of a body, ground axes; R, p: axes and origin of the body."""
+    f = turned(R, (H[0, c], H[1, c], H[2, c]))
+    return f, add(turned(R, (H[3, c], H[4, c], H[5, c])), cross(p, f))
 
 
 @small

@@ -34,7 +34,16 @@ from floatframe.engine.kernels.vector import (
 )
 from floatframe.engine.tree.kernels.jets import carrier, mode_rate, mode_screws, put_mode_jet, write_jets
 from floatframe.engine.tree.kernels.projection import force_slopes
-from floatframe.engine.tree.kernels.spatial import pair, pair_sum, scaled_pair, spatial_cross, turned_power, world_screw
+from floatframe.engine.tree.kernels.spatial import (
+    pair,
+    pair_sum,
+    put_pair_of,
+    scaled_pair,
+    spatial_cross,
+    turned_power,
+    world_screw,
+    wrench_of_column,
+)
 from floatframe.engine.tree.kernels.tree import COLUMN, NEAR_MODE
 
 __all__ = [
@@ -202,9 +211,7 @@ def of_modes(model, work, tree, tangent, i):
     H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((6 + n, 6 + n))
     R, p, f = work.state.R[i], sub(vector(work.state.r[i]), vector(tangent.origin)), tangent.f
     for k in range(n):
-        df = turned(R, (H[0, 6 + k], H[1, 6 + k], H[2, 6 + k]))
-        put(f, 0, df)
-        put(f, 3, add(turned(R, (H[3, 6 + k], H[4, 6 + k], H[5, 6 + k])), cross(p, df)))
+        put_pair_of(f, 0, wrench_of_column(H, 6 + k, R, p))
         b = i
         while b >= 0:
             for j in range(tree.jet0[b], tree.jet0[b + 1]):

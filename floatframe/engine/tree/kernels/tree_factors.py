@@ -14,9 +14,9 @@ Wrenches that are kept are found from V - C K⁻¹ B, a column of K⁻¹ B being
 
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.dense import lu_factor, lu_solve, lu_solve_columns
-from floatframe.engine.kernels.vector import add, cross, put, sub, turned, vector
+from floatframe.engine.kernels.vector import sub, vector
 from floatframe.engine.tree.kernels.projection import force_slopes
-from floatframe.engine.tree.kernels.spatial import pair, turned_power
+from floatframe.engine.tree.kernels.spatial import pair, put_pair_of, turned_power, wrench_of_column
 from floatframe.engine.tree.kernels.tangent import add_second_order, inner_product, product_of, unit_of
 from floatframe.engine.tree.kernels.tree import COLUMN, NEAR_MODE
 
@@ -55,9 +55,7 @@ def modal_forces(model, work, tangent, i):
     H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((6 + n, 6 + n))
     R, p = work.state.R[i], sub(vector(work.state.r[i]), vector(tangent.origin))
     for k in range(n):
-        df = turned(R, (H[0, 6 + k], H[1, 6 + k], H[2, 6 + k]))
-        put(tangent.by_mode[q0 + k], 0, df)
-        put(tangent.by_mode[q0 + k], 3, add(turned(R, (H[3, 6 + k], H[4, 6 + k], H[5, 6 + k])), cross(p, df)))
+        put_pair_of(tangent.by_mode[q0 + k], 0, wrench_of_column(H, 6 + k, R, p))
 
 
 @inner

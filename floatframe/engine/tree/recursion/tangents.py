@@ -55,7 +55,13 @@ from floatframe.engine.kernels.vector import (
     vector,
 )
 from floatframe.engine.tree.kernels.elastic_turning import turning_bias_by_angle, turning_bias_by_rate
-from floatframe.engine.tree.kernels.spatial import pair_sum, put_pair_of, spatial_cross, spatial_motion
+from floatframe.engine.tree.kernels.spatial import (
+    pair_sum,
+    put_pair_of,
+    spatial_cross,
+    spatial_motion,
+    wrench_of_column,
+)
 from floatframe.engine.tree.recursion.columns import marker_columns_in_ground
 from floatframe.engine.tree.recursion.composite import along
 from floatframe.engine.tree.recursion.newton_euler import elastic_carrier
@@ -292,8 +298,7 @@ def tangent_columns(nodes, work, dense, model, marker_work, k, c_d, c_k, first):
     out = dense.by_z if first == 0 else dense.by_rate
     for j in range(n):
         c = 6 + j
-        f = turned(R, (H[0, c], H[1, c], H[2, c]))
-        t = add(turned(R, (H[3, c], H[4, c], H[5, c])), cross(r, f))
+        f, t = wrench_of_column(H, c, R, r)
         put_sum(dense.by_mode[vq + j], first, f)
         put_sum(dense.by_mode[vq + j], first + 3, t)
         for i in range(n):

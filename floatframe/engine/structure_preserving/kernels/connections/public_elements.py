@@ -29,7 +29,13 @@ import math
 
 from floatframe.engine.kernels.body import axial
 from floatframe.engine.kernels.compiler.compilation import inner
-from floatframe.engine.kernels.connections.element_law import law_call, note_what_is_no_number
+from floatframe.engine.kernels.connections.element_law import (
+    FIRST,
+    law_call,
+    n_results,
+    note_stops,
+    note_what_is_no_number,
+)
 from floatframe.engine.kernels.rotation import exp_matrix
 from floatframe.engine.kernels.vector import (
     add,
@@ -56,7 +62,6 @@ from floatframe.model.joints.rows.kinds import POSITION, VELOCITY
 __all__ = ["element_gap", "element_load", "element_residual", "first_row_of_multipliers"]
 
 WAY = 1.0 / 64.0  # fraction of the step over which the gradient of the potential is taken
-FIRST = (-1 / 60, 9 / 60, -45 / 60, 0.0, 45 / 60, -9 / 60, 1 / 60)  # coefficients of sixth-order differences at -3 to 3
 LEAST = 1e-6  # motion relative to the length of the law, below which it counts as zero
 BALANCED = 1e-9  # sum of wrenches relative to the sum of their norms, below which they balance
 ALONG, BEGIN, END = range(3)
@@ -76,10 +81,16 @@ def begin_motion(model, discrete, step, c):
         turn = vector(step.theta_G[model.markers.body[m]])
         if discrete.turns[m]:
             turn = way_turned(product(matrix(step.A_f[m]), transposed(matrix(step.A_0[m]))))
-        half = scaled(1.0 / (1.0 + math.sqrt(1.0 + 0.25 * dot(turn, turn))), turn)
-        put(step.turn[m], 0, turn)
-        put(step.r_law[m], 0, scaled(0.5, add(vector(step.x_0[m]), vector(step.x_f[m]))))
-        put_matrix(step.A_law[m], product(cayley(half), matrix(step.A_0[m])))
+        put_middle(step, m, turn, vector(step.x_f[m]))
+
+
+@inner
+def put_middle(step, m, turn, end):
+    """Write the middle of the step of marker m, which turns by a Cayley vector and goes to `end`."""
+    half = scaled(1.0 / (1.0 + math.sqrt(1.0 + 0.25 * dot(turn, turn))), turn)
+    put(step.turn[m], 0, turn)
+    put(step.r_law[m], 0, scaled(0.5, add(vector(step.x_0[m]), end)))
+    put_matrix(step.A_law[m], product(cayley(half), matrix(step.A_0[m])))
 
 
 @inner
@@ -127,11 +138,10 @@ def element_gap(model, work, discrete, step, g):
     """Return gap g of an element at the end of the step."""
     c = model.gaps.connection[g]
     i = model.connections.item[c]
-    head = model.laws.head[i]
     begin_motion(model, discrete, step, c)
     put_inputs(model, work, discrete, step, c, step.end.state.time, END, 0.0, 1.0)
     law_call(model, work, i, work.laws.trial)
-    return work.laws.trial[6 * head[0] + head[2] + head[3] + model.gaps.output[g]]
+    return work.laws.trial[n_results(model.laws.head[i]) + model.gaps.output[g]]
 
 
 @inner
@@ -305,14 +315,10 @@ def add_axes_moment(model, discrete, step, m, M):
 @inner
 def note(model, work, c):
     """Record an output that ends the run, and results that are not finite for a finite motion."""
-    i, laws, out = model.connections.item[c], model.laws, work.laws.outputs
-    n_out = 6 * laws.head[i, 0] + laws.head[i, 2] + laws.head[i, 3]
-    for k in range(laws.stop0[i], laws.stop0[i + 1]):
-        if out[n_out + laws.stop[k]] > 0.0 and work.counted.stopped == 0:
-            work.counted.stopped = k + 1
-    total = 0.0
-    for k in range(n_out):
-        total += out[k]
+    i, total = model.connections.item[c], 0.0
+    note_stops(model, work, i)
+    for k in range(n_results(model.laws.head[i])):
+        total += work.laws.outputs[k]
     if not math.isfinite(total):
         note_what_is_no_number(model, work, c)
 
@@ -340,7 +346,7 @@ def element_load(model, work, discrete, step, c):
         if model.markers.moment[m] >= 0:
             add_axes_moment(model, discrete, step, m, M)
             on_bodies += dot(M, vector(step.turn[m]))
-    seen = 6 * head[0] + head[2] + head[3]
+    seen = n_results(head)
     given = step.h * out[seen + laws.given[i]] if laws.given[i] >= 0 else 0.0
     lost = step.h * out[seen + laws.lost[i]] if laws.lost[i] >= 0 else 0.0
     if laws.energy[i] < 0:
@@ -393,10 +399,6 @@ def begin_in_middle(model, discrete, step, c):
     """Write the motion of the markers of element c from the beginning to the end of the step, in its middle."""
     a = model.connections.a[c]
     for m in range(a, a + model.laws.head[model.connections.item[c], 0]):
-        Q = product(matrix(step.end.markers.A[m]), transposed(matrix(step.A_0[m])))
-        turn = way_turned(Q)
-        half = scaled(1.0 / (1.0 + math.sqrt(1.0 + 0.25 * dot(turn, turn))), turn)
-        put(step.turn[m], 0, turn)
-        put(step.d_law[m], 0, sub(vector(step.end.markers.r[m]), vector(step.x_0[m])))
-        put(step.r_law[m], 0, scaled(0.5, add(vector(step.x_0[m]), vector(step.end.markers.r[m]))))
-        put_matrix(step.A_law[m], product(cayley(half), matrix(step.A_0[m])))
+        end = vector(step.end.markers.r[m])
+        put(step.d_law[m], 0, sub(end, vector(step.x_0[m])))
+        put_middle(step, m, way_turned(product(matrix(step.end.markers.A[m]), transposed(matrix(step.A_0[m])))), end)
