@@ -29,3 +29,10 @@ def test_public_functions_document_every_parameter(package):
         if (left := set(inspect.signature(function).parameters) - documented(function))
     }
     assert missing == {}, "expected these parameters in the section Parameters, with shape and unit"
+
+
+def test_help_of_a_rigid_body_explains_every_field_and_the_point_of_its_inertia():
+    from floatframe import RigidBody
+
+    assert set(inspect.signature(RigidBody).parameters) == documented(RigidBody)
+    assert "Inertia tensor about the centre of mass" in inspect.getdoc(RigidBody)

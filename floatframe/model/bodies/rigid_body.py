@@ -24,6 +24,27 @@ TRIANGLE_DEFECT = 1e-6
 class RigidBody:
     """A rigid body with its initial position and motion.
 
+    Parameters
+    ----------
+    name
+        Unique in the system; markers name the body by it.
+    mass
+        [kg]
+    inertia
+        Inertia tensor about the centre of mass, not about the frame origin, in body axes, (3, 3) [kg m²].
+    center_of_mass
+        From the frame origin, in body axes, (3,) [m]; by default the origin itself.
+    position
+        Initial position of the frame origin, in ground axes, (3,) [m].
+    orientation
+        Initial unit Euler parameters p = (w, x, y, z) of R_GB, which maps components in body axes to ground axes, (4,).
+    velocity
+        Initial velocity of the frame origin, in ground axes, (3,) [m/s].
+    omega_B
+        Initial angular velocity, in body axes, (3,) [rad/s].
+    shapes
+        Drawn shapes, in the body frame.
+
     Raises
     ------
     ModelError
@@ -31,15 +52,14 @@ class RigidBody:
     """
 
     name: str
-    mass: float  #: [kg]
-    inertia: Array  #: about the centre of mass, body axes, (3, 3) [kg m²]
-    center_of_mass: Array = field(default_factory=lambda: np.zeros(3))  #: in the body frame, (3,) [m]
-    position: Array = field(default_factory=lambda: np.zeros(3))  #: of the frame origin, in ground axes, (3,) [m]
-    orientation: Array = field(default_factory=lambda: np.array([1.0, 0, 0, 0]))  #: Euler parameters p of R_GB, (4,)
-    velocity: Array = field(default_factory=lambda: np.zeros(3))  #: of the frame origin, in ground axes, (3,) [m/s]
-    #: angular velocity in body axes, (3,) [rad/s]
+    mass: float
+    inertia: Array
+    center_of_mass: Array = field(default_factory=lambda: np.zeros(3))
+    position: Array = field(default_factory=lambda: np.zeros(3))
+    orientation: Array = field(default_factory=lambda: np.array([1.0, 0, 0, 0]))
+    velocity: Array = field(default_factory=lambda: np.zeros(3))
     omega_B: Array = field(default_factory=lambda: np.zeros(3))  # noqa: N815
-    shapes: Sequence[Shape | Geometry] = field(default=(), kw_only=True)  #: drawn shapes, in the body frame
+    shapes: Sequence[Shape | Geometry] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
         where = f"rigid body {self.name!r}"
