@@ -40,7 +40,7 @@ MONTH = 30 * 24 * 3600.0  # seconds
 keys: WeakKeyDictionary[FunctionType, str | None] = WeakKeyDictionary()  # of functions, without types of arguments
 
 
-class NoKeyError(Exception):
+class UnknownKindError(Exception):
     """A value of unknown kind."""
 
 
@@ -71,7 +71,7 @@ def code_key(function: FunctionType, arguments: tuple, options: str) -> str | No
     """Return the key of a function for the types of its arguments and the options of its compilation, if it has one."""
     try:
         words = function_words(function), [type_words(each) for each in arguments], options
-    except NoKeyError:
+    except UnknownKindError:
         return None
     return digest(repr((compiler_key(), words)))
 
@@ -80,13 +80,13 @@ def function_words(function: FunctionType) -> str:
     """Return the digest of a function of Python and of everything that it uses."""
     if function not in keys:
         keys[function] = None  # of a function that calls itself
-        with contextlib.suppress(NoKeyError):
+        with contextlib.suppress(UnknownKindError):
             names = function.__code__.co_freevars
             cells = dict(zip(names, [cell.cell_contents for cell in function.__closure__ or ()], strict=True))
             words = code_words(function.__code__, function.__globals__ | cells)
             keys[function] = digest(repr((function.__module__, function.__qualname__, words, default_words(function))))
     if (key := keys[function]) is None:
-        raise NoKeyError
+        raise UnknownKindError
     return key
 
 
@@ -122,7 +122,7 @@ def is_ours(module: str | None) -> bool:
 
 
 def value_words(value) -> object:
-    """Return words that are equal only for equal values; `NoKeyError` for a kind that is unknown here."""
+    """Return words that are equal only for equal values; `UnknownKindError` for a kind that is unknown here."""
     if value is None or isinstance(value, PLAIN):
         return type(value).__qualname__, repr(value)
     if isinstance(value, Enum):
@@ -145,7 +145,7 @@ def value_words(value) -> object:
         return record_words(value)
     if isinstance(value, type | FunctionType | BuiltinFunctionType | np.ufunc):
         return "foreign", str(getattr(value, "__module__", "")), getattr(value, "__qualname__", value.__name__)
-    raise NoKeyError
+    raise UnknownKindError
 
 
 PLAIN = (bool, int, float, complex, str, bytes, type(Ellipsis))
@@ -154,12 +154,12 @@ PLAIN = (bool, int, float, complex, str, bytes, type(Ellipsis))
 def record_words(kind: type) -> object:
     """Return the words of a class of records."""
     if not issubclass(kind, tuple) or not hasattr(kind, "_fields"):
-        raise NoKeyError
+        raise UnknownKindError
     return "record", kind.__module__, kind.__qualname__, kind._fields
 
 
 def type_words(kind: types.Type) -> object:
-    """Return words that are equal only for equal types; `NoKeyError` for a kind that is unknown here."""
+    """Return words that are equal only for equal types; `UnknownKindError` for a kind that is unknown here."""
     if isinstance(fields := getattr(kind, "fields", None), dict):  # a record of arrays
         return str(kind), [(name, type_words(each), place) for name, (each, place) in fields.items()]
     if isinstance(kind, types.BaseTuple):
@@ -169,7 +169,7 @@ def type_words(kind: types.Type) -> object:
         return value_words(kind.dispatcher)
     if isinstance(kind, types.Number | types.Boolean | types.NoneType | types.Array | types.SliceType | types.Omitted):
         return type(kind).__qualname__, str(kind)
-    raise NoKeyError
+    raise UnknownKindError
 
 
 def read_code(key: str) -> StoredCode | None:
