@@ -33,7 +33,7 @@ class State:
     #: of another number: they begin between -pi and pi
     angle: Array | None = None
     #: errors of steps and energy up to here, as the watch of a run has found them; a run that continues from here in
-    #: time adds its own; None: unknown
+    #: time is judged with that run as one motion; None: unknown
     watched: Mapping[str, Any] | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:

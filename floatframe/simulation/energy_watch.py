@@ -54,7 +54,6 @@ class EnergyWatch:
 
     every: int  #: steps between rows
     h: float  #: step size [s]
-    n_before: int = 0  #: steps of earlier runs that this one continues
     n_seen: int = 0  #: rows after the first one
     last: Array | None = None  #: energy, work given and taken at the last row, (3,)
     change: Array | None = None  #: work in the previous interval, (2,)
@@ -123,7 +122,7 @@ class EnergyWatch:
         unsure = self.unsure + np.cumsum(swing.sum(axis=1))
         self.gain, self.unsure = float(gains[-1]), float(unsure[-1])
         self.unresolved, self.taken = float(unresolved[-1]), float(taken_so_far[-1])
-        is_judged = self.n_before + number * self.every >= FIRST_VERDICT
+        is_judged = number * self.every >= FIRST_VERDICT
         is_judged[-1] = is_judged[-1] or is_last
         is_judged &= scales > 0.0
         share_of = np.where(is_judged, 1.0 / np.where(scales > 0.0, scales, 1.0), 0.0)
@@ -159,7 +158,6 @@ class EnergyWatch:
 
     def continue_from(self, watched: Mapping[str, Any]) -> None:
         """Add to the errors of the run that this one continues."""
-        self.n_before = int(watched["n_steps"])
         self.gain, self.unsure, self.unresolved, self.taken, self.scale, self.noise = watched["energy"]
 
     def record(self) -> dict[str, Array]:
@@ -168,7 +166,7 @@ class EnergyWatch:
             return {}
         change = np.full(2, np.nan) if self.change is None else self.change
         sums = np.array([self.gain, self.unsure, self.unresolved, self.taken, self.scale, self.noise])
-        return {"energy_sums": np.concatenate([sums, self.last, change, self.potential, [self.n_before]])}
+        return {"energy_sums": np.concatenate([sums, self.last, change, self.potential])}
 
     def restore(self, record: Mapping[str, Array], notes: tuple[ValidityNote, ...]) -> None:
         """Resume from a record and the notes of the completed part."""
@@ -178,9 +176,8 @@ class EnergyWatch:
         sums = (float(x) for x in numbers[:6])
         self.gain, self.unsure, self.unresolved, self.taken, self.scale, self.noise = sums
         self.n_seen = FIRST_VERDICT  # a restart comes later
-        self.last, change, self.potential = numbers[6:9], numbers[9:11], numbers[11:13]
+        self.last, change, self.potential = numbers[6:9], numbers[9:11], numbers[11:]
         self.change = None if np.isnan(change).any() else change
-        self.n_before = int(numbers[13])
         self.notes = {note.kind: note for note in notes if note.kind in ADVICE}
 
     def measured(self, d: Array) -> Array:

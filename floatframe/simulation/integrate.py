@@ -344,7 +344,7 @@ class Run:
         t = self.t_start + self.n_total * self.h
         if self.events is not None and self.events.has_stopped:
             t = self.events.happened[-1]["t"]
-        found: dict[str, Any] = {"t": t, "n_steps": self.energy.n_before + self.n_total}
+        found: dict[str, Any] = {"t": t, "n_steps": self.steps.n_before + self.n_total}
         return {"watched": found | self.steps.passed_on() | self.energy.passed_on()}
 
     def __post_init__(self) -> None:

@@ -26,10 +26,13 @@ It works for second-order methods, with fixed steps and with an error tolerance:
 (6) The first step is compared alone, with two half steps of the same damping. A stiff spring with a damper settles
     before the comparisons of (1), while the first step may be wrong by the whole sag.
 
-A companion restarts where a run can be resumed; its error up to there is added. A run that continues another one in
-time (`State.watched`) adds its errors to those of the other, relative to the motion since that began. These sums, and
-that over windows, do not know how the motion changes earlier errors: it may forget them (damping) or magnify them
-(chaos).
+(7) A run that continues another one in time (`State.watched`) is a piece of one motion, and its errors are relative to
+    the motion since that began. If a companion reached the end of the other run, the error of the last state is passed
+    on, and companions begin with it: they lie from the run as far as if they had run since the beginning. Other errors
+    of earlier pieces are added.
+
+A companion restarts where a run can be resumed; its error up to there is added. These sums, and that over windows, do
+not know how the motion changes earlier errors: it may forget them (damping) or magnify them (chaos).
 """
 
 from collections.abc import Mapping
@@ -45,9 +48,13 @@ from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import FloatframeError, ResultsError
 from floatframe.integrators import has_fixed_steps
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha
-from floatframe.integrators.integrator import Integrator, has_divided_steps
+from floatframe.integrators.integrator import Integrator, has_divided_steps, started_anew
 from floatframe.integrators.relative import RelativeGeneralizedAlpha
-from floatframe.model.rotations import rotations_between
+from floatframe.model.rotations import (
+    euler_parameter_product,
+    euler_parameters_of_rotation_vector,
+    rotations_between,
+)
 from floatframe.model.state import State
 from floatframe.model.system import System
 from floatframe.results.validity import ValidityNote
@@ -82,7 +89,7 @@ FULL_TURN = 3.0  #: rotation above which errors are relative to a whole turn [ra
 SCREEN = 0.25  #: share of the limit above which half steps decide: double steps may be outside the asymptotic range
 AIM = 0.2  #: share of the limit that the recommended step would reach
 DOUBLES, HALVES = 2.0, 0.5  #: step size of a companion over that of the run
-ERROR_SHARE = {DOUBLES: 1 / 3, HALVES: 4 / 3}  #: error of the run over the difference: 1/(2² - 1) and 1/(1 - 1/2²)
+ERROR_SHARE = {DOUBLES: -1 / 3, HALVES: 4 / 3}  #: error of the run over the difference: 1/(1 - 2²), 1/(1 - 1/2²)
 MOST_RATIO = 2 / 3  #: largest ratio of the differences by half and by double steps from which an error is estimated
 UNKNOWN_RATIO = 1 / 2  #: the ratio where double steps fail, that of errors of first order
 
@@ -106,6 +113,8 @@ class Companion:
     before: int  #: number of run steps at the comparison before
     error_before: Array  #: error at the comparison before, (n_b, 2, 3)
     peak: Array  #: largest error of position and rotation, (n_b, 2)
+    run: Memory  #: memory of the run at the last comparison
+    error_at_begin: Array  #: error of position and rotation where it started, (n_b, 2)
     events: EventWatch | None  #: its events
     events_at_begin: EventWatch | None  #: events of the run where it started
     share: float  #: error of the run over the difference
@@ -121,7 +130,7 @@ class Companion:
         events: those of the run after `start` steps, if it has any; the companion gets a copy with working arrays.
         is_light: with the numerical damping of `LIGHT` where that is less.
         """
-        none = np.zeros((len(memory.state.r), 2, 3))
+        none = np.zeros((len(memory.r), 2, 3))
         method, begin, share = integrator_of(integrator, ratio), memory, ERROR_SHARE[ratio]
         if is_light:
             method, share = lighter(integrator, share)
@@ -132,7 +141,17 @@ class Companion:
             work = own.new_work()
         work.solver.c_k[...] = 0.0  # a resumed run has no factors of other steps
         peak = lengths(none)
-        return cls(method, memory, start, ratio, start, begin, work, none, start, none, peak, own, events, share)
+        return cls(
+            method, memory, start, ratio, start, begin, work, none, start, none, peak, memory, peak, own, events, share
+        )
+
+    def begin_apart(self, system: System, t: float, error: Array) -> None:
+        """Begin as far from the run as if the error of the run at t were found by this companion; see `error_of`."""
+        apart = moved(self.begin, -error / self.share)
+        acting = system if self.events is None else self.events.system
+        self.memory, _ = started_anew(self.integrator, acting, t, apart, self.work)
+        self.error = self.error_before = error[: self.error.size].reshape(self.error.shape)
+        self.peak = self.error_at_begin = lengths(self.error)
 
     def follow(
         self, system: System, end: Memory, last: int, t0: float, h: float, jumps: Mapping[int, list[float]]
@@ -156,10 +175,14 @@ class Companion:
                     return False
         except FloatframeError:
             return False
-        self.memory, self.before, self.error_before, self.at = memory, self.at, self.error, last
+        self.memory, self.before, self.error_before, self.at, self.run = memory, self.at, self.error, last, end
         self.error = self.share * difference(end.state, memory.state)
         self.peak = np.maximum(self.peak, lengths(self.error))
         return True
+
+    def last_error(self) -> Array:
+        """Return the error of the state of the run at the last comparison; see `error_of`."""
+        return np.asarray(self.share * error_of(self.run, self.memory))
 
     @property
     def is_light(self) -> bool:
@@ -181,6 +204,7 @@ class StepWatch:
     n_before: int = 0  #: number of steps of earlier runs that this one continues
     is_piece: bool = False  #: whether it starts from a state whose errors are unknown
     first_error: Array | float = 0.0  #: error of position and rotation in the first step, not yet added, (n_b, 2)
+    error: Array | None = None  #: error of the state where the run begins, not in `total`; see `error_of`
     n_companion_steps: int = 0  #: number of steps that companions have covered
     companions_done: bool = False  #: whether only windows follow
     companion: Companion | None = None
@@ -192,6 +216,8 @@ class StepWatch:
     #: error per step in the last companion or window: of position and rotation, and of their speeds, (n_b, 2, 2)
     error_per_step: Array | None = None
     total: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))  #: sum of errors, likewise, (n_b, 2, 2)
+    #: error of the last state, and `total` without it, where a companion reached the end of the run
+    at_end: tuple[Array, Array] | None = None
     initial_state: State | None = None  #: state at the start
     #: largest displacement and rotation of any body, and twice the largest speeds, (2, 2)
     size: Array = field(default_factory=lambda: np.zeros((2, 2)))
@@ -212,14 +238,15 @@ class StepWatch:
         """Return what a run that continues this one in time has to know."""
         if not self.is_on or self.initial_state is None:
             return {}
-        first = self.initial_state
-        return {
-            name: [float(x) for x in array.ravel()]
-            for name, array in (("errors", self.total), ("size", self.size), ("r", first.r), ("p", first.p))
-        }
+        first, error, total = self.initial_state, np.zeros(0), self.total
+        if self.at_end is not None:
+            error, total = self.at_end
+        arrays = {"errors": total, "size": self.size, "r": first.r, "p": first.p, "error": error}
+        return {name: [float(x) for x in array.ravel()] for name, array in arrays.items()}
 
     def continue_from(self, watched: Mapping[str, Any]) -> None:
-        """Add to the errors of the run that this one continues, relative to the motion since that began."""
+        """Judge the run and the one that it continues as one motion."""
+        self.n_before, self.is_piece = int(watched["n_steps"]), False
         if not self.is_on or "errors" not in watched:
             return
         assert self.initial_state is not None
@@ -227,7 +254,17 @@ class StepWatch:
                   "p": self.initial_state.p.shape}  # fmt: skip
         self.total, self.size, r, p = (np.reshape(watched[name], shape) for name, shape in shapes.items())
         self.initial_state = replace(self.initial_state, r=r, p=p)
-        self.n_before, self.is_piece = int(watched["n_steps"]), False
+        if len(watched.get("error", ())):
+            self.error = np.array(watched["error"], dtype=float)
+            if self.is_long:  # its companion begins later
+                self.add_error_at_begin()
+
+    def add_error_at_begin(self) -> None:
+        """Add the error of the state where the run begins to the sum."""
+        assert self.error is not None
+        total = self.total.copy()
+        total[:, :, 0] += lengths(self.error[: 6 * len(total)].reshape(-1, 2, 3))
+        self.total, self.error = total, None
 
     @property
     def limit(self) -> float:
@@ -319,9 +356,9 @@ class StepWatch:
         if self.companion is None:
             self.add_unwatched_steps(first, self.error_per_step)
             is_fixed = not has_divided_steps(compiled_system(system).model) and has_fixed_steps(self.integrator)
-            self.companion = Companion.begun(
+            self.companion = self.moved_companion(system, t0, Companion.begun(
                 self.integrator, begin, self.work_arrays(system), first, DOUBLES, h if is_fixed else 0.0, events
-            )
+            ))  # fmt: skip
             self.coarse_fails = False
         other = self.companion
         if self.is_comparable(last):
@@ -336,13 +373,13 @@ class StepWatch:
             is_small = is_good and self.relative_errors(system, other.peak).max() < SCREEN * self.limit
             if other.ratio == DOUBLES and not is_small:
                 coarse, self.coarse_fails = (other, False) if is_good else (None, True)
-                other = self.companion = self.with_half_steps(system, other)
+                other = self.companion = self.with_half_steps(system, t0, other)
                 if coarse is not None and not other.is_light:
                     self.coarse, self.kept_work = coarse, None  # each has its own working arrays
-                    other = self.companion = self.with_half_steps(system, coarse)
+                    other = self.companion = self.with_half_steps(system, t0, coarse)
                 is_good = other.follow(system, end, last, t0, h, self.jumps)
             if not is_good and other.is_light:  # less damping may be what fails
-                damped = self.with_half_steps(system, other, is_light=False)
+                damped = self.with_half_steps(system, t0, other, is_light=False)
                 is_good = damped.follow(system, end, last, t0, h, self.jumps)
                 other = self.companion = damped if is_good else other
             if not is_good:  # what it has found so far counts
@@ -368,29 +405,42 @@ class StepWatch:
         is_flexible = np.diff(compiled_system(system).model.bodies.q0) > 0
         return bool((self.turn[is_flexible] > FAR_TURN).any())
 
-    def with_half_steps(self, system: System, other: Companion, *, is_light: bool = True) -> Companion:
+    def with_half_steps(self, system: System, t0: float, other: Companion, *, is_light: bool = True) -> Companion:
         """Return a companion with half steps that starts where another one started.
 
         is_light: with little numerical damping at the start of a run; a memory of the run has that of its method.
         """
-        return Companion.begun(
+        return self.moved_companion(system, t0, Companion.begun(
             self.integrator, other.begin, self.work_arrays(system), other.start, HALVES, events=other.events_at_begin,
             is_light=is_light and other.begin.h == 0.0,
-        )  # fmt: skip
+        ))  # fmt: skip
 
-    def close_companion(self, h: float) -> None:
-        """Add the error that the companion has found, and remove the companion."""
+    def moved_companion(self, system: System, t0: float, other: Companion) -> Companion:
+        """Return a companion that begins with the error of the run, where it starts at the beginning."""
+        if self.error is not None and other.start == 0:
+            try:
+                other.begin_apart(system, t0, self.error)
+            except FloatframeError:  # no such state
+                self.add_error_at_begin()
+        return other
+
+    def close_companion(self, h: float) -> Array | None:
+        """Remove the companion, and add the error that it has found; return this error, None if there is none."""
         other, self.companion = self.companion, None
         coarse, self.coarse = self.coarse, None
         if other is None or other.at == other.start:
-            return
+            return None
         factors = by_observed_order(other, coarse, self.coarse_fails)
         found = np.stack([other.peak, other.speeds(h)], axis=2) * factors[:, :, None]
-        self.error_per_step = found / (other.at - other.start)
+        grown = found.copy()
+        grown[:, :, 0] = np.maximum(found[:, :, 0] - other.error_at_begin, 0.0)
+        self.error_per_step = grown / (other.at - other.start)
         found[:, :, 0] = np.maximum(found[:, :, 0], self.first_error)
         self.total, self.first_error = self.total + found, 0.0
+        self.error = None
         self.n_companion_steps += other.at - other.start
         self.n_watched = other.at
+        return found
 
     def add_unwatched_steps(self, step: int, rate: Array | None) -> None:
         """Add the error of the steps before `step` that nothing has covered, from an error per step."""
@@ -440,15 +490,17 @@ class StepWatch:
             if note is not None:
                 return note
         other = self.companion
-        if other is not None and other.at == other.start and n_done > other.start:  # a run of one or three steps
-            other = self.with_half_steps(system, other, is_light=False)
-            if other.follow(system, end, n_done, t0, h, self.jumps):
-                self.update_size(other.begin.state, end.state, h * (n_done - other.start))
-                self.companion = other
-        self.close_companion(h)
+        if other is not None and other.at < n_done < FIRST_VERDICT:  # a run of few steps ends within a double step
+            halves = self.with_half_steps(system, t0, other, is_light=False)
+            if halves.follow(system, end, n_done, t0, h, self.jumps):
+                self.update_size(halves.begin.state, end.state, h * (n_done - halves.start))
+                self.companion = other = halves
+        found = self.close_companion(h)
         if self.error_per_step is None:
             return None
         self.add_unwatched_steps(n_done, self.error_per_step)
+        if other is not None and found is not None:
+            self.at_end = other.last_error(), self.total - found
         return self.new_note(system, t0 + n_done * h, h)
 
     def relative_errors(self, system: System, found: Array | None = None) -> Array:
@@ -502,6 +554,7 @@ class StepWatch:
         rate = np.full_like(self.total, np.nan) if self.error_per_step is None else self.error_per_step
         return {
             "watch_counts": np.array([getattr(self, name) for name in COUNTS]), "watch_rate": rate,
+            "watch_error": np.zeros(0) if self.error is None else self.error,
             "watch_total": self.total, "watch_size": self.size, "watch_turn": self.turn,
             **{f"watch_{name}": np.asarray(getattr(self.initial_state, name)) for name in ("r", "p", "q", "u")},
         }  # fmt: skip
@@ -515,12 +568,13 @@ class StepWatch:
                 setattr(self, name, type(getattr(self, name))(count))
             arrays = [
                 np.array(record[f"watch_{name}"], dtype=float)
-                for name in ("rate", "total", "size", "turn", "r", "p", "q", "u")
+                for name in ("rate", "total", "size", "turn", "error", "r", "p", "q", "u")
             ]
         except (KeyError, ValueError) as error:
             raise ResultsError("restart: the record has no data of the step watch; run it anew") from error
-        rate, self.total, self.size, self.turn = arrays[:4]
-        self.error_per_step, self.initial_state = None if np.isnan(rate).any() else rate, State(*arrays[4:])
+        rate, self.total, self.size, self.turn, error = arrays[:5]
+        self.error = error if error.size else None
+        self.error_per_step, self.initial_state = None if np.isnan(rate).any() else rate, State(*arrays[5:])
         self.note = next((note for note in notes if note.kind == "steps"), None)
 
 
@@ -557,7 +611,7 @@ def by_observed_order(other: Companion, coarse: Companion | None, coarse_fails: 
     if coarse is None:
         ratio = np.full(other.peak.shape, UNKNOWN_RATIO)
     else:
-        by_halves, by_doubles = other.peak / other.share, coarse.peak / coarse.share
+        by_halves, by_doubles = other.peak / other.share, coarse.peak / abs(coarse.share)
         ratio = np.clip(by_halves / np.where(by_doubles > 0.0, by_doubles, np.inf), 0.25, MOST_RATIO)
     return np.asarray(1 / (1 - ratio) / ERROR_SHARE[HALVES])
 
@@ -572,6 +626,21 @@ def difference(state: State, other: State) -> Array:
     apart = np.empty((len(state.r), 2, 3))
     apart[:, 0], apart[:, 1] = state.r - other.r, rotations_between(state.p, other.p)
     return apart
+
+
+def error_of(memory: Memory, other: Memory) -> Array:
+    """Return the difference of two states: of places and orientations (n_b, 2, 3), modal coordinates and velocities."""
+    apart = difference(memory.state, other.state)
+    return np.concatenate([apart.ravel(), memory.q - other.q, memory.u - other.u])
+
+
+def moved(memory: Memory, apart: Array) -> Memory:
+    """Return the memory whose state differs by so much; see `error_of`."""
+    n_b, n_q = len(memory.r), len(memory.q)
+    of_bodies, q, u = np.split(apart, [6 * n_b, 6 * n_b + n_q])
+    way, theta = of_bodies.reshape(n_b, 2, 3).transpose(1, 0, 2)
+    p = euler_parameter_product(memory.p, euler_parameters_of_rotation_vector(theta))
+    return memory.changed(r=memory.r + way, p=p, q=memory.q + q, u=memory.u + u)
 
 
 def turns_in_a_step(system: System, state: State, h: float) -> Array:
