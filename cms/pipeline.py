@@ -144,7 +144,7 @@ def reduced(
             stress=job.reduction.stress is not False,
             quadratic=bool(job.reduction.quadratic_modes),
             geometric=False if states is None else states,
-            recovery=requests_of(job.recovery),
+            recovery=requests_of(job.recovery) if job.recovery else (),
         )
     left_out = plan.left_out(len(modes.labels)) if states is None else ""
     return replace(made, provenance={**made.provenance, "geometric stiffness": left_out}) if left_out else made
@@ -159,7 +159,8 @@ class Plan:
 
     body: FEBody  #: the coupled body
     asked: "Asked"  #: geometric stiffness: True, False, the interfaces whose loads it has; None: if it is small
-    has_quadratic_modes: bool
+    is_requested: bool  #: whether the job requests the geometric stiffness, or quadratic modes, which need it
+    is_optional: bool  #: whether it is computed if it is small: nobody decided, and the elements know it
     solver: Solver | None = None  #: of the factorisation; None: the fastest that is installed
     to_disk: bool = False  #: whether the columns lie on disk
 
@@ -186,19 +187,11 @@ class Plan:
     @classmethod
     def of_stiffness(cls, job: Job, body: FEBody) -> "Plan":
         """Plan the geometric stiffness alone, for many reductions with one factorisation."""
-        return cls(body, job.reduction.geometric_stiffness, bool(job.reduction.quadratic_modes))
-
-    @property
-    def is_requested(self) -> bool:
-        """Whether the job requests the geometric stiffness, or quadratic modes, which need it."""
-        return self.has_quadratic_modes or self.asked not in (None, False)
-
-    @property
-    def is_optional(self) -> bool:
-        """Whether the geometric stiffness is computed if it is small: nobody decided, and the elements know it."""
         from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffness
 
-        return self.asked is None and not self.has_quadratic_modes and has_geometric_stiffness(self.body)
+        asked = job.reduction.geometric_stiffness
+        is_requested = bool(job.reduction.quadratic_modes) or asked not in (None, False)
+        return cls(body, asked, is_requested, not is_requested and asked is None and has_geometric_stiffness(body))
 
     def needs_states(self, n_modes: int) -> bool:
         """Return whether a mode set of this size is reduced with the static states of unit loads."""

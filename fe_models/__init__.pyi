@@ -88,6 +88,7 @@ from .meshes.line_mesh import LineMesh as LineMesh
 from .meshes.line_mesh import divide_lines as divide_lines
 from .meshes.line_mesh import straight_line as straight_line
 from .meshes.mesh import Mesh as Mesh
+from .meshes.mesh import drop_unused_nodes as drop_unused_nodes
 from .meshes.node_cloud import NodeCloud as NodeCloud
 from .meshes.numbering import NamedSet as NamedSet
 from .meshes.numbering import Numbering as Numbering
@@ -107,4 +108,3 @@ from .meshes.shell_mesh import mapped_shell as mapped_shell
 from .meshes.split import Cut as Cut
 from .meshes.split import Split as Split
 from .meshes.split import split_mesh as split_mesh
-from .meshes.unused_nodes import drop_unused_nodes as drop_unused_nodes

@@ -170,11 +170,23 @@ def numbers_of_loads(n_loaded: int) -> dict[str, tuple[int, ...]]:
 
 
 def put_array(record: object, where: str, name: str, shape: tuple[int, ...], *, is_symmetric: bool = False) -> None:
-    """Set a field of a frozen record after a check: shape, finite numbers and, if required, symmetry in the modes."""
+    """Set a field of a frozen record after a check: shape, finite numbers and, if required, symmetry in the modes.
+
+    The antisymmetric part of matrices that must be symmetric is rounding, and is removed.
+    """
     array = np.ascontiguousarray(getattr(record, name), dtype=np.float64)
     require_shape(where, array, shape)
     require_finite(where, array)
-    object.__setattr__(record, name, frozen(symmetrized(where, array) if is_symmetric else array))
+    if is_symmetric:
+        other = np.swapaxes(array, -1, -2)
+        defect, scale = np.abs(array - other).max(initial=0.0), np.abs(array).max(initial=0.0)
+        if defect > SYMMETRY_DEFECT * scale:
+            raise BodyError(
+                f"{where}: expected symmetric matrices over the modes, got |K - K.T| = {defect / scale:.2e} |K|; "
+                "check that all are projected on both sides by the same modes"
+            )
+        array = (array + other) / 2
+    object.__setattr__(record, name, frozen(array))
 
 
 def stiffness_of_loads(
@@ -209,15 +221,3 @@ def by_kind(K: Array, n_loaded: int) -> dict[str, Array]:
     translation, rotation, spin, interfaces, _ = np.split(K, [3, 6, 12, 12 + 6 * n_loaded])
     interfaces = interfaces.reshape(n_loaded, 6, *K.shape[1:])
     return dict(zip(UNIT_LOADS, (translation, rotation, spin, interfaces), strict=True))
-
-
-def symmetrized(where: str, array: Array) -> Array:
-    """Return the symmetric part of each matrix; raise `BodyError` if the rest is more than rounding."""
-    other = np.swapaxes(array, -1, -2)
-    defect, scale = np.abs(array - other).max(initial=0.0), np.abs(array).max(initial=0.0)
-    if defect > SYMMETRY_DEFECT * scale:
-        raise BodyError(
-            f"{where}: expected symmetric matrices over the modes, got |K - K.T| = {defect / scale:.2e} |K|; "
-            "check that all are projected on both sides by the same modes"
-        )
-    return np.asarray((array + other) / 2)

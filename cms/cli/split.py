@@ -157,7 +157,7 @@ def mesh_of(job: Job) -> Any:
     from cms.jobs.attachments_of_job import frame_mesh
     from cms.jobs.body_of_job import solid_mesh_of
     from cms.jobs.shell_body import shell_mesh
-    from fe_models.meshes.unused_nodes import drop_unused_nodes
+    from fe_models.meshes.mesh import drop_unused_nodes
 
     if job.body.matrices is not None:
         raise JobError("body.matrices: bare matrices cannot be cut; give the mesh they were made of")

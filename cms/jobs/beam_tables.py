@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, StringConstraints, model_validator
 
 from fe_models.foundation.arrays import MOTION_COMPONENTS as COMPONENTS
-from fe_models.foundation.toml_file import Matrix3, Table, Vector3, choice
+from fe_models.foundation.toml_file import Matrix3, Table, Vector3, choice, names
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["PLANES", "SHAPE_KEYS", "BeamSection", "LinkSection", "MassSection", "SpringSection", "TieSection"]
@@ -37,14 +37,6 @@ def numbers(*counts: int) -> Any:
         return tuple(float(x) for x in value)
 
     return Annotated[tuple[float, ...], BeforeValidator(check)]
-
-
-def names(value: Any) -> Any:
-    """Return one name, or a list of names, as a tuple."""
-    words = [value] if isinstance(value, str) else value
-    if not isinstance(words, list | tuple) or not words or not all(isinstance(w, str) and w for w in words):
-        raise ValueError('expected the name of a group, or a list of names: "a" or ["a", "b"]')
-    return tuple(words)
 
 
 def component_numbers(value: Any) -> tuple[int, ...]:

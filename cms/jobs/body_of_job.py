@@ -14,7 +14,7 @@ from fe_models.body.couplings.coupling_on_ranks import spread_body
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.ranks.ranks import Ranks
 from fe_models.foundation.stages import Stages
-from fe_models.foundation.units import unit_system
+from fe_models.foundation.units import UNIT_SYSTEMS
 
 if TYPE_CHECKING:
     from fe_models.checks.first_order import FirstOrderError
@@ -27,7 +27,6 @@ __all__ = [
     "body_of_mixed",
     "checked_mesh",
     "coupled_body",
-    "is_cad",
     "is_of_mesh",
     "job_body",
     "solid_mesh_of",
@@ -62,7 +61,7 @@ def body_of_matrices(job: Job, stages: Stages, on_report: Callable[[Any], None] 
         interfaces = interfaces_on(job, geometry)
     with stages("check matrices"):
         body = body_from_foreign(
-            read, geometry, name=str(job.body.name), units=unit_system(job.body.units), interfaces=interfaces,
+            read, geometry, name=str(job.body.name), units=UNIT_SYSTEMS[job.body.units], interfaces=interfaces,
             held=bool(job.body.held), remove_supports=job.body.remove_supports, repair_mass=bool(job.body.repair_mass),
             accept=[word for word in job.body.accept if word == "units"],
         )  # fmt: skip
@@ -77,7 +76,7 @@ def body_with_its_interfaces(job: Job, stages: Stages) -> FEBody:
 
     with stages("read matrices"):
         body = body_from_npz(
-            Path(str(job.body.matrices)), name=job.body.name, units=unit_system(job.body.units),
+            Path(str(job.body.matrices)), name=job.body.name, units=UNIT_SYSTEMS[job.body.units],
             held=bool(job.body.held), repair_mass=bool(job.body.repair_mass),
             accept=[word for word in job.body.accept if word == "units"],
         )  # fmt: skip
@@ -132,9 +131,11 @@ def body_of_frame(
     from fe_models.checks.frame_report import report_frame
     from fe_models.elements.beams.body import beam_body
 
-    units = unit_system(job.body.units)
+    units = UNIT_SYSTEMS[job.body.units]
     with stages("read lines"):
-        mesh = part_of_mesh(job, frame_mesh(job))
+        mesh = frame_mesh(job)
+        if job.body.part is not None:
+            mesh = part_of_mesh(job.body.part, mesh)
     properties = properties_of(job)
     masses, springs, links = attachments_of(job, mesh)
     with stages("check lines"):
@@ -241,7 +242,6 @@ def job_body(
 
 def coupled_body(job: Job, body: FEBody) -> FEBody:
     """Couple the interfaces of the body of a job, and make it planar if requested."""
-    from cms.jobs.beam_tables import PLANES
     from cms.modes.centrifugal import CENTRIFUGAL, centrifugal_loads
     from fe_models.body.couplings.couplings import couple
 
@@ -250,6 +250,7 @@ def coupled_body(job: Job, body: FEBody) -> FEBody:
         body = body.with_load_cases(*centrifugal_loads(body))
     if job.body.plane is None:
         return couple(body)
+    from cms.jobs.beam_tables import PLANES
     from fe_models.assembly.planar import planar
 
     return planar(couple(body), normal=PLANES[job.body.plane])
@@ -264,9 +265,11 @@ def uncoupled_body(
     ranks: Ranks | None = None,
 ) -> FEBody:
     """Run a job up to the body with uncoupled interfaces, with the requested nodes and points."""
-    from fe_models.body.kept_nodes import keep_nodes
+    body = made_body(job, stages, on_report, mesh, ranks)
+    if job.body.keep:
+        from fe_models.body.kept_nodes import keep_nodes
 
-    body = keep_nodes(made_body(job, stages, on_report, mesh, ranks), job.body.keep)
+        body = keep_nodes(body, job.body.keep)
     if not job.body.stress_points:
         return body
     from fe_models.elements.recovery.element_points import element_points
@@ -312,13 +315,15 @@ def checked_mesh(
 ) -> "tuple[Mesh, FirstOrderError | None]":
     """Read and check the solid mesh of a job; return it without unused nodes, and its first-order error."""
     from fe_models.checks.mesh_report import report_mesh
-    from fe_models.meshes.unused_nodes import drop_unused_nodes
+    from fe_models.meshes.mesh import drop_unused_nodes
 
-    with stages("mesh" if is_cad(job) else "read mesh"):
-        mesh = part_of_mesh(job, solid_mesh_of(job))
+    with stages("read mesh" if job.mesh_size is None else "mesh"):
+        mesh = solid_mesh_of(job)
+        if job.body.part is not None:
+            mesh = part_of_mesh(job.body.part, mesh)
     with stages("check mesh"):
         bricks = job.body.incompatible_modes
-        report = report_mesh(mesh, materials_of(job), units=unit_system(job.body.units), incompatible_modes=bricks)
+        report = report_mesh(mesh, materials_of(job), units=UNIT_SYSTEMS[job.body.units], incompatible_modes=bricks)
         if on_report is not None:
             on_report(report)
         report.raise_for_errors(accept=job.body.accept)
@@ -341,7 +346,7 @@ def body_of_mesh(
     """Read and check the mesh, unless it is given, and assemble it with the materials and interfaces of the job."""
     from fe_models.elements.solids.body import solid_body
 
-    units, first_order = unit_system(job.body.units), None
+    first_order = None
     if mesh is None:
         mesh, first_order = checked_mesh(job, stages, on_report)
     materials, bricks = materials_of(job), job.body.incompatible_modes
@@ -352,7 +357,7 @@ def body_of_mesh(
             mesh,
             materials,
             name=name,
-            units=units,
+            units=UNIT_SYSTEMS[job.body.units],
             interfaces=interfaces,
             incompatible_modes=bricks,
             progress=advance,
@@ -362,15 +367,10 @@ def body_of_mesh(
             body = replace(body, provenance={**body.provenance, **first_order.provenance()})
     if job.ties:
         body = body_of_mixed(job, stages, body, mesh, on_report)
-    return body.with_load_cases(*load_cases_of(job, body, mesh))
+    return body.with_load_cases(*load_cases_of(job, body, mesh)) if job.load_cases else body
 
 
 # the solid mesh of a job, read from a mesh file or made of a CAD file -------------------------------------------------
-
-
-def is_cad(job: Job) -> bool:
-    """Whether the body comes from a CAD file, which is meshed here."""
-    return job.mesh_size is not None
 
 
 def solid_mesh_of(job: Job) -> "Mesh":

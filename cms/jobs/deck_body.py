@@ -100,8 +100,7 @@ def _solids(
     from fe_models.checks.mesh_report import report_mesh
     from fe_models.elements.solids.body import solid_body
     from fe_models.meshes.cells.raw_mesh import chosen_cells, mesh_from_raw
-    from fe_models.meshes.mesh import SOLID_TYPES
-    from fe_models.meshes.unused_nodes import drop_unused_nodes
+    from fe_models.meshes.mesh import SOLID_TYPES, drop_unused_nodes
 
     materials = _materials(job)
     rules: dict[tuple[str, str], dict[str, AnyMaterial]] = {}

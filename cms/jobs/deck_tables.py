@@ -1,15 +1,14 @@
 """The tables of a reduction job that only apply to a whole deck: solids, couplings, equations (docs/job_file.md)."""
 
-from collections.abc import Mapping
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, StringConstraints
 
-from cms.jobs.beam_tables import component_numbers, names
+from cms.jobs.beam_tables import component_numbers
 from cms.jobs.shell_tables import check_layups
 from fe_models.elements.solids.elements import INTEGRATIONS, MASSES
 from fe_models.foundation.arrays import MOTION_COMPONENTS as COMPONENTS
-from fe_models.foundation.toml_file import Table, choice, is_no_number
+from fe_models.foundation.toml_file import Table, choice, is_no_number, names
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = [
@@ -103,27 +102,13 @@ class EquationSection(Table):
 
 
 def check_deck(job: Any) -> None:
-    """Raise `ValueError` unless tables of a deck come with a deck, and refer to existing materials and cells.
+    """Raise `ValueError` unless the tables of a deck are complete, and refer to existing materials and cells.
 
     Parameters
     ----------
     job
-        The job, with its tables read.
+        A job with a deck, with its tables read.
     """
-    tables: Mapping[str, Any] = {
-        "solids": job.solids,
-        "rods": job.rods,
-        "couplings": job.couplings,
-        "equations": job.equations,
-    }
-    if job.body.deck is None:
-        for key in ("mass", "program"):
-            if getattr(job.body, key) is not None:
-                raise ValueError(f"body.{key}: belongs to a whole deck; give [body] deck, or remove it")
-        for name, given in tables.items():
-            if given:
-                raise ValueError(f"{name}: belong to a whole deck; give [body] deck, or remove the tables")
-        return
     if job.ties or job.body.part or job.body.incompatible_modes:
         raise ValueError("body.deck: ties, part and incompatible_modes belong to a mesh; remove them")
     if not (job.solids or job.shells or job.sections or job.rods or job.springs):

@@ -16,7 +16,6 @@ from cms.jobs.beam_tables import (
     SpringSection,
     TieSection,
     check_beams,
-    names,
     numbers,
 )
 from cms.jobs.deck_tables import (
@@ -35,9 +34,20 @@ from cms.jobs.tables.mesh_size_table import MeshSizeSection, check_mesh_size
 from cms.jobs.tables.recovery_section import RecoverySection
 from fe_models.body.fe_body import INTERFACE_KINDS
 from fe_models.body.load_cases import LOAD_CASE_KINDS
+from fe_models.files.cad.cad_units import CAD_SUFFIXES
 from fe_models.foundation.parametric_file import read_parametric
 from fe_models.foundation.paths import near_file
-from fe_models.foundation.toml_file import Matrix3, Range, Table, Vector3, choice, is_no_number, kind_field, validated
+from fe_models.foundation.toml_file import (
+    Matrix3,
+    Range,
+    Table,
+    Vector3,
+    choice,
+    is_no_number,
+    kind_field,
+    names,
+    validated,
+)
 from fe_models.foundation.units import UNIT_SYSTEMS
 from fe_models.foundation.words import nearest, quoted
 
@@ -118,6 +128,7 @@ def elements_named(value: Any) -> tuple[Any, ...]:
     return tuple(entries)
 
 
+FileOfTheJob = Annotated[Path, BeforeValidator(beside_the_job)]
 Keep = Annotated[tuple[Any, ...], BeforeValidator(nodes_to_keep)]
 StressPoints = Annotated[tuple[Any, ...], BeforeValidator(elements_named)]
 Names = Annotated[tuple[str, ...], BeforeValidator(names)]
@@ -157,22 +168,22 @@ class BodySection(Table):
     """[body]: the source of the model."""
 
     name: Name | None = Field(None, description="the name of the body, text; default: the name of the job file")
-    mesh: Path | None = Field(None, description="the path of a mesh or CAD file, relative to the job file")
+    mesh: FileOfTheJob | None = Field(None, description="the path of a mesh or CAD file, relative to the job file")
     matrices: Path | tuple[Path, ...] | dict[str, Path] | None = Field(
         None,
         description="the path of a file with mass and stiffness, a list of paths, or a table {K = path, M = path, "
         "D = path, dofs = path}",
     )
-    geometry: Path | None = Field(None, description="the path of the deck or mesh that matrices were made of")
+    geometry: FileOfTheJob | None = Field(None, description="the path of the deck or mesh that matrices were made of")
     names: dict[str, str] | None = Field(
         None, description="a table {K = name, M = name, D = name}: names of the matrices in files that hold several"
     )
     remove_supports: bool = Field(
         False, description="true or false, for matrices: whether supports whose rows exist are taken out of K"
     )
-    deck: Path | None = Field(None, description="the path of a whole deck, as cms job writes it")
-    nodes: Path | None = Field(None, description="the path of a table of nodes, for beams")
-    lines: Path | None = Field(None, description="the path of a table of lines, for beams")
+    deck: FileOfTheJob | None = Field(None, description="the path of a whole deck, as cms job writes it")
+    nodes: FileOfTheJob | None = Field(None, description="the path of a table of nodes, for beams")
+    lines: FileOfTheJob | None = Field(None, description="the path of a table of lines, for beams")
     plane: choice("plane", lambda: tuple(PLANES)) | None = Field(  # type: ignore[valid-type]
         None, description=f"the plane beams or decks deform in, one of {', '.join(PLANES)}; default: space"
     )
@@ -202,11 +213,6 @@ class BodySection(Table):
         description='"all", or a list of elements, beams and shells, whose own stress is kept: numbers, names of sets',
     )
     accept: Accepted = Field((), description=f"a list of findings to accept, of {', '.join(ACCEPTABLE)}")
-
-    @field_validator("mesh", "deck", "geometry", "nodes", "lines", mode="before")
-    @classmethod
-    def _beside_the_job(cls, value: Any, info: ValidationInfo) -> Path:
-        return beside_the_job(value, info)
 
     @field_validator("matrices", mode="before")
     @classmethod
@@ -401,17 +407,25 @@ class Job(Table):
     def _fits_together(self) -> "Job":
         if not self.body.matrices and not self.body.deck and not self.materials:
             raise ValueError("materials: missing; a mesh needs at least one table [materials.NAME]")
-        check_mesh_size(self.mesh_size, self.body.mesh, has_others=bool(self.shells or self.sections))
-        check_deck(self)
+        if self.mesh_size is not None or (self.body.mesh and self.body.mesh.suffix.lower() in CAD_SUFFIXES):
+            check_mesh_size(self.mesh_size, self.body.mesh, has_others=bool(self.shells or self.sections))
         if self.body.deck:
+            check_deck(self)
             return self._names_of_interfaces()
+        for key in ("mass", "program"):
+            if getattr(self.body, key) is not None:
+                raise ValueError(f"body.{key}: belongs to a whole deck; give [body] deck, or remove it")
+        for key in ("solids", "rods", "couplings", "equations"):
+            if getattr(self, key):
+                raise ValueError(f"{key}: belong to a whole deck; give [body] deck, or remove the tables")
         attached = {"masses": self.masses, "springs": self.springs, "links": self.links, "ties": self.ties}
         if self.shells:
             check_shells(self.shells, self.sections, self.body, self.materials)
             if self.ties:
                 raise ValueError("ties: belong to a mesh of solid and lines; stiffeners share the nodes of the shell")
             attached = {}
-        check_beams(self.sections, attached, self.materials)
+        if self.sections or any(attached.values()):
+            check_beams(self.sections, attached, self.materials)
         if self.body.lines and not self.sections:
             raise ValueError("sections: missing; lines need at least one table [sections.NAME]")
         if self.body.matrices and (self.sections or self.body.plane):

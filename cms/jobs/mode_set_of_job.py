@@ -1,6 +1,7 @@
 """The mode set that a job requests, with its options as function arguments."""
 
 import logging
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -42,10 +43,7 @@ def job_mode_set(body: FEBody | Families, reduction: ReductionSection) -> ModeSe
     with families_of(body) as families:
         body = families.body
         options = set_options(body, reduction)
-
-        def added(modes: ModeSet) -> ModeSet:
-            return with_additions(families, modes, reduction)
-
+        added = partial(with_additions, families, reduction)
         if reduction.n_modes != AUTO:
             return added(MODE_SETS[reduction.set](families, **options))
         from cms.assessment.compare.mode_selection import select_modes
@@ -79,7 +77,7 @@ def reduction_of(job: Job, body: FEBody) -> ReductionSection:
     return job.reduction.model_copy(update={"n_modes": n_i})
 
 
-def with_additions(families: Families, modes: ModeSet, reduction: ReductionSection) -> ModeSet:
+def with_additions(families: Families, reduction: ReductionSection, modes: ModeSet) -> ModeSet:
     """Reduce interfaces of kind "nodes" to characteristic modes, and add extra columns, as the job requests."""
     if reduction.interface_modes is not None or reduction.interface_cutoff is not None:
         cutoff = None if reduction.interface_cutoff is None else reduction.interface_cutoff * families.body.units.time

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cms.errors import JobError
-from cms.jobs.job import InterfaceSection, Job, LoadCaseSection
+from cms.jobs.job import InterfaceSection, Job, LoadCaseSection, PartSection
 from cms.jobs.tables.material_table import material_of
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.load_cases import LoadCase
@@ -26,12 +26,11 @@ __all__ = [
 ]  # fmt: skip
 
 
-def part_of_mesh(job: Job, mesh: "AnyMesh") -> "AnyMesh":
-    """Return the part of the mesh that the job requests; default: the whole mesh."""
+def part_of_mesh(part: PartSection, mesh: "AnyMesh") -> "AnyMesh":
+    """Return the part of the mesh that the table [body] part requests."""
     from fe_models.meshes.split import split_mesh
 
-    part = job.body.part
-    return mesh if part is None else split_mesh(mesh, part.of, at=part.at, axis=part.axis).parts[part.number - 1]
+    return split_mesh(mesh, part.of, at=part.at, axis=part.axis).parts[part.number - 1]
 
 
 def materials_of(job: Job) -> "AnyMaterial | dict[str, AnyMaterial]":

@@ -29,7 +29,9 @@ def body_of_shell(job: Job, stages: Stages, on_report: Callable[[Any], None] | N
 
     units = unit_system(job.body.units)
     with stages("read mesh"):
-        mesh = part_of_mesh(job, shell_mesh(job))
+        mesh = shell_mesh(job)
+        if job.body.part is not None:
+            mesh = part_of_mesh(job.body.part, mesh)
     properties = shell_properties_of(job)
     stiffeners = properties_of(job) if job.sections else None
     masses, springs, links = attachments_of(job, mesh)

@@ -5,8 +5,8 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, StringConstraints
 
-from cms.jobs.beam_tables import BeamSection, names
-from fe_models.foundation.toml_file import Table, Vector3
+from cms.jobs.beam_tables import BeamSection
+from fe_models.foundation.toml_file import Table, Vector3, names
 from fe_models.foundation.words import nearest
 
 __all__ = ["LayerTable", "ShellSection", "check_layups", "check_shells"]

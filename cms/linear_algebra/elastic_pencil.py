@@ -59,22 +59,16 @@ def elastic_eigenvectors(G_K: Array, G_M: Array, omega2_1: float) -> tuple[Array
 def turn_to_diagonal(G_K: Array) -> Array:
     """Return the orthogonal matrix that makes a nearly diagonal, ascending stiffness diagonal, band by band, (k, k).
 
-    A second pass has bands that begin within those of the first, for close modes on the two sides of a border.
+    The first band of a second pass is narrower, for close modes on the two sides of a border of the first pass.
     """
     turn = np.eye(len(G_K))
     for width in (BAND, np.sqrt(BAND)):
-        turn = turn @ turn_by_bands(turn.T @ G_K @ turn, width)
-    return turn
-
-
-def turn_by_bands(G_K: Array, width: float) -> Array:
-    """Return the orthogonal matrix that makes bands of a stiffness diagonal: the first of a given width, then BAND."""
-    omega2 = np.diag(G_K)
-    omega2 = np.maximum(omega2, np.finfo(float).eps * omega2.max(initial=0.0))
-    turn, first = np.zeros_like(G_K), 0
-    while first < len(omega2):
-        stiffer = omega2[first:] > width * omega2[first]
-        last = first + int(np.argmax(stiffer)) if stiffer.any() else len(omega2)
-        turn[first:last, first:last] = la.eigh(G_K[first:last, first:last])[1]
-        first, width = last, BAND
+        G, bands, first = turn.T @ G_K @ turn, np.zeros_like(G_K), 0
+        omega2 = np.maximum(np.diag(G), np.finfo(float).eps * np.diag(G).max(initial=0.0))
+        while first < len(omega2):
+            stiffer = omega2[first:] > width * omega2[first]
+            last = first + int(np.argmax(stiffer)) if stiffer.any() else len(omega2)
+            bands[first:last, first:last] = la.eigh(G[first:last, first:last])[1]
+            first, width = last, BAND
+        turn = turn @ bands
     return turn

@@ -183,7 +183,8 @@ def independent_basis(
     if not len(index):
         return _no_columns(V), np.asarray(redundant, dtype=np.int64)
     size = length[index]
-    noise = _rounding_noise(V, body, omega2)[index]
+    diagonal = np.abs(body.K.diagonal()) + omega2 * body.M.diagonal()
+    noise = np.finfo(float).eps * np.sqrt(squares(diagonal, V))[index]  # W-length of rounding errors eps |v_k|
     tolerance = np.maximum(RANK_TOLERANCE, ROUNDING_MARGIN * noise / size)
     # tall arrays are not changed: lengths and pivot order go into the small matrices
     W = (G_K + omega2 * G_M)[np.ix_(index, index)] / np.outer(size, size)
@@ -264,9 +265,3 @@ def _orthonormalized(products: Products, new: Columns, omega2: float) -> Columns
     fresh.T = new.T
     G = fresh.inner(fresh, omega2)
     return fresh @ la.solve_triangular(la.cholesky((G + G.T) / 2), np.eye(len(G)))
-
-
-def _rounding_noise(X: Array, body: FEBody, omega2: float) -> Array:
-    """Return the W-length of independent rounding errors eps |x_k| in every column, (k,)."""
-    diagonal = np.abs(body.K.diagonal()) + omega2 * body.M.diagonal()
-    return np.finfo(float).eps * np.sqrt(squares(diagonal, X))

@@ -141,11 +141,10 @@ def reduce(
     elif geometric or quadratic:
         states = states_of(source, condition)
     finished = finish(body, modes, condition)
-    keeping = keep_nodes(body, keep)
-    if len(loaded := nodes_of_loads(body, unique(recovery))):
+    keeping = keep_nodes(body, keep) if keep else body
+    if recovery and len(loaded := nodes_of_loads(body, unique(recovery))):
         keeping = replace(keeping, kept=np.concatenate([keeping.kept, loaded]))
     kept = kept_nodes(keeping)
-    axes, origin = condition.frame.axes, condition.frame.origin
     moments = reduced_moments(body, finished.Phi, condition.frame)
     told = {"geometric stiffness": left_out if states is None else chosen_words(body, states.names)}
     if moments.is_exact and moments.negativity > OF_MASSES:
@@ -155,8 +154,10 @@ def reduce(
         reduced,
         provenance={**reduced.provenance, **{key: words for key, words in told.items() if words}},
         recovery=recovery_of_model(source, in_memory(finished.Phi), condition, reduced, recovery) if recovery else {},
-        stress=nodal_stress_modes(body, finished.Phi, kept, axes) if stress else None,
-        point_stress=point_stress_modes(body, finished.Phi, origin, axes) if stress else None,
+        stress=nodal_stress_modes(body, finished.Phi, kept, condition.frame.axes) if stress else None,
+        point_stress=point_stress_modes(body, body.stress_points, finished.Phi, condition.frame)
+        if stress and body.stress_points is not None
+        else None,
         geometric=None if states is None else stiffness_of_states(body, finished.Phi, states),
         quadratic=quadratic_modes(source, in_memory(finished.Phi), condition, kept) if quadratic else None,
     )
@@ -202,7 +203,7 @@ def assembled(
         Phi=Phi_kept,
         surface=index_of[body.surface],
         numbering=body.numbering.of_rows(kept, len(body.nodes)).without_indices(kept),
-        kept=kept_points(body, finished.Phi, axes, index_of),
+        kept=kept_points(body, finished.Phi, axes, index_of) if len(body.kept) else None,
         interfaces=tuple(
             reduced_interface(body, interface, finished.Phi, condition.frame, index_of) for interface in body.interfaces
         ),

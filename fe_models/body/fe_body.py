@@ -346,7 +346,9 @@ class FEBody:
             require_finite(f"{where}: node_volumes", self.node_volumes)
             if (self.node_volumes < 0).any() or not self.node_volumes.any():
                 raise BodyError(f"{where}: node_volumes: expected no negative volume and a positive sum")
-        put(self, "load_cases", check_load_cases(where, self.load_cases, n_dof))
+        put(self, "load_cases", tuple(self.load_cases))
+        if self.load_cases:
+            check_load_cases(where, self.load_cases, n_dof)
         names = [interface.name for interface in self.interfaces]
         if len(set(names)) != len(names):
             raise BodyError(f"{where}: two interfaces have the same name; got {', '.join(names)}")

@@ -60,22 +60,14 @@ class ReducedLoadCase:
             raise BodyError(f"{where}: h: expected one number per mode, got shape {self.h.shape}")
 
 
-def check_load_cases(where: str, load_cases: Iterable[LoadCase], n_dof: int) -> tuple[LoadCase, ...]:
-    """Return the load cases as a tuple, after a check that names differ and lengths fit.
-
-    Raises
-    ------
-    BodyError
-        If one does not fit.
-    """
-    checked = tuple(load_cases)
-    names = [case.name for case in checked]
+def check_load_cases(where: str, load_cases: tuple[LoadCase, ...], n_dof: int) -> None:
+    """Raise `BodyError` if two load cases have one name, or a length does not fit."""
+    names = [case.name for case in load_cases]
     if len(set(names)) != len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise BodyError(f"{where}: two load cases are named {twice!r}; give each its own name")
-    for case in checked:
+    for case in load_cases:
         require_shape(f"{where}: load case {case.name!r}: f", case.f, (n_dof,))
-    return checked
 
 
 def load_columns(load_cases: Iterable[LoadCase], n_dof: int) -> Array:

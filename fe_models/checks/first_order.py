@@ -24,9 +24,8 @@ from fe_models.elements.solids.assembly import assemble, elastic_properties, exp
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.meshes.boundary import boundary_nodes
 from fe_models.meshes.connectivity import facet_pairs
-from fe_models.meshes.mesh import Mesh
+from fe_models.meshes.mesh import Mesh, drop_unused_nodes
 from fe_models.meshes.quadratic_mesh import FIRST_ORDER, quadratic_mesh, tetrahedra_of
-from fe_models.meshes.unused_nodes import drop_unused_nodes
 
 __all__ = ["PROVENANCE", "FirstOrderError", "first_order_error"]
 

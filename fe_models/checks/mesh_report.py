@@ -20,9 +20,8 @@ from fe_models.foundation.presentation import presented
 from fe_models.foundation.units import Units, unit_system
 from fe_models.meshes.cell_shapes import CELL_SHAPES, cell_jacobians, quadrature, shape_values
 from fe_models.meshes.connectivity import Connectivity, coincident_nodes, connectivity
-from fe_models.meshes.mesh import Mesh
+from fe_models.meshes.mesh import Mesh, used_nodes
 from fe_models.meshes.objects.as_mesh import as_mesh
-from fe_models.meshes.unused_nodes import used_nodes
 
 __all__ = ["CellGeometry", "MeshReport", "cell_geometry", "face_angles", "report_mesh"]
 
@@ -192,7 +191,10 @@ def report_mesh(
     given: tuple[AnyMaterial, ...] = ()
     if materials is not None:
         given, number = assign_materials(mesh, materials)
-        mass, centre = _mass(geometry, given, number)
+        rho = np.array([material.rho for material in given])
+        mass = sum(float(rho[number[kind]] @ g.volume) for kind, g in geometry.items())
+        moment = sum((rho[number[kind]] @ g.moment for kind, g in geometry.items()), np.zeros(3))
+        centre = moment / mass if mass else moment
     first_order = _first_order(mesh, materials, incompatible_modes, findings)
     if first_order is not None and first_order.error > FIRST_ORDER_NOTED:
         findings.append(Finding("first-order", False, first_order.description()))
@@ -281,16 +283,6 @@ def _select(
 ) -> Mapping[str, IntArray]:
     chosen = {kind: frozen_int(np.flatnonzero(test(g))) for kind, g in geometry.items()}
     return MappingProxyType({kind: rows for kind, rows in chosen.items() if rows.size})
-
-
-def _mass(
-    geometry: Mapping[str, CellGeometry], materials: tuple[AnyMaterial, ...], number: Mapping[str, IntArray]
-) -> tuple[float, Array]:
-    """Return mass and its centre."""
-    rho = np.array([material.rho for material in materials])
-    mass = sum(float(rho[number[kind]] @ g.volume) for kind, g in geometry.items())
-    moment = sum((rho[number[kind]] @ g.moment for kind, g in geometry.items()), np.zeros(3))
-    return mass, moment / mass if mass else moment
 
 
 def _cell_findings(

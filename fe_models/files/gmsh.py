@@ -9,7 +9,6 @@ format" and "Legacy formats: MSH file format version 2".
 import shlex
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -58,6 +57,7 @@ _ORDER = {
 }  # meshio (VTK) place -> Gmsh place, for types that differ: the edges are numbered in another sequence
 
 
+_BINARY = {"real": "<f8", "int": "<i4", "size": "<u8"}  #: kinds of numbers in binary files
 MOST_EXACT = 2.0**53  #: whole numbers up to here are exact as float64
 
 
@@ -74,22 +74,19 @@ class _Text:
         self._at = 0
         self._where = where
 
-    def doubles(self, count: int) -> Array:
+    def take(self, kind: str, count: int) -> np.ndarray:
+        """Return the next numbers of a kind in `_BINARY`: float64, or int64."""
         end = self._at + int(count)
         if count < 0 or end > len(self._values):
             raise MeshError(f"{self._where}: ends too early; the file is truncated or damaged")
         values = self._values[self._at : end]
         self._at = end
-        return values
-
-    def ints(self, count: int) -> IntArray:
-        values = self.doubles(count)
+        if kind == "real":
+            return values
         bad = ~(np.abs(values) < MOST_EXACT) | (values != np.round(values))
         if bad.any():
             raise MeshError(f"{self._where}: expected whole numbers, got {values[bad][0]:g}; the file is damaged")
         return values.astype(np.int64)
-
-    sizes = ints
 
 
 class _Binary:
@@ -100,26 +97,25 @@ class _Binary:
         self.at = at
         self._where = where
 
-    def _take(self, count: int, kind: str) -> np.ndarray:
-        size = np.dtype(kind).itemsize * int(count)
+    def take(self, kind: str, count: int) -> np.ndarray:
+        """Return the next numbers of a kind in `_BINARY`: float64, or int64."""
+        dtype = np.dtype(_BINARY[kind])
+        size = dtype.itemsize * int(count)
         if count < 0 or self.at + size > len(self._data):
             raise MeshError(f"{self._where}: ends too early; the file is truncated or damaged")
-        values = np.frombuffer(self._data, kind, int(count), self.at)
+        values = np.frombuffer(self._data, dtype, int(count), self.at)
         self.at += size
-        return values
-
-    def doubles(self, count: int) -> Array:
-        return self._take(count, "<f8")
-
-    def ints(self, count: int) -> IntArray:
-        return self._take(count, "<i4").astype(np.int64)
-
-    def sizes(self, count: int) -> IntArray:
-        return self._take(count, "<u8").astype(np.int64)
+        return values if kind == "real" else values.astype(np.int64)
 
 
 _Numbers = _Text | _Binary
-_Names = dict[tuple[int, int], str]  #: (dimension, tag) -> name of a physical group
+
+
+class _Names(dict[tuple[int, int], str]):
+    """Names of physical groups by dimension and tag; a group without a name is `group_<tag>`."""
+
+    def __missing__(self, key: tuple[int, int]) -> str:
+        return f"group_{key[1]}"
 
 
 def read_gmsh(path: Path, data: bytes) -> RawMesh:
@@ -207,9 +203,9 @@ def _sections(where: str, data: bytes, is_binary: bool) -> dict[str, tuple[int, 
 def _physical_names(where: str, data: bytes, sections: dict[str, tuple[int, int]]) -> _Names:
     """Return (dimension, tag) -> name."""
     if "PhysicalNames" not in sections:
-        return {}
+        return _Names()
     start, end = sections["PhysicalNames"]
-    names: _Names = {}
+    names = _Names()
     for line in data[start:end].decode("utf-8", "replace").splitlines()[1:]:
         if not line.strip():
             continue
@@ -251,51 +247,40 @@ def _type(where: str, code: int) -> tuple[str, int, int]:
     return _TYPES[code]
 
 
-@dataclass(frozen=True)
-class _Group:
-    """Name of a physical group in messages and sets."""
-
-    names: _Names
-
-    def __call__(self, dim: int, tag: int) -> str:
-        return self.names.get((dim, abs(tag)), f"group_{abs(tag)}")
-
-
 def _read_41(where: str, has_entities: bool, numbers: Callable[[str], _Numbers], names: _Names) -> RawMesh:
-    group = _Group(names)
     physical: dict[tuple[int, int], list[int]] = {}
     if has_entities:
         source = numbers("Entities")
-        for dim, count in enumerate(source.sizes(4)):
+        for dim, count in enumerate(source.take("size", 4)):
             for _ in range(count):
-                tag = int(source.ints(1)[0])
-                source.doubles(3 if dim == 0 else 6)
-                physical[dim, tag] = [int(t) for t in source.ints(source.sizes(1)[0])]
+                tag = int(source.take("int", 1)[0])
+                source.take("real", 3 if dim == 0 else 6)
+                physical[dim, tag] = [int(t) for t in source.take("int", source.take("size", 1)[0])]
                 if dim:
-                    source.ints(source.sizes(1)[0])
+                    source.take("int", source.take("size", 1)[0])
     source = numbers("Nodes")
-    n_blocks, n_nodes, _, _ = source.sizes(4)
+    n_blocks, n_nodes, _, _ = source.take("size", 4)
     coordinates, node_numbers = [np.zeros((0, 3))], [np.zeros(0, np.int64)]
     for _ in range(n_blocks):
-        dim, _, is_parametric = source.ints(3)
-        count = source.sizes(1)[0]
-        node_numbers.append(source.sizes(count))
+        dim, _, is_parametric = source.take("int", 3)
+        count = source.take("size", 1)[0]
+        node_numbers.append(source.take("size", count))
         width = 3 + (dim if is_parametric else 0)
-        coordinates.append(source.doubles(count * width).reshape(count, width)[:, :3])
+        coordinates.append(source.take("real", count * width).reshape(count, width)[:, :3])
     numbers_of_nodes = np.concatenate(node_numbers)
     if len(numbers_of_nodes) != n_nodes:
         raise MeshError(f"{where}: section $Nodes: {n_nodes} nodes announced, {len(numbers_of_nodes)} found")
     place_of = _places(where, numbers_of_nodes)
     source = numbers("Elements")
-    n_blocks, n_cells, _, _ = source.sizes(4)
+    n_blocks, n_cells, _, _ = source.take("size", 4)
     blocks, found = [], 0
     for _ in range(n_blocks):
-        dim, tag, code = (int(v) for v in source.ints(3))
-        count = int(source.sizes(1)[0])
+        dim, tag, code = (int(v) for v in source.take("int", 3))
+        count = int(source.take("size", 1)[0])
         kind, _, n_local = _type(where, code)
-        rows = source.sizes(count * (1 + n_local)).reshape(count, 1 + n_local)
+        rows = source.take("size", count * (1 + n_local)).reshape(count, 1 + n_local)
         everything = np.arange(count)
-        groups = {group(dim, t): everything for t in physical.get((dim, tag), [])}
+        groups = {names[dim, abs(t)]: everything for t in physical.get((dim, tag), [])}
         blocks.append(RawBlock(kind, _connectivity(place_of, kind, rows[:, 1:]), groups, rows[:, 0]))
         found += count
     if found != n_cells:
@@ -313,7 +298,7 @@ def _nodes_22(where: str, data: bytes, section: tuple[int, int], is_binary: bool
             raise MeshError(f"{where}: section $Nodes: {count} nodes announced, but the file ends before")
         rows = np.frombuffer(data, kind, count, first)
         return rows["x"].astype(float), rows["number"].astype(np.int64)
-    table = _Text(data[first:end], f"{where}: section $Nodes").doubles(4 * count).reshape(count, 4)
+    table = _Text(data[first:end], f"{where}: section $Nodes").take("real", 4 * count).reshape(count, 4)
     return table[:, 1:], table[:, 0].astype(np.int64)
 
 
@@ -321,7 +306,6 @@ def _cells_22(
     where: str, data: bytes, section: tuple[int, int], is_binary: bool, place_of: IntArray, names: _Names
 ) -> list[RawBlock]:
     """Return a block for every run of cells of one type and number of tags."""
-    group = _Group(names)
     start, end = section
     first = data.index(b"\n", start, end) + 1
     count = int(data[start:first])
@@ -330,7 +314,7 @@ def _cells_22(
     for code, n_tags, table in runs:
         kind, dim, _ = _type(where, code)
         tags = table[:, 1] if n_tags else np.zeros(len(table), np.int64)
-        groups = {group(dim, tag): np.flatnonzero(tags == tag) for tag in np.unique(tags) if tag}
+        groups = {names[dim, abs(tag)]: np.flatnonzero(tags == tag) for tag in np.unique(tags) if tag}
         blocks.append(RawBlock(kind, _connectivity(place_of, kind, table[:, 1 + n_tags :]), groups, table[:, 0]))
     return blocks
 
@@ -347,7 +331,7 @@ def _runs_text(where: str, text: bytes, count: int) -> list[tuple[int, int, IntA
     runs = []
     for (code, n_tags), mine in by_type.items():
         width = 3 + n_tags + _type(where, code)[2]
-        table = _Text(b"\n".join(mine), f"{where}: section $Elements").ints(len(mine) * width).reshape(-1, width)
+        table = _Text(b"\n".join(mine), f"{where}: section $Elements").take("int", len(mine) * width).reshape(-1, width)
         runs.append((code, n_tags, np.delete(table, [1, 2], axis=1)))
     return runs
 
@@ -358,9 +342,9 @@ def _runs_binary(where: str, data: bytes, at: int, count: int) -> list[tuple[int
     tables: dict[tuple[int, int], list[IntArray]] = {}
     found = 0
     while found < count:
-        code, n_here, n_tags = (int(v) for v in source.ints(3))
+        code, n_here, n_tags = (int(v) for v in source.take("int", 3))
         width = 1 + n_tags + _type(where, code)[2]
-        tables.setdefault((code, n_tags), []).append(source.ints(n_here * width).reshape(n_here, width))
+        tables.setdefault((code, n_tags), []).append(source.take("int", n_here * width).reshape(n_here, width))
         if n_here <= 0:
             raise MeshError(f"{where}: section $Elements: an empty run of cells; the file is damaged")
         found += n_here

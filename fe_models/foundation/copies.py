@@ -3,7 +3,6 @@
 NumPy makes writable copies of read-only arrays, and a mapping proxy cannot be pickled at all.
 """
 
-from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from typing import Any, TypeVar
 
@@ -17,34 +16,16 @@ Key = TypeVar("Key")
 Item = TypeVar("Item")
 
 
-class FrozenMapping(Mapping[Key, Item]):
+class FrozenMapping(dict[Key, Item]):
     """An immutable mapping whose copies are immutable too."""
 
-    __slots__ = ("_items",)
+    def _refuse(self, *_: Any, **__: Any) -> Any:
+        raise TypeError("this mapping cannot be changed; make a dict of it")
 
-    def __init__(self, items: Mapping[Key, Item]) -> None:
-        self._items = dict(items)
-
-    def __getitem__(self, key: Key) -> Item:
-        return self._items[key]
-
-    def __iter__(self) -> Iterator[Key]:
-        return iter(self._items)
-
-    def __len__(self) -> int:
-        return len(self._items)
-
-    def __or__(self, other: Mapping[Key, Item]) -> dict[Key, Item]:
-        return self._items | dict(other)
-
-    def __ror__(self, other: Mapping[Key, Item]) -> dict[Key, Item]:
-        return dict(other) | self._items
-
-    def __repr__(self) -> str:
-        return repr(self._items)
+    __setitem__ = __delitem__ = __ior__ = clear = pop = popitem = setdefault = update = _refuse
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return restored_mapping, (self._items,)
+        return restored_mapping, (dict(self),)
 
 
 def restored_mapping(items: dict[Any, Any]) -> "FrozenMapping[Any, Any]":

@@ -1,11 +1,12 @@
 """Number of threads, and separation of the thread pools of two libraries."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, nullcontext
 from typing import Any
 
-__all__ = ["bounded_threads", "n_processors", "n_threads", "one_blas_thread", "thread_environment"]
+__all__ = ["bounded_threads", "in_threads", "n_processors", "n_threads", "one_blas_thread", "thread_environment"]
 
 #: each thread has a workspace over all nodes, and memory bandwidth limits the speed at fewer threads already
 MOST_THREADS = 16
@@ -22,6 +23,13 @@ def n_processors() -> int:
 def n_threads() -> int:
     """Return the number of threads for one task: of processors, limited by `MOST_THREADS` and the set bound."""
     return min(n_processors(), MOST_THREADS, bound or MOST_THREADS)
+
+
+def in_threads(kernel: Callable[..., Any], inputs: tuple[Any, ...], outputs: tuple[Any, ...]) -> None:
+    """Run kernel(*inputs, part, n_parts, *outputs) for every part, each in a thread."""
+    n_parts = n_threads()
+    with ThreadPoolExecutor(n_parts) as pool:
+        list(pool.map(lambda part: kernel(*inputs, part, n_parts, *outputs), range(n_parts)))
 
 
 def thread_environment(n: int) -> dict[str, str]:

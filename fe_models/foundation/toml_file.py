@@ -19,7 +19,7 @@ from fe_models.foundation.words import nearest, quoted, shortened
 
 __all__ = [
     "KINDS", "FileContent", "Location", "Matrix3", "Range", "Table", "Vector3", "changed", "choice", "describe",
-    "files_named", "first_key", "kind_field", "read_toml", "validated", "value_of",
+    "files_named", "first_key", "kind_field", "names", "read_toml", "validated", "value_of",
 ]  # fmt: skip
 
 
@@ -246,6 +246,14 @@ def choice(what: str, choices: Callable[[], Sequence[str]]) -> Any:
         return value
 
     return Annotated[str, BeforeValidator(check)]
+
+
+def names(value: Any) -> Any:
+    """Return one name, or a list of names, as a tuple."""
+    words = [value] if isinstance(value, str) else value
+    if not isinstance(words, list | tuple) or not words or not all(isinstance(w, str) and w for w in words):
+        raise ValueError('expected the name of a group, or a list of names: "a" or ["a", "b"]')
+    return tuple(words)
 
 
 def numbers(value: Any, count: int = 3) -> tuple[float, ...]:

@@ -17,6 +17,7 @@ __all__ = [
     "boundary_nodes",
     "boundary_owners",
     "boundary_triangles",
+    "cells_of_facets",
     "face_triangles",
     "facet_weights",
     "first_of_equal_rows",
@@ -82,7 +83,7 @@ def _boundary(mesh: Mesh) -> tuple[Facets, Facets]:
 
 
 def _single_facets(mesh: Mesh) -> tuple[dict[str, IntArray], dict[str, IntArray]]:
-    facets, cells = all_facets(mesh), _cells_of_facets(mesh)
+    facets, cells = all_facets(mesh), cells_of_facets(mesh)
     boundary: dict[str, IntArray] = {}
     owners: dict[str, IntArray] = {}
     for n_corners in (3, 4):
@@ -99,7 +100,7 @@ def _single_facets(mesh: Mesh) -> tuple[dict[str, IntArray], dict[str, IntArray]
     return boundary, owners
 
 
-def _cells_of_facets(mesh: Mesh) -> dict[str, IntArray]:
+def cells_of_facets(mesh: Mesh) -> dict[str, IntArray]:
     """Return the cell of each of `all_facets` by face type; cells are numbered through all types."""
     parts: dict[str, list[IntArray]] = {}
     first = 0

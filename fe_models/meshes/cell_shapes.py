@@ -5,9 +5,13 @@ from functools import cache
 
 import numpy as np
 
+from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray, frozen
 
-__all__ = ["CELL_SHAPES", "CellShape", "cell_jacobians", "collapsed_cube", "facet_tables", "quadrature", "shape_values"]
+__all__ = [
+    "CELL_SHAPES", "SKFEM_ELEMENTS", "CellShape", "cell_jacobians", "collapsed_cube", "facet_tables", "quadrature",
+    "shape_values", "skfem_node_order",
+]  # fmt: skip
 
 
 TIP = 1e-14  #: height below the tip of a pyramid that counts as the tip
@@ -235,3 +239,28 @@ def cell_jacobians(kind: str, coordinates: Array, points: Array) -> Array:
     J = (coordinates.transpose(0, 2, 1) @ gradients).reshape(len(coordinates), 3, n_points, 3)
     a, b, c = J[:, 0], J[:, 1], J[:, 2]
     return np.einsum("epi,epi->ep", a, np.cross(b, c))
+
+
+# the same cells in scikit-fem -----------------------------------------------------------------------------------------
+
+
+SKFEM_ELEMENTS = {
+    "tetra": "ElementTetP1",
+    "tetra10": "ElementTetP2",
+    "hexahedron": "ElementHex1",
+    "hexahedron20": "ElementHexS2",
+    "hexahedron27": "ElementHex2",
+    "wedge": "ElementWedge1",
+}  #: scikit-fem element with the same nodes, by cell type; other cell types use the monomials of their shapes
+
+
+def skfem_node_order(kind: str) -> IntArray:
+    """Return, for each meshio node of a cell type, the local number of the same node in scikit-fem, (n_nodes,)."""
+    import skfem
+
+    positions = np.asarray(getattr(skfem, SKFEM_ELEMENTS[kind])().doflocs)
+    distance = np.abs(CELL_SHAPES[kind].nodes[:, None] - positions[None]).max(axis=2)
+    order = distance.argmin(axis=1)
+    if (distance.min(axis=1) > 1e-12).any() or np.unique(order).size != len(positions):
+        raise MeshError(f"{kind}: the installed scikit-fem places its nodes elsewhere; expected scikit-fem 10 to 12")
+    return order

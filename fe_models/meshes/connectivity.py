@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import IntArray, frozen_int
-from fe_models.meshes.boundary import CORNERS, all_facets, boundary_facets, first_of_equal_rows
-from fe_models.meshes.mesh import Mesh
-from fe_models.meshes.unused_nodes import used_nodes
+from fe_models.meshes.boundary import CORNERS, all_facets, boundary_facets, cells_of_facets, first_of_equal_rows
+from fe_models.meshes.mesh import Mesh, used_nodes
 
 __all__ = ["Connectivity", "coincident_nodes", "connectivity", "facet_pairs"]
 
@@ -67,12 +66,7 @@ def facet_pairs(mesh: Mesh) -> IntArray:
 
 def _facet_pairs(mesh: Mesh) -> tuple[IntArray, int, int]:
     """Return pairs of cells with a common facet, (n_pairs, 2), and the counts of overlapping and mismatched facets."""
-    start, owner = 0, {}  # cells are numbered through all types in the order of mesh.cells
-    for kind, cells in mesh.cells.items():
-        owner[kind] = np.arange(start, start + len(cells))
-        start += len(cells)
-    facets = all_facets(mesh)
-    owners = _owners(mesh, owner)
+    facets, owners = all_facets(mesh), cells_of_facets(mesh)
     pairs, n_overlapping, n_mismatched = [np.zeros((0, 2), np.int64)], 0, 0
     for n_corners in (3, 4):
         kinds = [kind for kind in facets if CORNERS[kind] == n_corners]
@@ -88,17 +82,6 @@ def _facet_pairs(mesh: Mesh) -> tuple[IntArray, int, int]:
         pairs.append(np.column_stack([cell[order][1:][same], cell[order][:-1][same]]))
         n_mismatched += int((middles[order][1:][same] != middles[order][:-1][same]).sum())
     return np.concatenate(pairs), n_overlapping, n_mismatched
-
-
-def _owners(mesh: Mesh, owner: dict[str, IntArray]) -> dict[str, IntArray]:
-    """Return the cell of every row of `all_facets`, by face type."""
-    from fe_models.meshes.cell_shapes import facet_tables
-
-    parts: dict[str, list[IntArray]] = {}
-    for kind in mesh.cells:
-        for face_kind, local in facet_tables(kind).items():
-            parts.setdefault(face_kind, []).append(np.repeat(owner[kind], len(local)))
-    return {face_kind: np.concatenate(blocks) for face_kind, blocks in parts.items()}
 
 
 def _transitions(mesh: Mesh) -> int:

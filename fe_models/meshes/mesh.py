@@ -1,7 +1,7 @@
 """The mesh of one body: nodes, solid cells, and groups for materials and interfaces."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 from fe_models.foundation.copies import FrozenMapping, frozen_copies
 from fe_models.foundation.presentation import presented
 
-__all__ = ["FACE_TYPES", "SOLID_TYPES", "Mesh"]
+__all__ = ["FACE_TYPES", "SOLID_TYPES", "Mesh", "drop_unused_nodes", "used_nodes"]
 
 #: meshio names and node order
 SOLID_TYPES = (
@@ -73,3 +73,62 @@ class Mesh:
     def n_cells(self) -> int:
         """Number of solid cells."""
         return sum(len(cells) for cells in self.cells.values())
+
+
+# nodes that belong to no solid cell, which would make the stiffness singular ------------------------------------------
+
+
+def used_nodes(mesh: Mesh) -> np.ndarray:
+    """Return which nodes belong to a solid cell, (n_nodes,) bool."""
+    used = np.zeros(len(mesh.nodes), dtype=bool)
+    for cells in mesh.cells.values():
+        used[cells] = True
+    return used
+
+
+def drop_unused_nodes(mesh: Mesh) -> Mesh:
+    """Return the mesh without the nodes that belong to no solid cell, with everything renumbered.
+
+    Faces with such a node are dropped too; groups that become empty are kept. `Mesh.notes` reports the numbers. A mesh
+    without unused nodes is returned unchanged.
+
+    Parameters
+    ----------
+    mesh
+        A solid mesh.
+    """
+    used = used_nodes(mesh)
+    n_unused = int((~used).sum())
+    if n_unused == 0:
+        return mesh
+    place = np.full(len(used), -1)
+    place[used] = np.arange(used.sum())
+    faces: dict[str, IntArray] = {}
+    face_place: dict[str, IntArray] = {}
+    for kind, rows in mesh.faces.items():
+        whole = used[rows].all(axis=1)
+        face_place[kind] = np.where(whole, np.cumsum(whole) - 1, -1)
+        if whole.any():
+            faces[kind] = place[rows[whole]]
+    face_sets: dict[str, dict[str, IntArray]] = {}
+    for group, by_type in mesh.face_sets.items():
+        kept = {kind: face_place[kind][rows] for kind, rows in by_type.items()}
+        face_sets[group] = {kind: rows[rows >= 0] for kind, rows in kept.items() if (rows >= 0).any()}
+    node_sets = {group: place[nodes] for group, nodes in mesh.node_sets.items()}
+    node_sets = {group: nodes[nodes >= 0] for group, nodes in node_sets.items()}
+    n_faces = sum(len(rows) for rows in mesh.faces.values()) - sum(len(rows) for rows in faces.values())
+    empty = [group for group, by_type in face_sets.items() if not by_type and mesh.face_sets[group]]
+    empty += [group for group, nodes in node_sets.items() if not nodes.size and mesh.node_sets[group].size]
+    note = f"{n_unused} nodes that belong to no solid cell were dropped"
+    note += f", with {n_faces} faces on them" if n_faces else ""
+    note += f"; groups that became empty: {', '.join(empty)}" if empty else ""
+    return replace(
+        mesh,
+        nodes=mesh.nodes[used],
+        cells={kind: place[cells] for kind, cells in mesh.cells.items()},
+        faces=faces,
+        face_sets=face_sets,
+        node_sets=node_sets,
+        node_numbers=mesh.node_numbers[used] if mesh.node_numbers.size else mesh.node_numbers,
+        notes=(*mesh.notes, note),
+    )

@@ -12,7 +12,7 @@ from fe_models.foundation.presentation import presented
 from fe_models.foundation.words import nearest
 from fe_models.meshes.boundary import CORNERS, boundary_facets, boundary_nodes, first_of_equal_rows
 from fe_models.meshes.line_mesh import LineMesh
-from fe_models.meshes.mesh import Mesh
+from fe_models.meshes.mesh import Mesh, used_nodes
 from fe_models.meshes.node_cloud import NodeCloud
 from fe_models.meshes.shell_mesh import ShellMesh
 
@@ -59,17 +59,13 @@ class FaceGroup:
                 found.setdefault(kind, []).append(rows)
         if isinstance(mesh, NodeCloud):  # groups of a node cloud hold the nodes of their faces
             return {kind: np.unique(np.concatenate(parts), axis=0) for kind, parts in found.items()}
-        kept = {kind: mesh_faces(mesh)[kind][np.unique(np.concatenate(parts))] for kind, parts in found.items()}
+        faces = mesh.cells if isinstance(mesh, ShellMesh) else mesh.faces
+        kept = {kind: faces[kind][np.unique(np.concatenate(parts))] for kind, parts in found.items()}
         if isinstance(mesh, ShellMesh):
             return kept
         what = " and ".join(repr(name) for name in (self.name, *self.also))
         _require_on_solid(mesh, f"face group {what}", np.concatenate([f.ravel() for f in kept.values()]))
         return _complete(mesh, kept)
-
-
-def mesh_faces(mesh: Mesh | ShellMesh) -> Mapping[str, IntArray]:
-    """Return the faces to which the groups refer: the `faces` of a solid mesh, or the cells of a shell."""
-    return mesh.cells if isinstance(mesh, ShellMesh) else mesh.faces
 
 
 def _faces_of_group(mesh: Mesh | ShellMesh | NodeCloud, name: str) -> dict[str, IntArray]:
@@ -282,10 +278,7 @@ def _complete(mesh: Mesh, faces: Mapping[str, IntArray]) -> dict[str, IntArray]:
 def _require_on_solid(mesh: AnyMesh, what: str, nodes: IntArray) -> None:
     if not isinstance(mesh, Mesh):
         return
-    used = np.zeros(len(mesh.nodes), dtype=bool)
-    for cells in mesh.cells.values():
-        used[cells] = True
-    loose = np.unique(nodes[~used[nodes]])
+    loose = np.unique(nodes[~used_nodes(mesh)[nodes]])
     if loose.size:
         raise InterfaceError(
             f"{what}: {loose.size} of its nodes belong to no solid cell, first node {loose[0]}; "

@@ -17,9 +17,8 @@ from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.presentation import presented
 from fe_models.meshes.boundary import area_centroid, boundary_facets
 from fe_models.meshes.line_mesh import LineMesh
-from fe_models.meshes.mesh import Mesh
+from fe_models.meshes.mesh import Mesh, drop_unused_nodes
 from fe_models.meshes.shell_mesh import ShellMesh
-from fe_models.meshes.unused_nodes import drop_unused_nodes
 
 __all__ = ["Cut", "Split", "cut_name", "split_mesh"]
 

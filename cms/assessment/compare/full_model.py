@@ -173,7 +173,7 @@ def solve_full_model(
 
 def static_labels(families: Families, full: FullModel) -> tuple[tuple[str, ...], ...]:
     """Return names of the loads of Psi_A, Psi_H and Psi_L."""
-    held = families.held_labels("load")
+    held = families.held_names("load")[0]
     cases = tuple(case.name for case in families.body.load_cases)
     return tuple(held[k] for k in families.free.e), acceleration_labels(full.Psi_H.shape[1]), cases
 

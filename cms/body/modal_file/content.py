@@ -100,7 +100,8 @@ def attributes_of(body: ReducedBody) -> dict[str, Mapping[str, Attribute]]:
         attributes |= {SPREAD: {}} if body.geometric.spread is not None else {}
     if body.quadratic is not None:
         attributes["/quadratic"] = {}
-    attributes |= recovery_attributes(body.recovery)
+    if body.recovery:
+        attributes |= recovery_attributes(body.recovery)
     if body.nodal_sums is not None:
         attributes["/nodal_sums"] = {"is_volume": int(body.nodal_sums.is_volume)}
     return attributes
@@ -152,7 +153,9 @@ def values_of(body: ReducedBody) -> dict[str, Any]:
     if points is not None:
         values["/stress/points/names"], values["/stress/points/position"] = points.names, points.positions
         values["/stress/points/modes"] = points.modes
-    return values | recovery_values(body.recovery)
+    if body.recovery:
+        values |= recovery_values(body.recovery)
+    return values
 
 
 def numbering_values(numbering: Numbering) -> dict[str, Any]:

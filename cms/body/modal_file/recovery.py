@@ -20,9 +20,7 @@ UNITS = ("units", "load_units")  #: meant for other readers; they follow from th
 
 
 def recovery_attributes(tables: Mapping[str, RecoveryTable]) -> dict[str, Mapping[str, Attribute]]:
-    """Return the attributes of the groups; empty for a body without tables."""
-    if not tables:
-        return {}
+    """Return the attributes of the groups."""
     attributes: dict[str, Mapping[str, Attribute]] = {GROUP: {"count": len(tables)}}
     for k, table in enumerate(tables.values()):
         attributes[f"{GROUP}/{k}"] = {"name": table.name, "truncated": table.truncated}

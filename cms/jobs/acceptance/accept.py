@@ -28,7 +28,7 @@ from cms.errors import CmsError
 from cms.jobs.acceptance.acceptance import Acceptance, LeftOut, MeshError, now
 from cms.jobs.acceptance.origin import source_files
 from cms.jobs.acceptance.range_of_use import custom_band, range_of_use
-from cms.jobs.body_of_job import coupled_body, is_cad, solid_mesh_of, uncoupled_body
+from cms.jobs.body_of_job import coupled_body, solid_mesh_of, uncoupled_body
 from cms.jobs.decks.job_text import JobRequest, job_text
 from cms.jobs.job import Job, read_job
 from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
@@ -44,7 +44,7 @@ from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.stages import Stages
 from fe_models.foundation.units import UNIT_SYSTEMS, unit_system
 from fe_models.foundation.words import quoted
-from fe_models.meshes.unused_nodes import drop_unused_nodes
+from fe_models.meshes.mesh import drop_unused_nodes
 
 if TYPE_CHECKING:
     from fe_models.body.fe_body import FEBody
@@ -238,7 +238,7 @@ def mesh_error(job: Job | None, most_dofs: int, stages: Stages) -> MeshError:
     if not most_dofs:
         return MeshError("not estimated, as asked")
     try:
-        if is_cad(job):
+        if job.mesh_size is not None:
             found = mesh_convergence(job, n_modes=6, stages=stages)
             return MeshError(
                 f"two sizes, {found.n_dof[0]} and {found.n_dof[1]} dofs: the lowest frequencies of the job's own lie "
@@ -247,9 +247,9 @@ def mesh_error(job: Job | None, most_dofs: int, stages: Stages) -> MeshError:
             )
         if job.body.mesh is None or job.shells or job.sections or job.ties:
             return MeshError("not estimated: only bodies of one solid mesh are refined; compare two meshes of your own")
-        mesh = drop_unused_nodes(part_of_mesh(job, solid_mesh_of(job)))
+        mesh = solid_mesh_of(job) if job.body.part is None else part_of_mesh(job.body.part, solid_mesh_of(job))
         refined = mesh_refinement(
-            mesh,
+            drop_unused_nodes(mesh),
             materials_of(job),
             units=unit_system(job.body.units),
             incompatible_modes=job.body.incompatible_modes,

@@ -1,12 +1,12 @@
 """The tables [materials.NAME] of a reduction job: isotropic and orthotropic materials (docs/job_file.md)."""
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BeforeValidator, Field, model_validator
 
 from cms.errors import JobError
-from cms.jobs.beam_tables import names
-from fe_models.foundation.toml_file import Matrix3, Table, is_no_number
+from fe_models.foundation.toml_file import Matrix3, Table, is_no_number, names
 
 if TYPE_CHECKING:
     from fe_models.body.material import AnyMaterial, Material
@@ -22,21 +22,23 @@ ELASTICITY = "six rows of six numbers, stress by strain in the order 11 22 33 23
 SHEAR = "three numbers above 0, the shear moduli G_12, G_13, G_23, where young has three"
 
 
-def moduli(value: Any) -> float | Three:
-    """Return one positive modulus, or three."""
-    return _one_or_three(value, YOUNG, lambda x: x > 0, lambda x: x > 0)
+def one_or_three(expected: str, one: Callable[[float], bool], each: Callable[[float], bool]) -> Callable[[Any], Any]:
+    """Return a function that returns one number or three, whose limits `one` and `each` check."""
+
+    def check(value: Any) -> float | Three:
+        if isinstance(value, list | tuple):
+            if len(value) == 3 and not any(is_no_number(x) or not each(x) for x in value):
+                return float(value[0]), float(value[1]), float(value[2])
+        elif not is_no_number(value) and one(value):
+            return float(value)
+        raise ValueError(f"expected {expected}")
+
+    return check
 
 
-def ratios(value: Any) -> float | Three:
-    """Return one Poisson's ratio within its limits, or three ratios, whose limits depend on the moduli."""
-    return _one_or_three(value, POISSON, lambda x: -1 < x < 0.5, lambda x: True)
-
-
-def shear_moduli(value: Any) -> Three:
-    """Return three positive moduli."""
-    found = _one_or_three(value, SHEAR, lambda x: False, lambda x: x > 0)
-    assert isinstance(found, tuple)  # a single number has been rejected
-    return found
+moduli = one_or_three(YOUNG, lambda x: x > 0, lambda x: x > 0)
+ratios = one_or_three(POISSON, lambda x: -1 < x < 0.5, lambda x: True)  # the limits of three depend on the moduli
+shear_moduli = one_or_three(SHEAR, lambda x: False, lambda x: x > 0)
 
 
 def tensor(value: Any) -> Tensor:
@@ -47,14 +49,6 @@ def tensor(value: Any) -> Tensor:
     ):
         raise ValueError(f"expected {ELASTICITY}")
     return tuple(tuple(float(x) for x in row) for row in value)
-
-
-def _one_or_three(value: Any, expected: str, one: Any, each: Any) -> Any:
-    if isinstance(value, list | tuple) and len(value) == 3 and not any(is_no_number(x) or not each(x) for x in value):
-        return tuple(float(x) for x in value)
-    if isinstance(value, list | tuple) or is_no_number(value) or not one(value):
-        raise ValueError(f"expected {expected}")
-    return float(value)
 
 
 class MaterialSection(Table):
@@ -72,11 +66,6 @@ class MaterialSection(Table):
         ("all",), description='"all", the name of a group of cells, or a list of names'
     )
 
-    @property
-    def is_orthotropic(self) -> bool:
-        """Whether the material has three moduli."""
-        return isinstance(self.young, tuple)
-
     @model_validator(mode="after")
     def _one_kind(self) -> "MaterialSection":
         if self.elasticity is not None:
@@ -87,12 +76,13 @@ class MaterialSection(Table):
         for key, expected in (("young", YOUNG), ("poisson", POISSON)):
             if getattr(self, key) is None:
                 raise ValueError(f"{key}: missing; expected {expected}")
-        if self.is_orthotropic != isinstance(self.poisson, tuple):
-            three, one = ("young", "poisson") if self.is_orthotropic else ("poisson", "young")
+        is_orthotropic = isinstance(self.young, tuple)
+        if is_orthotropic != isinstance(self.poisson, tuple):
+            three, one = ("young", "poisson") if is_orthotropic else ("poisson", "young")
             raise ValueError(f"{one}: {three} has three numbers; an orthotropic material needs three here too")
-        if self.is_orthotropic and self.shear is None:
+        if is_orthotropic and self.shear is None:
             raise ValueError(f"shear: missing; expected {SHEAR}")
-        if not self.is_orthotropic and (self.shear is not None or self.axes is not None):
+        if not is_orthotropic and (self.shear is not None or self.axes is not None):
             key = "shear" if self.shear is not None else "axes"
             raise ValueError(f"{key}: belongs to an orthotropic material, young = [E_1, E_2, E_3]; remove it")
         return self

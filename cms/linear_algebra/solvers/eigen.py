@@ -125,6 +125,8 @@ def eigenmodes(
         raise EigenError(f"eigenmodes: expected K and M of one square shape, got {K.shape} and {M.shape}")
     asked = mode_count(n_modes)
     wanted = ModeRequest.of(asked)
+    if wanted.count is not None and wanted.count < 1:
+        raise EigenError(f"eigenmodes: n_modes = {wanted.count}; expected at least 1")
     if wanted.count is not None and wanted.count > n:
         raise EigenError(f"eigenmodes: {asked.description}, but there are {n} dofs; choose n_modes <= {n}")
     if not TIGHTEST <= tolerance <= LOOSEST:
@@ -161,7 +163,13 @@ def eigenmodes(
         n_solves, solver = operator.n_solves, factorization.description
         # if K itself is factorised, there is no rigid-body mode, however far the mesh's omega² exceed those of the
         # modes
-        omega2 = _zero_rigid(modes.omega2, zero=max(ZERO * scale, 1e-9 * abs(shift)) if shift else 0.0)
+        zero = max(ZERO * scale, 1e-9 * abs(shift)) if shift else 0.0
+        if (modes.omega2 < -zero).any():
+            raise EigenError(
+                f"eigenmodes: omega² = {modes.omega2.min():.6g} is negative; expected a stiffness without negative "
+                "energy"
+            )
+        omega2 = np.where(modes.omega2 <= zero, 0.0, modes.omega2)
         columns, whole = modes.expand(), modes.space.whole
         del search, modes, operator  # frees the basis before the modes are copied
         if space is not None:
@@ -237,14 +245,6 @@ def _count_below(K: Matrix, M: Matrix, sigma: float, at_shift: Inverse) -> int:
             "cannot be counted there; ask for another number of modes, or do without the proof"
         )
     return inertia.n_negative - at_shift.inertia.n_negative
-
-
-def _zero_rigid(omega2: Array, *, zero: float) -> Array:
-    if (omega2 < -zero).any():
-        raise EigenError(
-            f"eigenmodes: omega² = {omega2.min():.6g} is negative; expected a stiffness without negative energy"
-        )
-    return np.where(omega2 <= zero, 0.0, omega2)
 
 
 def _require_match(K: Matrix, M: Matrix, Phi: Array, omega2: Array, shift: float, tolerance: float) -> None:

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from cms.errors import FactorizationError
 from cms.linear_algebra.solvers.registry import solver_of
-from fe_models.body.couplings.submatrix import PrincipalBlock
+from fe_models.body.couplings.submatrix import PrincipalBlock, principal_block
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix, spread_sum, whole_matrix
 from fe_models.foundation.solver import Factor, Solver
@@ -34,7 +34,7 @@ Matrix: TypeAlias = sp.csc_array | PrincipalBlock
 
 def matrix_of(A: Matrix) -> sp.csc_array:
     """Return the matrix; a block is formed."""
-    return A.cut() if isinstance(A, PrincipalBlock) else sp.csc_array(whole_matrix(A))
+    return principal_block(A.A, A.index) if isinstance(A, PrincipalBlock) else sp.csc_array(whole_matrix(A))
 
 
 def shifted_matrix(K: Matrix, M: Matrix, sigma: float) -> Matrix:
@@ -77,28 +77,19 @@ class Factorization:
     """A factorised symmetric matrix; the context manager frees the factor."""
 
     def __init__(self, factor: Factor, solver: Solver) -> None:
-        self._factor = factor
+        self.factor = factor  #: made by the solver
+        self.n = factor.n  #: order of the matrix
         self.solver = solver  #: the solver that made the factor, for further matrices of the same body
-
-    @property
-    def factor(self) -> Factor:
-        """The factor made by the solver."""
-        return self._factor
-
-    @property
-    def n(self) -> int:
-        """Order of the matrix."""
-        return self._factor.n
 
     @property
     def description(self) -> str:
         """Solver, its version and settings, for the provenance."""
-        return self._factor.description
+        return self.factor.description
 
     @property
     def n_factor_entries(self) -> int:
         """Number of stored entries of the factor, 8 bytes each."""
-        return self._factor.n_factor_entries
+        return self.factor.n_factor_entries
 
     @property
     def inertia(self) -> Inertia:
@@ -109,7 +100,7 @@ class Factorization:
         FactorizationError
             If the solver used off-diagonal pivots, as SuperLU may, so that their signs are meaningless.
         """
-        factor = self._factor
+        factor = self.factor
         if factor.n_negative < 0:
             raise FactorizationError(
                 f"inertia: {self.description}: pivots are off the diagonal, so that their signs do not count "
@@ -119,16 +110,16 @@ class Factorization:
 
     def solve(self, b: Array) -> Array:
         """Return A⁻¹ b for one column, (n,), or many, (n, k), in the memory order of the factor."""
-        if not self._factor.is_open:
+        if not self.factor.is_open:
             raise FactorizationError("solve: the factorisation was closed; factorise again")
         b = np.asarray(b, dtype=np.float64)
         if b.ndim not in (1, 2) or len(b) != self.n:
             raise FactorizationError(f"solve: expected right-hand sides ({self.n},) or ({self.n}, k), got {b.shape}")
-        return self._factor.solve(b[:, None])[:, 0] if b.ndim == 1 else self._factor.solve(b)
+        return self.factor.solve(b[:, None])[:, 0] if b.ndim == 1 else self.factor.solve(b)
 
     def close(self) -> None:
         """Free the factor."""
-        self._factor.close()
+        self.factor.close()
 
     def __enter__(self) -> "Factorization":
         return self
@@ -181,19 +172,16 @@ def _ready(A: Matrix, definite: bool, solver: Solver) -> Callable[[], Factor]:
         if definite:
             _require_positive(A.diagonal())
         return partial(solver.spread, block, definite=definite)
-    lower = checked_lower(matrix_of(A))
+    whole = matrix_of(A)
+    if whole.shape[0] != whole.shape[1] or whole.shape[0] == 0:
+        raise FactorizationError(f"factorize: expected a square matrix with at least one row, got {whole.shape}")
+    if not np.isfinite(whole.data).all():
+        raise FactorizationError("factorize: the matrix holds NaN or infinite entries")
+    lower = lower_triangle(whole)
+    del whole
     if definite:
         _require_positive(lower.data[lower.indptr[:-1]])
     return partial(solver.factor, lower, definite=definite)
-
-
-def checked_lower(A: sp.csc_array) -> sp.csc_array:
-    """Return the lower triangle of a matrix that can be factorised."""
-    if A.shape[0] != A.shape[1] or A.shape[0] == 0:
-        raise FactorizationError(f"factorize: expected a square matrix with at least one row, got {A.shape}")
-    if not np.isfinite(A.data).all():
-        raise FactorizationError("factorize: the matrix holds NaN or infinite entries")
-    return lower_triangle(A)
 
 
 def lower_triangle(A: sp.csc_array) -> sp.csc_array:
@@ -235,7 +223,9 @@ def require_regular(A: Matrix, factorization: Factorization) -> None:
     Its solutions are then 1e16 times too large along the null space, and no longer satisfy A x = b.
     """
     b = np.random.default_rng(0).standard_normal(A.shape[0])
-    b = _unit(factorization.solve(b))
+    b = factorization.solve(b)
+    length = np.linalg.norm(b)
+    b = b / length if np.isfinite(length) and length > 0 else np.full(len(b), np.nan)
     x = factorization.solve(b)
     residual = np.linalg.norm(A @ x - b) if np.isfinite(x).all() else np.inf
     if not residual < SINGULAR:
@@ -244,8 +234,3 @@ def require_regular(A: Matrix, factorization: Factorization) -> None:
             f"factorize: the matrix is singular: a solution leaves {100 * min(residual, 9.99):.0f} % of its right-hand "
             f"side; n = {A.shape[0]}"
         )
-
-
-def _unit(x: Array) -> Array:
-    length = np.linalg.norm(x)
-    return x / length if np.isfinite(length) and length > 0 else np.full(len(x), np.nan)

@@ -107,7 +107,8 @@ class BlockLanczos:
         first, last = self.m, self.m + M_new.shape[1]
         block = slice(first, last)
         self.m = last
-        W = self._apply(M_new)  # (1)
+        self.n_solves += M_new.shape[1]
+        W = self.solve(M_new)  # (1)
         A = self.space.inner(M_new, W)  # (2)
         near = np.concatenate([self._R[:, self._coupled :].T, A])
         self.space.subtract(W, self._basis.columns(self._coupled, self.m), near)
@@ -145,14 +146,11 @@ class BlockLanczos:
         self._coupled = 0
         self.m = keep
 
-    def _apply(self, M_x: Any) -> Any:
-        self.n_solves += M_x.shape[1]
-        return self.solve(M_x)
-
     def _start(self) -> Any:
         """Append an M-orthonormal random block in the range of the operator, orthogonal to V; return M times it."""
         width = min(self.block, self.n - self.m)
-        _, _, M_W = self._append(self._apply(self.M @ self.space.random(self._random, width)), 0.0)
+        self.n_solves += width
+        _, _, M_W = self._append(self.solve(self.M @ self.space.random(self._random, width)), 0.0)
         return M_W
 
     def _append(self, W: Any, length: float) -> tuple[Array, Array, Any]:

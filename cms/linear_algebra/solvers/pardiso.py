@@ -167,24 +167,32 @@ class PardisoFactor:
 
     def _call(self, phase: int, b: Array | None = None, x: Array | None = None) -> int:
         error = ctypes.c_int32(0)
-        self._pardiso(
-            _pointer(self._pt),
-            _integer(1),  # maxfct
-            _integer(1),  # mnum
-            _integer(self._mtype),
-            _integer(phase),
-            _integer(self.n),
-            _pointer(self._a),
-            _pointer(self._ia),
-            _pointer(self._ja),
+        given = (
+            self._pt,
+            1,  # maxfct
+            1,  # mnum
+            self._mtype,
+            phase,
+            self.n,
+            self._a,
+            self._ia,
+            self._ja,
             None,  # perm
-            _integer(1 if b is None else b.shape[1]),
-            _pointer(self._iparm),
-            _integer(0),  # msglvl
-            _pointer(b),
-            _pointer(x),
-            ctypes.byref(error),
+            1 if b is None else b.shape[1],
+            self._iparm,
+            0,  # msglvl
+            b,
+            x,
         )
+        pointers = [
+            ctypes.byref(ctypes.c_int32(value))
+            if isinstance(value, int)
+            else None
+            if value is None
+            else value.ctypes.data_as(ctypes.c_void_p)
+            for value in given
+        ]
+        self._pardiso(*pointers, ctypes.byref(error))
         return error.value
 
 
@@ -226,11 +234,3 @@ def mkl_version() -> str:
     library.mkl_get_version_string(text, 200)
     words = text.value.decode(errors="replace").split()
     return next((word.split("-")[0] for word in words if word[0].isdigit()), "unknown")
-
-
-def _integer(value: int) -> object:
-    return ctypes.byref(ctypes.c_int32(value))
-
-
-def _pointer(array: np.ndarray | None) -> ctypes.c_void_p | None:
-    return None if array is None else array.ctypes.data_as(ctypes.c_void_p)

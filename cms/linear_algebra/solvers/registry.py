@@ -59,13 +59,8 @@ def pardiso_or_cholesky(lower: sp.csc_array, *, definite: bool) -> Factor:
     return SOLVERS["pardiso"].factor(lower, definite=definite)
 
 
-def missing_default() -> str:
-    """Describe the missing parts of PARDISO here."""
-    return SOLVERS["pardiso"].missing()
-
-
 #: default solvers; the first installed one is used
-DEFAULTS = (Solver("pardiso", pardiso_or_cholesky, missing_default), SOLVERS["cholesky"])
+DEFAULTS = (Solver("pardiso", pardiso_or_cholesky, lambda: SOLVERS["pardiso"].missing()), SOLVERS["cholesky"])
 
 
 def solver_of(choice: str | Solver | None = None) -> Solver:

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import scipy.linalg as la
 
-from cms.errors import EigenError
 from cms.linear_algebra.solvers.factorization import Matrix
 from cms.linear_algebra.solvers.inverse import Inverse
 from cms.linear_algebra.solvers.mode_count import ModeCount
@@ -25,10 +24,6 @@ class ModeRequest:
 
     count: int | None
     omega2: float | None
-
-    def __post_init__(self) -> None:
-        if self.count is not None and self.count < 1:
-            raise EigenError(f"eigenmodes: n_modes = {self.count}; expected at least 1")
 
     @classmethod
     def of(cls, wanted: ModeCount) -> "ModeRequest":
@@ -54,18 +49,15 @@ class ShiftInverted:
         self.space: TallSpace = space or ArraySpace(self.n)
         self.M_product = self.space.product(M)
         self.n_solves = 0
-        self.factorization, self._progress = factorization, progress
+        self.factorization = factorization
+        #: receives the number of modes found and the number wanted
+        self.report = progress or (lambda found, wanted: None)
         self._solve = self.space.solver(factorization)
 
     def solve(self, b: Any) -> Any:
         """Return (K - sigma M)⁻¹ b, (n, k)."""
         self.n_solves += b.shape[1]
         return self._solve(b)
-
-    def report(self, found: int, wanted: int) -> None:
-        """Report the progress of the search to the caller."""
-        if self._progress is not None:
-            self._progress(found, wanted)
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ import scipy.sparse as sp
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.ranks.spread_columns import SpreadColumns, on_rows, spread_columns, spread_with
-from fe_models.foundation.tall.on_disk import is_on_disk, row_slices, zeros_like
+from fe_models.foundation.tall.on_disk import row_slices, zeros_like
 from fe_models.foundation.threads import n_threads
 
 if TYPE_CHECKING:
@@ -94,14 +94,14 @@ def combined(X: Any, C: Array) -> Any:
         return combine(X, C)
 
     def update(rows: slice) -> None:
-        for part in _slices(rows, X):
+        for part in row_slices(rows, X, height=SLICE):
             X[part, :m] = X[part] @ C
 
     _by_rows(len(X), update)
     if m == k or not X.flags.c_contiguous:
         return X[:, :m]
     whole = X.reshape(-1)  # rows are packed, so that the result is contiguous, as sparse products need it
-    for part in _slices(slice(0, len(X)), X):
+    for part in row_slices(len(X), X, height=SLICE):
         whole[part.start * m : part.stop * m] = X[part, :m].ravel()
     return whole[: len(X) * m].reshape(-1, m)
 
@@ -114,7 +114,7 @@ def subtract(Y: Any, X: Any, C: Array) -> None:
     order = _order(Y)
 
     def update(rows: slice) -> None:
-        for part in _slices(rows, X, Y):
+        for part in row_slices(rows, X, Y, height=SLICE):
             if order == "C":
                 Y[part] -= X[part] @ C
             else:
@@ -136,7 +136,7 @@ def put(X: Array, target: Array) -> None:
     """Copy X, (n, k), into an array of the same shape, in any memory order."""
 
     def copy(rows: slice) -> None:
-        for part in _slices(rows, X):
+        for part in row_slices(rows, X, height=SLICE):
             target[part] = X[part]
 
     _by_rows(len(X), copy)
@@ -145,15 +145,6 @@ def put(X: Array, target: Array) -> None:
 def _order(X: Array) -> Literal["C", "F"]:
     """Return the memory order of X, also if X is a part of the rows or columns of an array."""
     return "C" if X.strides[1] <= X.strides[0] else "F"
-
-
-def _slices(rows: slice, *arrays: Array) -> Iterator[slice]:
-    """Yield slices that fit in the cache, or, for arrays on disk, slices after which their memory is released."""
-    if any(is_on_disk(X) for X in arrays):
-        yield from row_slices(rows, *arrays)
-        return
-    for first in range(rows.start, rows.stop, SLICE):
-        yield slice(first, min(first + SLICE, rows.stop))
 
 
 def _sum(parts: Iterator[Array]) -> Array:

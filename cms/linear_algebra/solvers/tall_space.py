@@ -7,7 +7,6 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
-import scipy.sparse as sp
 
 from cms.linear_algebra.solvers.inverse import Inverse
 from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
@@ -119,21 +118,11 @@ class ArraySpace:
         """Return columns of normally distributed numbers, (n, k)."""
         return dealt(generator.standard_normal((k, self.n)).T, self.numbering)
 
-    def inner(self, X: Array, Y: Array) -> Array:
-        """Return Xᵀ Y, (k, l)."""
-        return inner(X, Y)
-
-    def combine(self, X: Array, C: Array) -> Array:
-        """Return X C, (n, l)."""
-        return combine(X, C)
-
-    def combined(self, X: Array, C: Array) -> Array:
-        """Return X C, (n, l), in the memory of X, which is overwritten."""
-        return combined(X, C)
-
-    def subtract(self, Y: Array, X: Array, C: Array) -> None:
-        """Subtract X C from Y in place."""
-        subtract(Y, X, C)
+    inner = staticmethod(inner)
+    combine = staticmethod(combine)
+    combined = staticmethod(combined)
+    subtract = staticmethod(subtract)
+    product = SymmetricProduct
 
     def scale(self, X: Array, factors: Array) -> None:
         """Multiply every column by its factor, (k,), in place."""
@@ -146,10 +135,6 @@ class ArraySpace:
     def whole(self, X: Array) -> Array:
         """Return the columns."""
         return X
-
-    def product(self, A: sp.csc_array) -> SymmetricProduct:
-        """Return the product with a symmetric matrix, (n, n)."""
-        return SymmetricProduct(A)
 
     def solver(self, factorization: Inverse) -> Callable[[Array], Array]:
         """Return the function that solves for columns with a factorisation, in the memory order of the factor."""

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -20,8 +20,7 @@ from cms.modes.families.interface_cost import large_interfaces
 from cms.modes.families.rigid_modes import determinate_partition, independent_rigid_modes
 from cms.modes.families.static_modes import (
     attachment_modes,
-    boundary_groups,
-    boundary_labels,
+    boundary_names,
     constraint_modes,
     inertia_relief_modes,
     redundant_constraint_modes,
@@ -84,7 +83,6 @@ class Families:
         self.body = body
         self.solver = solver_of(solver)
         self._announces, self._to_disk = announce, to_disk
-        self._stack = ExitStack()
         self._is_open = True
         self._fixed: FixedInterfaceBody | None = None
         self._modes: dict[bytes, list[_Found]] = {}
@@ -98,8 +96,9 @@ class Families:
 
     def close(self) -> None:
         """Free the factorisation; computed families stay."""
+        if self._is_open and self._fixed is not None:
+            self._fixed.factorization.close()
         self._is_open = False
-        self._stack.close()
 
     def forget_vibration_modes(self) -> None:
         """Recompute vibration modes at the next request; an earlier requested number affects roundoff."""
@@ -144,13 +143,13 @@ class Families:
             raise ModeSetError(f"families of body {self.body.name!r}: closed; make new ones")
         for words in large_interfaces(self.body) if self._announces else ():
             log.warning(words)
-        self._fixed = self._stack.enter_context(fix_interfaces(self.body, self._partition[1], solver=self.solver))
+        self._fixed = fix_interfaces(self.body, self._partition[1], solver=self.solver)
         return self._fixed
 
     def adopt(self, fixed: FixedInterfaceBody) -> None:
         """Use an existing interior factorisation, unless there is one here; it is freed with these families."""
         if self._fixed is None:
-            self._fixed = self._stack.enter_context(fixed)
+            self._fixed = fixed
 
     # -- Static families -------------------------------------------------------------------------------------------
 
@@ -259,20 +258,13 @@ class Families:
         """Return a label for each rigid-body mode, such as 'rigid-body rx'."""
         return tuple(f"{family} {MOTION_COMPONENTS[k]}" for k in self._rigid[1])
 
-    def held_labels(self, family: str) -> tuple[str, ...]:
-        """Return a label for each held dof."""
-        extra = self.body.dofs[self._partition[1]]
-        return (
-            *boundary_labels(self.body, family),
-            *(
-                f"{family} node {self.body.numbering.called(node)} {MOTION_COMPONENTS[component]}"
-                for node, component in extra
-            ),
-        )
-
-    def held_groups(self, family: str) -> tuple[str, ...]:
-        """Return a group for each held dof."""
-        return (*boundary_groups(self.body, family), *[f"{family} determinate"] * len(self._partition[1]))
+    def held_names(self, family: str) -> tuple[list[str], list[str]]:
+        """Return a label and a group for each held dof."""
+        labels, groups = boundary_names(self.body, family)
+        for node, component in self.body.dofs[self._partition[1]]:
+            labels.append(f"{family} node {self.body.numbering.called(node)} {MOTION_COMPONENTS[component]}")
+            groups.append(f"{family} determinate")
+        return labels, groups
 
     # -- Internals -------------------------------------------------------------------------------------------------
 

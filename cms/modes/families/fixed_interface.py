@@ -6,11 +6,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from cms.errors import BodyError, EigenError, FactorizationError, ModeSetError
-from cms.linear_algebra.solvers.factorization import EmptyFactor, Factorization, factorize
+from cms.linear_algebra.solvers.factorization import EmptyFactor, Factorization, factorize, matrix_of
 from cms.linear_algebra.solvers.registry import solver_of
 from cms.modes.families.mechanism import WITHIN_ROUNDING, moving_nodes
-from fe_models.body.couplings.nearby import nearby_order
-from fe_models.body.couplings.submatrix import PrincipalBlock, principal_block
+from fe_models.body.couplings.submatrix import PrincipalBlock, nearby_order, principal_block
 from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.solver import Solver
@@ -82,7 +81,7 @@ def fix_interfaces(
     try:
         factorization = factorize(K_ii, definite=is_definite, solver=chosen)
     except FactorizationError as error:
-        raise BodyError(_mechanism_message(body, i, K_ii.cut(), principal_block(body.M, i), chosen)) from error
+        raise BodyError(_mechanism_message(body, i, matrix_of(K_ii), principal_block(body.M, i), chosen)) from error
     return FixedInterfaceBody(body, i, b, factorization)
 
 

@@ -18,8 +18,7 @@ from fe_models.foundation.tall.on_disk import of_this_process, on_disk, release
 
 __all__ = [
     "attachment_modes",
-    "boundary_groups",
-    "boundary_labels",
+    "boundary_names",
     "constraint_modes",
     "inertia_relief_modes",
     "redundant_constraint_modes",
@@ -188,22 +187,14 @@ def _unit(body: FEBody, is_rotation: np.ndarray) -> Array:
     return np.where(is_rotation, body.length**2 or 1.0, 1.0)
 
 
-def boundary_labels(body: FEBody, family: str) -> tuple[str, ...]:
-    """Return a label for each boundary dof, such as 'constraint big_end ux' or 'constraint bolts node 12 uz'."""
-    labels = []
+def boundary_names(body: FEBody, family: str) -> tuple[list[str], list[str]]:
+    """Return a label for each boundary dof, such as 'constraint bolts node 12 uz', and a group, 'constraint bolts'."""
+    labels, groups = [], []
     for interface in body.interfaces:
         for dof in interface.dofs if interface.dofs is not None else ():
             node, component = body.dofs[dof]
             is_one_of_many = interface.kind == "nodes" and len(interface.nodes) > 1
             at_node = f" node {body.numbering.called(node)}" if is_one_of_many else ""
             labels.append(f"{family} {interface.name}{at_node} {MOTION_COMPONENTS[component]}")
-    return tuple(labels)
-
-
-def boundary_groups(body: FEBody, family: str) -> tuple[str, ...]:
-    """Return a group for each boundary dof, such as 'constraint big_end'."""
-    return tuple(
-        f"{family} {interface.name}"
-        for interface in body.interfaces
-        for _ in (interface.dofs if interface.dofs is not None else ())
-    )
+            groups.append(f"{family} {interface.name}")
+    return labels, groups

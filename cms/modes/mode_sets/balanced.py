@@ -14,7 +14,7 @@ from cms.linear_algebra.solvers.eigen import EigenResult
 from cms.linear_algebra.solvers.tall import combine
 from cms.modes.families.families import Families, body_of, families_of
 from cms.modes.families.receptance import boundary_scale
-from cms.modes.families.static_modes import boundary_labels
+from cms.modes.families.static_modes import boundary_names
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets.blocks import mode_set, require_interfaces, rigid_block, static_block
 from fe_models.body.fe_body import FEBody
@@ -272,14 +272,19 @@ def balanced_truncation(
             "position-velocity singular values": _listed(sigma),
             "part left out": f"{sigma[n_modes // sides :].sum() / sigma.sum():.3g}",
         }
-        modes = mode_set("balanced-truncation", families, [rigid_block(families), columns], options=options)
+        modes = mode_set(
+            "balanced-truncation",
+            families,
+            [rigid_block(families, families.Psi_R, "rigid-body"), columns],
+            options=options,
+        )
         data = {"hankel": system.hankel, "hankel signs": system.signs, "position-velocity": sigma}
         return replace(modes, data=data)
 
 
 def chosen_dofs(body: FEBody, key: str, names: Sequence[str] | None) -> IntArray:
     """Return the named boundary dofs, ascending, (n,); all boundary dofs if no names are given."""
-    labels = [label.removeprefix("at ") for label in boundary_labels(body, "at")]
+    labels = [label.removeprefix("at ") for label in boundary_names(body, "at")[0]]
     if names is None:
         return np.arange(len(labels), dtype=np.int64)
     if isinstance(names, str) or not len(names):

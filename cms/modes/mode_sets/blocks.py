@@ -10,7 +10,7 @@ from cms.errors import ModeSetError
 from cms.linear_algebra.solvers.eigen import EigenResult
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.modes.families.families import Families
-from cms.modes.families.static_modes import boundary_groups, boundary_labels
+from cms.modes.families.static_modes import boundary_names
 from cms.modes.mode_set import ModeSet
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
@@ -23,7 +23,6 @@ __all__ = [
     "boundary_block",
     "checked_modes",
     "constraint_block",
-    "inertia_relief_block",
     "mode_set",
     "require_interfaces",
     "rigid_block",
@@ -49,25 +48,16 @@ def static_block(columns: Array, labels: Sequence[str], groups: Sequence[str]) -
 
 def boundary_block(body: FEBody, columns: Array, family: str) -> Block:
     """Return the static columns of a family, one for each boundary dof."""
-    return static_block(columns, boundary_labels(body, family), boundary_groups(body, family))
+    return static_block(columns, *boundary_names(body, family))
 
 
 def constraint_block(families: Families) -> Block:
     """Return the constraint modes."""
-    return static_block(families.Psi_C, families.held_labels("constraint"), families.held_groups("constraint"))
+    return static_block(families.Psi_C, *families.held_names("constraint"))
 
 
-def rigid_block(families: Families) -> Block:
-    """Return the rigid-body modes."""
-    return _rigid_block(families, families.Psi_R, "rigid-body")
-
-
-def inertia_relief_block(families: Families) -> Block:
-    """Return the static responses to rigid-body accelerations with the boundary dofs B held."""
-    return _rigid_block(families, families.Psi_H, "inertia-relief")
-
-
-def _rigid_block(families: Families, columns: Array, family: str) -> Block:
+def rigid_block(families: Families, columns: Array, family: str) -> Block:
+    """Return the columns of a family, one for each rigid-body mode."""
     labels = families.rigid_labels(family)
     return static_block(columns, labels, [family] * len(labels))
 

@@ -11,14 +11,13 @@ from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
 from cms.modes.families.families import Families, families_of
 from cms.modes.families.flexibility import BoundaryConditions
 from cms.modes.families.interface_loads import InterfaceLoad, boundary_load
-from cms.modes.families.static_modes import boundary_groups, boundary_labels
+from cms.modes.families.static_modes import boundary_names
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets.blocks import (
     Block,
     boundary_block,
     checked_modes,
     constraint_block,
-    inertia_relief_block,
     mode_set,
     require_interfaces,
     rigid_block,
@@ -78,10 +77,10 @@ def attachment(
             body,
             wanted,
         )
-        labels = np.array(boundary_labels(body, "attachment"), dtype=object)[families.free.e]
-        groups = np.array(boundary_groups(body, "attachment"), dtype=object)[families.free.e]
+        names = boundary_names(body, "attachment")
+        labels, groups = (np.array(each, dtype=object)[families.free.e] for each in names)
         blocks = [
-            rigid_block(families),
+            rigid_block(families, families.Psi_R, "rigid-body"),
             static_block(families.Psi_A, labels.tolist(), groups.tolist()),
             vibration_block("determinate-interface", modes),
         ]
@@ -117,7 +116,7 @@ def unrestrained_attachment(
             wanted,
         )
         blocks = [
-            rigid_block(families),
+            rigid_block(families, families.Psi_R, "rigid-body"),
             boundary_block(body, families.Psi_U, "unrestrained attachment"),
             vibration_block("free", modes),
         ]
@@ -126,7 +125,7 @@ def unrestrained_attachment(
 
 def held_words(families: Families) -> list[str]:
     """Return the names of the determinate dofs."""
-    labels = families.held_labels("held")
+    labels = families.held_names("held")[0]
     return [label for dof, label in zip(families.h.tolist(), labels, strict=True) if dof in families.r]
 
 
@@ -333,7 +332,7 @@ def craig_bampton_ir(
         body, wanted = families.body, mode_count(n_modes)
         require_interfaces("craig_bampton_ir", body)
         block, modes = _held_modes("craig_bampton_ir", families, wanted, free or {})
-        blocks = [constraint_block(families), inertia_relief_block(families), block]
+        blocks = [constraint_block(families), rigid_block(families, families.Psi_H, "inertia-relief"), block]
         return mode_set("craig-bampton-ir", families, blocks, modes=modes, wanted=wanted, options=_free_words(free))
 
 

@@ -15,7 +15,6 @@ from cms.modes.mode_sets.blocks import (
     boundary_block,
     checked_modes,
     constraint_block,
-    inertia_relief_block,
     mode_set,
     require_interfaces,
     rigid_block,
@@ -53,7 +52,7 @@ def normal_modes(
     with families_of(body) as families:
         body, wanted = families.body, mode_count(n_modes)
         modes = _free_modes("normal_modes", families, wanted)
-        blocks = [rigid_block(families), vibration_block("free", modes)]
+        blocks = [rigid_block(families, families.Psi_R, "rigid-body"), vibration_block("free", modes)]
         return mode_set("normal", families, blocks, modes=modes, wanted=wanted)
 
 
@@ -85,7 +84,11 @@ def rubin(
         body, wanted = families.body, mode_count(n_modes)
         require_interfaces("rubin", body)
         modes = _free_modes("rubin", families, wanted)
-        blocks = [rigid_block(families), vibration_block("free", modes), _residual_block(families, modes)]
+        blocks = [
+            rigid_block(families, families.Psi_R, "rigid-body"),
+            vibration_block("free", modes),
+            _residual_block(families, modes),
+        ]
         return mode_set("rubin", families, blocks, modes=modes, wanted=wanted)
 
 
@@ -172,7 +175,7 @@ def craig_chang(
         modes = _free_modes("craig_chang", families, wanted)
         residual, b = families.residual_attachment(modes), body.b
         interface = combine(residual, _pseudo_inverse(residual[b]))
-        rigid, free = rigid_block(families), vibration_block("free", modes)
+        rigid, free = rigid_block(families, families.Psi_R, "rigid-body"), vibration_block("free", modes)
         blocks = [
             boundary_block(body, interface, "residual interface"),
             replace(rigid, columns=rigid.columns - combine(interface, rigid.columns[b])),
@@ -208,7 +211,7 @@ def herting(
         modes = _free_modes("herting", families, wanted)
         blocks = [
             constraint_block(families),
-            inertia_relief_block(families),
+            rigid_block(families, families.Psi_H, "inertia-relief"),
             vibration_block("free", modes, families.without_boundary(modes.Phi)),
         ]
         return mode_set("herting", families, blocks, modes=modes, wanted=wanted)

@@ -299,7 +299,7 @@ def _mode_set(
     if len(history) > 1:
         options["estimated transfer-function error"] = f"{largest_error(history[-1], history[-2]):.3g}"
     columns = static_block(span.columns.X[:, :n_kept], span.labels[:n_kept], span.groups[:n_kept])
-    rigid = rigid_block(families)
+    rigid = rigid_block(families, families.Psi_R, "rigid-body")
     modes = mode_set("krylov", families, [rigid, columns], options=options)
     # columns not counted by n_modes; smaller sets of this kind contain them too
     n_static = np.array([float(rigid.columns.shape[1] + min(n_first, n_kept))])

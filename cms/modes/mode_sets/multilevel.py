@@ -17,9 +17,9 @@ from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets.blocks import (
     checked_modes,
     constraint_block,
-    inertia_relief_block,
     mode_set,
     require_interfaces,
+    rigid_block,
     vibration_block,
 )
 from fe_models.body.couplings.submatrix import principal_block
@@ -97,7 +97,7 @@ def multilevel(
         modes = checked_modes("multilevel", "fixed-interface", find, body, wanted)
         blocks = [constraint_block(families)]
         if inertia_relief:
-            blocks.append(inertia_relief_block(families))
+            blocks.append(rigid_block(families, families.Psi_H, "inertia-relief"))
         n_static = sum(block.columns.shape[1] for block in blocks)
         errors = results[-1].errors if results else np.zeros(0)
         made = mode_set(

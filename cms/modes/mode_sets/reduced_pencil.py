@@ -9,7 +9,7 @@ from cms.errors import ModeSetError
 from cms.linear_algebra.independent import gram
 from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
 from cms.modes.families.families import Families, families_of
-from cms.modes.families.static_modes import boundary_labels
+from cms.modes.families.static_modes import boundary_names
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets.free_interface import rubin
 from fe_models.body.fe_body import FEBody
@@ -128,7 +128,7 @@ def dual_craig_bampton_pencil(
         K[:, force] = -macneal.interface.T
         K[force, :] = -macneal.interface
         K[force, force] = -_symmetric(macneal.interface[:, force])
-        labels = (*macneal.labels[: n - n_b], *boundary_labels(body, "force"))
+        labels = (*macneal.labels[: n - n_b], *boundary_names(body, "force")[0])
         return ReducedPencil("dual-craig-bampton", M, K, labels, np.eye(n)[force], is_dual=True)
 
 

@@ -34,7 +34,7 @@ from cms.reduction.basis.frames import (
     determinate_rows,
     placed,
 )
-from cms.reduction.geometric_stiffness.unit_loads import unit_mass_loads
+from cms.reduction.geometric_stiffness.unit_states import unit_mass_loads
 from fe_models.body.beam_line import BeamLine
 from fe_models.body.mass_loads import MassLoads, rotation_work
 from fe_models.foundation.arrays import Array, IntArray

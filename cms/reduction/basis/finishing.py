@@ -115,23 +115,20 @@ def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedB
     turn = orientation(Phi, omega2)
     turn_in_place(Phi, turn)
     A = Q.T @ (Z @ turn)
+    if Q.is_formed:  # the terms of VᵀKV A cancel where columns are nearly dependent
+        forces = np.hstack([inner(V, products.K @ Phi[:, k : k + 16]) for k in range(0, A.shape[1], 16)])
+    else:
+        forces = np.asarray(V_K @ A)
     return FinishedBasis(
         Phi=Phi,
         M=np.diag(is_massive.astype(float)),
         K=np.diag(omega2),
-        columns=source_columns(modes.labels, modes.groups, A, forces_on_columns(V, V_K, A, Q, Phi, products)),
+        columns=source_columns(modes.labels, modes.groups, A, forces),
         dropped=tuple(modes.labels[k] for k in redundant),
         n_rigid=found.elastic.shape[0] - found.elastic.shape[1],
         free_omega2=found.free_omega2,
         A=A,
     )
-
-
-def forces_on_columns(V: Array, V_K: Array, A: Array, Q: Basis, Phi: Array, products: Products) -> Array:
-    """Return Vᵀ K Phi, (n_columns, n_q); the terms of VᵀKV A cancel where columns are nearly dependent."""
-    if not Q.is_formed:
-        return np.asarray(V_K @ A)
-    return np.hstack([inner(V, products.K @ Phi[:, k : k + 16]) for k in range(0, A.shape[1], 16)])
 
 
 def normalised_again(Phi: Array, is_massive: np.ndarray, products: Products) -> tuple[Array, float]:

@@ -132,8 +132,8 @@ def mean_translation(weights: Array) -> Array:
 # rotations of the kept nodes, over the shapes -------------------------------------------------------------------------
 
 
-def kept_points(body: FEBody, Phi: Array, axes: Array, row_of: IntArray) -> KeptPoints | None:
-    """Return the points that a body keeps with rotations; None if there are none.
+def kept_points(body: FEBody, Phi: Array, axes: Array, row_of: IntArray) -> KeptPoints:
+    """Return the points that a body keeps with rotations.
 
     (1) if all three rotations of the node are dofs (beams, shells, leaders of rigid groups): these dofs
     (2) else, if the elements know the rotation: half the curl of the displacement
@@ -153,8 +153,6 @@ def kept_points(body: FEBody, Phi: Array, axes: Array, row_of: IntArray) -> Kept
         Row of every node among the kept nodes, (n_nodes,).
     """
     nodes = body.kept
-    if not len(nodes):
-        return None
     Phi = in_memory(Phi)
     u = body.mesh_displacement(Phi)
     rotation, has = rotations_of_dofs(body, Phi, u, nodes)

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from cms.body.reduced_body import BodyFrame
 from cms.body.stress import PointStress
-from fe_models.body.fe_body import FEBody
+from fe_models.body.fe_body import FEBody, StressPointModel
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.ranks.spread_columns import SpreadColumns
 from fe_models.foundation.tall.on_disk import in_memory, is_on_disk, release, zeros_like
@@ -50,13 +51,11 @@ def nodal_stress_modes(body: FEBody, Phi: Array, nodes: IntArray, axes: Array) -
     return modes
 
 
-def point_stress_modes(body: FEBody, Phi: Array, origin: Array, axes: Array) -> PointStress | None:
-    """Return the stress of the shapes at the stress points of the body; None if it has none."""
-    points = body.stress_points
-    if points is None:
-        return None
+def point_stress_modes(body: FEBody, points: StressPointModel, Phi: Array, frame: BodyFrame) -> PointStress:
+    """Return the stress of the shapes at the stress points of the body, in the frame B."""
     modes = points.stress(body.mesh_displacement(in_memory(Phi)))
-    return PointStress(points.names, (np.asarray(points.positions) - origin) @ axes, turned_stress(modes, axes))
+    positions = (np.asarray(points.positions) - frame.origin) @ frame.axes
+    return PointStress(points.names, positions, turned_stress(modes, frame.axes))
 
 
 def turned_stress(stress: Array, axes: Array) -> Array:

@@ -22,7 +22,7 @@ import numpy as np
 from cms.body.geometric_stiffness import SPIN_PAIRS, GeometricStiffness, RotatedLoads, stiffness_of_loads
 from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.errors import BodyError
-from cms.reduction.geometric_stiffness.unit_loads import unit_mass_loads
+from cms.reduction.geometric_stiffness.unit_states import unit_mass_loads
 from fe_models.body.mass_loads import MassLoads
 from fe_models.foundation.arrays import Array, axial
 

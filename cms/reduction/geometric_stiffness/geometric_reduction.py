@@ -1,6 +1,6 @@
 """Geometric stiffness of a reduced body from its elements: one static solution and matrix per unit load (theory.md §7).
 
-(1) balance the unit loads f_j with the support of the frame: P f_j (`cms.reduction.geometric_stiffness.unit_loads`)
+(1) balance the unit loads f_j with the support of the frame: P f_j (`cms.reduction.geometric_stiffness.unit_states`)
 (2) compute static states u_j = G_R P f_j with the factorisation of the mode set; only their stress counts
 (3) compute Phiᵀ K_geo(sigma_j) Phi of the elements, also for rotations of the body, as needed for other frames
 (4) add rigid links: forces on followers, internal minus applied, do work on their second-order motion
@@ -18,8 +18,7 @@ from cms.modes.families.families import Families, body_of
 from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.frames import FrameCondition
 from cms.reduction.basis.node_motion import is_mean, reference_motion, translation_rows
-from cms.reduction.geometric_stiffness.unit_loads import turned_rigid_work
-from cms.reduction.geometric_stiffness.unit_states import UnitStates, states_of
+from cms.reduction.geometric_stiffness.unit_states import UnitStates, states_of, turned_rigid_work
 from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.mass_loads import MassLoads, rotation_work
@@ -140,7 +139,9 @@ def elastic_part(body: FEBody, u: Array, mass: MassLoads, Phi: Array) -> Array:
     model = body.element_model
     assert model is not None
     u_mesh = body.mesh_displacement(u)
-    K = model.geometric_stiffness(u_mesh, mass, body.mesh_displacement(Phi)) + tie_part(body, u, Phi)
+    K = model.geometric_stiffness(u_mesh, mass, body.mesh_displacement(Phi))
+    if body.ties:
+        K = K + tie_part(body, u, Phi)
     if body.recovery is None:
         return K
     T, dofs = body.recovery.matrix, body.recovery.dofs
@@ -151,7 +152,8 @@ def elastic_part(body: FEBody, u: Array, mass: MassLoads, Phi: Array) -> Array:
         return K
     forces = model.internal_forces(u_mesh, nodes=asked) - model.mass_forces(mass)
     on_followers = np.where(np.isin(dofs[:, 0], nodes)[:, None], forces, 0.0)
-    return K + link_work(T, dofs, body.dofs, on_followers, Phi) + mean_nodes_part(body, forces, Phi)
+    K = K + link_work(T, dofs, body.dofs, on_followers, Phi)
+    return K + mean_nodes_part(body, forces, Phi) if body.mean_nodes else K
 
 
 def mean_nodes_part(body: FEBody, forces: Array, Phi: Array) -> Array:

@@ -15,8 +15,7 @@ from cms.modes.families.families import Families, body_of, families_of
 from cms.reduction.basis.frames import FrameCondition
 from cms.reduction.basis.node_motion import translation_rows
 from cms.reduction.geometric_stiffness.geometric_reduction import distributing_part, elastic_part, link_work
-from cms.reduction.geometric_stiffness.unit_loads import balanced, together
-from cms.reduction.geometric_stiffness.unit_states import require_geometric_stiffness
+from cms.reduction.geometric_stiffness.unit_states import balanced, require_geometric_stiffness, together
 from fe_models.body.fe_body import FEBody
 from fe_models.body.mass_loads import MassLoads
 from fe_models.foundation.arrays import Array, IntArray

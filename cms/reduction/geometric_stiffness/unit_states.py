@@ -1,4 +1,11 @@
-"""Static states of the unit loads of a body: the part of its geometric stiffness that needs the factorisation."""
+"""Unit loads of a body, balanced by the frame, and their static states, for the geometric stiffness (theory.md §7).
+
+Loads per unit mass, about the origin and along the axes of the frame B: -e_a for the acceleration of the origin, -e_a ×
+c for the angular acceleration, -½ [e_a × (e_b × c) + e_b × (e_a × c)] for products of angular velocities. Then a unit
+force and a unit moment at every interface, or at chosen interfaces. Optionally, six loads distributed over the nodes
+(`spread_forces`). All are balanced by the same support, W Psi_R of the frame condition. Their static states are the
+part of the geometric stiffness that needs the factorisation.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,12 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
+from cms.body.geometric_stiffness import SPIN_PAIRS
+from cms.body.reduced_body import BodyFrame
 from cms.errors import BodyError
 from cms.linear_algebra.solvers.tall import combine
 from cms.modes.families.families import Families, body_of, families_of
 from cms.modes.families.flexibility import held_factor
+from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.frames import Frame, FrameCondition, TisserandFrame, frame_condition
-from cms.reduction.geometric_stiffness.unit_loads import balanced, spread_forces, unit_loads
+from cms.reduction.basis.node_motion import node_weights, reference_motion, weighted_rigid_modes
 from fe_models.body.fe_body import FEBody
 from fe_models.body.mass_loads import MassLoads
 from fe_models.foundation.arrays import Array, IntArray
@@ -19,9 +29,132 @@ from fe_models.foundation.tall.on_disk import of_this_process
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = [
-    "UnitStates", "has_geometric_stiffness", "loaded_interfaces", "require_geometric_stiffness", "states_of",
+    "UnitLoads", "UnitStates", "balanced", "has_geometric_stiffness", "loaded_interfaces",
+    "require_geometric_stiffness", "spread_forces", "states_of", "turned_rigid_work", "unit_loads", "unit_mass_loads",
     "unit_states",
 ]  # fmt: skip
+
+
+#: remainder of a load, relative to the load, that counts as zero, because the support carries all of it
+BALANCED = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class UnitLoads:
+    """Loads per unit mass and loads on dofs; load j is the sum of both."""
+
+    mass: MassLoads  #: k loads
+    on_dofs: Array  #: over the dofs of the body, (n_dof, k) [N, N m]
+    F: Array  #: sum of both over the dofs of the body, (n_dof, k)
+    is_zero: np.ndarray  #: whether the remaining load is zero, (k,) bool
+
+
+def unit_loads(
+    body: FEBody, frame: BodyFrame, spread: Array | None = None, is_loaded: tuple[bool, ...] = ()
+) -> UnitLoads:
+    """Return the 12 loads per unit mass, then six for each loaded interface, then the given ones, (n_dof, 6).
+
+    Without `is_loaded`, all interfaces are loaded.
+    """
+    turn = np.kron(np.eye(2), frame.axes)
+    chosen = is_loaded or (True,) * len(body.interfaces)
+    columns = [
+        reference_motion(body, interface)[0].T @ turn
+        for interface, is_chosen in zip(body.interfaces, chosen, strict=True)
+        if is_chosen
+    ]
+    on_dofs = np.hstack([np.zeros((body.n_dof, 12)), *columns, *([] if spread is None else [spread])])
+    return together(body, unit_mass_loads(frame, on_dofs.shape[1] - 12), on_dofs)
+
+
+def unit_mass_loads(frame: BodyFrame, n_more: int = 0) -> MassLoads:
+    """Return the 12 loads per unit mass of a frame: 3 translations, 3 rotations, 6 products as in `SPIN_PAIRS`.
+
+    `n_more` loads of zero follow, for loads that do not act on the mass.
+    """
+    e = frame.axes.T  # e[a]: axis a of B
+    A, b = np.zeros((12 + n_more, 3, 3)), np.zeros((12 + n_more, 3))
+    b[:3] = -e
+    for a in range(3):
+        A[3 + a] = -np.cross(e[a], np.eye(3)).T
+    for j, (p, q) in enumerate(SPIN_PAIRS):
+        A[6 + j] = float(p == q) * np.eye(3) - (np.outer(e[p], e[q]) + np.outer(e[q], e[p])) / 2
+    b[3:] = -A[3:] @ frame.origin
+    return MassLoads(A, b)
+
+
+def balanced(body: FEBody, loads: UnitLoads, condition: FrameCondition) -> UnitLoads:
+    """Return P f = f - W Psi_R (Psi_Rᵀ W Psi_R)⁻¹ Psi_Rᵀ f: each load with the reaction of the support.
+
+    If the support is the mass itself (Tisserand frame), the reaction is the load of a rigid-body acceleration.
+    """
+    amounts = np.asarray(np.linalg.solve(condition.Psi_R.T @ condition.W, condition.Psi_R.T @ loads.F), np.float64)
+    if condition.frame.kind == "tisserand":
+        after = together(body, loads.mass.plus_rigid(-amounts, condition.center), loads.on_dofs)
+    else:
+        after = together(body, loads.mass, loads.on_dofs - condition.W @ amounts)
+    is_zero = np.abs(after.F).max(axis=0) <= BALANCED * np.abs(loads.F).max(axis=0)
+    # a load per unit mass may load sections even if its nodal forces vanish
+    is_zero &= _size(body, after.mass) <= BALANCED * _size(body, loads.mass)
+    return UnitLoads(after.mass, after.on_dofs, after.F, is_zero)
+
+
+def _size(body: FEBody, mass: MassLoads) -> Array:
+    """Return the largest force per unit mass at the nodes and over a length of the body, (k,)."""
+    at_nodes = np.abs(mass.at(body.nodes)).max(axis=(0, 1))
+    return np.asarray(at_nodes + np.abs(mass.A).max(axis=(1, 2)) * body.length)
+
+
+def together(body: FEBody, mass: MassLoads, on_dofs: Array) -> UnitLoads:
+    """Return both kinds of loads, and their sum over the dofs of the body."""
+    assert body.element_model is not None
+    on_mesh = body.element_model.mass_forces(mass)
+    F = on_dofs + (on_mesh if body.recovery is None else body.recovery.matrix.T @ on_mesh)
+    return UnitLoads(mass, on_dofs, F, np.asarray(~F.any(axis=0)))
+
+
+# six loads distributed over the nodes of a body by weight, and their work when they are rotated (theory.md §7) --------
+
+
+def spread_forces(body: FEBody, frame: BodyFrame) -> Array | None:
+    """Return the loads (w_i/w) e_a and (w_i/w) e_a × c_i, axes and origin of B, over the dofs, (n_dof, 6).
+
+    None if there is no Buckens frame, because nodes are collinear or have no translations.
+    """
+    weights = node_weights(body)
+    if not weights.any():
+        return None
+    try:
+        W_Psi_R = weighted_rigid_modes(body, frame.origin)
+    except BodyError:
+        return None
+    return np.asarray(W_Psi_R @ np.kron(np.eye(2), frame.axes) / weights.sum())
+
+
+def turned_rigid_work(body: FEBody, forces: Array, frame: BodyFrame) -> Array:
+    """Return the work of loads, rotated about the axes of B, on the rotations about its axes and origin, (k, 3, 3).
+
+    At a node, e_x × f does work on the translation, and ½ e_x × m on the rotation.
+
+    Parameters
+    ----------
+    forces
+        Loads over the dofs of the body, (n_dof, k) [N, N m].
+    """
+    node, component = body.dofs.T
+    own = np.flatnonzero(component >= 0)
+    by_node = np.zeros((len(body.nodes), 2, 3, forces.shape[1]))
+    by_node[node[own], component[own] // 3, component[own] % 3] = forces[own]
+    by_node[:, 1] /= 2
+    rotations = geometric_rigid_modes(body, origin=frame.origin)[own, 3:] @ frame.axes
+    work = np.empty((forces.shape[1], 3, 3))
+    for x, axis in enumerate(frame.axes.T):
+        turned = np.cross(axis[:, None], by_node, axisa=0, axisb=2, axisc=2)
+        work[:, x] = turned[node[own], component[own] // 3, component[own] % 3].T @ rotations
+    return work
+
+
+# static states of the unit loads, the part of the geometric stiffness that needs the factorisation --------------------
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +208,6 @@ def unit_states(
         If the body has no element model with geometric stiffness, the frame cannot be attached, or an interface is
         unknown.
     """
-    require_geometric_stiffness(body_of(body))
     condition = frame_condition(body_of(body), frame or TisserandFrame())
     return states_of(body, condition, spread=spread, interfaces=interfaces)
 
@@ -138,16 +270,11 @@ def static_states(families: Families, F: Array) -> Array:
     z = np.zeros((len(h), F.shape[1]))
     e = np.flatnonzero(~np.isin(h, families.r))
     if len(e):
-        g = F[h] - (body.K[:, h].T @ embedded(v, i, body.n_dof))
+        u_i = np.zeros(F.shape)
+        u_i[i] = v
+        g = F[h] - (body.K[:, h].T @ u_i)
         size, factor = held_factor(families.condensed, np.eye(len(h)), families.S, e)
         z[e] = size[:, None] * la.cho_solve(factor, size[:, None] * g[e])
     u = of_this_process(combine(families.Psi_C, z))
     u[i] += v
     return u
-
-
-def embedded(v: Array, rows: IntArray, n: int) -> Array:
-    """Return v in some rows of an array with n rows, zero in the others."""
-    whole = np.zeros((n, v.shape[1]))
-    whole[rows] = v
-    return whole

@@ -17,8 +17,7 @@ from cms.errors import RecoveryError
 from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.node_motion import reference_motion
 from cms.reduction.frame_conversion import rigid_mass, six_motions
-from cms.reduction.geometric_stiffness.unit_loads import unit_mass_loads
-from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffness
+from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffness, unit_mass_loads
 from cms.reduction.interface_model import free_matrices
 from cms.reduction.recovery.model_rows import node_rows
 from cms.reduction.recovery.places import Places

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
-from fe_models.body.couplings.nearby import nearby_order
+from fe_models.body.couplings.submatrix import nearby_order
 from fe_models.body.fe_body import FEBody, Recovery
 from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.ranks.ranks import Ranks

@@ -66,10 +66,10 @@ def couple(body: FEBody) -> FEBody:
     reference_node = {interface.name: len(body.nodes) + k for k, interface in enumerate(references)}
     new_dofs = np.concatenate(
         [body.dofs[keep]]
-        + [_node_dofs(reference_node[interface.name]) for interface in references]
         + [
-            np.stack([np.full(6, reference_node[interface.name]), np.full(6, MULTIPLIER)], axis=1)
-            for interface in distributing
+            np.stack([np.full(6, reference_node[interface.name]), component], axis=1)
+            for group, component in ((references, np.arange(6)), (distributing, np.full(6, MULTIPLIER)))
+            for interface in group
         ]
     )
 
@@ -180,10 +180,6 @@ class _DofTable:
         return dofs
 
 
-def _node_dofs(node: int) -> IntArray:
-    return np.stack([np.full(6, node), np.arange(6)], axis=1)
-
-
 def _rigid_rows(body: FEBody, interface: Interface, slaves: IntArray) -> Array:
     """Return the rows of u_members = T u_reference for these slave dofs, (n_slaves, 6)."""
     node, component = body.dofs[slaves].T
@@ -223,7 +219,8 @@ def _congruence(
     if isinstance(A, SpreadMatrix):
         return spread_extension(A, keep, sum((B for B in (new, more) if B is not None), sp.csc_array((n_new, n_new))))
     A_kk = principal_block(A, keep)
-    result = sp.csc_array((A_kk.data, A_kk.indices, _longer(A_kk.indptr, n_new)), shape=(n_new, n_new))
+    indptr = np.append(A_kk.indptr, np.full(n_new - len(keep), A_kk.indptr[-1], A_kk.indptr.dtype))  # empty columns
+    result = sp.csc_array((A_kk.data, A_kk.indices, indptr), shape=(n_new, n_new))
     for B in (new, more):
         if B is not None:
             result = sp.csc_array(result + B)
@@ -246,11 +243,6 @@ def _reference_entries(
         shape=(n_new, n_new),
     ).tocsc()
     return sp.csc_array(half + half.T)
-
-
-def _longer(indptr: IntArray, n: int) -> IntArray:
-    """Return the column pointers extended to n columns; the new columns are empty."""
-    return np.concatenate([indptr, np.full(n + 1 - len(indptr), indptr[-1], indptr.dtype)])
 
 
 def _multiplier_rows(

@@ -23,7 +23,7 @@ from fe_models.elements.solids.elements import ReferenceElement, reference_eleme
 from fe_models.elements.solids.incompatible import KIND, brick_chunks, brick_stiffness
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.threads import n_threads
+from fe_models.foundation.threads import in_threads, n_threads
 from fe_models.meshes.mesh import Mesh
 
 __all__ = ["Progress", "assemble", "elastic_properties", "expand_scalar_mass"]
@@ -42,11 +42,6 @@ class NodeGraph:
     places: np.ndarray  #: places in the joined element lists, node by node, ascending, (n_places,) int32
     row_start: IntArray  #: first entry of `columns` of each node, (n_nodes + 1,)
     columns: np.ndarray  #: neighbours of each node, including itself, ascending, (n_entries,) int32
-
-    @property
-    def n_nodes(self) -> int:
-        """Number of nodes."""
-        return len(self.row_start) - 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,8 +106,8 @@ def assemble(
     """
     kinds = require_assemblable(mesh)
     lists = {kind: np.ascontiguousarray(mesh.cells[kind], dtype=np.int32) for kind in kinds}
+    graph = node_graph(list(lists.values()), len(mesh.nodes))
     with ThreadPoolExecutor(n_threads()) as pool:
-        graph = node_graph(list(lists.values()), len(mesh.nodes), pool)
         K_data, M_data = assembled_data(
             mesh.nodes,
             lists,
@@ -124,9 +119,9 @@ def assemble(
             (integration, mass),
             progress,
         )
-        K = expanded_stiffness(graph, K_data, pool)
-    M_s = sp.csr_array((M_data, graph.columns, index_like(graph.row_start, len(M_data))), shape=2 * (graph.n_nodes,))
-    return K, M_s
+    row_start = graph.row_start.astype(np.int32) if len(M_data) <= LARGEST_INT32 else graph.row_start
+    M_s = sp.csr_array((M_data, graph.columns, row_start), shape=2 * (len(mesh.nodes),))
+    return expanded_stiffness(graph, K_data), M_s
 
 
 def elastic_properties(materials: tuple[AnyMaterial, ...]) -> tuple[Array, dict[int, Array]]:
@@ -143,12 +138,11 @@ def expand_scalar_mass(M_s: sp.csr_array) -> sp.csc_array:
     index_type = np.int32 if nnz <= LARGEST_INT32 else np.int64
     indptr, indices, data = np.zeros(3 * n_nodes + 1, index_type), np.empty(nnz, index_type), np.empty(nnz)
     row_start, columns = np.asarray(M_s.indptr, np.int64), np.asarray(M_s.indices, np.int32)
-    with ThreadPoolExecutor(n_threads()) as pool:
-        in_parts(pool, expand_mass, (row_start, columns, M_s.data), (indptr, indices, data))
+    in_threads(expand_mass, (row_start, columns, M_s.data), (indptr, indices, data))
     return sorted_csc(data, indices, indptr)
 
 
-def node_graph(lists: list[np.ndarray], n_nodes: int, pool: ThreadPoolExecutor) -> NodeGraph:
+def node_graph(lists: list[np.ndarray], n_nodes: int) -> NodeGraph:
     """Make the node graph, steps (1) and (2), from the element lists of all types, each (n_cells, nodes per cell)."""
     from fe_models.elements.solids.assembly_kernels import node_incidence, row_columns, row_counts
 
@@ -168,13 +162,13 @@ def node_graph(lists: list[np.ndarray], n_nodes: int, pool: ThreadPoolExecutor) 
     if unused.size:
         raise MeshError(
             f"assembly: {unused.size} of {n_nodes} nodes belong to no solid cell (first: {unused[0]}); "
-            f"drop them first: fe_models.meshes.unused_nodes.drop_unused_nodes(mesh)"
+            f"drop them first: fe_models.meshes.mesh.drop_unused_nodes(mesh)"
         )
     counts = np.zeros(n_nodes, np.int64)
-    in_parts(pool, row_counts, (members, first, n_members, start, places), (counts,))
+    in_threads(row_counts, (members, first, n_members, start, places), (counts,))
     row_start = np.concatenate([[0], np.cumsum(counts)])
     columns = np.empty(row_start[-1], np.int32)
-    in_parts(pool, row_columns, (members, first, n_members, start, places), (row_start, columns))
+    in_threads(row_columns, (members, first, n_members, start, places), (row_start, columns))
     return NodeGraph(start, places, row_start, columns)
 
 
@@ -195,7 +189,7 @@ def assembled_data(
 
     n_parts = n_threads()
     K_data, M_data = np.zeros(9 * len(graph.columns)), np.zeros(len(graph.columns))
-    where = np.zeros((n_parts, graph.n_nodes), np.int32)
+    where = np.zeros((n_parts, len(nodes)), np.int32)
     cursor = graph.start[:-1].copy()
     first_place = 0
     for kind, cells in lists.items():
@@ -281,19 +275,27 @@ def lumped_mass(M_e: Array) -> Array:
 
 
 def kernel_tables(element: ReferenceElement) -> tuple[tuple[np.ndarray, ...], ...]:
-    """Return the kernel's tables: for affine elements, and for stiffness and mass of curved elements."""
-    affine = (element.nodes, element.axis_nodes, element.stiffness_integrals, element.mass_integrals)
-    stiffness = (element.stiffness.gradients, element.stiffness.weights)
-    return affine, stiffness, (element.mass.values, element.mass.gradients, element.mass.weights)
+    """Return the kernel's tables: for affine elements, and for stiffness and mass of curved elements.
+
+    The tables of affine elements are the reference cell's nodes, (n_nodes, 3), those at e_1, e_2, e_3, (3,), and its
+    integrals for pairs b >= a, row by row: ∫ ∂N_a/∂xi_k ∂N_b/∂xi_l in row 3 k + l, (9, n_pairs), and ∫ N_a N_b.
+    """
+    stiffness, mass, nodes = element.stiffness, element.mass, element.nodes
+    on_axes = np.array([int(np.flatnonzero((nodes == axis).all(axis=1))[0]) for axis in np.eye(3)])
+    a, b = np.triu_indices(len(nodes))
+    gradients = np.einsum("q,qpk,qpl->klp", stiffness.weights, stiffness.gradients[:, a], stiffness.gradients[:, b])
+    products = np.einsum("q,qp,qp->p", mass.weights, mass.values[:, a], mass.values[:, b])
+    affine = (nodes, on_axes, gradients.reshape(9, -1), products)
+    return affine, (stiffness.gradients, stiffness.weights), (mass.values, mass.gradients, mass.weights)
 
 
-def expanded_stiffness(graph: NodeGraph, K_data: Array, pool: ThreadPoolExecutor) -> sp.csc_array:
+def expanded_stiffness(graph: NodeGraph, K_data: Array) -> sp.csc_array:
     """Make K from its entries, the row starts and the column numbers; rows equal columns, because K is symmetric."""
     from fe_models.elements.solids.assembly_kernels import expand_columns
 
     index_type = np.int32 if len(K_data) <= LARGEST_INT32 else np.int64
-    indptr, indices = np.zeros(3 * graph.n_nodes + 1, index_type), np.empty(len(K_data), index_type)
-    in_parts(pool, expand_columns, (graph.row_start, graph.columns), (indptr, indices))
+    indptr, indices = np.zeros(3 * len(graph.row_start) - 2, index_type), np.empty(len(K_data), index_type)
+    in_threads(expand_columns, (graph.row_start, graph.columns), (indptr, indices))
     return sorted_csc(K_data, indices, indptr)
 
 
@@ -302,17 +304,6 @@ def sorted_csc(data: Array, indices: np.ndarray, indptr: np.ndarray) -> sp.csc_a
     matrix = sp.csc_array((data, indices, indptr), shape=2 * (len(indptr) - 1,))
     matrix.has_canonical_format = True
     return matrix
-
-
-def index_like(values: IntArray, largest: int) -> np.ndarray:
-    """Return index numbers as int32 if they fit; this halves the memory and suits the sparse solvers."""
-    return values.astype(np.int32) if largest <= LARGEST_INT32 else values
-
-
-def in_parts(pool: ThreadPoolExecutor, kernel: Any, inputs: tuple[Any, ...], outputs: tuple[Any, ...]) -> None:
-    """Run kernel(*inputs, part, n_parts, *outputs) for every part, in threads."""
-    n_parts = n_threads()
-    run(pool, [(kernel, *inputs, part, n_parts, *outputs) for part in range(n_parts)])
 
 
 def run(pool: ThreadPoolExecutor, calls: list[tuple[Any, ...]]) -> None:
@@ -332,18 +323,14 @@ def require_assemblable(mesh: Mesh) -> list[str]:
             f"assembly: {(~np.isfinite(mesh.nodes)).any(axis=1).sum()} nodes have coordinates that are not "
             f"finite numbers"
         )
+    n_nodes = len(mesh.nodes)
     for kind in kinds:
-        require_known_nodes(kind, mesh.cells[kind], len(mesh.nodes))
+        cells, expected = mesh.cells[kind], reference_element(kind).n_nodes
+        if cells.ndim != 2 or cells.shape[1] != expected:
+            raise MeshError(f"assembly: {kind}: expected (n_cells, {expected}) nodes, got {cells.shape}")
+        if cells.min() < 0 or cells.max() >= n_nodes:
+            raise MeshError(f"assembly: {kind}: expected nodes 0..{n_nodes - 1}, got {cells.min()}..{cells.max()}")
     return kinds
-
-
-def require_known_nodes(kind: str, cells: IntArray, n_nodes: int) -> None:
-    """Raise `MeshError` if cells have the wrong number of nodes or refer to unknown nodes."""
-    expected = reference_element(kind).n_nodes
-    if cells.ndim != 2 or cells.shape[1] != expected:
-        raise MeshError(f"assembly: {kind}: expected (n_cells, {expected}) nodes, got {cells.shape}")
-    if cells.min() < 0 or cells.max() >= n_nodes:
-        raise MeshError(f"assembly: {kind}: expected nodes 0..{n_nodes - 1}, got {cells.min()}..{cells.max()}")
 
 
 def require_upright(kind: str, is_inverted: np.ndarray) -> None:

@@ -11,7 +11,6 @@ because the elements of a node are added in the same order.
 
 import weakref
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from fe_models.elements.solids.assembly import assemble, in_parts, node_graph, require_assemblable
+from fe_models.elements.solids.assembly import assemble, node_graph, require_assemblable
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.ranks.ranks import Ranks
@@ -27,7 +26,7 @@ from fe_models.foundation.ranks.row_layout import RowLayout, asked, dropped, new
 from fe_models.foundation.ranks.rows import Rows, even_rows
 from fe_models.foundation.ranks.spread_matrix import OwnRows, SpreadMatrix
 from fe_models.foundation.ranks.trim import give_back
-from fe_models.foundation.threads import n_threads
+from fe_models.foundation.threads import in_threads
 from fe_models.meshes.mesh import Mesh
 
 __all__ = ["MeshPart", "SpreadMesh", "assemble_on_ranks"]
@@ -97,8 +96,7 @@ def assemble_on_ranks(
 
 def node_order(lists: list[np.ndarray], n_nodes: int, size: int) -> tuple[IntArray, Rows]:
     """Order the nodes, step (1): return the node at each position, (n_nodes,), and the positions of each rank."""
-    with ThreadPoolExecutor(n_threads()) as pool:
-        graph = node_graph(lists, n_nodes, pool)
+    graph = node_graph(lists, n_nodes)
     starts = graph.row_start.astype(np.int32)
     A = sp.csr_array((np.ones(len(graph.columns), np.int8), graph.columns, starts), shape=(n_nodes, n_nodes))
     order = reverse_cuthill_mckee(A, symmetric_mode=True).astype(np.int64)
@@ -183,6 +181,5 @@ def expanded_rows(indptr: np.ndarray, columns: np.ndarray, data: Array) -> OwnRo
 
     n = 3 * len(data)
     wide, indices, values = np.zeros(3 * len(indptr) - 2, np.int32), np.empty(n, np.int32), np.empty(n)
-    with ThreadPoolExecutor(n_threads()) as pool:
-        in_parts(pool, expand_mass, (indptr.astype(np.int64), columns, data), (wide, indices, values))
+    in_threads(expand_mass, (indptr.astype(np.int64), columns, data), (wide, indices, values))
     return OwnRows(wide, indices, values)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
 from itertools import pairwise
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -108,15 +108,13 @@ class SolidModel:
     integration: str = "full"  #: integration of the stiffness, one of `fe_models.elements.solids.elements.INTEGRATIONS`
     parts: SpreadMesh | None = None  #: the distributed mesh, if several ranks assembled it
 
+    has_nodal_stress: ClassVar[bool] = True  #: solid elements know their stress
+    has_geometric_stiffness: ClassVar[bool] = True  #: solid elements know their geometric stiffness
+
     @cached_property
     def of_node(self) -> IntArray:
         """Material whose stress each node shows: that of the stiffest adjoining element, (n_nodes,)."""
         return frozen_int(stiffest_at_nodes(self.mesh, self.materials, self.of_cell))
-
-    @property
-    def has_nodal_stress(self) -> bool:
-        """True, because solid elements know their stress."""
-        return True
 
     def mass_gram(self, u: Any) -> Array:
         """Return ∫ a aᵀ dm with a = [1, c, u_x, u_y, u_z], (4 + 3 k, 4 + 3 k), exact; u is (3 n_nodes, k)."""
@@ -141,11 +139,6 @@ class SolidModel:
         is_own = nodes < len(self.mesh.nodes)
         rotation[is_own] = nodal_rotation(self.mesh, u, nodes[is_own])
         return rotation
-
-    @property
-    def has_geometric_stiffness(self) -> bool:
-        """True, because solid elements know their geometric stiffness."""
-        return True
 
     def mass_forces(self, loads: MassLoads) -> Array:
         """Return consistent nodal forces of loads per unit mass, (3 n_nodes, k); exact for loads linear in c."""
@@ -271,7 +264,7 @@ def solid_body(
         node_volumes=node_volumes(mesh),
         element_model=SolidModel(mesh, used, of_cell, M_s, incompatible_modes, integration, parts),
         numbering=solid_numbering(mesh),
-        provenance=provenance(mesh, used, of_cell) | _brick_words(mesh, incompatible_modes) | rule_words,
+        provenance=provenance(mesh, used, of_cell, incompatible_modes=incompatible_modes) | rule_words,
     )
 
 
@@ -368,7 +361,9 @@ def node_volumes(mesh: Mesh) -> Array:
     return volumes
 
 
-def provenance(mesh: Mesh, materials: tuple[AnyMaterial, ...], of_cell: Mapping[str, IntArray]) -> dict[str, str]:
+def provenance(
+    mesh: Mesh, materials: tuple[AnyMaterial, ...], of_cell: Mapping[str, IntArray], *, incompatible_modes: bool
+) -> dict[str, str]:
     """Return the origin of the body: mesh, digest, elements, materials and the version of scikit-fem."""
     record = {"mesh": mesh.source, "mesh sha256": mesh.digest, "nodes": str(len(mesh.nodes))}
     record |= {f"file {path}": digest for path, digest in mesh.included.items()}
@@ -379,11 +374,10 @@ def provenance(mesh: Mesh, materials: tuple[AnyMaterial, ...], of_cell: Mapping[
         record[f"material {material.name}"] = f"{material_words(material)}, {count} cells"
     if len(materials) > 1:
         record["stress where materials meet"] = 'of the stiffest; of each with stress_points = "borders"'
-    return {key: value for key, value in record.items() if value} | {"scikit-fem": version("scikit-fem")}
-
-
-def _brick_words(mesh: Mesh, incompatible_modes: bool) -> dict[str, str]:
-    return {f"cells {KIND} with": "incompatible modes"} if incompatible_modes and len(mesh.cells.get(KIND, ())) else {}
+    record["scikit-fem"] = version("scikit-fem")
+    if incompatible_modes and len(mesh.cells.get(KIND, ())):
+        record[f"cells {KIND} with"] = "incompatible modes"
+    return {key: value for key, value in record.items() if value}
 
 
 def _rule_words(integration: str, mass: str) -> dict[str, str]:

@@ -8,16 +8,15 @@ The orders are chosen so that, on an isoparametric (curved) element,
 """
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 
 import numpy as np
 
 from fe_models.errors import MeshError
-from fe_models.foundation.arrays import Array, IntArray, frozen
+from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.words import nearest, quoted
-from fe_models.meshes.cell_shapes import CELL_SHAPES, collapsed_cube, shape_values
+from fe_models.meshes.cell_shapes import CELL_SHAPES, SKFEM_ELEMENTS, collapsed_cube, shape_values, skfem_node_order
 from fe_models.meshes.mesh import SOLID_TYPES
-from fe_models.meshes.skfem_cells import SKFEM_ELEMENTS, skfem_node_order
 
 __all__ = [
     "INTEGRATIONS", "MASSES", "ReferenceElement", "ShapeTable", "reference_centre", "reference_element", "shape_table",
@@ -102,24 +101,6 @@ class ReferenceElement:
     def n_nodes(self) -> int:
         """Nodes per element."""
         return CELL_SHAPES[self.kind].n_nodes
-
-    @cached_property
-    def axis_nodes(self) -> IntArray:
-        """The nodes at e_1, e_2, e_3 of the reference cell, (3,); node 0 is at its origin."""
-        return np.array([int(np.flatnonzero((self.nodes == axis).all(axis=1))[0]) for axis in np.eye(3)])
-
-    @cached_property
-    def stiffness_integrals(self) -> Array:
-        """∫ ∂N_a/∂xi_k ∂N_b/∂xi_l over the reference cell: row 3 k + l, pairs b >= a row by row, (9, n_pairs)."""
-        a, b = np.triu_indices(self.n_nodes)
-        gradients = self.stiffness.gradients
-        return np.einsum("q,qpk,qpl->klp", self.stiffness.weights, gradients[:, a], gradients[:, b]).reshape(9, -1)
-
-    @cached_property
-    def mass_integrals(self) -> Array:
-        """∫ N_a N_b over the reference cell, pairs b >= a row by row, (n_pairs,)."""
-        a, b = np.triu_indices(self.n_nodes)
-        return np.einsum("q,qp,qp->p", self.mass.weights, self.mass.values[:, a], self.mass.values[:, b])
 
 
 def quadrature(cell: str, degree: Degree) -> tuple[Array, Array]:

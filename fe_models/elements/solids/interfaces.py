@@ -1,8 +1,8 @@
 """Interfaces of a meshed body at selected nodes: rigid, distributing, or with the dofs of every node."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import combinations
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +17,8 @@ from fe_models.meshes.objects.as_mesh import selectable
 from fe_models.meshes.selections import Selection, selected_facets
 
 __all__ = ["check_overlap", "distributing_interface", "nodes_interface", "rigid_interface"]
+
+Chosen = TypeVar("Chosen")
 
 
 def rigid_interface(
@@ -49,7 +51,7 @@ def rigid_interface(
         If fewer than three nodes are selected, or all lie on one line, which would leave a rotation free.
     """
     mesh = selectable(mesh)
-    nodes = _members(name, mesh, selection)
+    nodes = _chosen(name, lambda: selection.members(mesh))
     _require_spread(name, "rigid", mesh.nodes[nodes], np.ones(len(nodes)))
     return _interface(mesh, name, "rigid", nodes, selection, reference, triad)
 
@@ -79,9 +81,9 @@ def distributing_interface(
         If no facet is selected, or the weighted nodes lie on one line.
     """
     mesh = selectable(mesh)
-    facets = _facets(name, mesh, selection)
+    facets = _chosen(name, lambda: selected_facets(mesh, selection))
     if not facets:
-        count = len(_members(name, mesh, selection))
+        count = len(_chosen(name, lambda: selection.members(mesh)))
         raise InterfaceError(
             f"interface {name!r}: the {count} selected nodes make up no complete facet of the surface "
             f"and so have no area; select a surface, or widen the tolerance so that middle nodes "
@@ -120,7 +122,7 @@ def nodes_interface(
         If no node is selected.
     """
     mesh = selectable(mesh)
-    return _interface(mesh, name, "nodes", _members(name, mesh, selection), selection, reference, triad)
+    return _interface(mesh, name, "nodes", _chosen(name, lambda: selection.members(mesh)), selection, reference, triad)
 
 
 def check_overlap(interfaces: Sequence[Interface], *, numbers: IntArray | None = None) -> None:
@@ -148,16 +150,10 @@ def check_overlap(interfaces: Sequence[Interface], *, numbers: IntArray | None =
         )
 
 
-def _members(name: str, mesh: Mesh, selection: Selection) -> IntArray:
+def _chosen(name: str, choose: Callable[[], Chosen]) -> Chosen:
+    """Return what a selection chooses; its error names the interface."""
     try:
-        return selection.members(mesh)
-    except InterfaceError as error:
-        raise InterfaceError(f"interface {name!r}: {error}") from None
-
-
-def _facets(name: str, mesh: Mesh, selection: Selection) -> dict[str, IntArray]:
-    try:
-        return selected_facets(mesh, selection)
+        return choose()
     except InterfaceError as error:
         raise InterfaceError(f"interface {name!r}: {error}") from None
 
@@ -193,7 +189,7 @@ def _interface(
     weights: Array | None = None,
 ) -> Interface:
     if reference is None:
-        facets = _facets(name, mesh, selection)
+        facets = _chosen(name, lambda: selected_facets(mesh, selection))
         point = area_centroid(mesh.nodes, facets)[1] if facets else mesh.nodes[nodes].mean(axis=0)
     else:
         point = np.asarray(reference, dtype=float)

@@ -82,8 +82,8 @@ def zeros_like(X: Array, shape: tuple[int, ...]) -> Array:
     return on_disk(shape) if is_large and is_on_disk(X) else np.zeros(shape)
 
 
-def row_slices(rows: slice | int, *arrays: Array) -> Iterator[slice]:
-    """Yield slices of rows and release the memory after each; without an array on disk, a single slice.
+def row_slices(rows: slice | int, *arrays: Array, height: int | None = None) -> Iterator[slice]:
+    """Yield slices of rows and release the memory after each; without an array on disk, slices of that height.
 
     Parameters
     ----------
@@ -91,13 +91,16 @@ def row_slices(rows: slice | int, *arrays: Array) -> Iterator[slice]:
         The rows as a slice, or the number of rows.
     arrays
         Arrays with at least that many rows.
+    height
+        Number of rows of a slice if no array is on disk; None: a single slice.
     """
     whole = rows if isinstance(rows, slice) else slice(0, rows)
     stored = [X for X in arrays if is_on_disk(X)]
-    if not stored:
+    if stored:
+        height = max(16, int(SLICE_BYTES / max(max(X[:1].nbytes for X in stored), 1)))
+    if height is None:
         yield whole
         return
-    height = max(16, int(SLICE_BYTES / max(max(X[:1].nbytes for X in stored), 1)))
     for first in range(whole.start, whole.stop, height):
         yield slice(first, min(first + height, whole.stop))
         for X in stored:

@@ -6,8 +6,8 @@ import numpy as np
 
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.meshes.cell_shapes import SKFEM_ELEMENTS, skfem_node_order
 from fe_models.meshes.cells.raw_mesh import RawBlock, RawMesh, turned_upright
-from fe_models.meshes.skfem_cells import SKFEM_ELEMENTS, skfem_node_order
 
 __all__ = ["raw_from_cells", "raw_from_skfem"]
 

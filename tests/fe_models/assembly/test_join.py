@@ -17,8 +17,7 @@ from fe_models.elements.solids.body import solid_body
 from fe_models.foundation.errors import BodyError
 from fe_models.foundation.units import unit_system
 from fe_models.meshes.line_mesh import LineMesh
-from fe_models.meshes.mesh import Mesh
-from fe_models.meshes.unused_nodes import drop_unused_nodes
+from fe_models.meshes.mesh import Mesh, drop_unused_nodes
 from tests.bodies import STEEL, box_mesh
 
 UNITS = unit_system("m-kg-s")

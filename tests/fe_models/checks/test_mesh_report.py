@@ -11,9 +11,8 @@ from fe_models.foundation.units import UNIT_SYSTEMS
 from fe_models.meshes.boundary import boundary_facets
 from fe_models.meshes.cell_shapes import CELL_SHAPES, quadrature, shape_values
 from fe_models.meshes.cells.raw_mesh import mirrored_order
-from fe_models.meshes.mesh import Mesh
+from fe_models.meshes.mesh import Mesh, drop_unused_nodes
 from fe_models.meshes.quadratic_mesh import FIRST_ORDER
-from fe_models.meshes.unused_nodes import drop_unused_nodes
 from tests.bodies import ALUMINIUM, STEEL
 from tests.fe_models.small_meshes import SOLID_TYPES, cell_mesh, faced_box, joined
 

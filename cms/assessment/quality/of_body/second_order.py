@@ -14,7 +14,7 @@ from cms.assessment.quality.record import QualityRecord, information, judge
 from cms.body.geometric_stiffness import UNIT_LOADS, GeometricStiffness
 from cms.body.reduced_body import BodyFrame, ReducedBody
 from cms.reduction.frame_conversion import rigid_mass
-from cms.reduction.geometric_stiffness.unit_loads import unit_mass_loads
+from cms.reduction.geometric_stiffness.unit_states import unit_mass_loads
 from fe_models.foundation.arrays import Array
 from fe_models.meshes.mesh import SOLID_TYPES
 

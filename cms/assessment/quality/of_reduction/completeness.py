@@ -61,7 +61,7 @@ def static_completeness(reference: FullReference, basis: FreeBasis) -> StaticCom
     interface forces); accelerations act with all interfaces held (inertia-relief modes Psi_H).
     """
     body, families = reference.body, reference.families
-    Psi_H, labels = families.Psi_H, families.held_labels("load")
+    Psi_H, labels = families.Psi_H, families.held_names("load")[0]
     cases = tuple(case.name for case in body.load_cases)
     return StaticCompleteness(
         tuple(labels[k] for k in families.free.e),

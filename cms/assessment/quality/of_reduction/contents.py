@@ -438,7 +438,8 @@ def compare_stress(case: Case) -> Iterator[Compared]:
             own = np.asarray(file.stress) @ Z
             yield apart("stress", own, made, np.abs(made).max(initial=0.0), axes=f"node component {word}")
     if file.point_stress is not None or is_asked:
-        points = point_stress_modes(case.body, case.Phi @ Z, frame.origin, frame.axes)
+        asked = case.body.stress_points
+        points = None if asked is None else point_stress_modes(case.body, asked, case.Phi @ Z, frame)
         own_points = file.point_stress
         if points is None or own_points is None:
             if points is not None or own_points is not None:

@@ -102,7 +102,6 @@ def kept_turns(body: FEBody, reduced: ReducedBody, X: Array) -> Array:
     row_of = np.full(len(body.nodes), -1, np.int64)
     row_of[reduced.node_ids] = np.arange(len(reduced.node_ids))
     points = kept_points(replace(body, kept=reduced.node_ids[reduced.kept.nodes]), X, reduced.frame.axes, row_of)
-    assert points is not None
     return np.asarray(points.rotation).reshape(-1, X.shape[1])
 
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from cms.errors import FactorizationError
-from cms.linear_algebra.solvers.factorization import factorize, lower_triangle
+from cms.linear_algebra.solvers.factorization import factorize, lower_triangle, matrix_of
 from cms.linear_algebra.solvers.pardiso import CHUNK, mkl_runtime
 from cms.linear_algebra.solvers.superlu import SuperLuFactor
 from fe_models.body.couplings.couplings import couple
@@ -302,7 +302,7 @@ def test_rows_on_many_ranks_stay_there_for_a_solver_that_takes_them():
         x = factorization.solve(np.ones(len(A.index)))
     assert sum(seen) == len(A.index)
     assert min(seen) > 0
-    assert_allclose(A.cut() @ x, 1.0, rtol=0, atol=1e-8)
+    assert_allclose(matrix_of(A) @ x, 1.0, rtol=0, atol=1e-8)
 
 
 def test_a_spread_matrix_that_is_not_definite_is_refused():

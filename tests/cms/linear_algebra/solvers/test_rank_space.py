@@ -45,7 +45,7 @@ def space(request, pencil, monkeypatch):
         return own_rows(ranks, rows, None if b is None else solve(b))
 
     monkeypatch.setattr("cms.linear_algebra.solvers.slepc_modes.solved_rows", solved)
-    monkeypatch.setattr(factorization, "_factor", Stand(request.param, K))
+    monkeypatch.setattr(factorization, "factor", Stand(request.param, K))
     return RankSpace(factorization.factor)
 
 

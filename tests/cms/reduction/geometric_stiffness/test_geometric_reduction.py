@@ -13,7 +13,7 @@ from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.frames import BuckensFrame, NodalFrame, TisserandFrame, frame_condition
 from cms.reduction.basis.node_motion import reference_motion
 from cms.reduction.geometric_stiffness.geometric_reduction import reduced_geometric_stiffness
-from cms.reduction.geometric_stiffness.unit_loads import balanced, spread_forces, unit_loads
+from cms.reduction.geometric_stiffness.unit_states import balanced, spread_forces, unit_loads
 from fe_models.assembly.planar import planar
 from fe_models.body.mass_loads import MassLoads
 from fe_models.body.material import Material

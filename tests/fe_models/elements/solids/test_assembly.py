@@ -11,12 +11,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skfem.helpers import ddot, dot, eye, sym_grad, trace
 
 import fe_models.elements.solids.assembly as assembly
+import fe_models.foundation.threads as threads
 from fe_models.elements.solids.assembly import assemble, expand_scalar_mass
 from fe_models.elements.solids.elements import quadrature, reference_element
 from fe_models.errors import MeshError
-from fe_models.meshes.cell_shapes import shape_values
+from fe_models.meshes.cell_shapes import shape_values, skfem_node_order
 from fe_models.meshes.mesh import SOLID_TYPES, Mesh
-from fe_models.meshes.skfem_cells import skfem_node_order
 from tests.bodies import ALUMINIUM, STEEL, box_mesh, distorted
 
 ROUNDOFF = 1e-12
@@ -220,7 +220,8 @@ def test_matrices_are_symmetric_and_repeat_bit_for_bit_whatever_the_threads_and_
     K, M_s = assembled(mesh)
     assert_array_equal((K - K.T).data, 0)
     assert_array_equal((M_s - M_s.T).data, 0)
-    monkeypatch.setattr(assembly, "n_threads", lambda: 5)
+    for module in (assembly, threads):
+        monkeypatch.setattr(module, "n_threads", lambda: 5)
     monkeypatch.setattr(assembly, "BATCH_BYTES", 1e5)
     K_5, M_5 = assembled(mesh)
     for one, other in ((K, K_5), (M_s, M_5)):

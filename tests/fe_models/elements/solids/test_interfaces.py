@@ -6,9 +6,8 @@ from fe_models.body.fe_body import Interface
 from fe_models.elements.solids.interfaces import check_overlap, distributing_interface, nodes_interface, rigid_interface
 from fe_models.errors import InterfaceError
 from fe_models.meshes.cell_shapes import CELL_SHAPES
-from fe_models.meshes.mesh import Mesh
+from fe_models.meshes.mesh import Mesh, drop_unused_nodes
 from fe_models.meshes.selections import Box, Cylinder, FaceGroup, NearestNode, NodeSet, Plane, selected_facets
-from fe_models.meshes.unused_nodes import drop_unused_nodes
 from tests.fe_models.small_meshes import SOLID_TYPES, cell_mesh, faced_box
 
 ROUNDOFF = 1e-12
