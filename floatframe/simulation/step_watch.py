@@ -572,8 +572,8 @@ class StepWatch:
             ]
         except (KeyError, ValueError) as error:
             raise ResultsError("restart: the record has no data of the step watch; run it anew") from error
-        rate, self.total, self.size, self.turn, error = arrays[:5]
-        self.error = error if error.size else None
+        rate, self.total, self.size, self.turn, apart = arrays[:5]
+        self.error = apart if apart.size else None
         self.error_per_step, self.initial_state = None if np.isnan(rate).any() else rate, State(*arrays[5:])
         self.note = next((note for note in notes if note.kind == "steps"), None)
 
