@@ -428,7 +428,10 @@ class StepWatch:
         """Remove the companion, and add the error that it has found; return this error, None if there is none."""
         other, self.companion = self.companion, None
         coarse, self.coarse = self.coarse, None
-        if other is None or other.at == other.start:
+        if other is None or other.at == other.start:  # what the first step alone has found counts nevertheless
+            first = np.zeros_like(self.total)
+            first[:, :, 0] = self.first_error
+            self.total, self.first_error = self.total + first, 0.0
             return None
         factors = by_observed_order(other, coarse, self.coarse_fails)
         found = np.stack([other.peak, other.speeds(h)], axis=2) * factors[:, :, None]
@@ -496,7 +499,7 @@ class StepWatch:
                 self.update_size(halves.begin.state, end.state, h * (n_done - halves.start))
                 self.companion = other = halves
         found = self.close_companion(h)
-        if self.error_per_step is None:
+        if self.error_per_step is None and not self.total.any():
             return None
         self.add_unwatched_steps(n_done, self.error_per_step)
         if other is not None and found is not None:

@@ -266,3 +266,13 @@ def test_a_motion_that_is_wrong_says_so(name, caplog):
     ]
     error = abs(value - exact) / abs(exact)
     assert error <= WRONG_BY or told, f"{name}: expected {exact:.6g}, got {value:.6g} in silence"
+
+
+def test_an_error_of_the_first_step_is_told_though_half_steps_fail_after_it():
+    """A hinge damper stops a turning rod within the first step, which leads 0.06 rad too far of 0.15 in all."""
+    joint = ff.RevoluteJoint("hinge", at("ground"), Marker("b", "start"), axis=(0, 0, 1))
+    damper = JointForce("damper", "hinge", "angle", damping=50.0)
+    body = ff.FlexibleBody("b", rod(cms.NodalFrame("start")), stiffening=False, omega_B=(0, 0, 10))
+    system = System([body], [joint], [ff.Gravity((0, -9.81, 0)), damper])
+    motion = ff.integrate(system, GeneralizedAlpha(0.5), 0.1, 1e-2)
+    assert [note.largest for note in motion.validity if note.kind == "steps"] > [0.2]
