@@ -10,6 +10,7 @@ from cms.cli.console import commands, guarded, register, say
 from cms.cli.info import info_command, print_body
 from cms.cli.modes import view_command
 from cms.cli.reduce import Fleet, reduce_and_write_fleet, reduce_command
+from cms.cli.schema import schema_command_of
 from cms.cli.show import show_command
 
 __all__ = ["app"]
@@ -577,5 +578,14 @@ register(
             "formats": formats_command,
         },
         "Look": {"info": info_command, "view": view_command},
+        "Set up": {
+            "schema": schema_command_of(
+                {
+                    "job": "cms.jobs.job:Job",
+                    "correlation": "cms.jobs.studies.correlation_file:CorrelationFile",
+                    "recovery": "cms.jobs.tables.recovery_section:RecoveryFile",
+                }
+            ),
+        },
     },
 )

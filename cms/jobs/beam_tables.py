@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, StringConstraints, model_validator
 
 from fe_models.foundation.arrays import MOTION_COMPONENTS as COMPONENTS
-from fe_models.foundation.toml_file import Matrix3, Table, Vector3, choice, names
+from fe_models.foundation.toml_file import Matrix3, Names, Table, Vector3, choice, names
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["PLANES", "SHAPE_KEYS", "BeamSection", "LinkSection", "MassSection", "SpringSection", "TieSection"]
@@ -71,9 +71,7 @@ class BeamSection(Table):
     shape: choice("shape", lambda: tuple(SHAPE_KEYS)) = Field(  # type: ignore[valid-type]
         description=f"one of {', '.join(SHAPE_KEYS)}"
     )
-    lines: Annotated[tuple[str, ...], BeforeValidator(names)] = Field(
-        ("all",), description='"all", the name of a group of lines, or a list of names'
-    )
+    lines: Names = Field(("all",), description='"all", the name of a group of lines, or a list of names')
     material: Name | None = Field(None, description="the name of a material; default: the only one")
     radius: Positive | None = Field(None, description="a number above 0, the outer radius")
     thickness: Positive | None = Field(None, description="a number above 0, of the wall of a tube")
@@ -90,7 +88,7 @@ class BeamSection(Table):
     shear_center: numbers(2) | None = Field(  # type: ignore[valid-type]
         None, description="[y, z] of the shear centre from the centroid"
     )
-    outline: Annotated[tuple[Pair, ...], BeforeValidator(polygon)] | None = Field(
+    outline: Annotated[tuple[Pair, ...], BeforeValidator(polygon, json_schema_input_type=Any)] | None = Field(
         None, description="a polygon [[y, z], ...], anticlockwise"
     )
     orientation: Vector3 | None = Field(None, description="a vector towards the local y axis, [x, y, z]")
@@ -125,7 +123,7 @@ class MassSection(Table):
 
     node: Name | NodeNumber = Field(description="the name of a group that holds one node, or a node number")
     mass: Annotated[float, Field(ge=0)] = Field(description="a number, 0 or more")
-    inertia: Annotated[Any, BeforeValidator(inertia_numbers)] = Field(
+    inertia: Annotated[Any, BeforeValidator(inertia_numbers, json_schema_input_type=Any)] = Field(
         0.0, description="about the centre of mass: one number, three principal values, or three rows of three"
     )
     offset: Vector3 | None = Field(None, description="from the node to the centre of mass, [x, y, z]")
@@ -134,7 +132,7 @@ class MassSection(Table):
 class SpringSection(Table):
     """[springs.NAME]: a spring between two nodes."""
 
-    nodes: Annotated[tuple[str, ...], BeforeValidator(names), Field(min_length=2, max_length=2)] = Field(
+    nodes: Annotated[Names, Field(min_length=2, max_length=2)] = Field(
         description="two names of groups that hold one node each"
     )
     stiffness: numbers(6) = Field(  # type: ignore[valid-type]
@@ -151,10 +149,8 @@ class LinkSection(Table):
     """[links.NAME]: nodes that move rigidly with one node."""
 
     node: Name = Field(description="the name of a group that holds one node, which leads")
-    followers: Annotated[tuple[str, ...], BeforeValidator(names)] = Field(
-        description="the name of a group of nodes, or a list of names"
-    )
-    components: Annotated[tuple[int, ...], BeforeValidator(component_numbers)] = Field(
+    followers: Names = Field(description="the name of a group of nodes, or a list of names")
+    components: Annotated[tuple[int, ...], BeforeValidator(component_numbers, json_schema_input_type=Any)] = Field(
         tuple(range(6)), description="with a deck: components that follow, ux to rz; default: all"
     )
 

@@ -8,7 +8,7 @@ from cms.jobs.beam_tables import component_numbers
 from cms.jobs.shell_tables import check_layups
 from fe_models.elements.solids.elements import INTEGRATIONS, MASSES
 from fe_models.foundation.arrays import MOTION_COMPONENTS as COMPONENTS
-from fe_models.foundation.toml_file import Table, choice, is_no_number, names
+from fe_models.foundation.toml_file import Names, Table, choice, is_no_number
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = [
@@ -41,16 +41,14 @@ def equation_terms(value: Any) -> tuple[tuple[str, int, float], ...]:
     return tuple(made)
 
 
-Components = Annotated[tuple[int, ...], BeforeValidator(component_numbers)]
+Components = Annotated[tuple[int, ...], BeforeValidator(component_numbers, json_schema_input_type=Any)]
 ALL = tuple(range(6))
 
 
 class SolidSection(Table):
     """[solids.NAME]: material and formulation of a group of solid cells."""
 
-    cells: Annotated[tuple[str, ...], BeforeValidator(names)] = Field(
-        ("all",), description='"all", the name of a group of cells, or a list of names'
-    )
+    cells: Names = Field(("all",), description='"all", the name of a group of cells, or a list of names')
     material: Name | None = Field(None, description="the name of a material; default: the only one")
     integration: choice("integration", lambda: (*INTEGRATIONS, "incompatible")) = Field(  # type: ignore[valid-type]
         "full", description=f"of the stiffness, one of {', '.join((*INTEGRATIONS, 'incompatible'))}"
@@ -71,15 +69,13 @@ def member_weight(value: Any) -> float | tuple[float, ...]:
 class RodSection(Table):
     """[rods.NAME]: lines with axial force only (trusses)."""
 
-    lines: Annotated[tuple[str, ...], BeforeValidator(names)] = Field(
-        description="the name of a group of lines, or a list of names"
-    )
+    lines: Names = Field(description="the name of a group of lines, or a list of names")
     material: Name | None = Field(None, description="the name of a material; default: the only one")
     area: Annotated[float, Field(gt=0)] = Field(description="a number above 0 [length^2]")
 
 
 SixWeights = tuple[float, float, float, float, float, float]  #: for ux uy uz rx ry rz
-MemberWeight = Annotated[float | SixWeights, BeforeValidator(member_weight)]
+MemberWeight = Annotated[float | SixWeights, BeforeValidator(member_weight, json_schema_input_type=Any)]
 
 
 class CouplingSection(Table):
@@ -96,9 +92,9 @@ class CouplingSection(Table):
 class EquationSection(Table):
     """[equations.NAME]: Σ coefficient × component = 0."""
 
-    terms: Annotated[tuple[tuple[str, int, float], ...], BeforeValidator(equation_terms)] = Field(
-        description='two or more terms [group of one node, component, coefficient], as ["node_7", "ux", 1.0]'
-    )
+    terms: Annotated[
+        tuple[tuple[str, int, float], ...], BeforeValidator(equation_terms, json_schema_input_type=Any)
+    ] = Field(description='two or more terms [group of one node, component, coefficient], as ["node_7", "ux", 1.0]')
 
 
 def check_deck(job: Any) -> None:

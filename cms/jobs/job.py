@@ -13,6 +13,7 @@ from cms.jobs.beam_tables import (
     BeamSection,
     LinkSection,
     MassSection,
+    Names,
     SpringSection,
     TieSection,
     check_beams,
@@ -129,12 +130,11 @@ def elements_named(value: Any) -> tuple[Any, ...]:
 
 
 FileOfTheJob = Annotated[Path, BeforeValidator(beside_the_job)]
-Keep = Annotated[tuple[Any, ...], BeforeValidator(nodes_to_keep)]
-StressPoints = Annotated[tuple[Any, ...], BeforeValidator(elements_named)]
-Names = Annotated[tuple[str, ...], BeforeValidator(names)]
-Nodes = Annotated[Name | tuple[int, ...], BeforeValidator(node_names)]
+Keep = Annotated[tuple[Any, ...], BeforeValidator(nodes_to_keep, json_schema_input_type=Any)]
+StressPoints = Annotated[tuple[Any, ...], BeforeValidator(elements_named, json_schema_input_type=Any)]
+Nodes = Annotated[Name | tuple[int, ...], BeforeValidator(node_names, json_schema_input_type=Any)]
 FACES = "the name of a group of faces, of a CAD file also what they are (cylinder r=12), or a list of these"
-Accepted = Annotated[tuple[str, ...], BeforeValidator(accepted)]
+Accepted = Annotated[tuple[str, ...], BeforeValidator(accepted, json_schema_input_type=Any)]
 
 
 class PartSection(Table):

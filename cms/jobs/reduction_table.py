@@ -132,14 +132,14 @@ def workers_key(value: Any) -> int | str:
         raise ValueError(str(error).partition(": ")[2]) from None
 
 
-WorkersKey = Annotated[int | str, BeforeValidator(workers_key)]
-Components = Annotated[tuple[str, ...], BeforeValidator(components)]
-Amount = Annotated[tuple[float, float, float], BeforeValidator(amount)]
-AmountOrMatrix = Annotated[Rows, BeforeValidator(amount_or_matrix)]
-CountOrAuto = Annotated[int | str, BeforeValidator(count_or_auto)]
+WorkersKey = Annotated[int | str, BeforeValidator(workers_key, json_schema_input_type=Any)]
+Components = Annotated[tuple[str, ...], BeforeValidator(components, json_schema_input_type=Any)]
+Amount = Annotated[tuple[float, float, float], BeforeValidator(amount, json_schema_input_type=Any)]
+AmountOrMatrix = Annotated[Rows, BeforeValidator(amount_or_matrix, json_schema_input_type=Any)]
+CountOrAuto = Annotated[int | str, BeforeValidator(count_or_auto, json_schema_input_type=Any)]
 Count = Annotated[int, Field(ge=0)]
-Shifts = Annotated[tuple[float, ...], BeforeValidator(shift_list)]
-Places = Annotated[tuple[str, ...], BeforeValidator(places)]
+Shifts = Annotated[tuple[float, ...], BeforeValidator(shift_list, json_schema_input_type=Any)]
+Places = Annotated[tuple[str, ...], BeforeValidator(places, json_schema_input_type=Any)]
 
 
 def memory_size(value: Any) -> Any:
@@ -150,8 +150,8 @@ def memory_size(value: Any) -> Any:
     return value
 
 
-Memory = Annotated[str, BeforeValidator(memory_size)]
-Extras = Annotated[tuple[str, ...], BeforeValidator(extras)]
+Memory = Annotated[str, BeforeValidator(memory_size, json_schema_input_type=Any)]
+Extras = Annotated[tuple[str, ...], BeforeValidator(extras, json_schema_input_type=Any)]
 
 
 class LoadSection(Table):
@@ -218,7 +218,7 @@ def is_dof(node: Any, component: Any) -> bool:
     return type(node) is int and type(component) is int and node >= 0 and 0 <= component <= 5
 
 
-HeldDofs = Annotated[tuple[tuple[int | str, int | str], ...], BeforeValidator(held_dofs)]
+HeldDofs = Annotated[tuple[tuple[int | str, int | str], ...], BeforeValidator(held_dofs, json_schema_input_type=Any)]
 
 
 class ReductionSection(Table):
@@ -415,11 +415,11 @@ class DampingSection(Table):
     """[damping]: ratios of the modes, or Rayleigh damping."""
 
     ratio: Ratio | None = Field(None, description="a number, 0 to 1, of critical damping (0.01 is 1 %)")
-    ratios: Annotated[tuple[float, ...], BeforeValidator(ratio_list)] | None = Field(
+    ratios: Annotated[tuple[float, ...], BeforeValidator(ratio_list, json_schema_input_type=Any)] | None = Field(
         None, description="a list of numbers, 0 to 1, of critical damping, one per mode"
     )
-    ramp: Annotated[tuple[tuple[float, float], ...], BeforeValidator(ramp_steps)] | None = Field(
-        None, description="true, or pairs [frequency in Hz, ratio below it]"
+    ramp: Annotated[tuple[tuple[float, float], ...], BeforeValidator(ramp_steps, json_schema_input_type=Any)] | None = (
+        Field(None, description="true, or pairs [frequency in Hz, ratio below it]")
     )
     above: Ratio | None = Field(None, description="a number, 0 to 1, the ratio above the last step of the ramp")
     alpha: Coefficient | None = Field(None, description="a number, 0 or more, of D = alpha M + beta K")

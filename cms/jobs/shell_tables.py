@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, StringConstraints
+from pydantic import Field, StringConstraints
 
 from cms.jobs.beam_tables import BeamSection
-from fe_models.foundation.toml_file import Table, Vector3, names
+from fe_models.foundation.toml_file import Names, Table, Vector3
 from fe_models.foundation.words import nearest
 
 __all__ = ["LayerTable", "ShellSection", "check_layups", "check_shells"]
@@ -41,9 +41,7 @@ class ShellSection(Table):
         None, description="rows of the transverse shear stiffness over Q_x Q_y; belongs to stiffness"
     )
     symmetric: bool = Field(False, description="true: the layers listed are the lower half, their mirror image follows")
-    cells: Annotated[tuple[str, ...], BeforeValidator(names)] = Field(
-        ("all",), description='"all", the name of a group of cells, or a list of names'
-    )
+    cells: Names = Field(("all",), description='"all", the name of a group of cells, or a list of names')
     material: Name | None = Field(None, description="the name of a material; default: the only one")
     offset: float = Field(0.0, description="a number, of the middle surface from the nodes along the normal")
     added_mass: Annotated[float, Field(ge=0)] = Field(0.0, description="a number, 0 or more [mass / length^2]")

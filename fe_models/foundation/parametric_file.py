@@ -22,10 +22,10 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from fe_models.foundation.toml_file import FileContent, Location, changed, key_path, quoted_value, read_toml
+from fe_models.foundation.toml_file import FileContent, Location, Table, changed, key_path, quoted_value, read_toml
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["read_parametric"]
+__all__ = ["json_schema", "read_parametric"]
 
 log = logging.getLogger(__name__)
 
@@ -78,6 +78,31 @@ def read_parametric(path: Path, error: type[Exception], changes: Mapping[str, An
                 raise error(f"{path}: there is no parameter {quoted(key)}{nearest(key, given)}")
         return changed(result, changes, str(path), error)
     return result
+
+
+def json_schema(model: type[Table], *, is_parametric: bool) -> dict[str, Any]:
+    """Return the JSON schema of the files of a model, with which editors complete keys and show their meanings.
+
+    In a parametric file, every value may be a text with an expression, every table may be repeated, and
+    `[parameters]` and `extends` are keys of the file.
+    """
+    schema = model.model_json_schema()
+    if not is_parametric:
+        return schema
+    for table in (schema, *schema.get("$defs", {}).values()):
+        for name, value in table.get("properties", {}).items():
+            if name != "kind":
+                table["properties"][name] = {
+                    "description": value.get("description", ""),
+                    "anyOf": [value, {"type": "string", "pattern": r"\{.+\}"}],
+                }  # fmt: skip
+        if table is not schema and "properties" in table:
+            table["properties"]["repeat"] = {"description": "a count, a table of names with counts or lists, or rows"}
+    schema["properties"]["parameters"] = {"type": "object", "description": "values and expressions by name"}
+    schema["properties"]["extends"] = {
+        "type": ["string", "array"], "description": "a file over which this one is merged, or several"
+    }  # fmt: skip
+    return schema
 
 
 # Step 1: files that a file extends -----------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ the key path, the value found, and that description.
 import copy
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
@@ -18,8 +19,8 @@ from fe_models.foundation.paths import is_stream, near_file
 from fe_models.foundation.words import nearest, quoted, shortened
 
 __all__ = [
-    "KINDS", "FileContent", "Location", "Matrix3", "Range", "Table", "Vector3", "changed", "choice", "describe",
-    "files_named", "first_key", "kind_field", "names", "read_toml", "validated", "value_of",
+    "KINDS", "FileContent", "Location", "Matrix3", "Names", "Range", "Table", "Vector3", "changed", "choice",
+    "describe", "files_named", "first_key", "kind_field", "names", "read_toml", "validated", "value_of",
 ]  # fmt: skip
 
 
@@ -236,6 +237,17 @@ def kind_field(kind: str) -> Any:
     return Field(kind, description=f'the kind of the file, "{kind}"')
 
 
+@dataclass(frozen=True)
+class Enumeration:
+    """The choices of a key, for its JSON schema."""
+
+    choices: Callable[[], Sequence[str]]
+
+    def __get_pydantic_json_schema__(self, core_schema: Any, handler: Any) -> dict[str, Any]:
+        """Return the schema of the key."""
+        return {"type": "string", "enum": list(self.choices())}
+
+
 def choice(what: str, choices: Callable[[], Sequence[str]]) -> Any:
     """Return the type of a string that must be one of the choices; the message suggests the nearest choice."""
 
@@ -245,7 +257,7 @@ def choice(what: str, choices: Callable[[], Sequence[str]]) -> Any:
             raise ValueError(f"unknown {what}{nearest(str(value), names)}")
         return value
 
-    return Annotated[str, BeforeValidator(check)]
+    return Annotated[str, BeforeValidator(check), Enumeration(choices)]
 
 
 def names(value: Any) -> Any:
@@ -254,6 +266,9 @@ def names(value: Any) -> Any:
     if not isinstance(words, list | tuple) or not words or not all(isinstance(w, str) and w for w in words):
         raise ValueError('expected the name of a group, or a list of names: "a" or ["a", "b"]')
     return tuple(words)
+
+
+Names = Annotated[tuple[str, ...], BeforeValidator(names, json_schema_input_type=str | tuple[str, ...])]
 
 
 def numbers(value: Any, count: int = 3) -> tuple[float, ...]:

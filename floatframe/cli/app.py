@@ -28,6 +28,7 @@ from cms.cli.console import (
     say,
     stages,
 )
+from cms.cli.schema import schema_command_of
 from cms.cli.show import show_command
 
 if TYPE_CHECKING:
@@ -591,6 +592,18 @@ register(
             "fmu": exchange.fmu_command,
             "generate": exchange.generate_command,
         },
-        "Set up": {"prepare": prepare.prepare_command},
+        "Set up": {
+            "prepare": prepare.prepare_command,
+            "schema": schema_command_of(
+                {
+                    "system": "floatframe.files.system_file.read_system:SystemFile",
+                    "sweep": "floatframe.design.studies.study_file:StudyFile",
+                    "optimization": "floatframe.design.optimization.design_file:DesignFile",
+                    "laboratory": "floatframe.design.laboratory.laboratory_file:LaboratoryFile",
+                    "shake": "floatframe.durability.shaking.shake_file:ShakeFile",
+                    "fatigue": "floatframe.durability.fatigue.fatigue_file:FatigueFile",
+                }
+            ),
+        },
     },
 )

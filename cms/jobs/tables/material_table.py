@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import BeforeValidator, Field, model_validator
 
 from cms.errors import JobError
-from fe_models.foundation.toml_file import Matrix3, Table, is_no_number, names
+from fe_models.foundation.toml_file import Matrix3, Names, Table, is_no_number
 
 if TYPE_CHECKING:
     from fe_models.body.material import AnyMaterial, Material
@@ -51,20 +51,24 @@ def tensor(value: Any) -> Tensor:
     return tuple(tuple(float(x) for x in row) for row in value)
 
 
+Moduli = Annotated[float | Three, BeforeValidator(moduli, json_schema_input_type=Any)]
+Ratios = Annotated[float | Three, BeforeValidator(ratios, json_schema_input_type=Any)]
+ShearModuli = Annotated[Three, BeforeValidator(shear_moduli, json_schema_input_type=Any)]
+Elasticity = Annotated[Tensor, BeforeValidator(tensor, json_schema_input_type=Any)]
+
+
 class MaterialSection(Table):
     """[materials.NAME]: a material, and the cells that have it."""
 
-    young: Annotated[float | Three, BeforeValidator(moduli)] | None = Field(None, description=YOUNG)
-    poisson: Annotated[float | Three, BeforeValidator(ratios)] | None = Field(None, description=POISSON)
-    shear: Annotated[Three, BeforeValidator(shear_moduli)] | None = Field(None, description=SHEAR)
-    elasticity: Annotated[Tensor, BeforeValidator(tensor)] | None = Field(None, description=ELASTICITY)
+    young: Moduli | None = Field(None, description=YOUNG)
+    poisson: Ratios | None = Field(None, description=POISSON)
+    shear: ShearModuli | None = Field(None, description=SHEAR)
+    elasticity: Elasticity | None = Field(None, description=ELASTICITY)
     axes: Matrix3 | None = Field(
         None, description="the axes 1, 2, 3 of the material in mesh axes, three rows; default: the mesh axes"
     )
     density: Annotated[float, Field(ge=0)] = Field(description="a number, 0 or more, the density [mass / length^3]")
-    cells: Annotated[tuple[str, ...], BeforeValidator(names)] = Field(
-        ("all",), description='"all", the name of a group of cells, or a list of names'
-    )
+    cells: Names = Field(("all",), description='"all", the name of a group of cells, or a list of names')
 
     @model_validator(mode="after")
     def _one_kind(self) -> "MaterialSection":

@@ -28,7 +28,7 @@ def component_names(value: Any) -> tuple[str, ...]:
     return tuple(values)
 
 
-Places = Annotated[tuple[str | int, ...], BeforeValidator(places)]
+Places = Annotated[tuple[str | int, ...], BeforeValidator(places, json_schema_input_type=Any)]
 
 
 class RowsSection(Table):
@@ -38,7 +38,7 @@ class RowsSection(Table):
         description=f"kind of the rows, one of {', '.join(QUANTITIES)}"
     )
     at: Places = Field((), description="numbers or names of nodes, elements, sets, interfaces; default: all there are")
-    components: Annotated[tuple[str, ...], BeforeValidator(component_names)] = Field(
+    components: Annotated[tuple[str, ...], BeforeValidator(component_names, json_schema_input_type=Any)] = Field(
         (), description="names of components, such as uz or xx; default: all"
     )
     about: Vector3 | None = Field(None, description="of net forces: the point [x, y, z]")

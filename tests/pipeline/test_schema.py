@@ -1,0 +1,68 @@
+"""JSON schemas of all kinds of files: valid, complete, and true of the files that are shipped."""
+
+import json
+import tomllib
+
+import jsonschema
+import pytest
+from typer.testing import CliRunner
+
+from cms.cli.app import app as cms_app
+from fe_models.foundation.toml_file import KINDS
+from floatframe.cli.app import app
+from tests.root import ROOT
+
+SHIPPED = sorted(path for room in ("cms", "floatframe") for path in (ROOT / room).rglob("*.toml"))
+PROGRAMS = {"cms": cms_app, "floatframe": app}
+
+
+@pytest.fixture(scope="module")
+def schemas():
+    """Return the schema of every kind, as the command prints it."""
+    found = {}
+    for kind, command in KINDS.items():
+        result = CliRunner().invoke(PROGRAMS[command.split()[0]], ["schema", kind])
+        assert result.exit_code == 0, result.output
+        found[kind] = json.loads(result.stdout)
+    return found
+
+
+def kind_of(content):
+    """Return the kind of a shipped file, by a table that no other kind has."""
+    marks = {"body": "job", "bodies": "system", "objectives": "optimization", "cases": "laboratory"}
+    return next(kind for mark, kind in marks.items() if mark in content)
+
+
+def test_every_schema_is_valid_and_describes_its_keys(schemas):
+    for kind, schema in schemas.items():
+        jsonschema.Draft202012Validator.check_schema(schema)
+        bare = [name for name, value in schema["properties"].items() if not value.get("description")]
+        assert bare == [], kind
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: str(path.relative_to(ROOT)))
+def test_shipped_files_fit_their_schema(schemas, path):
+    content = tomllib.loads(path.read_text())
+    jsonschema.validate(content, schemas[kind_of(content)])
+
+
+def test_a_schema_refuses_what_the_reader_refuses(schemas):
+    content = {"system": {"units": "m-kg-s"}, "bodies": {"rod": {"mass": 1.0}}, "run": {"t_end": 1.0, "h": 1e-3}}
+    jsonschema.validate(content, schemas["system"])
+    for table, key, value in (("run", "scheme", "newmrk"), ("run", "h", -1.0), ("system", "unit", "m-kg-s")):
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate({**content, table: {**content[table], key: value}}, schemas["system"])
+
+
+def test_a_schema_knows_parameters_and_repeat(schemas):
+    content = {
+        "extends": "base.toml", "parameters": {"n": 3}, "system": {"units": "m-kg-s"},
+        "bodies": {"rod": {"repeat": "{n}", "mass": "{2.0 * i}"}},
+    }  # fmt: skip
+    jsonschema.validate(content, schemas["system"])
+
+
+def test_an_unknown_kind_is_refused_with_the_nearest():
+    result = CliRunner().invoke(app, ["schema", "sytem"])
+    assert result.exit_code == 2
+    assert "did you mean 'system'?" in result.stderr
