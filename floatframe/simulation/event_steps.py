@@ -194,7 +194,7 @@ class EventWatch:
                 raise ModelError(f"event {event.name!r}: column: expected one of {', '.join(found)}, got {name!r}")
             columns.append(found[name])
         values = np.array(columns).T
-        self.largest = np.maximum(self.largest, np.abs(values).max(axis=0))
+        self.largest = np.maximum(self.largest, np.abs(values).max(axis=0, initial=0.0))
         return values
 
     def in_files(self, row: Rows) -> Rows:

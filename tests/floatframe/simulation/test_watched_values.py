@@ -1,11 +1,14 @@
 """What events take straight from a run against the sensors; memories that a run keeps against runs that end there."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from floatframe import (
     GROUND,
+    ConvergenceError,
     EnergyMomentum,
     Event,
     FlexibleBody,
@@ -48,6 +51,14 @@ def test_an_angle_of_the_run_is_that_of_the_sensor(method, joint):
     expected = joint_coordinate(system, motion, joint, "angle").value
     assert np.abs(expected).max() > (np.pi if joint == "hinge" else 1.0)
     assert_allclose(watched(rows), expected, rtol=0, atol=1e-12)
+
+
+def test_a_first_step_that_fails_under_a_watched_event_is_told_as_such():
+    """No row of results exists then; the search for passed levels found its largest value among none."""
+    system = double_pendulum(forces=[JointForce("drive", "hinge", "angle", preload=1e9)])
+    system = replace(system, events=[Event("far", "hinge.angle", level=1e6, stop=True)])
+    with pytest.raises(ConvergenceError, match="step"):
+        integrate(system, GeneralizedAlpha(), 3.0, 0.5, output_every=3)
 
 
 def test_what_a_run_does_not_count_is_left_to_the_sensors():
