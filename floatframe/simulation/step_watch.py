@@ -133,7 +133,7 @@ class Companion:
         none = np.zeros((len(memory.r), 2, 3))
         method, begin, share = integrator_of(integrator, ratio), memory, ERROR_SHARE[ratio]
         if is_light:
-            method, share = lighter(integrator, share)
+            method, share = lighter(method, share)
         if h and memory.h and isinstance(method, GeneralizedAlpha | RelativeGeneralizedAlpha) and method.h_min is None:
             method, begin = replace(method, h_min=h), memory.changed(h_next=ratio * h)  # without a new start
         own = None if events is None else events.copied()

@@ -322,6 +322,22 @@ def test_an_error_tolerance_that_is_too_large_for_a_small_motion_is_told(toleran
     assert all("take an error_tolerance of about" in note.words for note in motion.validity)
 
 
+def test_companions_of_a_run_with_an_error_tolerance_have_another_one(monkeypatch):
+    """Eight times for double steps, an eighth for half steps; with that of the run they are the run, and blind."""
+    made = []
+
+    def begun(integrator, *arguments, **options):
+        companion = begin(integrator, *arguments, **options)
+        made.append((companion.ratio, companion.integrator.error_tolerance))
+        return companion
+
+    begin = Companion.begun
+    monkeypatch.setattr(Companion, "begun", begun)
+    integrate(two_bars(0.3), GeneralizedAlpha(0.8, error_tolerance=1e-3), 2.0, 0.05)
+    assert {ratio for ratio, _ in made} == {0.5, 2.0}
+    assert all(np.isclose(tolerance, 1e-3 * ratio**3, rtol=1e-12, atol=0) for ratio, tolerance in made)
+
+
 def test_a_motion_that_gains_energy_stops_with_what_was_reached():
     with pytest.raises(ConvergenceError, match="of the energy in the motion comes from the steps") as caught:
         integrate(growing(), FRESH, 4.0, 0.05)
