@@ -19,6 +19,7 @@ ROUNDING = 1e3 * np.finfo(float).eps  #: of the Gram matrix about the origin of 
 ALIKE = 10.0  #: negativity of a body in another frame, or of some of its shapes, relative to that of the model
 LEAST_NODES = 60  #: smallest number of nodes that can represent the mass of a body
 EVEN = 0.3  #: weight of equal masses beside the second moment
+FAR_OFF = 4.0  #: ratio of moments by masses at the kept nodes and of the file above which these are not its mass
 CLEAR = 0.1  #: smallest moment whose direction is judged, relative to the largest that the mass could have
 
 
@@ -53,6 +54,10 @@ def check_moments_of_shapes(reduced: ReducedBody) -> QualityRecord:
     (2) compute P of each mode, and S_kl without its trace, of these masses
     (3) compute the cosine between these moments and those of the file, if both are at least `CLEAR` of the largest that
         the mass could have
+
+    Where the P of all modes together are larger or smaller than those of the file by `FAR_OFF`, the mass lies elsewhere
+    (a point mass on a light frame), and nothing is judged. Sound bodies have ratios of 0.9 to 3.2, bodies with a wrong
+    sign too.
     """
     moments, nodes = reduced.moments, np.asarray(reduced.nodes)
     if moments.missing or len(nodes) < LEAST_NODES or not reduced.n_q:
@@ -65,6 +70,9 @@ def check_moments_of_shapes(reduced: ReducedBody) -> QualityRecord:
     Phi = np.asarray(reduced.Phi)
     own = moments.P - np.einsum("a,bk->abk", moments.center_of_mass, moments.C1)
     made = np.einsum("i,ia,ibk->abk", weights, c, Phi, optimize=True)
+    ratio = np.linalg.norm(made) / max(float(np.linalg.norm(own)), np.finfo(float).tiny)
+    if not 1 / FAR_OFF < ratio < FAR_OFF:
+        return information("moments-shapes", f"masses at the kept nodes have {ratio:.2g} times the moments of the file")
     found: dict[str, float] = {}
     for k, cosine in enumerate(cosines(own.reshape(9, -1) / size, made.reshape(9, -1) / size)):
         if np.isfinite(cosine):
