@@ -170,6 +170,20 @@ def test_a_bush_says_whose_axes_it_takes_unasked(tmp_path, bush, axes):
     assert all(axes in why for why in told)
 
 
+@pytest.mark.parametrize("orientation", ["12", "2.,-1.,.5"], ids=["grid", "vector"])
+def test_axes_of_a_bush_lie_along_it_and_towards_its_orientation(tmp_path, orientation):
+    """From (1, 2, 3) to (3, 5, 9), off the origin: x is (2, 3, 6)/7, z is normal to x and the orientation."""
+    grids = "GRID,10,,1.,2.,3.\nGRID,11,,3.,5.,9.\nGRID,12,,3.,1.,3.5\n"
+    lines = f"{grids}CBUSH,70,71,10,11,{orientation}\nPBUSH,71,K,1.,2.,3.,4.,5.,6."
+    deck = read_deck(deck_of(tmp_path, DECK.replace("CELAS2,70,5.+3,1,2,2,2", lines)))
+    x = np.array([2, 3, 6]) / 7
+    z = np.cross(x, [2, -1, 0.5])
+    z /= np.linalg.norm(z)
+    (spring,) = deck.springs
+    assert spring.stiffness == (1, 2, 3, 4, 5, 6)
+    assert_allclose(spring.triad, [x, np.cross(z, x), z], rtol=0, atol=1e-14)
+
+
 @pytest.mark.parametrize(
     ("law", "is_round"),
     [

@@ -86,6 +86,8 @@ def test_a_waterfall_shows_a_line_where_it_is():
     found = frequency_map(Signal("a", t, 2.0 * np.sin(2 * np.pi * 64 * t), "N"), speed, n_segment=1024)
     assert_allclose(found.amplitudes[:, found.lines == 64.0], 2.0, rtol=1e-9, atol=0)
     assert_allclose(found.speeds, 70.0, rtol=1e-12, atol=0)
+    raised = frequency_map(Signal("a", t, 7.0 + 2.0 * np.sin(2 * np.pi * 64 * t), "N"), n_segment=1024)
+    assert_allclose(raised.amplitudes, found.amplitudes, rtol=0, atol=1e-12)  # without the mean of the record
     unasked = frequency_map(Signal("a", t, 2.0 * np.sin(2 * np.pi * 64 * t), "N"), speed)
     assert_allclose(unasked.lines[1], 16 / t[-1], rtol=2e-3)  # a sixteenth of the record, which lasts 6 s
 
