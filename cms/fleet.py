@@ -15,6 +15,7 @@ from cms.jobs.job import Job, read_job
 from cms.linear_algebra.solvers.registry import solver_of
 from fe_models.foundation.digest import file_digest
 from fe_models.foundation.errors import ReportedError
+from fe_models.foundation.parametric_file import extended_files
 from fe_models.foundation.paths import file_identity, remove_parts
 from fe_models.foundation.tasks.installation import source_mark
 from fe_models.foundation.tasks.journal import TaskJournal, open_task_journal
@@ -212,8 +213,8 @@ def record_of(row: FleetRow) -> dict[str, object]:
 
 
 def inputs_of(path: Path, job: Job) -> list[Path]:
-    """Return the job file and all files that it names: meshes, tables, matrices, columns, and neighbours' files."""
-    found = [path]
+    """Return the job file and all files that it names: base files, meshes, tables, matrices, and neighbours' files."""
+    found = [path, *extended_files(path, JobError)]
     for each in files_named(job):
         found += inputs_of(each, read_job(each)) if each.suffix == ".toml" and each not in found else [each]
     return found

@@ -22,10 +22,19 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from fe_models.foundation.toml_file import FileContent, Location, Table, changed, key_path, quoted_value, read_toml
+from fe_models.foundation.toml_file import (
+    FileContent,
+    Location,
+    Table,
+    changed,
+    key_path,
+    quoted_value,
+    read_toml,
+    require_usable,
+)
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["json_schema", "read_parametric"]
+__all__ = ["extended_files", "json_schema", "read_parametric"]
 
 log = logging.getLogger(__name__)
 
@@ -57,8 +66,7 @@ def read_parametric(path: Path, error: type[Exception], changes: Mapping[str, An
     error
         With file and line, if an expression, a name, a parameter, a base file or a `repeat` is not valid.
     """
-    content, origins = merged(Path(path), error, ())
-    files = tuple(dict.fromkeys([Path(path), *(source for source, _ in origins.values())]))
+    content, origins, files = merged(Path(path), error, ())
     given = content.pop("parameters", {})
     if not isinstance(given, dict):
         raise error(f"{path}: parameters = {quoted_value(given)}: expected a table of names and values")
@@ -67,6 +75,7 @@ def read_parametric(path: Path, error: type[Exception], changes: Mapping[str, An
     resolver = Resolver(Path(path), error, {**given, **set_outside}, frozenset(set_outside), origins)
     if given or uses_repeat(content):
         content, origins = resolver.table(content, (), (), {}), resolver.resolved
+        require_usable(content, Path(path), error)
     values = {name: resolver.parameter(name) for name in given}
     result = FileContent(content, Path(path), files=files, origins=origins, parameters=values)
     unused = [name for name in given if name not in resolver.used]
@@ -105,13 +114,18 @@ def json_schema(model: type[Table], *, is_parametric: bool) -> dict[str, Any]:
     return schema
 
 
+def extended_files(path: Path, error: type[Exception]) -> tuple[Path, ...]:
+    """Return the files that a file extends, directly or not."""
+    return merged(Path(path), error, ())[2][1:]
+
+
 # Step 1: files that a file extends -----------------------------------------------------------------------------------
 
 
 def merged(
     path: Path, error: type[Exception], chain: tuple[Path, ...]
-) -> tuple[dict[str, Any], dict[Location, tuple[Path, Location]]]:
-    """Return the content of a file merged over the files that it extends, and where each key comes from."""
+) -> tuple[dict[str, Any], dict[Location, tuple[Path, Location]], tuple[Path, ...]]:
+    """Return the content of a file merged over the files that it extends, where each key comes from, and all files."""
     if path.resolve() in [each.resolve() for each in chain]:
         names = " extends ".join(each.name for each in (*chain, path))
         raise error(f"{chain[0]}: files extend each other in a circle: {names}")
@@ -122,14 +136,16 @@ def merged(
         raise error(f"{path}: extends = {quoted_value(bases)}: expected a file name, or a list of file names")
     content: dict[str, Any] = {}
     origins: dict[Location, tuple[Path, Location]] = {}
+    files = [path]
     for base in bases:
-        lower, lower_origins = merged(path.parent / base, error, (*chain, path))
+        lower, lower_origins, lower_files = merged(path.parent / base, error, (*chain, path))
+        files += lower_files
         if (path.parent / base).parent.resolve() != path.parent.resolve():
             lower = relocated(lower, (path.parent / base).parent)
         merge(content, lower, lower_origins, origins)
     own_origins = {location: (path, location) for location in locations(own)}
     merge(content, own, own_origins, origins)
-    return content, origins
+    return content, origins, tuple(dict.fromkeys(files))
 
 
 def merge(

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from fe_models.foundation.paths import is_stream, near_file
@@ -185,9 +186,10 @@ def describe(model: type[BaseModel], detail: ErrorDetails) -> str:
     location = detail["loc"]
     key = key_path(location)
     parent = table_at(model, location[:-1]) if location else None
-    field = parent.model_fields.get(str(location[-1])) if parent is not None else None
+    fields = fields_of(parent) if parent is not None else {}
+    field = fields.get(str(location[-1])) if location else None
     if detail["type"] == "extra_forbidden":
-        return f"{key}: unknown key{nearest(str(location[-1]), parent.model_fields if parent else ())}"
+        return f"{key}: unknown key{nearest(str(location[-1]), fields)}"
     expected = (field.description if field is not None else None) or "a table of keys"
     if detail["type"] == "missing":
         return f"{key}: missing; expected {expected}"
@@ -198,6 +200,11 @@ def describe(model: type[BaseModel], detail: ErrorDetails) -> str:
             f"{key} = {quoted_value(detail['input'])}: {text}" if shows_value else f"{key}: {text}".removeprefix(": ")
         )
     return f"{key} = {quoted_value(detail['input'])}: expected {expected}"
+
+
+def fields_of(model: type[BaseModel]) -> dict[str, FieldInfo]:
+    """Return the fields of a model by the keys of the file."""
+    return {field.alias or name: field for name, field in model.model_fields.items()}
 
 
 def key_path(location: Sequence[str | int]) -> str:
@@ -213,7 +220,7 @@ def table_at(model: type[BaseModel], location: Sequence[str | int]) -> type[Base
     here: Any = model
     for part in location:
         if isinstance(here, type) and issubclass(here, BaseModel):
-            field = here.model_fields.get(str(part))
+            field = fields_of(here).get(str(part))
             here = field.annotation if field is not None else None
         else:
             here = (get_args(here) or (None,))[-1]  # dict[str, Table], list[Table]

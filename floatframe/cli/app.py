@@ -90,7 +90,7 @@ def run_command(
         return
     model, given = read_system(system, changes_of(set_values))
     analyses.tell_left_out(model)
-    options = required_run(given, system)
+    options = required_run(given, system, begins_there=not model.fmus)
     integrator = options.integrator if formulation is None else in_formulation(options.integrator, formulation)
     inputs = (system, *model.files)
     path = output_path(output, system.with_suffix(".h5"), ResultsError, overwrite_of=inputs, needs_file=True)

@@ -120,13 +120,13 @@ def driven_motion(
     if elastic not in choices:
         raise ModelError(f"--elastic {elastic}: expected one of {', '.join(choices)}{nearest(elastic, choices)}")
     model, given = read_system(file, changes_of(set_values))
-    run = required_run(given, file)
+    run = required_run(given, file, begins_there=True)
     path = output_path(output, file.with_suffix(suffix), ResultsError, overwrite_of=(file, *model.files))
     with stages(remaining=True) as clock, clock(f"{model.name}: motion of the drives") as advance:
         if elastic == "dynamic":
             motion = integrate(
                 model, run.integrator, run.t_end, run.h, output=path, output_every=run.output_every,
-                progress=lambda p: advance(p.n_steps / p.n_total),
+                progress=lambda p: advance(p.n_steps / p.n_total), state=run.start_state(model),
             )  # fmt: skip
         else:
             motion = kinematics(

@@ -102,7 +102,9 @@ class System:
     scene: Sequence[Shape | Geometry] = field(default=(), kw_only=True)  #: surroundings: ground, road, track
     #: path of the system file, for the record; "": the system was made in Python
     source: str = field(default="", kw_only=True)
-    data_files: Sequence[str] = field(default=(), kw_only=True)  #: paths of the signals, tyres and roads that were used
+    data_files: Sequence[str] = field(
+        default=(), kw_only=True
+    )  #: paths of base files, signals, tyres, roads and states that were used
     #: values that replaced those in the system file, by parameter or key path
     changes: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
 

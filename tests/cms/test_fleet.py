@@ -13,7 +13,8 @@ from typer.testing import CliRunner
 import cms
 from cms.cli.app import app
 from cms.errors import JobError
-from cms.fleet import reduce_and_write_one, reduce_fleet
+from cms.fleet import fleet_of, inputs_of, reduce_and_write_one, reduce_fleet
+from cms.jobs.job import read_job
 from fe_models.foundation.tasks.workers import ThisProcess
 
 ROD = """
@@ -99,6 +100,19 @@ def test_what_is_done_is_not_done_again_until_something_changes(jobs, monkeypatc
     (jobs[0].parent / "out").mkdir()
     assert reduced("-o", str(jobs[0].parent / "out")) == "3 jobs: 3 done, 0 done before, 0 failed"
     assert (jobs[0].parent / "out" / "rod_3.h5").is_file()
+
+
+def test_a_job_is_done_again_when_a_file_that_it_extends_changes(jobs):
+    """A base whose keys were all overridden counts too: a new key in it changes the job."""
+    base = jobs[0].parent / "base.toml"
+    base.write_text(jobs[0].read_text())
+    jobs[0].write_text('extends = "base.toml"\n')
+    before = inputs_of(jobs[0], read_job(jobs[0]))
+    assert base in before
+    (first,) = fleet_of(jobs[:1], [jobs[0].with_suffix(".h5")])
+    base.write_text(base.read_text().replace("radius = 0.02", "radius = 0.03"))
+    (then,) = fleet_of(jobs[:1], [jobs[0].with_suffix(".h5")])
+    assert then.digest != first.digest
 
 
 def test_a_job_that_fails_takes_no_other_along(jobs):

@@ -191,10 +191,12 @@ def sensitivities(
 def run_of_file(path: Any, t_end: float | None, h: float | None, integrator: Integrator | None):
     """Return end, step and method of a run; missing values are taken from the file."""
     from floatframe.files.system_file.read_system import read_system
+    from floatframe.files.system_file.run_section import required_run
 
     run = read_system(path)[1]
     if run is None:
         return t_end, h, integrator
+    required_run(run, path)
     return t_end or run.t_end, h or run.h, integrator or run.integrator
 
 

@@ -239,7 +239,7 @@ def check(study: Study, point: tuple[Any, ...]) -> None:
 
     plain, run = read_system(study.system)
     if study.analysis in MOTIONS:
-        required_run(run, study.system)
+        required_run(run, study.system, begins_there=True)
     try:
         system, _ = read_system(study.system, study.changes(point))
     except ReportedError as error:
@@ -305,12 +305,15 @@ class StudyPoint:
         """Return the motion of the analysis; an equilibrium is a motion with one time."""
         if self.study.analysis == "static":
             return equilibrium_of(system, formulation_of(given))
-        return MOTIONS[self.study.analysis](system, required_run(given, self.study.system))
+        run = required_run(given, self.study.system, begins_there=True)
+        return MOTIONS[self.study.analysis](system, run)
 
 
 def motion_of_run(system: System, run: RunOptions) -> Trajectory:
     """Return the integrated motion."""
-    return integrate(system, run.integrator, run.t_end, run.h, output_every=run.output_every)
+    return integrate(
+        system, run.integrator, run.t_end, run.h, output_every=run.output_every, state=run.start_state(system)
+    )
 
 
 def equilibrium_of(system: System, formulation: str) -> Trajectory:

@@ -200,6 +200,9 @@ def read_system(
             forces.insert(0, Gravity(np.array(data.system.gravity)))
         name = data.system.name or path.stem
         sensors = [section.sensor(key) for key, section in data.sensors.items()]
+        data_files = [*content.files[1:], *(each.file for each in data.signals.values()), *element_files]
+        if data.run is not None and data.run.continues is not None:
+            data_files.append(data.run.continues)
         system = System(
             bodies, joints, forces, units, name, data.system.redundant, couplers, elements=elements, sensors=sensors,
             inputs=[section.channel(key) for key, section in data.inputs.items()],
@@ -209,11 +212,7 @@ def read_system(
             scene=[section.shape for section in data.scene],
             source=str(path.resolve()),
             changes=dict(changes or {}),
-            data_files=tuple(
-                dict.fromkeys(
-                    [*map(str, content.files[1:]), *(str(each.file) for each in data.signals.values()), *element_files]
-                )
-            ),
+            data_files=tuple(dict.fromkeys(map(str, data_files))),
         )  # fmt: skip
         _ = compiled_system(system)  # looks up all markers and interfaces
         require_events(system)

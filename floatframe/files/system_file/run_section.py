@@ -151,7 +151,7 @@ class RunOptions:
         ConvergenceError
             If there is no equilibrium near the bodies as placed.
         SystemFileError
-            If the results file has other bodies, or other modes.
+            If the results file has other units, bodies, modes, joints or springs.
         """
         if self.continues is not None:
             return last_state_of(self.continues, system)
@@ -173,14 +173,24 @@ class RunOptions:
 
 
 def last_state_of(path: Path, system: System) -> State:
-    """Return the last state in a results file; `SystemFileError` if it is that of other bodies."""
-    motion = read_results(path)
-    found = [(entry.name, entry.n_q) for entry in motion.head.bodies]
-    compiled = compiled_system(system)
-    expected = [(body.name, int(n)) for body, n in zip(system.bodies, compiled.model.bodies.n_q, strict=True)]
-    if found != expected:
-        words = [", ".join(f"{name} ({n} modes)" for name, n in each) for each in (expected, found)]
-        raise SystemFileError(f"run.from: {path}: expected the bodies {words[0]}; the file has {words[1]}")
+    """Return the last state in a results file; `SystemFileError` if it does not fit the system."""
+    motion, compiled = read_results(path), compiled_system(system)
+    n_q = compiled.model.bodies.n_q
+    for kind, expected, found in (
+        ("units", [system.units.name], [motion.units.name]),
+        (
+            "bodies",
+            [f"{body.name} ({n} modes)" for body, n in zip(system.bodies, n_q, strict=True)],
+            [f"{entry.name} ({entry.n_q} modes)" for entry in motion.head.bodies],
+        ),
+        ("joints and springs", compiled.joint_names + compiled.spring_names, motion.connection_names),
+        ("unknowns of connections", [str(compiled.model.connections.w0[-1])], [str(motion.head.w0[-1])]),
+    ):
+        if list(expected) != list(found):
+            raise SystemFileError(
+                f"run.from: {path}: expected {kind} {', '.join(expected) or 'none'}; the file has "
+                f"{', '.join(found) or 'none'}"
+            )
     return motion.state(-1)
 
 
@@ -189,8 +199,26 @@ def formulation_of(run: RunOptions | None) -> str:
     return "relative" if run is not None and isinstance(run.integrator, RelativeGeneralizedAlpha) else "absolute"
 
 
-def required_run(run: RunOptions | None, path: str | os.PathLike[str]) -> RunOptions:
-    """Return the run of a system file; `SystemFileError` if it has none."""
+def required_run(run: RunOptions | None, path: str | os.PathLike[str], *, begins_there: bool = False) -> RunOptions:
+    """Return the run of a system file.
+
+    Parameters
+    ----------
+    run
+        The run, if the file has a table [run].
+    path
+        The file.
+    begins_there
+        Whether the caller begins in `RunOptions.start_state`, or integrates no motion.
+
+    Raises
+    ------
+    SystemFileError
+        If there is no run, or if it begins elsewhere than with the bodies as placed, where the caller does.
+    """
     if run is None:
         raise SystemFileError(f"{path}: run: missing; expected a table [run] with t_end and h, for a motion over time")
+    if not begins_there and (run.start != "placed" or run.continues is not None):
+        key = "start" if run.continues is None else "from"
+        raise SystemFileError(f"{path}: run.{key}: this computation begins with the bodies as placed; remove the key")
     return run

@@ -7,7 +7,7 @@ import pytest
 import tomlkit
 
 from cms.errors import CmsError
-from fe_models.foundation.parametric_file import FUNCTIONS, read_parametric
+from fe_models.foundation.parametric_file import FUNCTIONS, extended_files, read_parametric
 from fe_models.foundation.toml_file import line_numbers, value_of
 
 
@@ -69,6 +69,12 @@ def test_a_base_file_is_merged_key_by_key(read):
     content = read('extends = "base.toml"\nbodies.b = {}\n[parameters]\nn = 3\n[run]\nt_end = 5.0', base=base)
     assert content == {"run": {"h": 3, "t_end": 5.0}, "bodies": {"a": {"mass": 1.0}}}
     assert [path.name for path in content.files] == ["file.toml", "base.toml"]
+
+
+def test_all_files_that_a_file_extends_are_listed_although_they_give_nothing(read, tmp_path):
+    read('extends = "upper.toml"\na = 1', upper='extends = "base.toml"\na = 2', base="a = 3")
+    found = extended_files(tmp_path / "file.toml", CmsError)
+    assert [path.name for path in found] == ["upper.toml", "base.toml"]
 
 
 def test_files_named_by_a_base_in_another_folder_are_found(tmp_path):
@@ -134,6 +140,7 @@ def test_parameters_that_nothing_uses_are_reported(read, caplog):
         ("[x.y]\nrepeat = -1", "expected a count, a table...got -1 (line 2)"),
         ("[x.y]\nrepeat = {i = true}", "expected a count or a list for each name"),
         ("[x.y]\nrepeat = [{a = 1}, {a = 2}]", "two copies are called 'y'"),
+        ('[parameters]\na = "1e60"\n[x]\ny = "{2 * a * a}"', "x.y = ...: expected a number up to 1e+100 in size"),
         ("[x.y]\nrepeat = 1000000", "expected up to 20000 repeated tables"),
     ],
 )  # fmt: skip

@@ -5,10 +5,15 @@ import pytest
 from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
+import cms
+import floatframe as ff
 from cms.cli.app import app as cms_app
+from fe_models.foundation.units import unit_system
 from floatframe.cli.app import app
 from floatframe.files.system_file.read_system import read_system
 from floatframe.files.system_file.recorded_system import recorded_system
+from floatframe.files.system_file.run_section import RunOptions
+from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_matrix
 from floatframe.results.trajectory import read_results
 
 CART = """
@@ -93,14 +98,63 @@ def test_a_run_begins_in_the_last_state_of_another(folder):
     assert_allclose(parts, whole, rtol=0, atol=1e-5 * np.ptp(whole))
 
 
-def test_a_run_from_other_bodies_is_refused(folder):
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("m-kg-s", "mm-kg-s", "expected units mm-kg-s; the file has m-kg-s"),
+        ("cart]", "car]", "expected bodies slider (0 modes), car (0 modes); the file has slider"),
+        ("joints.up", "joints.lift", "expected joints and springs rail, lift, spring; the file has rail, up, spring"),
+    ],
+)
+def test_a_run_from_another_system_is_refused(folder, old, new, words):
     run("run", folder / "cart.toml", "-o", folder / "first.h5")
-    (folder / "next.toml").write_text(CART.replace("[bodies.cart]", "[bodies.car]").replace('"cart"', '"car"')
-                                      + 'from = "first.h5"\n')  # fmt: skip
+    text = CART.replace(old, new).replace('body_b = "cart"', f'body_b = "{new[:-1] if "]" in new else "cart"}"')
+    (folder / "next.toml").write_text(text + 'from = "first.h5"\n')
     result = CliRunner().invoke(app, ["run", str(folder / "next.toml")])
     assert result.exit_code == 2
     assert "run.from" in result.stderr
-    assert "expected the bodies slider (0 modes), car (0 modes); the file has slider" in result.stderr
+    assert words in result.stderr
+
+
+def test_a_run_does_not_overwrite_the_state_that_it_begins_from(folder):
+    run("run", folder / "cart.toml", "-o", folder / "first.h5")
+    (folder / "next.toml").write_text('extends = "cart.toml"\n[run]\nfrom = "first.h5"\n')
+    for source in ("first.h5", "cart.toml"):
+        result = CliRunner().invoke(app, ["run", str(folder / "next.toml"), "-o", str(folder / source)])
+        assert result.exit_code == 2
+        assert "this is an input" in result.stderr
+
+
+def test_a_sweep_begins_each_run_in_its_equilibrium(folder):
+    (folder / "cart.toml").write_text(CART + 'start = "equilibrium"\n')
+    (folder / "sweep.toml").write_text(
+        'system = "cart.toml"\n[parameters.stiffness]\npath = "stiffness"\nvalues = [250.0, 500.0]\n'
+        '[outputs.low]\nof = "up.distance value"\ntake = "least"\n'
+        '[outputs.high]\nof = "up.distance value"\ntake = "greatest"\n'
+    )
+    run("sweep", folder / "sweep.toml", "-o", folder / "sweep.csv")
+    rows = np.loadtxt(folder / "sweep.csv", delimiter=",", skiprows=1, usecols=(0, 1, 2))
+    for column in (1, 2):
+        assert_allclose(rows[:, column], -2.0 * 9.81 / rows[:, 0], rtol=0, atol=1e-9)
+
+
+def test_computations_that_begin_as_placed_refuse_another_start(folder):
+    (folder / "cart.toml").write_text(CART + 'start = "equilibrium"\n')
+    result = CliRunner().invoke(app, ["gradient", str(folder / "cart.toml"), "-p", "mass", "-m", "up.distance"])
+    assert result.exit_code == 2
+    assert "run.start: this computation begins with the bodies as placed; remove the key" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [("from = 3", "run.from = 3: expected a results file (.h5)"), ("fron = 3", "did you mean 'from'?")],
+)
+def test_the_key_from_is_called_so_in_messages(folder, line, words):
+    (folder / "cart.toml").write_text(CART + line + "\n")
+    result = CliRunner().invoke(app, ["run", str(folder / "cart.toml")])
+    assert result.exit_code == 2
+    assert words in result.stderr
+    assert "continues" not in result.stderr
 
 
 def test_set_replaces_parameters_and_keys_and_the_results_record_them(folder):
@@ -159,3 +213,30 @@ def test_run_runs_a_sweep_by_its_kind(folder):
     assert_allclose(rows[:, 0], [125.0, 500.0])
     assert_allclose(rows[1, 1] / rows[0, 1], 2.0, rtol=1e-6)
     assert result.exit_code == 0
+
+
+@pytest.mark.parametrize("frame", [None, cms.NodalFrame("start")], ids=["mean", "nodal"])
+@pytest.mark.parametrize("formulation", ["absolute", "relative"])
+def test_a_turned_flexible_body_begins_sagged_and_with_its_velocity(frame, formulation):
+    """A rod off the origin on a rail sags across it, does not vibrate, and keeps its speed along the rail."""
+    line = cms.BeamLine(1.0, 0.785, 2.1e9, 17500.0, 17500.0, 11200.0, 6.3e-6, 6.3e-6)
+    reduced = cms.beam_from_assumed_modes(
+        line, name="rod", units=unit_system("m-kg-s"), n_axial=1, n_bending=3, frame=frame
+    )
+    turn, along = euler_parameters_of_rotation_vector(np.array([0.4, -0.7, 0.9])), np.array([1.0, 2.0, 2.0]) / 3
+    place, speed = np.array([0.3, -0.2, 0.5]), 1.7 * along
+    interface = reduced.interfaces[0].name
+    rod = ff.FlexibleBody("rod", reduced, position=place, orientation=turn, velocity=speed)
+    rail = ff.PrismaticJoint("rail", ff.Marker("ground", position=place), ff.Marker("rod", interface), axis=along)
+    pull = ff.Gravity(9.81 * np.cross(along, [0.6, 0.0, 0.8]))  # across the rail
+    system = ff.System([rod], [rail], [pull])
+    run_options = RunOptions(0.2, 1e-3, 1, ff.GeneralizedAlpha(0.8), start="equilibrium")
+    motion = ff.integrate(
+        system, run_options.integrator, 0.2, 1e-3, state=run_options.start_state(system), formulation=formulation
+    )
+    q, v = motion.body("rod").q, motion.body("rod").v
+    if frame is not None:  # held at its interface: K q = C1ᵀ g
+        sag = np.linalg.solve(reduced.K, reduced.moments.C1.T @ rotation_matrix(turn).T @ pull.acceleration)
+        assert_allclose(q[0], sag, rtol=0, atol=1e-5 * np.abs(sag).max())
+    assert_allclose(q, np.broadcast_to(q[0], q.shape), rtol=0, atol=1e-8 * np.abs(q[0]).max())
+    assert_allclose(v, np.broadcast_to(speed, v.shape), rtol=0, atol=1e-8)
