@@ -34,7 +34,8 @@ from floatframe.engine.kernels.compiler.sources import PACKAGES
 
 __all__ = ["StoredCode", "code_key", "delete_old", "read_code", "write_code"]
 
-FOLDER = Path(__file__).parents[3] / "__pycache__" / "inner"
+#: beside the code that numba stores: in NUMBA_CACHE_DIR if that is set
+FOLDER = Path(os.environ.get("NUMBA_CACHE_DIR") or Path(__file__).parents[3] / "__pycache__") / "inner"
 MONTH = 30 * 24 * 3600.0  # seconds
 
 keys: WeakKeyDictionary[FunctionType, str | None] = WeakKeyDictionary()  # of functions, without types of arguments
