@@ -15,7 +15,7 @@ from cms.errors import BodyError
 from fe_models.body.load_cases import ReducedLoadCase
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, require_finite, require_shape
 from fe_models.foundation.copies import FrozenMapping, frozen_copies
-from fe_models.foundation.presentation import Summary, presented
+from fe_models.foundation.presentation import Summary, listed, presented
 from fe_models.foundation.tall.on_disk import row_slices
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
@@ -218,13 +218,12 @@ class ReducedBody:
     def summary(self) -> Summary:
         """Return what `repr` and notebooks show: units, mass, frame and interfaces, and the modes with their labels."""
         center = ", ".join(f"{x:.6g}" for x in self.moments.center_of_mass)
-        shown = ", ".join(each.name for each in self.interfaces[:6]) + ", ..." * (len(self.interfaces) > 6)
         rows = [
             ("units", self.units.name),
             ("mass", f"{self.moments.m:.6g} {self.units.mass_symbol}"),
             ("centre of mass", f"({center}) {self.units.length_symbol} in the frame"),
             ("frame", self.frame.kind),
-            ("interfaces", f"{len(self.interfaces)}: {shown}" if self.interfaces else "none"),
+            ("interfaces", listed([each.name for each in self.interfaces])),
         ]
         scale = 1 / self.units.time
         modes = [

@@ -174,9 +174,9 @@ def formats_command(
     json: Annotated[bool, typer.Option("--json", help="Write the table as JSON, for other programs.")] = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="Write the table of docs/formats.md.")] = False,
 ) -> None:
-    """Formats of other programs, and what is lost.
+    """Formats of other programs, and what each cannot hold.
 
-    The versions tested are given.
+    The table names the versions that were tested.
 
     Example: cms formats
     """
@@ -447,7 +447,7 @@ def compare_command(
 ) -> None:
     """Compare mode sets with the full model.
 
-    Which set is accurate enough, with how few modes, and why.
+    The report says which set is accurate enough, with how few modes, and why.
 
     The full model is solved once and stored in the folder of the report, so that a repetition is fast. To compare sets
     in the motion of a mechanism, with frames, stiffening and parts: floatframe study (docs/laboratory.md).

@@ -20,7 +20,7 @@ from fe_models.foundation.arrays import (
     symmetric_csc,
 )
 from fe_models.foundation.errors import BodyError
-from fe_models.foundation.presentation import Summary, presented
+from fe_models.foundation.presentation import Summary, listed, presented
 from fe_models.foundation.ranks.row_layout import RowLayout
 from fe_models.foundation.ranks.spread_columns import SpreadColumns, spread_parts
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
@@ -306,7 +306,7 @@ class FEBody:
             ("nodes", str(len(self.nodes))),
             ("dofs", str(len(self.dofs))),
             ("support", "held to the ground" if self.is_held else "free"),
-            *([("load cases", ", ".join(case.name for case in self.load_cases[:6]))] if self.load_cases else []),
+            *([("load cases", listed([case.name for case in self.load_cases]))] if self.load_cases else []),
         ]
         interfaces = [(each.name, each.kind) for each in self.interfaces]
         return Summary(f"FEBody {self.name!r}", rows, ("interface", "kind"), interfaces)

@@ -46,6 +46,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "range": lambda *limits: list(range(*(min(limit, MOST_COPIES) for limit in limits))),
 }  # fmt: skip
 CONSTANTS = {"pi": math.pi}
+INDEX = "i"  #: name of the index where `repeat` is a count
 EXPRESSION = re.compile(r"\{\{|\}\}|\{([^{}]*)\}")
 
 
@@ -365,9 +366,6 @@ class Resolver:
             raise self.problem(location, f"expected up to {MOST_COPIES} repeated tables in a file")
         for row in rows:
             yield {**local, **row}
-
-
-INDEX = "i"  #: name of the index where `repeat` is a count
 
 
 def is_count(value: Any) -> bool:

@@ -9,18 +9,21 @@ from typing import Any, TypeVar
 import numpy as np
 import scipy.sparse as sp
 
-__all__ = ["Summary", "presented", "text_of"]
+from fe_models.foundation.words import shortened
+
+__all__ = ["Summary", "listed", "presented", "text_of"]
 
 Class = TypeVar("Class", bound=type)
 
 LONGEST_VALUE = 70  #: characters of a value
 MOST_ROWS = 12  #: rows of the table of a summary
+FEW = 6  #: names, or items of a list, that are shown
 SMALL_ARRAY = 12  #: entries of an array that is shown with its numbers
 
 
 @dataclass(frozen=True)
 class Summary:
-    """What is shown of an object.
+    """Text and table that describe an object.
 
     Parameters
     ----------
@@ -114,28 +117,33 @@ def text_of(value: Any) -> str:
         if not 0 < value.size <= SMALL_ARRAY:
             return f"array {value.shape}"
         numbers = np.array2string(value, separator=", ", formatter={"float_kind": "{:.6g}".format})
-        return shortened(" ".join(numbers.split()))
+        return shortened(" ".join(numbers.split()), LONGEST_VALUE)
     if sp.issparse(value):
         return f"sparse {value.shape}, {value.nnz} entries"
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, Path):
-        return shortened(str(value))
+        return shortened(str(value), LONGEST_VALUE)
     if isinstance(value, Mapping):
         if len(value) > 4:
             return f"{len(value)} entries"
-        return shortened("{" + ", ".join(f"{key!r}: {text_of(each)}" for key, each in value.items()) + "}")
+        return shortened(
+            "{" + ", ".join(f"{key!r}: {text_of(each)}" for key, each in value.items()) + "}", LONGEST_VALUE
+        )
     if isinstance(value, tuple | list):
-        if len(value) > 6:
+        if len(value) > FEW:
             return f"{len(value)} items"
         inner = ", ".join(text_of(each) for each in value)
-        return shortened(f"[{inner}]" if isinstance(value, list) else f"({inner}{',' * (len(value) == 1)})")
+        return shortened(
+            f"[{inner}]" if isinstance(value, list) else f"({inner}{',' * (len(value) == 1)})", LONGEST_VALUE
+        )
     if is_dataclass(value) and not isinstance(value, type):
         name = getattr(value, "name", None)
         return f"{type(value).__name__}({name!r})" if isinstance(name, str) else type(value).__name__
-    return shortened(repr(value).replace("\n", " "))
+    return shortened(repr(value).replace("\n", " "), LONGEST_VALUE)
 
 
-def shortened(text: str) -> str:
-    """Return a text of at most `LONGEST_VALUE` characters."""
-    return text if len(text) <= LONGEST_VALUE else f"{text[: LONGEST_VALUE - 3]}..."
+def listed(names: Sequence[str]) -> str:
+    """Return the number of names and the first of them."""
+    more = f", ... and {len(names) - FEW} more" if len(names) > FEW else ""
+    return f"{len(names)}: {', '.join(names[:FEW])}{more}" if names else "none"

@@ -12,7 +12,7 @@ from math import inf, isfinite
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, ValidationInfo
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
@@ -20,8 +20,8 @@ from fe_models.foundation.paths import is_stream, near_file
 from fe_models.foundation.words import nearest, quoted, shortened
 
 __all__ = [
-    "KINDS", "FileContent", "Location", "Matrix3", "Names", "Range", "Table", "Vector3", "changed", "choice",
-    "describe", "files_named", "first_key", "kind_field", "names", "read_toml", "validated", "value_of",
+    "KINDS", "FileContent", "Location", "Matrix3", "Names", "PathBeside", "Range", "Table", "Vector3", "changed",
+    "choice", "describe", "files_named", "first_key", "kind_field", "names", "read_toml", "validated", "value_of",
 ]  # fmt: skip
 
 
@@ -55,7 +55,7 @@ class FileContent(dict[str, Any]):
     Parameters
     ----------
     tables
-        The tables, which messages call by their key paths.
+        The content by key.
     path
         The file.
     files
@@ -311,6 +311,12 @@ def rows(value: Any) -> tuple[tuple[float, ...], ...]:
         raise ValueError("expected three rows of three numbers, [[..., ..., ...], ...]") from None
 
 
+def beside(value: Any, info: ValidationInfo) -> Any:
+    """Return the path that a text names, relative to the folder of the file."""
+    return Path(info.context or ".") / value if isinstance(value, str) else value
+
+
+PathBeside = Annotated[Path, BeforeValidator(beside, json_schema_input_type=str)]
 Vector3 = Annotated[tuple[float, float, float], BeforeValidator(numbers)]
 Range = Annotated[tuple[float, float], BeforeValidator(interval)]
 Matrix3 = Annotated[tuple[Vector3, Vector3, Vector3], BeforeValidator(rows)]
@@ -389,7 +395,7 @@ def first_key(here: dict[str, Any] | list[Any], path: str) -> tuple[Any, str | N
 
 
 def line_numbers(text: str) -> dict[Location, int]:
-    """Return the line, from 1, of each table and key of a TOML text that is valid; of values in one line, the first."""
+    """Return the line, from 1, of each table and key of a valid TOML text; the first line of a value of several."""
     found: dict[Location, int] = {}
     table: Location = ()
     n_rows: dict[Location, int] = {}

@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import Any, Protocol, TypeVar, cast
 
 from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.presentation import Summary, presented
+from fe_models.foundation.presentation import Summary, listed, presented
 from fe_models.foundation.units import Quantity, Units, unit_system
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
@@ -151,8 +151,7 @@ class System:
         rows = [("units", self.units.name)]
         for kind in ("joints", "couplers", "forces", "elements", "sensors", "inputs", "outputs", "events", "fmus"):
             if names := [getattr(each, "name", type(each).__name__) for each in getattr(self, kind)]:
-                shown = ", ".join(names[:6]) + (f", ... and {len(names) - 6} more" if len(names) > 6 else "")
-                rows.append((kind, f"{len(names)}: {shown}"))
+                rows.append((kind, listed(names)))
         bodies = []
         for body in self.bodies:
             mass, n_q = (body.mass, 0) if isinstance(body, RigidBody) else (body.reduced.moments.m, body.reduced.n_q)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from cms.assessment.correlation.correlate import Correlation, DampingFit, Pairing, correlate, fit_damping
 from cms.assessment.correlation.errors import CorrelationError
@@ -23,7 +23,7 @@ from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.parametric_file import read_parametric
 from fe_models.foundation.stages import Stages
-from fe_models.foundation.toml_file import Table, Vector3, kind_field, read_toml, validated, value_of
+from fe_models.foundation.toml_file import PathBeside, Table, Vector3, kind_field, read_toml, validated, value_of
 from fe_models.foundation.units import Units, unit_system
 from fe_models.meshes.mesh import Mesh
 
@@ -35,22 +35,12 @@ UNIVERSAL, TABLES = (".unv", ".uff", ".unv55", ".ufb"), (".csv", ".txt")
 Axis = Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
 
 
-def beside(value: Any, info: ValidationInfo) -> Any:
-    """Return a path relative to the file."""
-    return Path(info.context or ".") / value if isinstance(value, str) else value
-
-
 class ModelTable(Table):
     """[model]: the job of the full model, or a modal file."""
 
-    job: Path | None = Field(None, description="the path of a job file")
-    body: Path | None = Field(None, description="the path of a modal file")
+    job: PathBeside | None = Field(None, description="the path of a job file")
+    body: PathBeside | None = Field(None, description="the path of a modal file")
     held: tuple[str, ...] = Field((), strict=False, description="a list of interfaces that the test holds; none: free")
-
-    @field_validator("job", "body", mode="before")
-    @classmethod
-    def _beside(cls, value: Any, info: ValidationInfo) -> Any:
-        return beside(value, info)
 
     @model_validator(mode="after")
     def _one(self) -> "ModelTable":
@@ -65,7 +55,7 @@ class TestTable(Table):
     """[test]: the measured modes and where their points are."""
 
     __test__ = False  # not a class of tests for pytest
-    file: Path = Field(description="the path of a universal file (.unv, .uff) or a table (.csv)")
+    file: PathBeside = Field(description="the path of a universal file (.unv, .uff) or a table (.csv)")
     length: str | None = Field(None, description=f"the unit of length of the file, one of {', '.join(METRES)}")
     modes: tuple[int, ...] | None = Field(
         None, strict=False, description="a list of modes to take, from 1; default: all"
@@ -78,11 +68,6 @@ class TestTable(Table):
         description="the axes of the test in the mesh, three unit vectors",
     )  # fmt: skip
     nodes: dict[str, int | str] = Field({}, description="a table {point = node} of points that are placed by hand")
-
-    @field_validator("file", mode="before")
-    @classmethod
-    def _beside(cls, value: Any, info: ValidationInfo) -> Any:
-        return beside(value, info)
 
     @field_validator("length")
     @classmethod

@@ -4,11 +4,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from cms.assessment.compare.mode_counts import mode_counts
 from fe_models.foundation.stages import Stages
-from fe_models.foundation.toml_file import Table, kind_field, read_toml, validated
+from fe_models.foundation.toml_file import PathBeside, Table, kind_field, read_toml, validated
 from floatframe.design.laboratory.cases import Case, grid
 from floatframe.design.laboratory.exact_beam import ExactBeam
 from floatframe.design.laboratory.full_model import MOST_DOFS, FullModel
@@ -63,17 +63,12 @@ class ReferenceTable(Table):
     )
     most_dofs: int = Field(MOST_DOFS, ge=1, description="a whole number from 1, of a full model")
     elements: int = Field(32, ge=1, description="a whole number from 1, of exact beams")
-    file: Path | None = Field(None, description="the path of a table of time and sensor columns (.csv, .mat)")
+    file: PathBeside | None = Field(None, description="the path of a table of time and sensor columns (.csv, .mat)")
     mode_set: str = Field("craig-bampton", description="the name of a mode set")
     n_modes: int = Field(10, ge=0, description="a whole number from 0")
     frame: str = Field("tisserand", description='"tisserand", "buckens" or "nodal:INTERFACE"')
     stiffening: bool = Field(True, description="true or false")
     parts: int = Field(1, ge=1, description="a whole number from 1")
-
-    @field_validator("file", mode="before")
-    @classmethod
-    def _beside(cls, value: Any, info: ValidationInfo) -> Any:
-        return Path(info.context or ".") / value if isinstance(value, str) else value
 
     @model_validator(mode="after")
     def _one(self) -> "ReferenceTable":
@@ -103,20 +98,15 @@ class LaboratoryFile(Table):
     """A whole file."""
 
     kind: str = kind_field("laboratory")
-    system: Path = Field(description="the path of a system file with [run] and sensors")
+    system: PathBeside = Field(description="the path of a system file with [run] and sensors")
     body: str = Field(description="the name of its flexible body")
-    job: Path = Field(description="the path of the job that body is reduced by")
+    job: PathBeside = Field(description="the path of the job that body is reduced by")
     sensors: Annotated[tuple[str, ...], BeforeValidator(as_tuple)] | None = Field(
         None, description="a list of names of sensors; default: all"
     )
     cut: str = Field("rigid", description='"rigid" or "distributing", the interfaces at the cuts of parts')
     vary: VaryTable = Field(description="a table [vary]")
     reference: ReferenceTable = Field(description="a table [reference]")
-
-    @field_validator("system", "job", mode="before")
-    @classmethod
-    def _beside(cls, value: Any, info: ValidationInfo) -> Any:
-        return Path(info.context or ".") / value if isinstance(value, str) else value
 
 
 def read_laboratory(path: str | Path) -> LaboratoryFile:

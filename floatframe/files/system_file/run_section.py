@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.toml_file import Table, choice
+from fe_models.foundation.toml_file import PathBeside, Table, choice
 from fe_models.foundation.words import nearest
 from floatframe.analyses.equilibrium import static_equilibrium
 from floatframe.engine.compiling.file_frames import state_of_file
@@ -95,18 +95,13 @@ class RunSection(Table):
         "placed",
         description=f"one of {', '.join(STARTS)}: bodies as placed, or in static equilibrium with their velocities",
     )
-    continues: Path | None = Field(
+    continues: PathBeside | None = Field(
         None, alias="from", description="a results file (.h5): the run begins in its last state, instead of start"
     )
     watch: choice("watch", lambda: WATCHES) = Field(  # type: ignore[valid-type]
         "stop",
         description="stop, tell or off: what a run does if its steps distort the motion or add energy to it",
     )
-
-    @field_validator("continues", mode="before")
-    @classmethod
-    def _beside_the_file(cls, value: Any, info: ValidationInfo) -> Any:
-        return Path(info.context or ".") / value if isinstance(value, str) else value
 
     @model_validator(mode="after")
     def _fits_the_scheme(self) -> "RunSection":

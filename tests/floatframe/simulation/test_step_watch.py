@@ -323,7 +323,7 @@ def test_an_error_tolerance_that_is_too_large_for_a_small_motion_is_told(toleran
 
 
 def test_companions_of_a_run_with_an_error_tolerance_have_another_one(monkeypatch):
-    """Eight times for double steps, an eighth for half steps; with that of the run they are the run, and blind."""
+    """Double steps take eight times the tolerance of the run, half steps an eighth; equal ones would find no error."""
     made = []
 
     def begun(integrator, *arguments, **options):
