@@ -101,7 +101,7 @@ def defects(case: BodyCase, coupled, columns, reduced) -> dict[str, float]:
             np.sort(reduced.free_frequencies)[: len(finite)] / finite, np.ones(len(finite)), 1.0
         ) if n_free >= len(finite) else np.inf  # fmt: skip
 
-    # (3): fields over the mesh
+    # (3): fields over the mesh, by all that is known of the kept nodes: translations alone tell bent beams apart badly
     kept = [(k, node) for k, node in enumerate(reduced.node_ids.tolist()) if node < len(body.nodes)]
     row_of = {(int(node), int(c)): row for row, (node, c) in enumerate(body.dofs)}
     kept = [(k, node) for k, node in kept if (node, 0) in row_of]
@@ -109,7 +109,8 @@ def defects(case: BodyCase, coupled, columns, reduced) -> dict[str, float]:
     places = reduced.nodes[[k for k, _ in kept]]
     found["places"] = relative(frame.origin + places @ A.T, body.nodes[[node for _, node in kept]], extent)
     shapes = np.einsum("ab,kbq->kaq", A, reduced.Phi[[k for k, _ in kept]]).reshape(-1, reduced.n_q)
-    seen = W[rows]
+    turning, turns = rotations_of(reduced, row_of, A)
+    seen, shapes = np.vstack([W[rows], extent * W[turning]]), np.vstack([shapes, extent * turns])
     values = np.linalg.svd(seen, compute_uv=False)
     if len(values) < W.shape[1] or values[-1] < 1e-9 * values[0]:
         return found  # the kept nodes do not tell the fields apart
@@ -156,6 +157,17 @@ def defects(case: BodyCase, coupled, columns, reduced) -> dict[str, float]:
         found["torque"] = relative(load.torque, wrench[3:], size * distance)
         found["h"] = relative(load.h, U.T @ given.f, size * np.abs(shapes).max())
     return found
+
+
+def rotations_of(reduced, row_of, A):
+    """Return the rows of rotations that the body keeps of dofs of the mesh, and these rotations in mesh axes."""
+    kept = reduced.kept
+    if kept is None:
+        return np.zeros(0, dtype=int), np.zeros((0, reduced.n_q))
+    nodes = reduced.node_ids[kept.nodes]
+    known = [k for k, node in enumerate(nodes.tolist()) if kept.source[k] == "dofs" and (node, 3) in row_of]
+    rows = [row_of[int(nodes[k]), 3 + c] for k in known for c in range(3)]
+    return np.array(rows, dtype=int), np.einsum("ab,kbq->kaq", A, kept.rotation[known]).reshape(-1, reduced.n_q)
 
 
 def elastic_basis(columns, R, M, norm):
