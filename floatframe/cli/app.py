@@ -250,9 +250,14 @@ def print_run(trajectory: "Trajectory") -> None:
     if record["sensors"]:
         print_table(
             "Sensors",
-            ("", "unit", "least>", "greatest>", "last>"),
+            ("", "unit", "least>", "greatest>", "last>", f"peak at [{second}]>"),
             [
-                (name, column["unit"], *(f"{column[key]:.6g}" for key in ("least", "greatest", "last")))
+                (
+                    name,
+                    column["unit"],
+                    *(f"{column[key]:.6g}" for key in ("least", "greatest", "last")),
+                    peak_words(column),
+                )
                 for name, column in record["sensors"].items()
             ],
         )
@@ -272,6 +277,12 @@ def known_system(trajectory: "Trajectory") -> "System | None":
     except (FloatframeError, CmsError) as error:
         typer.echo(f"note: sensors are left out: {error}", err=True)
         return None
+
+
+def peak_words(column: dict[str, Any]) -> str:
+    """Return the time of the largest magnitude of a measured quantity, with the node or instance where it was."""
+    numbers = [f"{name} {value}" for name, value in column["peak"].items() if name != "t"]
+    return ", ".join([f"{column['peak']['t']:.6g}", *numbers])
 
 
 def body_words(body: dict[str, Any]) -> str:

@@ -21,7 +21,7 @@ from floatframe.pictures.element_looks import dressed_bodies, element_pieces
 from floatframe.pictures.film_times import FilmTimes, film_times, round_below, speed_words, time_words
 from floatframe.pictures.glyphs import glyphs
 from floatframe.pictures.looks import looks_of, places_over
-from floatframe.pictures.stage import box_of, ground_grid, view_axes
+from floatframe.pictures.stage import box_of, film_size, ground_grid, view_axes
 from floatframe.results.recovery import nodal_displacements
 from floatframe.results.trajectory import BodyMotion, Trajectory
 
@@ -213,7 +213,7 @@ def motion_scene(
         scalar_unit=name_unit if flexible else "",
         direction=direction,
         up=up_axis,
-        size=(960, 720),
+        size=film_size(points, direction, up_axis),
     )
 
 

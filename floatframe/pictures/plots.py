@@ -21,8 +21,7 @@ __all__ = [
     "plot_reaction",
 ]
 
-SHOWN = 1e-18  #: least drift shown on the axis; smaller values are rounding errors
-FLOOR = 1e-300  #: lowest value on a logarithmic axis
+SHOWN = 1e-6  #: least drift shown on the axis / largest drift
 
 
 def plot_energies(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
@@ -87,18 +86,31 @@ def plot_reaction(trajectory: Trajectory, name: str, ax: "Axes | None" = None) -
 
 
 def plot_drift(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
-    """Plot the constraint error of each joint, as distance and angle, on a logarithmic axis."""
+    """Plot the constraint error of each joint, as distance and angle, on a logarithmic axis.
+
+    Errors that stay below `SHOWN` times the largest one are rounding; their number is written beside the curves.
+    """
     ax, length = axes_for(trajectory, ax), trajectory.units.length_symbol
+    sizes = {}
     for name in trajectory.head.joints:
         drift = trajectory.drift(name)
-        for kind, values in ((f"distance [{length}]", drift.distance), ("angle [rad]", drift.angle)):
-            size = np.abs(values)
-            if np.any(size > FLOOR):
-                ax.semilogy(trajectory.t, np.where(size > FLOOR, size, np.nan), label=f"{name} {kind}")
-    drawn = [np.asarray(line.get_ydata(), dtype=float) for line in ax.get_lines()]
-    largest = max((float(np.nanmax(values)) for values in drawn if np.isfinite(values).any()), default=0.0)
-    ax.set_ylim(SHOWN, max(10 * largest, 1e4 * SHOWN))
-    return labelled(ax, f"drift of joints [{length}, rad]")
+        sizes[f"{name} distance [{length}]"] = np.abs(drift.distance)
+        sizes[f"{name} angle [rad]"] = np.abs(drift.angle)
+    peaks = {name: float(np.nanmax(size, initial=0.0)) for name, size in sizes.items()}
+    most = max(peaks.values(), default=0.0)
+    kept = [name for name, peak in peaks.items() if peak > SHOWN * most]
+    for name in kept:
+        ax.semilogy(trajectory.t, np.where(sizes[name] > 0, sizes[name], np.nan), linewidth=0.8, label=name)
+    if kept:
+        decades = -np.log10(SHOWN)
+        ax.set_ylim(SHOWN * most, most * 10 ** (0.14 * decades * (1 + (len(kept) + 1) // 2)))  # room for the legend
+    if len(kept) < len(peaks):
+        less = len(peaks) - len(kept)
+        ax.text(0.99, 0.02, f"{less} below {SHOWN * most:.0e}", ha="right", transform=ax.transAxes, alpha=0.6)
+    labelled(ax, f"drift of joints [{length}, rad]")
+    if kept:
+        ax.legend(fontsize="small", ncols=2, loc="upper left")
+    return ax
 
 
 def axes_for(trajectory: Trajectory, ax: "Axes | None") -> "Axes":

@@ -16,17 +16,13 @@ if TYPE_CHECKING:
 __all__ = ["panels_of", "plot_measurement", "plot_sensors"]
 
 ROUNDING = 1e-9  #: relative to the largest column of a unit; smaller curves would coincide with zero
-LEFT_OUT = ("number in the mesh",)  #: units of columns that are not plotted
 
 
 def panels_of(measurement: Measurement) -> tuple[tuple[str, tuple[str, ...]], ...]:
     """Return the columns of each panel, as a unit and the names of the columns with this unit."""
-    units = dict.fromkeys(measurement.units[name] for name in measurement.columns)
-    return tuple(
-        (unit, tuple(name for name in measurement.columns if measurement.units[name] == unit))
-        for unit in units
-        if unit not in LEFT_OUT
-    )
+    quantities = measurement.quantities
+    units = dict.fromkeys(measurement.units[name] for name in quantities)
+    return tuple((unit, tuple(name for name in quantities if measurement.units[name] == unit)) for unit in units)
 
 
 def plot_measurement(

@@ -7,9 +7,11 @@ from fe_models.foundation.arrays import Array, IntArray
 from floatframe.model.bodies.rigid_body import RigidBody
 from floatframe.pictures.film_times import round_below
 
-__all__ = ["box_of", "ground_grid", "view_axes"]
+__all__ = ["box_of", "film_size", "ground_grid", "view_axes"]
 
 GRID_COLOR = "#cfd6dc"
+WIDTH, LEAST_HEIGHT, MOST_HEIGHT = 960, 480, 720  #: of a film [px]
+ROOM = 190  #: height that texts and margins take [px]
 
 
 def box_of(
@@ -48,6 +50,16 @@ def view_axes(points: Array, up: Array) -> tuple[Array, Array]:
     if side[np.argmax(np.abs(side))] < 0:
         across, side = -across, -side
     return -(across + 0.33 * up + 0.3 * side), up
+
+
+def film_size(points: Array, direction: Array, up: Array) -> tuple[int, int]:
+    """Return width and height of a film [px]: low where the points, (n, 3), lie side by side in the given view."""
+    forward = direction / np.linalg.norm(direction)
+    above = up - (up @ forward) * forward
+    above /= np.linalg.norm(above)
+    high, wide = np.ptp(points @ above), np.ptp(points @ np.cross(forward, above))
+    height = ROOM + 0.75 * WIDTH * high / max(wide, 1e-300)
+    return WIDTH, 16 * round(float(np.clip(height, LEAST_HEIGHT, MOST_HEIGHT)) / 16)
 
 
 def ground_grid(points: Array, up: Array) -> tuple[Lines, float]:

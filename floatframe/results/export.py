@@ -272,14 +272,20 @@ def run_record(trajectory: Trajectory, system: System | None = None) -> dict[str
 
 
 def sensors_record(system: System, trajectory: Trajectory) -> dict[str, Any]:
-    """Return unit, least, greatest and last value of every column of the sensors of a system."""
-    return {
-        f"{measurement.sensor} {name}": {
-            "unit": measurement.units[name],
-            "least": float(values.min()),
-            "greatest": float(values.max()),
-            "last": float(values[-1]),
-        }
-        for measurement in measured(system, trajectory).values()
-        for name, values in measurement.columns.items()
-    }
+    """Return unit, least, greatest and last value of every quantity that the sensors of a system measure.
+
+    `peak` holds the time at which the magnitude is largest, and the numbers of the place (node, instance) then.
+    """
+    record = {}
+    for measurement in measured(system, trajectory).values():
+        for name, values in measurement.quantities.items():
+            row = int(np.abs(values).argmax())
+            record[f"{measurement.sensor} {name}"] = {
+                "unit": measurement.units[name],
+                "least": float(values.min()),
+                "greatest": float(values.max()),
+                "last": float(values[-1]),
+                "peak": {"t": float(trajectory.t[row])}
+                | {number: int(measurement.columns[number][row]) for number in measurement.numbers},
+            }
+    return record

@@ -97,24 +97,36 @@ def round_ticks(low: float, high: float) -> Array:
 
 
 def draw_triads(draw: Any, scene: Scene, layout: Layout, camera: Camera, frame: int) -> None:
-    """Draw the triads of a frame with their labels."""
+    """Draw the triads of a frame, then their labels, each below the labels that it would cover."""
     u, offset = layout.unit, np.array(layout.view[:2], dtype=float)
+    words, pad = font(round(0.9 * u)), 0.25 * u
+    labels: list[tuple[float, float, str]] = []
     for triad in scene.triads:
         position, axes = frame_of(triad.position, frame, 1), frame_of(triad.axes, frame, 2)
         origin = camera.project(position)[:2] + offset
         tips = camera.project(position + triad.size * axes.T)[:, :2] + offset - origin
         draw_axes(draw, tuple(origin), tips.T, camera.axes[2] @ axes, u, "")
         if triad.label:
-            at, words = (origin[0] + 0.7 * u, origin[1] + 0.55 * u), font(round(0.9 * u))
-            box = draw.textbbox(at, triad.label, font=words)
-            pad = 0.25 * u
-            draw.rounded_rectangle(
-                (box[0] - pad, box[1] - pad, box[2] + pad, box[3] + pad),
-                radius=0.3 * u,
-                fill="#ffffff",
-                outline="#c5cdd4",
-            )
-            draw.text(at, triad.label, INK, font=words)
+            labels.append((origin[0] + 0.7 * u, origin[1] + 0.55 * u, triad.label))
+    boxes: list[tuple[float, float, float, float]] = []
+    for x, y, label in labels:
+        left, top, right, bottom = draw.textbbox((x, y), label, font=words)
+        box = (left - pad, top - pad, right + pad, bottom + pad)
+        down = drop_below(box, boxes)
+        box = (box[0], box[1] + down, box[2], box[3] + down)
+        draw.rounded_rectangle(box, radius=0.3 * u, fill="#ffffff", outline="#c5cdd4")
+        draw.text((x, y + down), label, INK, font=words)
+        boxes.append(box)
+
+
+def drop_below(box: tuple[float, float, float, float], drawn: list[tuple[float, float, float, float]]) -> float:
+    """Return how far a box (left, top, right, bottom) [px] has to move down so that it covers none of those drawn."""
+    down = 0.0
+    for left, top, right, bottom in sorted(drawn, key=lambda other: other[1]):
+        beside = box[2] < left or right < box[0]
+        if not beside and box[1] + down <= bottom and top <= box[3] + down:
+            down = bottom - box[1] + 1.0
+    return down
 
 
 def draw_axes(draw: Any, origin: Any, arms: Array, depth: Array, u: int, names: str) -> None:

@@ -158,7 +158,7 @@ def output_variables(unit: Unit, system: System) -> Iterator[Variable]:
             feeds = not (is_of_state or (kind == "CoordinateSensor" and column in COLUMNS_OF_THE_STATE))
             name, words = f"{sensor.name}.{column}", f"{column} of sensor {sensor.name}"
             unit_words = measurement.units[column]
-            symbol = "" if unit_words in ("-", "number in the mesh") else unit_words
+            symbol = "" if unit_words == "-" or column in measurement.numbers else unit_words
             yield Variable(name, "output", symbol, words, float(values[-1]), feeds_through=feeds)
 
 

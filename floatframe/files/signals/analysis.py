@@ -88,11 +88,8 @@ def plain(value: Any) -> Any:
 # measurements of sensors during a motion, as signals -----------------------------------------------------------------
 
 
-NO_SIGNALS = ("number in the mesh",)  #: units of columns that are not quantities over time
-
-
 def signals_of(measurements: Sequence[Measurement], units: Units) -> Signals:
-    """Return the columns of measurements as channels "sensor column"; times in seconds, values in units of the system.
+    """Return the measured quantities as channels "sensor column"; times in seconds, values in units of the system.
 
     Raises
     ------
@@ -100,10 +97,9 @@ def signals_of(measurements: Sequence[Measurement], units: Units) -> Signals:
         If there is no column, or no time.
     """
     columns = [
-        (one.sensor if one.sensor.endswith(f".{name}") else f"{one.sensor} {name}", one.columns[name], one.units[name])
+        (one.sensor if one.sensor.endswith(f".{name}") else f"{one.sensor} {name}", values, one.units[name])
         for one in measurements
-        for name in one.columns
-        if one.units[name] not in NO_SIGNALS
+        for name, values in one.quantities.items()
     ]
     if not columns or not len(measurements[0].t):
         raise SignalError("signals: no sensor has measured anything; name one, or a joint coordinate")

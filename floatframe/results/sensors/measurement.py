@@ -27,10 +27,16 @@ class Measurement:
     columns: Mapping[str, Array]  #: each (n_t,)
     units: Mapping[str, str]  #: of each column, in the symbols of the system
     places: tuple[str, ...] = ()  #: descriptions of the measured points, if they depend on the motion
+    numbers: tuple[str, ...] = ()  #: columns that number a place (node, instance) and are not quantities over time
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "columns", FrozenMapping(dict(self.columns)))
         object.__setattr__(self, "units", FrozenMapping(dict(self.units)))
+
+    @property
+    def quantities(self) -> dict[str, Array]:
+        """The columns that are quantities over time, by name."""
+        return {name: values for name, values in self.columns.items() if name not in self.numbers}
 
     @property
     def headers(self) -> tuple[str, ...]:

@@ -204,7 +204,8 @@ class VonMisesSensor:
         hot = int(where[int(largest.argmax())]) if len(where) else None
         words = () if hot is None else (f"largest at {node_words(reduced, hot)}",)
         place = (found.description(),) if found else ()
-        return Measurement(self.name, trajectory.t, columns, units, (*place, *words))
+        numbers = tuple(name for name in columns if name != "largest")
+        return Measurement(self.name, trajectory.t, columns, units, (*place, *words), numbers)
 
     def linear(self, small: SmallMotions) -> LinearColumns:
         """Return the von Mises stress as a function of small motions, at the node where it is largest now."""

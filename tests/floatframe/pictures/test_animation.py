@@ -14,7 +14,7 @@ from floatframe.model.rotations import euler_parameters_of_rotation_vector, rota
 from floatframe.model.shapes import Road, Wheel
 from floatframe.pictures.animation import animate, bodies_of, motion_scene, trail
 from floatframe.pictures.film_times import film_times, round_below, speed_words, time_words
-from floatframe.pictures.stage import box_of, ground_grid, view_axes
+from floatframe.pictures.stage import box_of, film_size, ground_grid, view_axes
 from floatframe.results.head import BodyEntry, Head
 from floatframe.results.results_file import MemorySource
 from floatframe.results.trajectory import Trajectory
@@ -244,6 +244,12 @@ def test_a_plane_motion_is_seen_from_across_the_plane():
     assert direction[2] < 0  # from above
     assert np.cross(direction, up)[0] > 0  # x runs to the right
     assert_allclose(up, [0, 0, 1], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("high", "height"), [(0.1, 480), (0.6, 624), (3.0, 720)])
+def test_a_film_is_as_high_as_what_it_shows(high, height):
+    points = np.array([[0.0, 0.0, 0.0], [1.0, 5.0, 0.3 * high], [0.4, -2.0, high]])
+    assert film_size(points, np.array([0.0, -1.0, 0.0]), np.array([0.0, 0.0, 1.0])) == (960, height)
 
 
 def test_up_is_against_gravity_where_the_run_knows_it(body):

@@ -1,11 +1,15 @@
 """Plots show what the trajectory holds."""
 
+from types import SimpleNamespace
+
 import matplotlib as mpl
+import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
 from floatframe import GeneralizedAlpha, integrate
 from floatframe.pictures import plots
+from floatframe.results.trajectory import Trajectory
 from tests.floatframe.results.examples import SYSTEM
 
 mpl.use("Agg")
@@ -46,6 +50,17 @@ def test_every_plot_of_the_whole_motion_has_lines_and_labels(motion, plot):
     ax = plot(motion)
     assert ax.get_lines()
     assert ax.get_ylabel()
+
+
+def test_drift_that_is_rounding_beside_the_largest_is_counted_and_not_drawn(motion, monkeypatch):
+    size = np.linspace(0.0, 1.0, len(motion.t))
+    monkeypatch.setattr(
+        Trajectory, "drift", lambda self, name: SimpleNamespace(distance=1e-9 * size, angle=-1e-16 * size)
+    )
+    ax = plots.plot_drift(motion)
+    line, _ = ax.get_lines()  # of two joints, the distances alone
+    assert_array_equal(np.asarray(line.get_ydata())[1:], 1e-9 * size[1:])
+    assert [text.get_text() for text in ax.texts] == ["2 below 1e-15"]
 
 
 def test_reaction_is_drawn_by_component(motion):

@@ -36,6 +36,7 @@ from floatframe.pictures.animation import motion_scene
 from floatframe.pictures.body_colors import VON_MISES
 from floatframe.pictures.film_times import film_times
 from floatframe.pictures.sensor_plots import plot_measurement
+from floatframe.results.export import sensors_record
 from floatframe.results.place_motion import interface_motion, point_motion
 from floatframe.results.sensors import (
     DisplacementSensor,
@@ -146,7 +147,12 @@ def test_the_hot_spot_has_the_number_of_its_node_in_the_mesh(bars):
     assert found.places == (f"largest at node {mesh.node_numbers[hot]} at [0.5, 0.04, 0]",)
     at_element = StressSensor("s", "bar", set="right").measure(system, motion).columns["von Mises"]
     assert_allclose(5 * at_element, found.columns["largest"], rtol=1e-9)
+    assert list(found.quantities) == ["largest"]
+    row = sensors_record(replace(system, sensors=(VonMisesSensor("vm", "bar"),)), motion)["vm largest"]
+    at_peak = int(np.argmax(found.columns["largest"]))
+    assert row["peak"] == {"t": float(motion.t[at_peak]), "node": int(mesh.node_numbers[hot])}
     without = swinging(replace(bars[0], stress=stress, numbering=Numbering()))
+    assert list(VonMisesSensor("vm", "bar").measure(without, motion).quantities) == ["largest"]
     assert VonMisesSensor("vm", "bar").measure(without, motion).units["node"] == "index in the model, from 0"
 
 

@@ -19,7 +19,7 @@ from cms.assessment.rendering import (
     render_animation,
     render_picture,
 )
-from cms.assessment.rendering.annotations import layout_of, round_ticks
+from cms.assessment.rendering.annotations import drop_below, layout_of, round_ticks
 from cms.assessment.rendering.camera import FILL, fitted_camera
 from cms.assessment.rendering.drawing import draw_picture
 from cms.assessment.rendering.film import average_of_blocks, write_film
@@ -462,3 +462,15 @@ def test_a_body_without_surface_is_refused(tmp_path):
 def test_a_scale_that_cannot_be_is_refused(scale, tmp_path):
     with pytest.raises(SceneError, match="scale: expected a share"):
         view_mode(body_with_surface(), 1, tmp_path / "m.png", scale=scale)
+
+
+def test_labels_of_coinciding_points_stand_below_each_other():
+    boxes = []
+    for left, top in ((0, 0), (5, 2), (8, 1), (40, 0), (2, 30)):
+        box = (left, top, left + 20, top + 10)
+        down = drop_below(box, boxes)
+        boxes.append((box[0], box[1] + down, box[2], box[3] + down))
+    assert [box[1] for box in boxes] == [0, 11, 22, 0, 33]
+    for a in boxes:
+        for b in boxes:
+            assert a is b or a[2] < b[0] or b[2] < a[0] or a[3] < b[1] or b[3] < a[1]
