@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from floatframe.model.system import System
     from floatframe.pictures.body_colors import BodyColor
 
-__all__ = ["campbell_command", "eig_command", "static_command"]
+__all__ = ["campbell_command", "check_command", "eig_command", "static_command"]
 
 MOST_SPEEDS = 10_000
 GREATEST_SPEED = 1e100
@@ -31,6 +31,41 @@ Formulation = Annotated[
     typer.Option("--formulation", help="absolute or relative (joint) coordinates; default: as in [run], or absolute."),
 ]
 Modes = Annotated[int, typer.Option("--modes", "-n", help="How many modes, by ascending frequency.")]
+
+
+@guarded
+def check_command(
+    system: SystemArgument,
+    json: Json = False,
+    set_values: SetValues = [],  # noqa: B006
+) -> None:
+    """What can be known of a system before its run.
+
+    Mobility and redundant constraints, placement, vibrations at the start and the step sizes that follow them,
+    functions of time that the steps miss, modes and stiffening of flexible bodies. Exit code 0: the run can begin
+    (warnings are printed), 1: it would be refused, 2: the file cannot be read.
+
+    Example: floatframe check crane.toml
+    """
+    from cms.assessment.quality.record import has_failed, worst
+    from cms.cli.verdicts.check import print_records
+    from floatframe.analyses.system_check import check_system
+    from floatframe.files.system_file.read_system import read_system
+    from floatframe.integrators import has_fixed_steps
+
+    model, run = read_system(system, changes_of(set_values))
+    tell_left_out(model)
+    if run is None:
+        records = check_system(model)
+    else:
+        fixed = has_fixed_steps(run.integrator)
+        records = check_system(model, t_end=run.t_end, h=run.h, state=run.start_state(model), has_fixed_steps=fixed)
+    if json:
+        record = {"system": model.name, "verdict": worst(records), "records": [each.as_dict() for each in records]}
+        typer.echo(json_module.dumps(record, indent=2))
+    else:
+        print_records(f"Check of {model.name}", model.name, records)
+    raise typer.Exit(int(has_failed(records)))
 
 
 @guarded

@@ -320,20 +320,20 @@ def integrator_words(run: dict[str, Any]) -> str:
 
 @guarded
 def info_command(
-    file: Annotated[Path, typer.Argument(help="A results file (.h5), a system file (.toml) or a robot (.urdf).")],
+    file: Annotated[Path, typer.Argument(help="A results file (.h5) or a robot (.urdf).")],
     json: Annotated[bool, typer.Option("--json", help="Write the same record as JSON, for other programs.")] = False,
 ) -> None:
     """Contents of a results file, energy balance, joint drift.
 
-    For a system file, its mobility is shown; for a robot, its links and joints.
+    For a robot, its links and joints are shown; `floatframe check` tells of a system file.
 
     Example: floatframe info swing.h5 --json
     """
+    from floatframe.errors import ResultsError
     from floatframe.results.trajectory import read_results
 
     if file.suffix == ".toml":
-        print_mobility(file, as_json=json)
-        return
+        raise ResultsError(f"{file}: expected a results file (.h5) or a robot (.urdf); try floatframe check {file}")
     if file.suffix == ".urdf":
         exchange.print_robot(file, as_json=json)
         return
@@ -347,50 +347,6 @@ def info_command(
         typer.echo(json_module.dumps(record, indent=2, ensure_ascii=True))
         return
     print_run(trajectory)
-
-
-def print_mobility(path: Path, *, as_json: bool) -> None:
-    """Print the mobility of a system file: by count and true, and redundant constraints."""
-    from floatframe.engine.initial_conditions.initial import mobility
-    from floatframe.files.system_file.read_system import read_system
-    from floatframe.model.bodies.flexible_body import FlexibleBody
-
-    system, _ = read_system(path)
-    found = mobility(system)
-    record: dict[str, Any] = {
-        "system": system.name,
-        "bodies": found.n_bodies,
-        "modes": found.n_modes,
-        "constraints": found.n_constraints,
-        "gruebler": found.gruebler,
-        "mobility": found.mobility,
-        "redundant": found.n_redundant,
-        "redundant_by_joint": dict(found.redundant),
-        "stiffening": {
-            body.name: "yes" if body.is_stiffened else "switched off" if body.reduced.geometric else "not in the file"
-            for body in system.bodies
-            if isinstance(body, FlexibleBody)
-        },
-    }
-    if as_json:
-        import json as json_module
-
-        typer.echo(json_module.dumps(record, indent=2, ensure_ascii=True))
-        return
-    told = ", ".join(f"{count} of {name}" for name, count in found.redundant.items()) or "none"
-    stiffened = ", ".join(f"{name}: {words}" for name, words in record["stiffening"].items()) or "no flexible body"
-    print_table(
-        "System",
-        ("", ""),
-        [
-            ("system", system.name),
-            ("bodies", f"{found.n_bodies}, {found.n_modes} modes"),
-            ("constraints", str(found.n_constraints)),
-            ("mobility", f"{found.mobility} (count of Gruebler {found.gruebler}), bodies taken as rigid"),
-            ("constraints that repeat others", told),
-            ("geometric stiffening", stiffened),
-        ],
-    )
 
 
 @guarded
@@ -565,7 +521,7 @@ def export_command(
 register(
     app,
     {
-        "Start": {"machine": prepare.machine_command},
+        "Start": {"machine": prepare.machine_command, "check": analyses.check_command},
         "Compute": {
             "run": run_command,
             "resume": resume_command,

@@ -32,7 +32,7 @@ def check_file(file: Path, job: Path | None, *, band: float | None, as_json: boo
     if as_json:
         typer.echo(json.dumps(quality_report(reduced, records), indent=2))
     else:
-        print_records(reduced, records)
+        print_records(f"Quality of {reduced.name}", reduced.name, records)
         if job is None:
             say("Not asked: frequencies, statics and responses against the full model; give its job with --job.")
     return int(has_failed(records))
@@ -74,13 +74,13 @@ def quality_report(reduced: ReducedBody, records: Sequence[QualityRecord]) -> di
     }
 
 
-def print_records(reduced: ReducedBody, records: Sequence[QualityRecord]) -> None:
-    """Print one row per record, worst last, then advice for records that do not pass."""
+def print_records(title: str, name: str, records: Sequence[QualityRecord]) -> None:
+    """Print one row per record, advice for records that do not pass, and the verdict about the body or system."""
     rows = [
         (record.verdict, record.name, number(record.value), number(record.tolerance), record.reason)
         for record in records
     ]
-    print_table(f"Quality of {reduced.name}", ("verdict", "check", "value>", "tolerance>", "found"), rows)
+    print_table(title, ("verdict", "check", "value>", "tolerance>", "found"), rows)
     loads = [row for record in records if record.name == "buckling" for row in record.data.get("loads", [])]
     if loads:
         print_table(
@@ -93,7 +93,7 @@ def print_records(reduced: ReducedBody, records: Sequence[QualityRecord]) -> Non
         print_table("Next", ("check", "what to do"), [(record.name, record.action) for record in todo])
     counts = {verdict: sum(r.verdict == verdict for r in records) for verdict in ("fail", "warn", "pass", "info")}
     say(
-        f"{reduced.name} {WORDS[worst(records)]}: "
+        f"{name} {WORDS[worst(records)]}: "
         + ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
     )
 

@@ -33,6 +33,7 @@ class Mobility:
     n_redundant: int  #: number of redundant constraints, taking modes into account
     n_redundant_rigid: int  #: number of redundant constraints if all bodies were rigid
     redundant: Mapping[str, int]  #: number of constraints that repeat those of earlier joints, by joint
+    redundant_rigid: Mapping[str, int]  #: the same if all bodies were rigid
 
     @property
     def gruebler(self) -> int:
@@ -57,18 +58,19 @@ def constraint_mobility(compiled: CompiledSystem, work: Work, state: State) -> M
     owner = np.repeat(np.arange(len(model.connections.size)), model.connections.size)[holds]
     with_modes, rigid = scaled_constraints(model, work, state)
     repeated, repeated_rigid = dependent_rows(with_modes), dependent_rows(rigid)
-    counts = {
-        name: int(repeated[owner == c].sum())
-        for c, name in enumerate(compiled.connection_names)
-        if repeated[owner == c].any()
-    }
+    names = compiled.connection_names
+
+    def by_joint(rows: Array) -> dict[str, int]:
+        return {name: int(rows[owner == c].sum()) for c, name in enumerate(names) if rows[owner == c].any()}
+
     return Mobility(
         n_bodies=len(model.bodies.kind),
         n_modes=int(model.bodies.q0[-1]),
         n_constraints=int(holds.sum()),
         n_redundant=int(repeated.sum()),
         n_redundant_rigid=int(repeated_rigid.sum()),
-        redundant=counts,
+        redundant=by_joint(repeated),
+        redundant_rigid=by_joint(repeated_rigid),
     )
 
 

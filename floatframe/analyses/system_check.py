@@ -1,0 +1,257 @@
+"""What can be known of a system before its run: mobility, placement, frequencies, step size, ranges of its bodies."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from math import ceil
+
+import numpy as np
+import scipy.linalg as la
+
+from cms.assessment.quality.record import QualityRecord, Verdict
+from fe_models.foundation.arrays import Array
+from floatframe.analyses.linear.linearization import allowed_motions
+from floatframe.analyses.system_matrices import tangents
+from floatframe.engine.compiling.file_frames import state_of_engine
+from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.initial_conditions.freedoms import Mobility
+from floatframe.engine.initial_conditions.initial import ConsistentState, consistent_motion, mobility
+from floatframe.engine.initial_conditions.newton_equations import set_iterate
+from floatframe.engine.initial_conditions.placement import REPORTED, body_sizes
+from floatframe.engine.kernels.work import Work, new_work
+from floatframe.errors import FloatframeError
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.state import State
+from floatframe.model.system import System
+from floatframe.simulation.step_advice import FOLLOWED, SEEN, frequency_words, knot_words
+
+__all__ = ["SystemVibrations", "check_system", "system_vibrations"]
+
+MOST_MOTIONS = 1500  #: largest number of independent motions whose frequencies are computed
+STILL = 1e-6  #: frequency relative to the highest, below which a motion counts as free
+NEAR = 1e-6  #: displacement relative to the size of a body, or relative change of velocities, that is not worth a word
+
+
+@dataclass(frozen=True)
+class SystemVibrations:
+    """Undamped vibrations of a system at one state, joints closed, forces and springs included."""
+
+    frequencies: Array  #: from the lowest, without free motions, (n,) [Hz, or 1 over the unit of time]
+    bodies: tuple[str, ...]  #: the body with most of the kinetic energy, of each vibration
+    n_free: int  #: motions without stiffness
+    n_unstable: int  #: motions with negative stiffness: the state is no minimum of the potential energy
+
+
+def check_system(
+    system: System,
+    *,
+    t_end: float | None = None,
+    h: float | None = None,
+    state: State | None = None,
+    has_fixed_steps: bool = True,
+) -> tuple[QualityRecord, ...]:
+    """Return what can be known of a system before its run, one record for each question.
+
+    A record "fail" means that the run would be refused, "warn" that it would run with a doubtful result.
+
+    Parameters
+    ----------
+    system
+        The system.
+    t_end, h
+        End and step size of the run [s]; None: the steps are not judged.
+    state
+        The state in which the run begins; None: the bodies as placed.
+    has_fixed_steps
+        Whether the method keeps h; if not, h is the largest step.
+    """
+    records = [mobility_record(system)]
+    made: ConsistentState | None = None
+    if records[0].verdict != "fail":
+        try:
+            made = consistent_motion(system, state)
+            records += start_records(system, state, made)
+        except FloatframeError as error:
+            words = str(error)
+            records.append(record("start", "State at the start", "fail", words, "see the message; the run stops here"))
+    found = None if made is None else system_vibrations(system, made)
+    if found is not None:
+        records.append(vibration_record(system, found))
+        if h is not None:
+            records.append(step_record(system, found, h, has_fixed_steps=has_fixed_steps))
+    if t_end is not None and h is not None:
+        n_steps = max(1, ceil(t_end / h * (1 - 1e-12)))
+        told = [*frequency_words(system, 0.0, h, n_steps, has_steps_of_one_size=has_fixed_steps)]
+        told += knot_words(system, 0.0, h, n_steps)
+        records += [
+            record("function of time", "Functions of time", "warn", words, "change h or the table") for words in told
+        ]
+    records += [body_record(body, system) for body in system.bodies if isinstance(body, FlexibleBody)]
+    return tuple(records)
+
+
+def record(
+    name: str, title: str, verdict: Verdict, reason: str, action: str = "", value: float = np.nan,
+    tolerance: float | None = None,
+) -> QualityRecord:  # fmt: skip
+    """Return a record; what needs no remedy has none."""
+    return QualityRecord(name, title, value, tolerance, verdict, reason, "" if verdict in ("pass", "info") else action)
+
+
+def mobility_record(system: System) -> QualityRecord:
+    """Return the record of mobility and redundant constraints."""
+    try:
+        found = mobility(system)
+    except FloatframeError as error:
+        return record("mobility", "Mobility", "fail", str(error), "place the bodies at their joints")
+    words = (
+        f"{found.n_freedoms} independent motions: {found.n_bodies} bodies with {found.n_modes} modes less "
+        f"{found.n_constraints} constraints; {found.mobility} if all bodies were rigid (count of Gruebler "
+        f"{found.gruebler})"
+    )
+    words += redundant_words(found)
+    shares = system.redundant == "minimum-norm"
+    if found.n_redundant and not shares:
+        action = 'take a joint that holds less in place of one of these, or set redundant = "minimum-norm" in [system]'
+        return record("mobility", "Mobility", "fail", words, action, found.n_redundant, 0.0)
+    if found.n_redundant:
+        words += "; their reactions share the load by minimum norm"
+    return record("mobility", "Mobility", "pass", words, value=found.n_redundant, tolerance=0.0)
+
+
+def redundant_words(found: Mobility) -> str:
+    """Return the redundant constraints by joint, with flexible bodies and as if all were rigid."""
+
+    def told(counts: Mapping[str, int]) -> str:
+        return ", ".join(f"{count} of joint {name!r}" for name, count in counts.items())
+
+    words = f"; redundant: {told(found.redundant)}" if found.n_redundant else "; no constraint is redundant"
+    if found.n_redundant_rigid > found.n_redundant:
+        words += f"; if all bodies were rigid: {told(found.redundant_rigid)}"
+    return words
+
+
+def start_records(system: System, state: State | None, made: ConsistentState) -> Iterator[QualityRecord]:
+    """Yield the records of the start: how far the joints move the bodies, and how fast these begin."""
+    compiled, units = compiled_system(system), system.units
+    given = compiled.placed if state is None else state_of_engine(compiled, state)
+    way, size = np.linalg.norm(made.state.r - given.r, axis=1), body_sizes(compiled)
+    i = int(np.argmax(way / size))
+    share = float(way[i] / size[i])
+    words = "the bodies lie at their joints"
+    if share > NEAR:
+        words = (
+            f"closing the joints moves body {compiled.body_names[i]!r} by {way[i]:.3g} {units.length_symbol}, "
+            f"{share:.2g} of its size"
+        )
+    action = "place it at its joints: from this distance it can end in another configuration"
+    yield record("placement", "Placement", "pass" if share <= REPORTED else "warn", words, action, share, REPORTED)
+    first = compiled.model.bodies.u0[:-1]
+    told = []
+    for what, values, unit in (("speed", made.state.u, ""), ("acceleration", made.u_dot, "²")):
+        sizes = np.linalg.norm([values[u : u + 3] for u in first], axis=1)
+        i = int(np.argmax(sizes))
+        told.append(
+            f"the largest {what} is {sizes[i]:.3g} {units.length_symbol}/{units.time_symbol}{unit}, of body "
+            f"{compiled.body_names[i]!r}"
+        )
+    if given.u.any():
+        M = tangents(compiled.model, work_at(compiled, made)).M
+        change = made.state.u - given.u
+        changed = np.sqrt(max(float(change @ M @ change), 0.0) / float(given.u @ M @ given.u))
+        told.append(
+            f"the joints change the given velocities by {changed:.2g} of their size"
+            if changed > NEAR
+            else "the given velocities fit the joints"
+        )
+    yield record("start", "State at the start", "pass", "; ".join(told))
+
+
+def work_at(compiled: CompiledSystem, made: ConsistentState) -> Work:
+    """Return working arrays that hold a state with its accelerations and wrenches."""
+    work = new_work(compiled.model)
+    set_iterate(work, made.state, made.u_dot, made.w)
+    return work
+
+
+def system_vibrations(system: System, made: ConsistentState) -> SystemVibrations | None:
+    """Return the undamped vibrations of a system at one state; None if it has too many motions, or none.
+
+    They are those of the tangent matrices on the motions that the joints allow, K z = omega² M z, in which the state
+    counts as at rest: what turns or accelerates changes the low ones.
+    """
+    compiled = compiled_system(system)
+    parts = tangents(compiled.model, work_at(compiled, made))
+    N = allowed_motions(system, parts.G)
+    if not 0 < N.shape[1] <= MOST_MOTIONS:
+        return None
+    M, K = N.T @ parts.M @ N, N.T @ parts.K @ N
+    M, K = (M + M.T) / 2, (K + K.T) / 2
+    size = 1 / np.sqrt(np.maximum(np.diag(M), np.finfo(float).tiny))
+    has_mass = np.diag(M) > 0
+    size = np.where(has_mass, size, 1.0)
+    pairs, vectors = la.eig(size[:, None] * K * size, size[:, None] * M * size, homogeneous_eigvals=True)
+    above, below = pairs.real
+    finite = np.abs(below) > np.finfo(float).eps * len(M) * np.abs(below).max()
+    squares = above[finite] / below[finite]
+    moves = N @ (size[:, None] * vectors.real[:, finite])
+    highest = float(np.abs(squares).max(initial=0.0))
+    vibrates, unstable = squares > STILL**2 * highest, squares < -(STILL**2) * highest
+    order = np.flatnonzero(vibrates)[np.argsort(squares[vibrates])]
+    first = compiled.model.bodies.u0
+    energy = np.stack([
+        np.einsum("ik,ij,jk->k", moves[u:v], parts.M[u:v, u:v], moves[u:v]) for u, v in pairwise(first)
+    ])  # fmt: skip
+    return SystemVibrations(
+        frequencies=np.sqrt(squares[order]) / (2 * np.pi),
+        bodies=tuple(compiled.body_names[int(k)] for k in energy[:, order].argmax(axis=0)),
+        n_free=int((~vibrates & ~unstable).sum()),
+        n_unstable=int(unstable.sum()),
+    )
+
+
+def vibration_record(system: System, found: SystemVibrations) -> QualityRecord:
+    """Return the record of the frequencies at the start."""
+    hertz = 1 / system.units.time
+    f, words = found.frequencies * hertz, "no vibration"
+    if len(f):
+        words = (
+            f"{len(f)} vibrations at the start, from {f[0]:.4g} Hz (mostly body {found.bodies[0]!r}) to {f[-1]:.4g} Hz "
+            f"(mostly body {found.bodies[-1]!r})"
+        )
+    words += f"; {found.n_free} motions without stiffness" if found.n_free else ""
+    words += f"; {found.n_unstable} with negative stiffness" if found.n_unstable else ""
+    return record("vibrations", "Vibrations", "info", words)
+
+
+def step_record(system: System, found: SystemVibrations, h: float, *, has_fixed_steps: bool) -> QualityRecord:
+    """Return the record of the step size beside the periods of the vibrations."""
+    second, f = system.units.time_symbol, found.frequencies
+    if not len(f):
+        return record("step", "Step size", "pass", f"h = {h:g} {second}; there is no vibration to follow")
+    steps = 1 / (h * f)
+    followed, unseen = int((steps >= FOLLOWED * (1 - 1e-9)).sum()), int((steps < SEEN).sum())
+    words = (
+        f"h = {h:g} {second} follows {followed} of {len(f)} vibrations with {FOLLOWED:g} steps in a period or more"
+        f"{f', and sees nothing of {unseen}' if unseen else ''}; h = {1 / (FOLLOWED * f[0]):.2g} follows the slowest, "
+        f"h = {1 / (FOLLOWED * f[-1]):.2g} all"
+    )
+    if not has_fixed_steps:
+        words += "; the method takes shorter steps where its tolerance asks for it"
+    verdict: Verdict = "pass" if followed or not has_fixed_steps else "warn"
+    action = f"take h = {1 / (FOLLOWED * f[0]):.2g} {second} or less, or leave the step to error_tolerance"
+    return record("step", "Step size", verdict, words, action, float(steps[0]), FOLLOWED)
+
+
+def body_record(body: FlexibleBody, system: System) -> QualityRecord:
+    """Return the record of a flexible body: its modes, up to which frequency they reach, and its stiffening."""
+    reduced = body.reduced
+    squares = la.eigvalsh(reduced.K, reduced.M) if reduced.n_q else np.zeros(0)
+    highest = float(np.sqrt(max(squares.max(initial=0.0), 0.0))) / (2 * np.pi * system.units.time)
+    words = f"{reduced.n_q} modes up to {highest:.4g} Hz alone in its frame"
+    if body.is_stiffened:
+        words += "; geometric stiffening acts"
+        return record(f"body {body.name}", f"Body {body.name!r}", "info", words)
+    why = "switched off" if reduced.geometric else "not in its file"
+    words += f"; geometric stiffening is {why}: fast turning and large axial loads do not stiffen it"
+    return record(f"body {body.name}", f"Body {body.name!r}", "info", words)
