@@ -62,11 +62,10 @@ def sliding_place(system: System, trajectory: Trajectory, joint: SlidingJoint, e
     v = rotated(np.swapaxes(R, 1, 2), end.velocity - motion.v) - cross(motion.omega_B, x)
     line = Line(places, e, np.array(deformed), np.array(rates))
     s = (x - points[0]) @ e
-    for _ in range(MOST):
-        D, slope, bend = (line.displacement(s, order) for order in range(3))
-        t = e + slope
-        gap = x - points[0] - s[:, None] * e - D
-        change = dot(gap, t) / (dot(t, t) - dot(gap, bend))
+    for _ in range(MOST):  # Gauss-Newton: the joint keeps the gap at zero
+        t = e + line.displacement(s, 1)
+        gap = x - points[0] - s[:, None] * e - line.displacement(s, 0)
+        change = dot(gap, t) / dot(t, t)
         s = s + change
         if np.abs(change).max(initial=0.0) <= 1e-14 * places[-1]:
             break

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.arrays import Array
 from fe_models.foundation.paths import is_stream, near_file
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import SignalError
@@ -185,8 +185,8 @@ def without_gaps(
     step = usual_step(time)
     notes: list[str] = []
     if step is not None and equidistant_step(time) is None:
-        lost = np.flatnonzero(np.diff(time) > (1 + 10 * ALIKE) * step)
-        require_whole_steps(time, lost, step, place, uneven=uneven)
+        if not uneven:
+            require_whole_steps(time, step, place)
         if not uneven or fill > 0:
             time, values, told = with_lost_samples(time, values, step, fill, place)
             notes += told
@@ -222,11 +222,11 @@ def usual_step(time: Array) -> float | None:
     return float(dt[alike].mean()) if alike.mean() >= COMMON else None
 
 
-def require_whole_steps(time: Array, lost: IntArray, step: float, place: Callable[[int], str], *, uneven: bool) -> None:
+def require_whole_steps(time: Array, step: float, place: Callable[[int], str]) -> None:
     """Raise `SignalError` where a step is not a multiple of the usual step, because the rate changes there."""
     dt = np.diff(time)
     odd = np.flatnonzero((np.abs(dt - step) > 10 * ALIKE * step) & (np.abs(dt / step - np.round(dt / step)) > 0.1))
-    if len(odd) and not uneven:
+    if len(odd):
         k = int(odd[0])
         raise SignalError(
             f"{place(k + 1)}: the step is {dt[k]:.6g} s, elsewhere {step:.6g} s, and no multiple of it ({len(odd)} "

@@ -444,7 +444,7 @@ def test_abaqus_part_with_one_instance_reads_like_a_flat_deck(tmp_path):
     )
     assert len(mesh.nodes) == 4
     assert {name: list(nodes) for name, nodes in mesh.node_sets.items()} == {"inside": [0], "tip": [3]}
-    assert "2 blocks of nodes, elements or sets of the assembly itself" in mesh.notes[0]
+    assert mesh.notes[0].startswith("2 blocks of nodes, elements or sets of the assembly itself")
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,9 @@ from numpy.testing import assert_allclose
 
 from fe_models import read_cad
 from fe_models.errors import MeshError
+from fe_models.files.cad.cad_faces import SAMPLES, _sampled
 from fe_models.files.cad.cad_units import length_unit
+from fe_models.files.cad.gmsh_model import gmsh_model
 from tests.fe_models.small_solids import PLATE, PLATE_VOLUME, drawn, iges_unit, in_unit, painted, plate_file
 
 METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "inch": 0.0254}
@@ -80,6 +82,60 @@ def test_a_ball_and_a_pin_say_where_the_material_is(tmp_path):
     assert_allclose(cylinder.axis, np.array([1, 1, 0]) / np.sqrt(2), rtol=0, atol=1e-9)
     assert not sphere.is_hole
     assert not cylinder.is_hole
+
+
+def slanted(occ, turn):
+    """Draw a prism over two straight sides and an arc of 3, away from the origin and turned."""
+    a, b, c = (occ.addPoint(x, y, 7) for x, y in ((-9, -4), (-5, -4), (-2, -4)))
+    d = occ.addPoint(-5 + 3 * np.cos(2.2), -4 + 3 * np.sin(2.2), 7)
+    arc = occ.addCircleArc(c, b, d)
+    loop = occ.addCurveLoop([occ.addLine(a, c), arc, occ.addLine(d, a)])
+    solid = [each for each in occ.extrude([(2, occ.addPlaneSurface([loop]))], 0, 0, 11) if each[0] == 3]
+    occ.rotate(solid, 0, 0, 0, *turn)
+    return solid
+
+
+def test_a_prism_off_the_origin_and_turned_has_its_faces(tmp_path):
+    axis, angle = np.array([1.0, -2.0, 0.5]) / np.sqrt(5.25), 0.9
+    with drawn(tmp_path / "prism.step") as occ:
+        slanted(occ, (*axis, angle))
+    part = read_cad(tmp_path / "prism.step", units="mm-t-s")
+    c, s = np.cos(angle), np.sin(angle)
+    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    R = c * np.eye(3) + s * cross + (1 - c) * np.outer(axis, axis)
+    corner = np.array([-5 + 3 * np.cos(2.2), -4 + 3 * np.sin(2.2)])
+    base = 0.5 * 4 * (corner[1] + 4) + 0.5 * 9 * 2.2  # a triangle and a sector
+    assert_allclose(part.volume, 11 * base, rtol=1e-9, atol=0)
+    planes = [face for face in part.faces if face.kind == "plane"]
+    (round_,) = [face for face in part.faces if face.kind == "cylinder"]
+    slope = np.array([-(corner[1] + 4), corner[0] + 9, 0]) / np.hypot(corner[0] + 9, corner[1] + 4)
+    expected = [((0, 0, 1), base), ((0, 0, -1), base), ((0, -1, 0), 77.0)]
+    expected += [(slope, 11 * np.hypot(corner[0] + 9, corner[1] + 4))]
+    for normal, area in expected:
+        (face,) = [each for each in planes if each.normal @ R @ normal > 1 - 1e-9]
+        assert_allclose(face.area, area, rtol=1e-9, atol=0)
+    assert_allclose(round_.area, 3 * 2.2 * 11, rtol=1e-9, atol=0)
+    assert_allclose(round_.radius, 3, rtol=1e-9, atol=0)
+    assert not round_.is_hole
+    assert_allclose(np.abs(round_.axis @ R[:, 2]), 1, rtol=1e-12, atol=0)
+    assert_allclose(np.cross(round_.point - R @ [-5, -4, 0], R[:, 2]), 0, rtol=0, atol=1e-8)
+    middle = np.array([-5, -4]) + 3 * np.sin(1.1) / 1.1 * np.array([np.cos(1.1), np.sin(1.1)])
+    assert_allclose(round_.centre, R @ [*middle, 12.5], rtol=0, atol=1e-8)
+
+
+def test_a_face_is_sampled_all_over():
+    with gmsh_model("samples", {}) as gmsh:
+        occ = gmsh.model.occ
+        corners = [occ.addPoint(x, y, 2) for x, y in ((-3, 5), (1, 5), (1, 11), (-3, 11))]
+        loop = occ.addCurveLoop([occ.addLine(corners[k], corners[(k + 1) % 4]) for k in range(4)])
+        tag = occ.addPlaneSurface([loop])
+        occ.synchronize()
+        points, normals, curvatures, _ = _sampled(gmsh, tag)
+    assert_allclose(points.mean(axis=0), [-1, 8, 2], rtol=0, atol=1e-9)
+    assert_allclose(np.sort(np.unique(points[:, 0].round(9))), -3 + 4 * np.array(SAMPLES), rtol=0, atol=1e-8)
+    assert_allclose(np.sort(np.unique(points[:, 1].round(9))), 5 + 6 * np.array(SAMPLES), rtol=0, atol=1e-8)
+    assert_allclose(np.abs(normals), np.tile([0, 0, 1], (len(points), 1)), rtol=0, atol=1e-12)
+    assert_allclose(curvatures, 0, rtol=0, atol=1e-12)
 
 
 def test_solids_that_touch_share_a_face(tmp_path):

@@ -113,6 +113,60 @@ def test_damped_sines_meet_a_spectrum_and_leave_neither_velocity_nor_displacemen
     assert abs(run.displacement_left[0]) < 1e-6 * np.abs(x).max() * G
 
 
+def steps_of(made, target, duration):
+    """Check the times of a history: 20 in a cycle of the highest frequency, and just enough for the duration."""
+    h = 1 / (20 * target.last)
+    assert_allclose(np.diff(made.time), h, rtol=1e-9)
+    assert duration <= made.time[-1] < duration + h
+    octaves = np.log2(target.last / target.first)
+    return made.time, np.geomspace(target.first, target.last, int(np.ceil(6 * octaves)) + 1)
+
+
+def require_sum(acceleration, waves):
+    """Check that a history is a sum of shapes whose amplitudes alternate in sign, the first one positive."""
+    amplitudes, *_ = np.linalg.lstsq(waves.T, acceleration, rcond=None)
+    assert_allclose(amplitudes @ waves, acceleration, rtol=0, atol=1e-9 * np.abs(acceleration).max())
+    assert np.all(amplitudes * (-1.0) ** np.arange(len(waves)) > 0)
+
+
+@pytest.mark.parametrize("duration", [None, 0.011])
+def test_a_history_for_a_spectrum_is_the_sum_of_wavelets_of_its_docstring(duration):
+    """Wavelets of an odd number of half-cycles, as many as fit into the duration, but at most 31."""
+    target = Level.of([(190, 20.0), (700, 300.0), (3000, 250.0)])
+    made = synthesised(target, 15.0, duration)
+    length = 5 / 190 if duration is None else duration
+    t, f = steps_of(made, target, length)
+    waves = np.zeros((len(f), len(t)))
+    for k, own in enumerate(f):
+        n = max(odd for odd in range(3, 33, 2) if odd == 3 or odd / (2 * own) <= length)
+        inside = t <= n / (2 * own)
+        waves[k, inside] = (np.sin(2 * np.pi * own * t) * np.sin(2 * np.pi * own * t / n))[inside]
+    require_sum(made.acceleration, waves)
+    assert_allclose(made.target, target.at(made.frequencies), rtol=1e-12)
+    assert_allclose(made.frequencies, np.geomspace(190, 3000, 2 * len(f) - 1), rtol=1e-12)
+
+
+@pytest.mark.parametrize("duration", [None, 0.13])
+def test_a_history_of_damped_sines_is_their_sum_less_what_they_leave(duration):
+    target, decay = Level.of([(40, 5.0), (300, 100.0), (700, 100.0)]), 0.04
+    made = damped_sines(target, 10.0, duration, decay=decay)
+    t, f = steps_of(made, target, np.log(1000) / (2 * np.pi * decay * 40) if duration is None else duration)
+    fade = np.where(t > 0.95 * t[-1], 0.5 + 0.5 * np.cos(np.pi * (t / t[-1] - 0.95) / 0.05), 1.0)
+
+    def ringing(frequency, zeta):
+        omega = 2 * np.pi * frequency
+        return np.exp(-zeta * omega * t) * np.sin(omega * t) * fade
+
+    def left(a):
+        velocity = np.concatenate([[0], np.cumsum((a[1:] + a[:-1]) / 2)])
+        return np.array([velocity[-1], (velocity[:-1] + a[:-1] / 3 + a[1:] / 6).sum()])
+
+    slow = np.array([ringing(20.0, 0.8), ringing(10.0, 0.8)])
+    cure = np.linalg.inv(np.column_stack([left(each) for each in slow]))
+    waves = np.array([ringing(own, decay) for own in f])
+    require_sum(made.acceleration, np.array([wave - (cure @ left(wave)) @ slow for wave in waves]))
+
+
 def test_damped_sines_of_no_use_are_refused():
     target = Level.of([(10, 1.0), (100, 10.0)])
     with pytest.raises(ModelError, match=r"less than three cycles of the first frequency, 10 Hz; expected 0\.3 s"):
