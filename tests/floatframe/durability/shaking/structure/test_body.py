@@ -4,12 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.linalg as la
 from numpy.testing import assert_allclose
 
 import cms
+import fe_models as fm
 from cms.errors import BodyError
 from fe_models.body.fe_body import Interface
-from floatframe.durability.shaking.structure.body import bases_of_body, require_held, shaken_body
+from fe_models.elements.beams.attachments import PointMass
+from fe_models.meshes.line_mesh import LineMesh
+from floatframe.durability.shaking.structure.body import bases_of_body, held_by_bases, require_held, shaken_body
 from floatframe.durability.shaking.structure.damping import Damping
 from floatframe.durability.shaking.structure.model import response
 from floatframe.durability.shaking.structure.places import Observed
@@ -18,6 +22,7 @@ from tests.bodies import bar, beam, with_interfaces
 
 FREQUENCIES = np.array([1.0, 30.0, 77.0, 140.0, 400.0])
 ZETA = 0.03
+UNITS = cms.unit_system("m-kg-s")
 P = np.array([0.2, -0.1, 0.3])  #: a point of a base beside its interface
 
 
@@ -40,8 +45,6 @@ def driven_response(part, held, T, wanted, zeta):
     """Acceleration of dofs and forces on held dofs, from the finite element matrices, for s_ddot = exp(i omega t)."""
     M, K = part.M.toarray(), part.K.toarray()
     inner = np.setdiff1d(np.arange(len(M)), held)
-    import scipy.linalg as la
-
     omega2, Phi = la.eigh(K[np.ix_(inner, inner)], M[np.ix_(inner, inner)])
     omega = np.sqrt(omega2)
     full = np.zeros((len(M), T.shape[1]))
@@ -60,6 +63,51 @@ def driven_response(part, held, T, wanted, zeta):
 
 def dofs_of(part, node):
     return np.flatnonzero(part.dofs[:, 0] == node)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_motions_on_bases_split_a_random_structure(seed):
+    """Statically: x = T s + K_N^-1 f with G x = R s; dynamically the modes and the shapes without mass span G x = 0."""
+    rng = np.random.default_rng(seed)
+    n, n_g, n_s, n_0 = 11, 4, 3, int(rng.integers(0, 4))
+    S = 10 ** rng.uniform(-2, 2, size=n)
+    A, B, G, R = (rng.normal(size=size) for size in ((n, n), (n, n - n_g - n_0), (n_g, n), (n_g, n_s)))
+    K, M = ((X @ X.T) / S / S[:, None] for X in (A, B))
+    held = held_by_bases("a", M, K, G / S, R, S)
+    V, V_0 = held.V / S[:, None], held.V_0 / S[:, None]
+    K, M, T = K * S * S[:, None], M * S * S[:, None], held.T / S[:, None]
+    assert (V.shape, V_0.shape) == ((n, n - n_g - n_0), (n, n_0))
+    assert_allclose(G @ np.hstack([T, V, V_0]), np.hstack([R, np.zeros((n_g, n - n_g))]), rtol=0, atol=1e-9)
+    energy = la.block_diag(T.T @ K @ T, np.diag(held.omega**2), np.eye(n_0))
+    both = np.hstack([T, V, V_0])
+    assert_allclose(both.T @ K @ both, energy, rtol=0, atol=1e-8 * np.abs(energy).max())
+    assert_allclose(V.T @ M @ V, np.eye(n - n_g - n_0), rtol=0, atol=1e-9)
+    assert_allclose(M @ V_0, 0, rtol=0, atol=1e-8)
+    assert np.all(np.diff(held.omega) >= 0)
+
+
+def test_a_force_on_massless_shapes_gives_the_response_of_the_full_matrices():
+    """Point masses on beams without density: the rotations of the nodes follow forces statically."""
+    nodes = np.array([[0.2, 0.1, -0.3], [0.4, 0.2, -0.2], [0.5, 0.5, 0.0], [0.6, 0.4, 0.3], [0.9, 0.5, 0.4]])
+    mesh = LineMesh(nodes, np.array([[0, 1], [1, 2], [2, 3], [3, 4]]))
+    ends = [Interface(name, "nodes", np.array([k]), mesh.nodes[k]) for name, k in (("foot", 0), ("top", 4))]
+    masses = [PointMass(k, 0.3 + 0.1 * k) for k in range(5)]
+    property_ = fm.BeamProperty(fm.Rectangle(0.02, 0.03), fm.Material("light", 7e10, 0.3, 0.0))
+    part = cms.couple(fm.beam_body(mesh, property_, name="mast", units=UNITS, interfaces=ends, point_masses=masses))
+    body = cms.reduce(part, cms.craig_bampton(part, 9), damping=None)
+    seen = [Observed("top", interface="top", quantities=("displacement", "acceleration"))]
+    names = ["top:y", "top:rx", "top:rz"]
+    model = shaken_body(body, bases_of_body(body, "foot"), Damping(ratio=0.0), seen, names)
+    K, M = part.K.toarray()[6:, 6:], part.M.toarray()[6:, 6:]
+    forces = np.eye(24)[:, [19, 21, 23]]
+    at = model.output_index("top displacement x")
+    for f in (3.0, 20.0):
+        w = 2 * np.pi * f
+        x = np.linalg.solve(K - w**2 * M, forces)
+        H = response(model, np.array([f]))[0][:, 6:]
+        assert_allclose(H[at : at + 6], x[18:], rtol=0, atol=1e-7 * np.abs(x[18:]).max())
+        held = part.K.toarray()[:6, 6:] @ x
+        assert_allclose(H[:6], held, rtol=0, atol=1e-7 * np.abs(held).max())
 
 
 def test_one_driven_interface_gives_the_response_of_the_full_matrices(part, reduced):
