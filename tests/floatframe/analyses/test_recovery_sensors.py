@@ -5,13 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
 
 import cms
+from fe_models.body.loads import nodal_load
 from floatframe import (
     GROUND,
     BaseMotion,
+    BodyLoad,
+    Bushing,
     FixedJoint,
     FlexibleBody,
+    Gravity,
     InterfaceForceSensor,
     Marker,
     ModelError,
@@ -26,6 +31,7 @@ from floatframe import (
     snapshot,
     static_equilibrium,
 )
+from tests.cms.reduction.geometric_stiffness.examples import bar_of_beams
 from tests.floatframe.analyses.examples import compare, held
 
 
@@ -36,6 +42,70 @@ def test_rows_are_linear_outputs(bar):
     linear = linearize(system, about, outputs=sensors)
     assert len(linear.outputs) == bar.recovery["instruments"].n_rows
     compare(system, about, linear, sensors, size=1e-6, tolerance=1e-5)
+
+
+@pytest.fixture(scope="module")
+def placed():
+    """A bar off the origin and turned, in bushings between itself and the ground, under every load that a table knows."""
+    part = bar_of_beams(6)
+    part = part.with_load_cases(nodal_load(part, "wind", {2: np.array([9.0, -4.0, 6.0]), 4: np.array([-2.0, 5.0, 3.0])}))
+    coupled = cms.couple(part)
+    root, tip = (each.name for each in coupled.interfaces)
+    rows = [cms.Rows(quantity, at=(tip,)) for quantity in ("displacement", "velocity", "acceleration")]
+    rows += [cms.Rows("interface force"), cms.Rows("net force", about=(0.1, -0.2, 0.3))]
+    asked = [cms.RecoveryRequest("instruments", rows=rows)]
+    frame = cms.TisserandFrame(axes=Rotation.from_rotvec([0.4, 0.7, -0.5]).as_matrix())
+    reduced = cms.reduce(coupled, cms.craig_bampton(coupled, n_modes=3), frame=frame, recovery=asked)
+    turn, place = Rotation.from_rotvec([-0.8, 0.5, 1.1]), np.array([0.4, -0.3, 0.2])
+    ends = {each.name: reduced.frame.origin + reduced.frame.axes @ each.position for each in reduced.interfaces}
+    K, D = [3e5, 2e5, 4e5, 3e3, 2e3, 4e3], [200, 300, 100, 2, 3, 1]
+    forces = [
+        Bushing(name, Marker(GROUND, position=place + turn.apply(ends[name]), triad=turn.as_matrix()),
+                Marker("bar", name), np.multiply(K, 1.0 + (name == tip)), D)
+        for name in (root, tip)
+    ]  # fmt: skip
+    forces += [
+        Gravity((4.0, -3.0, -8.0)),
+        BodyLoad("blow", "bar", "wind", 1.3),
+        PointForce("push", Marker("bar", tip), force=(30.0, -20.0, 50.0), torque=(1.0, 2.0, 3.0)),
+    ]
+    x, y, z, w = turn.as_quat()
+    return System([FlexibleBody("bar", reduced, position=place, orientation=(w, x, y, z))], [], forces)
+
+
+def test_rows_of_a_turned_body_are_linear_outputs(placed):
+    about = static_equilibrium(placed, tolerance=1e-12)
+    sensors = [RecoverySensor("rows", "bar", "instruments")]
+    linear = linearize(placed, about, outputs=sensors)
+    assert len(linear.outputs) == placed.bodies[0].reduced.recovery["instruments"].n_rows
+    compare(placed, about, linear, sensors, size=1e-6, tolerance=1e-5)
+
+
+def test_rows_of_a_turned_body_are_what_acts_on_it_and_how_it_moves(placed):
+    bar = replace(placed.bodies[0], velocity=(0.03, -0.05, 0.02), omega_B=(2.0, -3.0, 4.0))
+    placed = replace(placed, bodies=[bar])
+    made = consistent_state(placed)
+    root, tip = (each.name for each in placed.bodies[0].reduced.interfaces)
+    now = snapshot(placed, made.state, made.u_dot, made.w)
+    sensors = [
+        RecoverySensor("rows", "bar", "instruments"),
+        *(InterfaceForceSensor(name, "bar", name) for name in (root, tip)),
+        PlaceSensor("place", Marker("bar", tip), "acceleration"),
+    ]
+    found = measured(placed, now, sensors)
+    rows = found["rows"].columns
+    turn = Rotation.from_quat(np.roll(placed.bodies[0].orientation, -1))
+    place = turn.inv().apply([found["place"].columns[x][0] for x in "xyz"])
+    table = placed.bodies[0].reduced.recovery["instruments"]
+    own = {table.components[row]: rows[table.labels[row]][0] for row in table.rows("acceleration")}
+    assert_allclose([own[f"u{x}"] for x in "xyz"], place, rtol=0, atol=1e-6 * np.abs(place).max())
+    for name in (root, tip):
+        own = found[name].columns
+        for key, letter in (("force", "f"), ("moment", "m")):
+            expected = turn.inv().apply([own[f"{key} {x}"][0] for x in "xyz"])
+            got = [rows[f"interface force {name} {letter}{x}"][0] for x in "xyz"]
+            assert np.abs(expected).max() > 1.0
+            assert_allclose(got, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
 
 
 def test_recovered_interface_forces_and_accelerations_are_those_of_joints_and_places(bar):
