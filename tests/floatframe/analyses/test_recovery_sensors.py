@@ -46,9 +46,11 @@ def test_rows_are_linear_outputs(bar):
 
 @pytest.fixture(scope="module")
 def placed():
-    """A bar off the origin and turned, in bushings between itself and the ground, under every load that a table knows."""
+    """A bar off the origin and turned, in bushings to the ground, under every load that a table knows."""
     part = bar_of_beams(6)
-    part = part.with_load_cases(nodal_load(part, "wind", {2: np.array([9.0, -4.0, 6.0]), 4: np.array([-2.0, 5.0, 3.0])}))
+    part = part.with_load_cases(
+        nodal_load(part, "wind", {2: np.array([9.0, -4.0, 6.0]), 4: np.array([-2.0, 5.0, 3.0])})
+    )
     coupled = cms.couple(part)
     root, tip = (each.name for each in coupled.interfaces)
     rows = [cms.Rows(quantity, at=(tip,)) for quantity in ("displacement", "velocity", "acceleration")]

@@ -95,17 +95,18 @@ def slanted(occ, turn):
     return solid
 
 
-def test_a_prism_off_the_origin_and_turned_has_its_faces(tmp_path):
+@pytest.mark.parametrize(("units", "mm"), [("mm-t-s", 1.0), ("m-kg-s", 1e-3)])
+def test_a_prism_off_the_origin_and_turned_has_its_faces(tmp_path, units, mm):
     axis, angle = np.array([1.0, -2.0, 0.5]) / np.sqrt(5.25), 0.9
     with drawn(tmp_path / "prism.step") as occ:
         slanted(occ, (*axis, angle))
-    part = read_cad(tmp_path / "prism.step", units="mm-t-s")
+    part = read_cad(tmp_path / "prism.step", units=units)
     c, s = np.cos(angle), np.sin(angle)
     cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
     R = c * np.eye(3) + s * cross + (1 - c) * np.outer(axis, axis)
     corner = np.array([-5 + 3 * np.cos(2.2), -4 + 3 * np.sin(2.2)])
     base = 0.5 * 4 * (corner[1] + 4) + 0.5 * 9 * 2.2  # a triangle and a sector
-    assert_allclose(part.volume, 11 * base, rtol=1e-9, atol=0)
+    assert_allclose(part.volume, 11 * base * mm**3, rtol=1e-9, atol=0)
     planes = [face for face in part.faces if face.kind == "plane"]
     (round_,) = [face for face in part.faces if face.kind == "cylinder"]
     slope = np.array([-(corner[1] + 4), corner[0] + 9, 0]) / np.hypot(corner[0] + 9, corner[1] + 4)
@@ -113,14 +114,18 @@ def test_a_prism_off_the_origin_and_turned_has_its_faces(tmp_path):
     expected += [(slope, 11 * np.hypot(corner[0] + 9, corner[1] + 4))]
     for normal, area in expected:
         (face,) = [each for each in planes if each.normal @ R @ normal > 1 - 1e-9]
-        assert_allclose(face.area, area, rtol=1e-9, atol=0)
-    assert_allclose(round_.area, 3 * 2.2 * 11, rtol=1e-9, atol=0)
-    assert_allclose(round_.radius, 3, rtol=1e-9, atol=0)
+        assert_allclose(face.area, area * mm**2, rtol=1e-9, atol=0)
+    assert_allclose(round_.area, 3 * 2.2 * 11 * mm**2, rtol=1e-9, atol=0)
+    assert_allclose(round_.radius, 3 * mm, rtol=1e-9, atol=0)
     assert not round_.is_hole
     assert_allclose(np.abs(round_.axis @ R[:, 2]), 1, rtol=1e-12, atol=0)
-    assert_allclose(np.cross(round_.point - R @ [-5, -4, 0], R[:, 2]), 0, rtol=0, atol=1e-8)
+    assert_allclose(np.cross(round_.point / mm - R @ [-5, -4, 0], R[:, 2]), 0, rtol=0, atol=1e-8)
     middle = np.array([-5, -4]) + 3 * np.sin(1.1) / 1.1 * np.array([np.cos(1.1), np.sin(1.1)])
-    assert_allclose(round_.centre, R @ [*middle, 12.5], rtol=0, atol=1e-8)
+    ends = np.array([(x, y, z) for x, y in ((-9, -4), (-2, -4), corner) for z in (7, 18)]) @ R.T
+    (flat,) = [each for each in planes if each.normal @ R @ [0, -1, 0] > 1 - 1e-9]
+    assert_allclose(flat.lo / mm, ends[:4].min(axis=0), rtol=0, atol=1e-5)
+    assert_allclose(flat.hi / mm, ends[:4].max(axis=0), rtol=0, atol=1e-5)
+    assert_allclose(round_.centre / mm, R @ [*middle, 12.5], rtol=0, atol=1e-8)
 
 
 def test_a_face_is_sampled_all_over():
