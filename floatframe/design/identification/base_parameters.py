@@ -20,6 +20,7 @@ from floatframe.design.identification.regressors import LinearForm
 from floatframe.design.identification.tree_samples import TreeSamples, as_placed, gravity_of, rigid_tree, tree_samples
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.tree.kernels.tree import Tree
+from floatframe.engine.tree.topology import tree_of
 from floatframe.errors import ModelError
 
 __all__ = [
@@ -41,6 +42,10 @@ __all__ = [
     "silent_directions",
     "square_to",
     "tensor_row",
+    "typical",
+    "typical_channels",
+    "typical_rows",
+    "typical_time",
 ]
 
 
@@ -96,10 +101,10 @@ def silent_directions(form: LinearForm) -> Array:
     n_c, n_b = len(tree.side), len(tree.parent)
     zero = np.zeros((1, n_c))
     placed = tree_samples(system, as_placed(system)[None], zero, zero)
-    moves = [moves_of(form, placed, tree, i) for i in range(n_b)]
-    gravity = gravity_of(system)
     size = compiled_system(system).length
-    to_ground = [parameters_in(placed.r[0, i], placed.R[0, i]) for i in range(n_b)]
+    moves = [moves_of(form, placed, tree, i, size) for i in range(n_b)]
+    gravity = gravity_of(system)
+    to_ground = [parameters_in(placed.r[0, i] / size, placed.R[0, i]) for i in range(n_b)]
     found: list[Array] = []
 
     def note(i: int, phi: Array, parent: int = -1, drive: int = -1) -> None:
@@ -116,9 +121,9 @@ def silent_directions(form: LinearForm) -> Array:
         parent = int(tree.parent[i])
         way = [move for j in chain(tree, i) for move in moves[j]]
         before = [move for j in chain(tree, parent) for move in moves[j]]
-        for phi in passing(moves[i], before, size, unweighed_dipoles):
+        for phi in passing(moves[i], before, unweighed_dipoles):
             note(i, phi, parent)
-        for phi in without_effect(way, gravity, size):
+        for phi in without_effect(way, gravity):
             note(i, phi)
         if "motor-inertia" in form.terms:
             for k, move in enumerate(moves[i]):
@@ -133,11 +138,11 @@ def silent_directions(form: LinearForm) -> Array:
     if not found:
         return np.zeros((len(form.names), 0))
     U, s, _ = la.svd(np.array(found).T, full_matrices=False)
-    return U[:, s > 1e-9 * s[0]]
+    return typical(form)[:, None] * U[:, s > 1e-9 * s[0]]
 
 
-def moves_of(form: LinearForm, placed: TreeSamples, tree: Tree, i: int) -> list[Move]:
-    """Return the moves of the joint of body i, from its parent on."""
+def moves_of(form: LinearForm, placed: TreeSamples, tree: Tree, i: int, size: float) -> list[Move]:
+    """Return the moves of the joint of body i, from its parent on, in lengths of the system."""
     made = []
     first, end = int(tree.column0[i]), int(tree.column0[i + 1])
     for k in range(first, end):
@@ -148,7 +153,7 @@ def moves_of(form: LinearForm, placed: TreeSamples, tree: Tree, i: int) -> list[
                 f"system {form.system.name!r}: joint {name!r} is a screw, for which there is no closed rule; find the "
                 "base parameters by samples"
             )
-        made.append(Move(turn, shift, placed.point[0, k]))
+        made.append(Move(turn, shift, placed.point[0, k] / size))
     return made
 
 
@@ -179,7 +184,7 @@ def dipole(p: Array, d: Array) -> Array:
 
 
 def common(spaces: list[Array]) -> Array:
-    """Return a basis, rows, of what lies in all row spaces; their rows are scaled to the lengths of the system."""
+    """Return a basis, rows, of what lies in all row spaces, in lengths of the system."""
     kept = spaces[0]
     for space in spaces[1:]:
         if not len(kept):
@@ -189,7 +194,7 @@ def common(spaces: list[Array]) -> Array:
     return kept
 
 
-def passing(own: list[Move], before: list[Move], size: float, dipoles: Callable[[list[Move], Array], Array]) -> Array:
+def passing(own: list[Move], before: list[Move], dipoles: Callable[[list[Move], Array], Array]) -> Array:
     """(1) Return what passes from a body to its parent, rows of 10.
 
     dipoles: the first moments without mass, (k, 10), that a translation lets through, by the moves before it and its
@@ -197,15 +202,14 @@ def passing(own: list[Move], before: list[Move], size: float, dipoles: Callable[
     """
     if not own:
         return np.eye(10)
-    scale = np.array([1.0] + [size] * 3 + [size**2] * 6)
     spaces = []
     for k, move in enumerate(own):
         if move.shift.any():
             space = np.vstack([tensors(), dipoles(before + own[:k], move.shift)])
         else:
             space = line_masses(move)
-        spaces.append(space / scale)
-    return common(spaces) * scale
+        spaces.append(space)
+    return common(spaces)
 
 
 def unweighed_dipoles(before: list[Move], shift: Array) -> Array:
@@ -238,7 +242,7 @@ def tensor_row(J: Array) -> Array:
     return np.array([0.0] * 4 + [J[pair] for pair in PAIRS])
 
 
-def without_effect(way: list[Move], gravity: Array, size: float) -> list[Array]:
+def without_effect(way: list[Move], gravity: Array) -> list[Array]:
     """(2) Return parameters of a body that its ways to move never show."""
     e, are_several = rotations(way)
     shifts = [move.shift for move in way if move.shift.any()]
@@ -249,7 +253,7 @@ def without_effect(way: list[Move], gravity: Array, size: float) -> list[Array]:
         silent = [dipole(still, axis) for axis in np.eye(3)] + list(tensors())
         return silent if shifts else [*silent, point_mass(still)]
     if are_several:
-        centre = common_point(turns, size)
+        centre = common_point(turns)
         if shifts or centre is None:
             return []
         about = [] if has_gravity else [dipole(centre, axis) for axis in np.eye(3)]
@@ -262,7 +266,7 @@ def without_effect(way: list[Move], gravity: Array, size: float) -> list[Array]:
         tensor_row(np.outer(x, y) + np.outer(y, x)) for a, x in enumerate(axes) for y in axes[a:] if a or y is not e
     ]
     point = turns[0].point
-    stays = all(np.linalg.norm(np.cross(e, move.point - point)) < SAME * size for move in turns)
+    stays = all(np.linalg.norm(np.cross(e, move.point - point)) < SAME for move in turns)
     stays = stays and all(np.linalg.norm(np.cross(e, shift)) < SAME for shift in shifts)
     if stays:
         if not shifts:
@@ -272,7 +276,7 @@ def without_effect(way: list[Move], gravity: Array, size: float) -> list[Array]:
     return silent
 
 
-def common_point(turns: list[Move], size: float) -> Array | None:
+def common_point(turns: list[Move]) -> Array | None:
     """Return the point in which all axes of rotation meet, or None."""
     A, b = np.zeros((3, 3)), np.zeros(3)
     for move in turns:
@@ -282,7 +286,7 @@ def common_point(turns: list[Move], size: float) -> Array | None:
         b += across @ move.point
     centre = la.solve(A, b, assume_a="sym")
     misses = [np.linalg.norm(np.cross(move.turn, centre - move.point)) for move in turns]
-    return centre if max(misses) < SAME * size else None
+    return centre if max(misses) < SAME else None
 
 
 def drive_twins(move: Move, earlier: list[Move], gravity: Array) -> list[tuple[Array, bool]]:
@@ -333,14 +337,14 @@ def silent_at_base(form: LinearForm) -> Array:
     n_c, n_b, p = len(tree.side), len(tree.parent), len(form.names)
     zero = np.zeros((1, n_c))
     placed = tree_samples(system, as_placed(system)[None], zero, zero)
-    moves = [moves_of(form, placed, tree, i) for i in range(n_b)]
     size = compiled_system(system).length
-    to_ground = [parameters_in(placed.r[0, i], placed.R[0, i]) for i in range(n_b)]
+    moves = [moves_of(form, placed, tree, i, size) for i in range(n_b)]
+    to_ground = [parameters_in(placed.r[0, i] / size, placed.R[0, i]) for i in range(n_b)]
     found: list[Array] = []  # parameters of all bodies, in ground axes about its origin, without momentum
     for i in range(n_b):
         parent = int(tree.parent[i])
         before = [move for j in chain(tree, parent) for move in moves[j]]
-        for phi in passing(moves[i], before, size, still_dipoles):
+        for phi in passing(moves[i], before, still_dipoles):
             direction = np.zeros((n_b, 10))
             direction[i] = phi
             if parent >= 0:
@@ -353,15 +357,14 @@ def silent_at_base(form: LinearForm) -> Array:
     drives = np.eye(p)[:, form.n_inertial :]  # (3)
     if not found:
         return drives
-    scale = np.tile([1.0] + [size] * 3 + [size**2] * 6, n_b)[:, None]
-    at_ground = (la.orth(np.array(found).reshape(-1, 10 * n_b).T / scale, rcond=SAME) * scale).reshape(n_b, 10, -1)
+    at_ground = la.orth(np.array(found).reshape(-1, 10 * n_b).T, rcond=SAME).reshape(n_b, 10, -1)
     gravity = gravity_of(system)
-    weights = weight(at_ground, gravity) / np.repeat([1.0, size], 3)[:, None]
-    weightless = at_ground @ unseen(weights, SAME * np.linalg.norm(gravity))
+    weightless = at_ground @ unseen(weight(at_ground, gravity), SAME * np.linalg.norm(gravity))
     inertial = np.concatenate([la.solve(to_ground[i], weightless[i]) for i in range(n_b)])
     if inertial.shape[1]:
         inertial = la.orth(inertial)
-    return np.hstack([np.vstack([inertial, np.zeros((p - 10 * n_b, inertial.shape[1]))]), drives])
+    silent = np.hstack([np.vstack([inertial, np.zeros((p - 10 * n_b, inertial.shape[1]))]), drives])
+    return typical(form)[:, None] * silent
 
 
 def unseen(weights: Array, least: np.floating) -> Array:
@@ -397,7 +400,7 @@ def weight(at_ground: Array, gravity: Array) -> Array:
 
 
 SOURCES = ("torques", "reactions", "both")
-RANK = 1e-9  #: largest singular value that counts as zero, relative to the largest one, for columns of length one
+RANK = 1e-9  #: largest singular value that counts as zero, relative to the largest one, in typical magnitudes
 SHOWN = 1e-9  #: largest factor of a combination that counts as zero, relative to the largest one
 N_SAMPLES = 60  #: smallest number of random instants per body
 #: range of samples of a system with loops about its placed position, so that loops stay closed [rad, or system sizes]
@@ -412,7 +415,7 @@ class BaseParameters:
     source: str  #: the measured quantities, one of `SOURCES`
     kept: IntArray  #: leading parameter of each combination, (n_base,)
     B: Array  #: (n_base, p), the identity in the columns `kept`
-    silent: Array  #: orthonormal directions without effect, (p, k)
+    silent: Array  #: directions without effect, orthonormal where parameters are divided by `typical`, (p, k)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -460,7 +463,7 @@ def base_parameters(form: LinearForm, *, source: str = "torques", by: str = "rul
     if by == "rules":
         silent = silent_by_rules(form, source)
     else:
-        silent = sampled_silence(form_rows(form, random_samples(form, seed), source), form)
+        silent = sampled_silence(form, random_samples(form, seed), source)
     return combined(form, source, silent)
 
 
@@ -484,13 +487,13 @@ def random_samples(form: LinearForm, seed: int = 0) -> TreeSamples:
     """Return random instants with angles over a full turn, or near the placed position if there are loops."""
     rng = np.random.default_rng(seed)
     is_length = np.array([column.unit == "m" for column in form.columns])
-    size = np.where(is_length, compiled_system(form.system).length, 1.0)
+    size, time = np.where(is_length, compiled_system(form.system).length, 1.0), typical_time(form)
     if form.independent is None:
         x = rng.uniform(-np.pi, np.pi, (N_SAMPLES * len(form.system.bodies), len(size))) * size
     else:
         x = rng.uniform(-LOOP_REACH, LOOP_REACH, (max(N_SAMPLES, 2 * len(form.names)), len(size))) * size
         x += as_placed(form.system)[form.independent]
-    return form.samples(x, rng.normal(size=x.shape) * size, rng.normal(size=x.shape) * size)
+    return form.samples(x, rng.normal(size=x.shape) * size / time, rng.normal(size=x.shape) * size / time**2)
 
 
 def form_rows(form: LinearForm, samples: TreeSamples, source: str) -> Array:
@@ -503,21 +506,45 @@ def form_rows(form: LinearForm, samples: TreeSamples, source: str) -> Array:
     return np.concatenate(parts, axis=1).reshape(-1, len(form.names))
 
 
-def sampled_silence(rows: Array, form: LinearForm) -> Array:
-    """Return directions without effect from the singular values of sampled rows, with columns scaled to one."""
-    size = typical(form)
-    scaled = rows * size
-    _, s, Vt = la.svd(scaled, full_matrices=False)
-    null = Vt[s <= RANK * s[0]].T * size[:, None]
-    return la.orth(null) if null.shape[1] else null
+def typical_rows(form: LinearForm, samples: TreeSamples, source: str) -> Array:
+    """Return `form_rows` divided by typical magnitudes of channels and parameters, without units, (n rows, p)."""
+    channels, size = typical_channels(form, source), typical(form)
+    rows = form_rows(form, samples, source).reshape(-1, len(channels), len(size))
+    return (rows * size / channels[:, None]).reshape(-1, len(size))
+
+
+def sampled_silence(form: LinearForm, samples: TreeSamples, source: str) -> Array:
+    """Return directions without effect from the singular values of sampled rows, independent."""
+    _, s, Vt = la.svd(typical_rows(form, samples, source), full_matrices=False)
+    return Vt[s <= RANK * s[0]].T * typical(form)[:, None]
+
+
+def typical_time(form: LinearForm) -> float:
+    """Return the time in which a weight falls by half the size of the system, or 1 without gravity."""
+    g = float(np.linalg.norm(gravity_of(form.system)))
+    return float(np.sqrt(compiled_system(form.system).length / g)) if g > 0 else 1.0
 
 
 def typical(form: LinearForm) -> Array:
-    """Return typical magnitudes of the parameters, from the size of the system, (p,)."""
-    size = compiled_system(form.system).length
+    """Return typical magnitudes of the parameters of bodies of mass 1, (p,): by size and `typical_time`."""
+    size, time = compiled_system(form.system).length, typical_time(form)
+    of_term = {"motor-inertia": 1.0, "viscous": 1 / time, "coulomb": size / time**2, "offset": size / time**2}
+    lever = {"m": {"motor-inertia": 1.0, "viscous": 1.0}, "rad": {"motor-inertia": size**2, "viscous": size**2}}
     body = np.array([1.0] + [size] * 3 + [size**2] * 6)
-    rest = len(form.names) - form.n_inertial
-    return np.concatenate([np.tile(body, len(form.system.bodies)), np.ones(rest)])
+    drives = [
+        of_term[term] * lever[column.unit].get(term, 1.0 if column.unit == "m" else size)
+        for term in form.terms
+        for column in tree_of(form.system).columns
+    ]
+    return np.concatenate([np.tile(body, len(form.system.bodies)), drives])
+
+
+def typical_channels(form: LinearForm, source: str) -> Array:
+    """Return typical magnitudes of the measured forces and torques, by the same bodies, (n_channels,)."""
+    size, time = compiled_system(form.system).length, typical_time(form)
+    torques = [1.0 if column.unit == "m" else size for column in form.columns]
+    lever = [*(torques if source != "reactions" else []), *([1.0] * 3 + [size] * 3 if source != "torques" else [])]
+    return np.array(lever) * size / time**2
 
 
 def combined(form: LinearForm, source: str, silent: Array) -> BaseParameters:
@@ -545,7 +572,7 @@ def combined(form: LinearForm, source: str, silent: Array) -> BaseParameters:
         out = np.array(left_out)
         B[:, out] = -la.solve(N[out].T, N[kept].T).T * (size[kept][:, None] / size[out][None])
     B[np.abs(B) * size[None] < SHOWN * size[kept][:, None]] = 0.0
-    return BaseParameters(form, source, kept, B, la.orth(silent) if k else silent)
+    return BaseParameters(form, source, kept, B, la.orth(silent / size[:, None]) * size[:, None] if k else silent)
 
 
 def preference(form: LinearForm) -> list[int]:

@@ -20,7 +20,7 @@ import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
-from floatframe.design.identification.base_parameters import BaseParameters, base_parameters
+from floatframe.design.identification.base_parameters import BaseParameters, base_parameters, typical, typical_channels
 from floatframe.design.identification.regressors import LinearForm
 from floatframe.design.identification.tree_samples import TreeSamples
 from floatframe.errors import ModelError
@@ -221,14 +221,15 @@ def estimate(
     if not y.any():
         raise ModelError("estimate: all measured torques and reactions are zero")
     require_excited(base, W)
-    sigma, weights = np.ones(n_channels), np.ones((n, n_channels))
+    alike = typical_channels(form, measured.source)  # forces and torques in one measure, until their noise is known
+    sigma, weights = alike, np.ones((n, n_channels))
     beta = solved(W, y, sigma, weights)
     for _ in range(1 if method == "ordinary" else ROUNDS):
         e = y - W @ beta
         before = sigma
         sigma = noise(e, weights, n_base / n_channels)
         if method == "ordinary":
-            sigma = np.full(n_channels, np.sqrt((sigma**2).mean()))
+            sigma = alike * np.sqrt(((sigma / alike) ** 2).mean())
             break
         if method == "robust":
             weights = np.minimum(1.0, HUBER * sigma / np.maximum(np.abs(e), 1e-300))
@@ -262,7 +263,8 @@ def solved(W: Array, y: Array, sigma: Array, weights: Array) -> Array:
 
 def require_excited(base: BaseParameters, W: Array) -> None:
     """Raise `ModelError` with the combinations that a motion does not excite."""
-    A = W.reshape(-1, W.shape[-1])
+    channels = typical_channels(base.form, base.source)
+    A = (W * typical(base.form)[base.kept] / channels[:, None]).reshape(-1, W.shape[-1])
     size = np.linalg.norm(A, axis=0)
     seen = size > 1e-10 * size.max()
     missing = [name for name, is_seen in zip(base.names, seen, strict=True) if not is_seen]

@@ -5,8 +5,8 @@ Of coordinate k, over one period T = 2 pi / w, with N harmonics [1]_
     x_k = c_k + Σ_l (a_kl sin(l w t) - b_kl cos(l w t)) / (l w),
 
 so that rates and accelerations are series too, the motion repeats (averages lower the noise) and its band is known.
-The coefficients minimise the logarithm of the condition number of the rows of the base parameters, columns in their
-typical size, within limits of position, rate, acceleration and torque at the instants of one period.
+The coefficients minimise the logarithm of the condition number of the rows of the base parameters, rows and columns in
+their typical sizes, within limits of position, rate, acceleration and torque at the instants of one period.
 
 References
 ----------
@@ -22,7 +22,10 @@ from scipy.optimize import LinearConstraint, minimize
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
-from floatframe.design.identification.base_parameters import BaseParameters, form_rows, typical
+from floatframe.design.identification.base_parameters import BaseParameters, typical_rows
+from floatframe.design.identification.regressors import LinearForm
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.tree.topology import CoordinateName
 from floatframe.errors import ModelError
 
 __all__ = ["ExcitingMotion", "MotionLimits", "exciting_motion"]
@@ -114,7 +117,6 @@ def exciting_motion(
     t = np.arange(n_instants) * period / n_instants
     blocks = series(t, period, n_harmonics)
     n_c, width = len(names), 1 + 2 * n_harmonics
-    size = typical(form)[base.kept]
     largest = np.array([each.torque for each in bounds])
     is_limited = np.isfinite(largest)
 
@@ -126,7 +128,7 @@ def exciting_motion(
         if key not in known:
             C = x.reshape(n_c, width)
             samples = form.samples(*(block @ C.T for block in blocks))
-            s = la.svdvals(base.rows(form_rows(form, samples, base.source)) * size)
+            s = la.svdvals(base.rows(typical_rows(form, samples, base.source)))
             room = np.inf
             if is_limited.any():
                 tau = form.torques(samples)[:, is_limited] @ form.values
@@ -134,24 +136,28 @@ def exciting_motion(
             known[key] = float(np.log(s[0] / max(s[-1], s[0] * SINGULAR))), room
         return known[key]
 
+    scale = np.concatenate([
+        scales_of(form, column, each, period, width) for column, each in zip(form.columns, bounds, strict=True)
+    ])  # fmt: skip
     rows, low, high = [], [], []
     for k, each in enumerate(bounds):
+        part = slice(k * width, (k + 1) * width)
         for block, (least, most) in zip(
             blocks,
             ((each.low, each.high), (-each.rate, each.rate), (-each.acceleration, each.acceleration)),
             strict=True,
         ):
             if np.isfinite(least) or np.isfinite(most):
-                A = np.zeros((n_instants, n_c * width))
-                A[:, k * width : (k + 1) * width] = block
+                A, unit = np.zeros((n_instants, n_c * width)), np.abs(block * scale[part]).max()
+                A[:, part] = block * scale[part] / unit
                 rows.append(A)
-                low += [least] * n_instants
-                high += [most] * n_instants
+                low += [least / unit] * n_instants
+                high += [most / unit] * n_instants
     inside = LinearConstraint(np.vstack(rows), low, high)
     rng = np.random.default_rng(seed)
     starts = []
     for _ in range(n_starts):
-        x = scaled_into(rng.normal(size=n_c * width), bounds, blocks, 0.95)
+        x = scaled_into(rng.normal(size=n_c * width) * scale, bounds, blocks, 0.95)
         for _ in range(SMALLER):
             if judged(x)[1] > 0:
                 starts.append(x)
@@ -164,12 +170,12 @@ def exciting_motion(
     start = min(starts, key=lambda x: judged(x)[0])
     constraints: list = [inside]
     if is_limited.any():
-        constraints.append({"type": "ineq", "fun": lambda x: judged(x)[1]})
+        constraints.append({"type": "ineq", "fun": lambda x: judged(x * scale)[1]})
     found = minimize(
-        lambda x: judged(x)[0], start, method="SLSQP", constraints=constraints,
+        lambda x: judged(x * scale)[0], start / scale, method="SLSQP", constraints=constraints,
         options={"maxiter": max_iterations, "ftol": 1e-3},
     )  # fmt: skip
-    best = kept_within(found.x, bounds, blocks)
+    best = kept_within(found.x * scale, bounds, blocks)
     if judged(best)[1] < -1e-6 or judged(best)[0] > judged(start)[0]:
         best = start
     return ExcitingMotion(names, period, best.reshape(n_c, width), float(np.exp(judged(best)[0])))
@@ -191,10 +197,18 @@ def checked(name: str, limits: Mapping[str, MotionLimits], names: tuple[str, ...
     return each
 
 
+def scales_of(form: LinearForm, column: CoordinateName, each: MotionLimits, period: float, width: int) -> Array:
+    """Return typical magnitudes of the coefficients of a coordinate, (width,): its range, and that in a period."""
+    half = 0.5 * (each.high - each.low)
+    if not np.isfinite(half):
+        half = compiled_system(form.system).length if column.unit == "m" else 1.0
+    return np.concatenate([[half], np.full(width - 1, 2 * np.pi / period * half)])
+
+
 def ratios_of(c: Array, each: MotionLimits, blocks: tuple[Array, Array, Array]) -> float:
     """Return the largest fraction of its limits that a coordinate uses, about its offset c[0]."""
     room = min(each.high - c[0], c[0] - each.low)
-    swing = np.abs(blocks[0][:, 1:] @ c[1:]).max() / max(room, 1e-12)
+    swing = np.abs(blocks[0][:, 1:] @ c[1:]).max() / max(room, np.finfo(float).tiny)
     return float(
         max(swing, np.abs(blocks[1] @ c).max() / each.rate, np.abs(blocks[2] @ c).max() / each.acceleration, 1e-300)
     )

@@ -9,11 +9,12 @@ from fe_models.foundation.arrays import Array
 from floatframe.design.identification.base_parameters import form_rows
 from floatframe.design.identification.estimation import Estimate
 from floatframe.design.identification.excitation import ExcitingMotion, MotionLimits, exciting_motion
+from floatframe.engine.compiling.system import compiled_system
 
 __all__ = ["NextMotion", "next_motion"]
 
 N_HARMONICS, N_INSTANTS, N_STARTS, MOST = 5, 40, 12, 8
-LEAST = 1e-3  #: range below which a coordinate hardly moved [rad or m]
+LEAST = 1e-3  #: range below which a coordinate hardly moved [rad], or relative to the size of the system
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,17 +43,19 @@ def next_motion(made: Estimate, *, seed: int = 0) -> NextMotion | None:
     form, samples = made.base.form, made.measured.samples
     own = slice(None) if form.independent is None else form.independent
     x, rate, acceleration = (getattr(samples, name)[:, own] for name in ("x", "rate", "acceleration"))
-    limits = {}
-    for k, column in enumerate(form.columns):
-        low, high = float(x[:, k].min()), float(x[:, k].max())
-        spare = max(LEAST - (high - low), 0.0)
-        limits[column.name] = MotionLimits(
-            low - spare, high + spare, max(float(np.abs(rate[:, k]).max()), LEAST),
-            max(float(np.abs(acceleration[:, k]).max()), LEAST),
-        )  # fmt: skip
     t = made.measured.times
     n = len(t)
     duration = float(t[-1] - t[0]) * n / (n - 1)
+    w = 2 * np.pi / duration
+    limits = {}
+    for k, column in enumerate(form.columns):
+        low, high = float(x[:, k].min()), float(x[:, k].max())
+        least = LEAST * (compiled_system(form.system).length if column.unit == "m" else 1.0)
+        spare = max(least - (high - low), 0.0)
+        limits[column.name] = MotionLimits(
+            low - spare, high + spare, max(float(np.abs(rate[:, k]).max()), least * w),
+            max(float(np.abs(acceleration[:, k]).max()), least * w**2),
+        )  # fmt: skip
     motion = exciting_motion(
         made.base, limits, period=duration, n_harmonics=N_HARMONICS, n_instants=N_INSTANTS, n_starts=N_STARTS,
         max_iterations=MOST, seed=seed,
