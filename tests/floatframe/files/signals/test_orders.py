@@ -71,6 +71,15 @@ def test_a_fixed_frequency_is_not_mirrored_into_low_orders():
     assert int(orders.notes[-1].split()[-4]) == pytest.approx(slowest, rel=0.01), orders.notes[-1]
 
 
+def test_by_default_speeds_below_a_twentieth_of_the_highest_are_left_out():
+    angle = np.pi * 8 * t**2 / t[-1]  # from rest to 8 turns a second
+    orders = order_map(Signal("a", t, np.sin(3 * angle), ""), angle, max_order=5, resolution=0.25)
+    fastest = 16 * np.pi
+    assert f"faster than {0.05 * fastest:.2g}" in orders.notes[0]
+    begin = float(orders.notes[0].split("t = ")[1].split()[0])
+    assert_allclose(begin, 0.05 * t[-1], rtol=0.01)
+
+
 def test_standing_and_slow_parts_are_left_out_and_said():
     speed = np.where(t < 1.0, 0.0, 2 * np.pi * 12 * (t - 1.0))
     angle = np.where(t < 1.0, 0.0, 2 * np.pi * 6 * (t - 1.0) ** 2)

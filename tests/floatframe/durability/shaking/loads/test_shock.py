@@ -61,12 +61,22 @@ def test_unequal_times_are_told():
     assert any("unequal times were sampled anew" in note for note in run.notes)
 
 
-def test_uncertain_frequencies_give_the_largest_of_three_runs():
+@pytest.mark.parametrize("f", [30.0, 80.0, 150.0], ids=["rising", "near the top", "falling"])
+def test_uncertain_frequencies_give_the_largest_of_three_runs(f):
+    """Where the spectrum of the pulse rises the stiffer structure has the largest answer, where it falls the softer."""
     t, a = pulse("half-sine", 40.0, 0.011)
     test = TimeTest("s", t, a, ("z",), kind="shock")
-    runs = [time_runs(model, test)[0].peaks for model in (masses([f], 0.02) for f in (72.0, 80.0, 88.0))]
-    own = time_runs(masses([80.0], 0.02), test, Uncertainty(1.25, 0.1))[0]
+    runs = [time_runs(masses([scale * f], 0.02), test)[0].peaks for scale in (0.9, 1.0, 1.1)]
+    own = time_runs(masses([f], 0.02), test, Uncertainty(1.25, 0.1))[0]
     assert_allclose(own.uncertain, 1.25 * np.max(runs, axis=0), rtol=2e-3)
+
+
+@pytest.mark.parametrize(("modes", "first", "last"), [([40.0, 300.0], 4.0, 600.0), ([900.0, 7000.0], 10.0, 1e4)])
+def test_spectra_of_responses_reach_from_below_the_first_mode_to_above_the_last(modes, first, last):
+    t, a = pulse("half-sine", 40.0, 0.002)
+    test = TimeTest("s", t, a, ("z",), kind="shock", spectra=SpectrumRequest(Q=(10.0,)))
+    run = time_runs(masses(modes, 0.02), test)[0]
+    assert_allclose(run.spectra_frequencies[[0, -1]], [first, last], rtol=0.06)
 
 
 def test_a_history_for_a_spectrum_meets_it_and_leaves_nothing():
