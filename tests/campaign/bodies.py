@@ -143,13 +143,16 @@ def defects(case: BodyCase, coupled, columns, reduced) -> dict[str, float]:
         scale = np.sqrt(np.outer(np.diag(D_q), np.diag(D_q))).max() if D_q.any() else 0.0
         found["D"] = relative(reduced.D, D_q, scale or float(np.sqrt(np.diag(reduced.K).max())))
     found |= frame_defects(case, dense, U, M, R_B, lengths, reduced)
+    is_rotation = body.dofs[:, 1] > 2
+    sizes = np.where(is_rotation, np.abs(U[is_rotation]).max(initial=0.0), np.abs(U[~is_rotation]).max())
     for port in reduced.interfaces:
         if port.name in dense.mean:
             motion = np.kron(np.eye(2), A.T) @ dense.mean[port.name] @ U
-            size = np.abs(shapes).max()
+            terms = np.abs(dense.mean[port.name]) @ sizes  # its rounding: large where members are nearly on a line
             found[f"Psi {port.name}"] = max(
-                relative(port.Psi[:3], motion[:3], size), relative(port.Psi[3:], motion[3:], size / extent * 10)
-            ) if port.has_rotation else relative(port.Psi[:3], motion[:3], size)  # fmt: skip
+                relative(port.Psi[rows], motion[rows], terms[rows].max())
+                for rows in ([slice(3), slice(3, 6)] if port.has_rotation else [slice(3)])
+            )
     for load, given in zip(reduced.load_cases, body.load_cases, strict=True):
         wrench = R_B.T @ given.f
         size = np.abs(given.f).sum()
