@@ -33,8 +33,12 @@ def prepared(folder: Path) -> Path:
         (folder / "bar.msh").write_text(FORMATS["msh"](*bar()))
         (folder / "job.toml").write_text(JOB)
         (folder / "system.toml").write_text(SYSTEM)
-        assert ask("cms", "reduce", folder / "job.toml", "-o", folder / "modal.h5").code == 0
-        assert ask("floatframe", "run", folder / "system.toml", "-o", folder / "results.h5").code == 0
+        for words in (
+            ("cms", "reduce", folder / "job.toml", "-o", folder / "modal.h5"),
+            ("floatframe", "run", folder / "system.toml", "-o", folder / "results.h5"),
+        ):
+            reply = ask(*words)
+            assert reply.code == 0, f"{words[:2]}: {reply.fault} {reply.stderr[-600:]}"
         system, run = read_system(folder / "system.toml")
 
         def stop(progress: Any) -> None:

@@ -104,6 +104,10 @@ def test_a_filled_last_frame_is_said(tmp_path):
     assert read_signals(path).notes == (
         "the last 28 samples of all channels are equal; they may be padding of the last frame",
     )
+    foreign_file(path, np.minimum(np.arange(256.0), 90.0)[:, None], "f4", 64, 64)  # stands still for two frames
+    assert read_signals(path).notes == (
+        "the last 64 samples of all channels are equal; they may be padding of the last frame",
+    )
 
 
 @pytest.mark.parametrize(
