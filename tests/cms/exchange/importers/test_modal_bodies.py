@@ -12,7 +12,9 @@ from numpy.testing import assert_allclose
 import cms
 from cms.errors import BodyError, ForeignBodyError
 from cms.exchange.export import export_body
-from cms.exchange.importers.modal_body import changed, momentum_of
+from cms.exchange.importers.modal_body import ForeignInterface, ModalBody, body_of_modes, changed, momentum_of
+from cms.exchange.importers.superelement_body import ImportOptions
+from fe_models.body.loads import nodal_load
 from tests.bodies import bar
 from tests.cms.exchange.exporters.small_bodies import soft_bar
 
@@ -89,6 +91,56 @@ def test_a_body_in_another_frame_is_moved_to_mean_axes(key, tmp_path):
             written(soft, key, tmp_path), units=soft.units, interfaces=names_of(soft, key), frame=cms.NodalFrame("left")
         )
         assert_allclose(np.diag(back.K), np.diag(soft.K), rtol=1e-8)
+
+
+def in_modes(body, T):
+    """Return a reduced body as one of another program whose modes are Phi T, with what a file may hold besides."""
+    rng, n = np.random.default_rng(8), len(body.nodes)
+    rotations = rng.normal(size=(n, 3, body.n_q))
+    loads = symmetric(rng.normal(size=(n, 6, body.n_q, body.n_q)))
+    geometric = replace(body.geometric, interfaces=loads, is_loaded=(), turned=None, spread=None)
+    left = body.interface("left")
+    interfaces = (
+        ForeignInterface("left", body.node_ids[left.members][:1], left.position, left.triad, left.Psi @ T),
+        ForeignInterface("corner", body.node_ids[-1:]),
+    )
+    return ModalBody(
+        "other", T.T @ T, T.T @ body.K @ T, T.T @ symmetric(body.D + 0.1 * rng.normal(size=T.shape)) @ T,
+        changed(body.moments, T), body.node_ids, body.nodes, body.Phi @ T, rotations @ T, body.stress @ T, body.surface,
+        interfaces, tuple(replace(case, h=T.T @ case.h) for case in body.load_cases), geometric.transformed(T),
+    )  # fmt: skip
+
+
+def symmetric(A):
+    return A + np.swapaxes(A, -1, -2)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_any_modes_of_the_same_span_are_the_same_body(seed):
+    """Modes that are neither orthonormal nor of one size: all that is linear or quadratic in them is carried along."""
+    part = bar(nx=4, width=0.07, height=0.04)
+    part = cms.couple(part.with_load_cases(nodal_load(part, "push", {17: np.array([3.0, -5.0, 4.0])})))
+    body = cms.reduce(part, cms.craig_bampton(part, n_modes=2), damping=cms.ModalDamping(0.01))
+    rng = np.random.default_rng(seed)
+    T = rng.normal(size=(body.n_q, body.n_q)) * 10 ** rng.uniform(-2, 2, size=body.n_q)
+    options = ImportOptions(units=body.units)
+    own, other = (body_of_modes(in_modes(body, each), options) for each in (np.eye(body.n_q), T))
+    assert own.frame.kind == other.frame.kind == "tisserand"
+    values = [
+        {
+            "K": np.diag(each.K), "M": each.M, "D": each.D, "Phi": each.Phi, "stress": each.stress,
+            "free": each.free_frequencies, "h": each.load_cases[0].h,
+            "C1": each.moments.C1 * 1e3, "P": each.moments.P, "S_kl": each.moments.S_kl, "J0": each.moments.J0,
+            "spin": each.geometric.spin, "rotation": each.geometric.rotation, "loads": each.geometric.interfaces,
+            "left": each.interface("left").Psi, "corner": each.interface("corner").Psi,
+        }
+        for each in (own, other)
+    ]  # fmt: skip
+    for name, expected in values[0].items():
+        size = max(np.abs(expected).max(), 1.0) if name == "C1" else np.abs(expected).max()
+        assert_allclose(values[1][name], expected, rtol=0, atol=1e-6 * size, err_msg=name)
+    assert_allclose(np.diag(own.K), np.diag(body.K), rtol=1e-9)
+    assert "mode" in other.labels[0]
 
 
 def test_stress_and_surface_come_back_from_mbsim(mean, tmp_path):
