@@ -30,7 +30,8 @@ def moments_of_invariants(
 
     (1) R = ½ tr(J0) 1 - J0
     (2) P_k = ½ tr(3C_k) 1 - 3C_kᵀ, its antisymmetric part by 2C
-    (3) S_ab,kl: trace by the modal mass, the part antisymmetric in a, b by 4C, the rest by 5C, S_lk = M_kl 1 - 5C_kl
+    (3) S_ab,kl: trace by the modal mass, the part antisymmetric in a, b by 4C, the rest by 5C, S_lk = M_kl 1 - 5C_kl;
+        half the antisymmetric part of 5C is 4C
     (4) what is None is missing
 
     Parameters
@@ -66,13 +67,15 @@ def moments_of_invariants(
     if C4 is not None:
         S_kl -= np.einsum("abc,klc->abkl", EPSILON, C4) / 2
     if C5 is not None:
+        if C4 is None:
+            raise ForeignBodyError(f"{where}: 5C is there and 4C, which is a part of it, is not")
         of_C5 = np.trace(C5, axis1=2, axis2=3) / 2
         compare(where, notes, "the modal mass and the trace of 5C", of_C5, M, size)
+        turning = -np.einsum("abc,klc->klab", EPSILON, C4) / 2
+        compare(where, notes, "4C and the antisymmetric part of 5C", (C5 - C5.swapaxes(2, 3)) / 2, turning, size)
         lk = of_C5[:, :, None, None] * np.eye(3) - C5  # [k, l, a, b] = S_ab,lk
         even = np.moveaxis((lk + lk.swapaxes(2, 3)) / 2, (0, 1, 2, 3), (3, 2, 0, 1))
         S_kl += even - np.einsum("ab,kl->abkl", np.eye(3), np.einsum("aakl->kl", even)) / 3
-        if C4 is None:
-            raise ForeignBodyError(f"{where}: 5C is there and 4C, which is a part of it, is not")
     missing = tuple(name for name in INERTIA_TERMS if given[name] is None)
     R = np.trace(J0) / 2 * np.eye(3) - J0
     moments = Moments(m=m, S=S, R=(R + R.T) / 2, C1=C1, P=P, S_kl=symmetric(S_kl), is_exact=not notes, missing=missing)

@@ -71,6 +71,19 @@ def test_a_fixed_frequency_is_not_mirrored_into_low_orders():
     assert int(orders.notes[-1].split()[-4]) == pytest.approx(slowest, rel=0.01), orders.notes[-1]
 
 
+def test_a_wheel_that_starts_and_stops_is_seen_where_it_turns_fast():
+    """Half a sine of speed: both ends are left out, and the order has its amplitude to the end of the rest."""
+    fastest, end = 2 * np.pi * 12, t[-1]
+    angle = fastest * end / np.pi * (1 - np.cos(np.pi * t / end))
+    orders = order_map(Signal("a", t, 0.7 * np.sin(3 * angle), ""), angle, max_order=5, resolution=0.25, slowest=20.0)
+    begin = end / np.pi * np.arcsin(20.0 / fastest)
+    assert f"from t = {begin:.3g}" in orders.notes[0]
+    assert f" to {end - begin:.4g}"[:7] in orders.notes[0]
+    assert orders.times[0] - begin < 1.0 > end - begin - orders.times[-1] > 0
+    assert_allclose(orders.speeds, fastest * np.sin(np.pi * orders.times / end), rtol=1e-4)
+    assert_allclose(order_cut(orders, 3.0), 0.7, rtol=1e-3)
+
+
 def test_by_default_speeds_below_a_twentieth_of_the_highest_are_left_out():
     angle = np.pi * 8 * t**2 / t[-1]  # from rest to 8 turns a second
     orders = order_map(Signal("a", t, np.sin(3 * angle), ""), angle, max_order=5, resolution=0.25)
