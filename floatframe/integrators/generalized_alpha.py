@@ -163,7 +163,8 @@ class GeneralizedAlpha:
         work.state.time[...] = t
         u_dot, w = solve_accelerations(compiled, work, memory.state, memory.w)
         after = memory.changed(u_dot=u_dot, w=w, h_next=0.0)
-        z = self.filter_at(compiled, after, float(memory.h), t, full=True, spin=self.spin_at(compiled, after, may))
+        spin = self.spin_at(compiled, after, may)
+        z = self.filter_at(compiled, after, float(memory.h), t, full=True, spin=spin, work=work)
         assert z is not None
         return after, z.twice(u_dot - memory.u_dot)
 
@@ -222,14 +223,23 @@ class GeneralizedAlpha:
         return spin_of(compiled, consistent_of(memory), may) if self.stabilized else None
 
     def filter_at(
-        self, compiled: CompiledSystem, memory: Memory, h: float, t: float, *, full: bool, spin: Spin | None
+        self,
+        compiled: CompiledSystem,
+        memory: Memory,
+        h: float,
+        t: float,
+        *,
+        full: bool,
+        spin: Spin | None,
+        work: Work | None = None,
     ) -> StepFilter | None:
         """Return the filter of `start.step_filter` for steps of size h; full: with s = 1; None for s = 0."""
         _, _, beta, gamma = self.coefficients
         s = 1.0 if full else min(gamma - 0.5, 1.0)
         if s <= 0.0:
             return None
-        return step_filter(compiled, consistent_of(memory), t, c_d=s * gamma * h, c_k=s * beta * h**2, spin=spin)
+        numbers = {"c_d": s * gamma * h, "c_k": s * beta * h**2}
+        return step_filter(compiled, consistent_of(memory), t, **numbers, spin=spin, work=work)
 
     def filtered(
         self, compiled: CompiledSystem, memory: Memory, h: float, t: float, *, full: bool, spin: Spin | None

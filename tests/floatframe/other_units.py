@@ -70,9 +70,14 @@ from floatframe.results.sensors import (
     VonMisesSensor,
 )
 
-__all__ = ["FIELDS", "SI", "Other", "dimensions", "in_units"]
+__all__ = ["FIELDS", "SI", "SIZES", "Other", "dimensions", "in_units", "other_units"]
 
 SI = unit_system("m-kg-s")
+#: systems of other size in SI, of the same density under the same gravity: their numbers are those of such units
+SIZES = {
+    "micrometres": replace(SI, name="of micrometres", length=1e6, mass=1e18, time=1e3),
+    "1000 km": replace(SI, name="of 1000 km", length=1e-6, mass=1e-18, time=1e-3),
+}
 BASE = {
     "1": (0, 0, 0), "rad": (0, 0, 0), "A": (0, 0, 0), "kg": (1, 0, 0), "m": (0, 1, 0), "s": (0, 0, 1),
     "Hz": (0, 0, -1), "N": (1, 1, -2), "J": (1, 2, -2), "W": (1, 2, -3), "V": (1, 2, -3), "Pa": (1, -1, -2),
@@ -334,13 +339,23 @@ class Other:
         return replace(part, terms=tuple(terms), constant=constant)
 
 
+def other_units(name):
+    """Return other units, or other sizes, by name."""
+    return Other(SIZES.get(name) or unit_system(name))
+
+
 def in_units(system, units, turn=None, place=None):
-    """Return a system in other units, as a whole turned by a rotation R and moved by a place [m]."""
+    """Return a system in other units or of another size, as a whole turned by a rotation R and moved by a place [m]."""
     other = Other(units)
     system = system if turn is None else moved(system, np.asarray(turn), np.asarray(place))
-    kept = ("bodies", "joints", "forces", "couplers", "elements")
-    return System(units=units, name=system.name, redundant=system.redundant,
-                  **{key: other.part(getattr(system, key)) for key in kept})  # fmt: skip
+    parts = {key: other.part(getattr(system, key)) for key in ("bodies", "joints", "forces", "couplers", "elements")}
+    if units in SIZES.values():
+        units = SI
+        parts["bodies"] = [
+            replace(body, reduced=replace(body.reduced, units=SI)) if isinstance(body, FlexibleBody) else body
+            for body in parts["bodies"]
+        ]
+    return System(units=units, name=system.name, redundant=system.redundant, **parts)
 
 
 def moved(system, R, place):

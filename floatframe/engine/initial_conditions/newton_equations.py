@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.linalg import splu
+from scipy.linalg.lapack import dgetrf, dgetrs
+from scipy.sparse.linalg import SuperLU, splu
 
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.engine.kernels.model import MASS, STIFFNESS, Model
@@ -15,6 +16,7 @@ from floatframe.model.state import State
 
 __all__ = [
     "Linearized",
+    "NewtonFactors",
     "balanced_scales",
     "displaced",
     "highest_frequency",
@@ -30,6 +32,7 @@ __all__ = [
     "with_modal_weight",
 ]
 
+DENSE = 150  #: equations up to which a dense factorisation is faster than a sparse one
 STIFF = 1e3  #: the stiffness in W is scaled so that it exceeds the mass by this factor for the softest mode
 STIFF_START = 1e6  #: the same when closing a placement: stiff modes hardly vibrate afterwards
 MASSLESS = 10.0  #: frequency of a mode without mass, relative to the highest frequency, from its artificial mass
@@ -99,8 +102,14 @@ def summed(parts: list[tuple[Array, int, int]], shape: tuple[int, int]) -> sp.cs
     """Return the sparse sum of dense blocks, each with its first row and column."""
     if not parts:
         return sp.csr_array(shape)
-    values, rows, columns = entries(parts)
-    return sp.csr_array(sp.coo_array((values, (rows, columns)), shape=shape))
+    if max(shape) > DENSE:
+        values, rows, columns = entries(parts)
+        return sp.csr_array(sp.coo_array((values, (rows, columns)), shape=shape))
+    total = np.zeros(shape)
+    for block, row, column in parts:
+        total[row : row + block.shape[0], column : column + block.shape[1]] += block
+    rows, columns = np.nonzero(total)
+    return sp.csr_array((total[rows, columns], columns, np.searchsorted(rows, np.arange(shape[0] + 1))), shape=shape)
 
 
 def entries(parts: list[tuple[Array, int, int]]) -> tuple[Array, IntArray, IntArray]:
@@ -111,25 +120,48 @@ def entries(parts: list[tuple[Array, int, int]]) -> tuple[Array, IntArray, IntAr
     return np.concatenate(values), np.concatenate(rows), np.concatenate(columns)
 
 
-def solve(H: tuple[Array, ...], parts: Linearized, forces: Array, rows: Array) -> tuple[Array, Array]:
-    """Solve H y - Jᵀ w = forces, G y + V w = rows; return y, (n_u,), and w, (n_w,).
+class NewtonFactors:
+    """Factors of the equations H y - Jᵀ w = forces, G y + V w = rows.
 
     The equations are scaled by `balanced_scales`: otherwise units and the size of the system would choose the pivots.
     """
-    n_u, n = len(forces), len(forces) + len(rows)
-    first = np.cumsum([0, *(len(block) for block in H)]).tolist()
-    values, row, column = entries([(block, k, k) for block, k in zip(H, first, strict=False)])
-    is_there = values != 0
-    J, G, V = parts.J, parts.G, parts.V
-    J_row, G_row, V_row = (np.repeat(np.arange(len(rows)), np.diff(A.indptr)) for A in (J, G, V))
-    values = np.concatenate([values[is_there], -J.data, G.data, V.data])
-    row = np.concatenate([row[is_there], J.indices, n_u + G_row, n_u + V_row])
-    column = np.concatenate([column[is_there], n_u + J_row, G.indices, n_u + V.indices])
-    diagonal = np.concatenate([np.diag(block) for block in H]) if H else np.zeros(0)
-    of_columns, of_rows = balanced_scales(diagonal, abs(J), abs(G), abs(V))
-    matrix = sp.csc_array((of_rows[row] * values * of_columns[column], (row, column)), shape=(n, n))
-    solution = of_columns * splu(matrix).solve(of_rows * np.concatenate([forces, rows]))
-    return solution[:n_u], solution[n_u:]
+
+    def __init__(self, H: tuple[Array, ...], parts: Linearized) -> None:
+        """Factorise, as a dense matrix if it is small; RuntimeError if it is exactly singular."""
+        first = np.cumsum([0, *(len(block) for block in H)]).tolist()
+        J, G, V = parts.J, parts.G, parts.V
+        self.n_u, n_w = first[-1], G.shape[0]
+        n = self.n_u + n_w
+        values, row, column = entries([(block, k, k) for block, k in zip(H, first, strict=False)])
+        is_there = values != 0
+        J_row, G_row, V_row = (np.repeat(np.arange(n_w), np.diff(A.indptr)) for A in (J, G, V))
+        values = np.concatenate([values[is_there], -J.data, G.data, V.data])
+        row = np.concatenate([row[is_there], J.indices, self.n_u + G_row, self.n_u + V_row])
+        column = np.concatenate([column[is_there], self.n_u + J_row, G.indices, self.n_u + V.indices])
+        diagonal = np.concatenate([np.diag(block) for block in H]) if H else np.zeros(0)
+        self.of_columns, self.of_rows = balanced_scales(diagonal, abs(J), abs(G), abs(V))
+        values = self.of_rows[row] * values * self.of_columns[column]
+        self.sparse: SuperLU | None = None
+        if n > DENSE:
+            self.sparse = splu(sp.csc_array((values, (row, column)), shape=(n, n)))
+            return
+        matrix = np.zeros((n, n))
+        matrix[row, column] = values
+        *self.dense, info = dgetrf(matrix, overwrite_a=True)
+        if info > 0:
+            raise RuntimeError("Factor is exactly singular")
+
+    def solve(self, forces: Array, rows: Array) -> tuple[Array, Array]:
+        """Return y, (n_u,), and w, (n_w,)."""
+        right = self.of_rows * np.concatenate([forces, rows])
+        found = dgetrs(*self.dense, right)[0] if self.sparse is None else self.sparse.solve(right)
+        solution = self.of_columns * found
+        return solution[: self.n_u], solution[self.n_u :]
+
+
+def solve(H: tuple[Array, ...], parts: Linearized, forces: Array, rows: Array) -> tuple[Array, Array]:
+    """Solve H y - Jᵀ w = forces, G y + V w = rows; return y, (n_u,), and w, (n_w,)."""
+    return NewtonFactors(H, parts).solve(forces, rows)
 
 
 def balanced_scales(diagonal: Array, J: Any, G: Any, V: Any) -> tuple[Array, Array]:

@@ -27,17 +27,17 @@ Where the steps take the spin w of a body about its axis e by itself, the filter
 do not spin: the part w omega × e of u_dot is not filtered, and D has what it adds.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.linalg import SuperLU, splu
 
 from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.system import CompiledSystem
 from floatframe.engine.initial_conditions.initial import ConsistentState, acceleration_rates, start_unknowns, work_from
 from floatframe.engine.initial_conditions.newton_equations import (
+    NewtonFactors,
     in_body_axes,
     in_ground_axes,
     linearized,
@@ -45,6 +45,7 @@ from floatframe.engine.initial_conditions.newton_equations import (
     with_mass_for_all,
 )
 from floatframe.engine.kernels.model import Model
+from floatframe.engine.kernels.work import Work
 from floatframe.model.joints.rows import is_held
 from floatframe.model.state import State
 
@@ -57,8 +58,9 @@ class StepFilter:
 
     compiled: CompiledSystem
     state: State
-    mass: sp.csr_array  #: M and, below, the dependence of rows on accelerations, (n_u + n_w, n_u)
-    factors: SuperLU  #: of the matrix of (1)
+    mass: tuple[Array, ...]  #: M, a block of each body
+    G: sp.csr_array  #: dependence of rows on accelerations, (n_w, n_u)
+    factors: NewtonFactors  #: of the matrix of (1)
 
     def __call__(self, y: Array) -> Array:
         """Return Z y, (n_u,), of accelerations or their rates, translations in ground axes."""
@@ -67,8 +69,10 @@ class StepFilter:
     def solved(self, y: Array) -> tuple[Array, Array]:
         """Return Z y, and mu, (n_w,)."""
         model = self.compiled.model
-        z = self.factors.solve(self.mass @ in_body_axes(model, self.state, y))
-        return in_ground_axes(model, self.state, z[: len(y)]), z[len(y) :]
+        own = in_body_axes(model, self.state, y)
+        ends = zip(self.mass, model.bodies.u0[:-1], model.bodies.u0[1:], strict=True)
+        z, mu = self.factors.solve(np.concatenate([M @ own[u0:u1] for M, u0, u1 in ends]), self.G @ own)
+        return in_ground_axes(model, self.state, z), mu
 
     def twice(self, y: Array) -> Array:
         """Return (2 Z - Z²) y."""
@@ -77,9 +81,8 @@ class StepFilter:
 
     def closing(self, gap: Array) -> Array:
         """Return du of (3), (n_u,), for g(after)/h, (n_w,), zero in all rows that are not closed in this way."""
-        model, n_u = self.compiled.model, self.mass.shape[1]
-        right = np.concatenate([np.zeros(n_u), -gap])
-        return in_ground_axes(model, self.state, self.factors.solve(right)[:n_u])
+        model = self.compiled.model
+        return in_ground_axes(model, self.state, self.factors.solve(np.zeros(self.factors.n_u), -gap)[0])
 
 
 def step_filter(
@@ -90,48 +93,43 @@ def step_filter(
     c_d: float,
     c_k: float,
     spin: "Spin | None" = None,
+    work: Work | None = None,
 ) -> StepFilter:
     """Return the filter with the matrix M + c_d D + c_k K at a state with its accelerations and wrenches, at time t.
 
-    spin: of bodies whose D is that of axes which do not spin with them.
+    spin: of bodies whose D is that of axes which do not spin with them. work: made by `work_from`; overwritten.
     K holds what forces do as they turn with the bodies. Those of modes that the step does not follow are no part of it:
     a first filter, without any forces, tells which stay.
     """
+    model, state = compiled.model, consistent.state
+    work = work_from(model, consistent.w) if work is None else work
+    work.state.time[...] = t
+    set_iterate(work, state, w=consistent.w)
+    inertia = linearized(model, work, 1.0, 0.0, 0.0)
+    M = with_mass_for_all(model, inertia.H)
+    held = is_held(model.rows.kind)
+
+    def by(u_dot: Array, w: Array) -> StepFilter:
+        """Return the filter with the matrix at other accelerations and wrenches."""
+        set_iterate(work, state, u_dot, np.where(is_wrench(model), w, consistent.w))
+        if spin is not None:
+            work.state.spins[:] = spin.bodies
+        step = linearized(model, work, 1.0, c_d, c_k)
+        rows = replace(step, G=chosen(held, inertia.G, step.G))
+        return StepFilter(compiled, state, M, inertia.G, NewtonFactors(with_mass_for_all(model, step.H), rows))
+
     y, w = consistent.u_dot, consistent.w
     if len(w):
-        first = filter_by(compiled, consistent, np.zeros_like(y), np.zeros_like(w), t, c_d, c_k, spin)
-        y, change = first.solved(y)
-        w = w + np.where(is_wrench(compiled.model), change, 0.0)
-    return filter_by(compiled, consistent, y, w, t, c_d, c_k, spin)
+        y, change = by(np.zeros_like(y), np.zeros_like(w)).solved(y)
+        w = w + np.where(is_wrench(model), change, 0.0)
+    return by(y, w)
 
 
-def filter_by(
-    compiled: CompiledSystem,
-    consistent: ConsistentState,
-    u_dot: Array,
-    w: Array,
-    t: float,
-    c_d: float,
-    c_k: float,
-    spin: "Spin | None",
-) -> StepFilter:
-    """Return the filter with the matrix of a consistent state, but other accelerations and wrenches."""
-    model, state = compiled.model, consistent.state
-    work = work_from(model, consistent.w)
-    work.state.time[...] = t
-    set_iterate(work, state, u_dot, np.where(is_wrench(model), w, consistent.w))
-    if spin is not None:
-        work.state.spins[:] = spin.bodies
-    inertia = linearized(model, work, 1.0, 0.0, 0.0)
-    step = linearized(model, work, 1.0, c_d, c_k)
-    M = sp.block_diag(with_mass_for_all(model, inertia.H))
-    top = sp.block_diag(with_mass_for_all(model, step.H))
-    if not len(w):
-        return StepFilter(compiled, state, sp.csr_array(M), splu(sp.csc_array(top)))
-    held = sp.diags_array(is_held(model.rows.kind).astype(float))
-    G = held @ inertia.G + (sp.eye_array(len(w)) - held) @ step.G
-    matrix = sp.csc_array(sp.block_array([[top, -step.J.T], [G, step.V]]))
-    return StepFilter(compiled, state, sp.csr_array(sp.vstack([M, inertia.G])), splu(matrix))
+def chosen(is_first: NDArray[np.bool_], first: sp.csr_array, second: sp.csr_array) -> sp.csr_array:
+    """Return some rows of one matrix, and the others of another."""
+    both = sp.csr_array(sp.vstack([first, second]))
+    rows = np.arange(len(is_first))
+    return both[np.where(is_first, rows, len(rows) + rows)]
 
 
 def is_wrench(model: Model) -> NDArray[np.bool_]:

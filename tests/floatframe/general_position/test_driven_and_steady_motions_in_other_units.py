@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 
 import cms
 from fe_models.body.fe_body import Interface
-from fe_models.foundation.units import unit_system
 from floatframe import (
     GROUND,
     FlexibleBody,
@@ -39,37 +38,17 @@ from floatframe.design.studies.study_file import read_study
 from floatframe.model.functions.time_functions import harmonic, polynomial_of_time
 from tests.bodies import beam, with_interfaces
 from tests.floatframe.components.wheels.car import Car
-from tests.floatframe.other_units import Other, in_units
+from tests.floatframe.other_units import SI, SIZES, in_units, other_units
 
 R = Rotation.from_rotvec([0.7, -0.4, 1.1]).as_matrix()
 PLACE = np.array([300.0, -200.0, 150.0])
 UNITS = ["mm-t-s", "mm-kg-ms", "in-slinch-s"]
-#: systems of other size in SI, of the same density under the same gravity: their numbers are those of such units
-SIZES = {
-    "micrometres": replace(unit_system("m-kg-s"), name="of micrometres", length=1e6, mass=1e18, time=1e3),
-    "1000 km": replace(unit_system("m-kg-s"), name="of 1000 km", length=1e-6, mass=1e-18, time=1e-3),
-}
-SI = unit_system("m-kg-s")
 TIMES = np.linspace(0, 0.3, 7)
-
-
-def other_units(name):
-    """Return other units, or other sizes, by name."""
-    return Other(SIZES.get(name) or unit_system(name))
 
 
 def elsewhere(system, other, turn=R, place=PLACE):
     """Return a system in other units, or of another size, turned and off the origin; in SI, as it is."""
-    if other.units == SI:
-        return system
-    moved = in_units(system, other.units, turn, place)
-    if other.units not in SIZES.values():
-        return moved
-    bodies = [
-        replace(body, reduced=replace(body.reduced, units=SI)) if isinstance(body, FlexibleBody) else body
-        for body in moved.bodies
-    ]
-    return replace(moved, bodies=bodies, units=SI)
+    return system if other.units == SI else in_units(system, other.units, turn, place)
 
 
 def directions(other):

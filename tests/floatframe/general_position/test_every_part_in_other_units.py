@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fe_models.foundation.units import unit_system
 from floatframe import GeneralizedAlpha, integrate
 from floatframe.model.rotations import rotation_matrix
 from tests.floatframe.engine.structure_preserving.element_parts import ELEMENT_PARTS
 from tests.floatframe.engine.structure_preserving.parts import PARTS
-from tests.floatframe.other_units import Other, in_units
+from tests.floatframe.other_units import SIZES, in_units, other_units
 
 R = Rotation.from_rotvec([0.7, -0.4, 1.1]).as_matrix()
 PLACE = np.array([300.0, -200.0, 150.0])
@@ -38,7 +37,7 @@ def in_si(name):
 def assert_moves_alike(name, units):
     """Compare places, axes and energies, turned back into SI, of a system and of itself elsewhere in other units."""
     part, system, motion = in_si(name)
-    other = Other(unit_system(units))
+    other = other_units(units)
     found = run(in_units(system, other.units, R, PLACE), part.h * other.factor("s"))
     for body in motion.body_names:
         a, b = motion.body(body), found.body(body)
@@ -49,7 +48,7 @@ def assert_moves_alike(name, units):
     assert np.abs(found.energies.kinetic / other.factor("J") - kinetic).max() < CLOSE * kinetic.max()
 
 
-@pytest.mark.parametrize("units", ["mm-t-s", "mm-kg-ms", "in-slinch-s"])
+@pytest.mark.parametrize("units", ["mm-t-s", "mm-kg-ms", "in-slinch-s", *SIZES])
 @pytest.mark.parametrize("name", OF_PARTS)
 def test_a_part_moves_alike_in_other_units_and_elsewhere(name, units):
     assert_moves_alike(name, units)

@@ -15,6 +15,7 @@ from floatframe import (
     GeneralizedAlpha,
     Gravity,
     JointCoordinate,
+    JointForce,
     Marker,
     PrismaticJoint,
     RevoluteJoint,
@@ -22,12 +23,14 @@ from floatframe import (
     SpringDamper,
     System,
     integrate,
+    joint_coordinate,
     static_equilibrium,
 )
 from floatframe.analyses.inverse_kinematics import Target, inverse_kinematics
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ModelError
 from floatframe.model.joints.coordinate_coupler import Limits
+from floatframe.model.rotations import euler_parameters
 from floatframe.results.sensors import PlaceSensor
 from floatframe.simulation import integrate as integration
 from floatframe.simulation.event_steps import EventWatch
@@ -170,3 +173,35 @@ def test_a_pose_placed_beyond_its_limits_is_refused(size):
     inverse_kinematics(arm(size), goal, limits={"slide.distance": (1e-11 * size, size)})
     with pytest.raises(ModelError, match=r"slide.distance is placed at 0, beyond its limits"):
         inverse_kinematics(arm(size), goal, limits={"slide.distance": (1e-7 * size, size)})
+
+
+def turned_arm(size):
+    """An arm on a hinge, a block on a sprung slide, turned; all falls through the size in the same time."""
+    m = size**3
+    places = np.array([[0.5, -0.2, 0.4], [1.1, -0.1, 0.5]]) * size
+    bodies = [
+        RigidBody("arm", 2.0 * m, np.diag([0.1, 0.12, 0.14]) * m * size**2, (0.3 * size, 0.05 * size, 0.02 * size),
+                  position=TURN @ places[0], orientation=euler_parameters(TURN)),
+        RigidBody("block", 0.7 * m, np.diag([0.02, 0.03, 0.04]) * m * size**2, (0.01 * size, 0.02 * size, 0.03 * size),
+                  position=TURN @ places[1], orientation=euler_parameters(TURN)),
+    ]  # fmt: skip
+    joints = [
+        RevoluteJoint(
+            "hinge", Marker(GROUND, position=TURN @ places[0], triad=TURN), Marker("arm"), axis=(0.6, 0.8, 0)
+        ),
+        PrismaticJoint("slide", Marker("arm", position=places[1] - places[0]), Marker("block"), axis=(0.8, 0, 0.6)),
+    ]
+    spring = JointForce("spring", "slide", "distance", stiffness=200.0 * m, damping=3.0 * m)
+    return System(bodies, joints, [Gravity(TURN @ [0.5, -1.0, -9.81] * size), spring])
+
+
+@pytest.mark.parametrize("formulation", ["absolute", "relative"])
+@pytest.mark.parametrize("size", [1e-9, *SIZES, 1e9])
+def test_an_arm_of_any_size_swings_alike(size, formulation):
+    """The first step too, whose filter is a matrix of masses, moments and lengths."""
+    angles = []
+    for each in (1.0, size):
+        system = turned_arm(each)
+        motion = integrate(system, GeneralizedAlpha(), 0.05, 2.5e-3, formulation=formulation)
+        angles.append(joint_coordinate(system, motion, "hinge", "angle").value)
+    assert_allclose(angles[1], angles[0], rtol=0, atol=1e-8 * np.abs(angles[0]).max())
