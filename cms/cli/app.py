@@ -15,7 +15,11 @@ from cms.cli.show import show_command
 
 __all__ = ["app"]
 
-app = commands("cms", "Component mode synthesis: a meshed part becomes a small, exact, portable flexible body.")
+app = commands(
+    "cms",
+    "Component mode synthesis: a meshed part becomes a small, exact, portable flexible body.",
+    hints={"validate": "check", "convert": "export", "craig-bampton": "reduce"},
+)
 
 
 @guarded
@@ -450,7 +454,7 @@ def compare_command(
     The report says which set is accurate enough, with how few modes, and why.
 
     The full model is solved once and stored in the folder of the report, so that a repetition is fast. To compare sets
-    in the motion of a mechanism, with frames, stiffening and parts: floatframe study (docs/laboratory.md).
+    in the motion of a mechanism, with frames, stiffening and parts: floatframe compare (docs/laboratory.md).
 
     Example: cms compare rod.toml --sets craig-bampton,craig-bampton-ir,rubin --modes 0:30 -o compare
 
@@ -474,7 +478,7 @@ def study_command(context: typer.Context) -> None:
     from cms.errors import JobError
 
     raise JobError(
-        f"cms study: a study runs the body in a mechanism: floatframe study {' '.join(context.args) or 'FILE'} "
+        f"cms study: a study runs the body in a mechanism: floatframe compare {' '.join(context.args) or 'FILE'} "
         "(docs/laboratory.md); mode sets of the body alone, against its full model: cms compare JOB"
     )
 

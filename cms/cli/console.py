@@ -16,7 +16,7 @@ from contextvars import ContextVar
 from typing import Any, ParamSpec, TypeVar
 
 import typer
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperGroup
 
 from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.stages import Stages
@@ -109,10 +109,21 @@ def register(app: typer.Typer, groups: Mapping[str, Mapping[str, Callable[..., N
             app.command(name, rich_help_panel=heading)(command)
 
 
-def commands(name: str, help: str) -> typer.Typer:
-    """Return an application with the options --version and --debug."""
+def commands(name: str, help: str, *, hints: Mapping[str, str] | None = None) -> typer.Typer:
+    """Return an application with the options --version and --debug.
+
+    hints: the commands that users of other programs and of earlier versions look for under other names.
+    """
+    known = hints or {}
+
+    class Hinting(TyperGroup):
+        def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+            if args[0] in known and args[0] not in self.commands:
+                ctx.fail(f"No such command {args[0]!r}. Use {name} {known[args[0]]}.")
+            return super().resolve_command(ctx, args)
+
     app = Commands(
-        name=name, help=help, no_args_is_help=True, add_completion=False, rich_markup_mode="rich",
+        name=name, help=help, cls=Hinting, no_args_is_help=True, rich_markup_mode="rich",
         pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]},
     )  # fmt: skip
 

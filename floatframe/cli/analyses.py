@@ -1,4 +1,4 @@
-"""The commands that analyse a system without a motion: static, eig, campbell."""
+"""The commands that analyse a system without a motion: static, modes, campbell."""
 
 import json as json_module
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from floatframe.model.system import System
     from floatframe.pictures.body_colors import BodyColor
 
-__all__ = ["campbell_command", "check_command", "eig_command", "static_command"]
+__all__ = ["campbell_command", "check_command", "modes_command", "static_command"]
 
 MOST_SPEEDS = 10_000
 GREATEST_SPEED = 1e100
@@ -135,7 +135,7 @@ def static_command(
 
 
 @guarded
-def eig_command(
+def modes_command(
     system: SystemArgument,
     speed: Speed = 0.0,
     axis: Axis = "z",
@@ -158,11 +158,11 @@ def eig_command(
 
     With --animate 3 and without -o the film of mode 3 of crane.toml is crane.mode3.gif.
 
-    Example: floatframe eig crane.toml
+    Example: floatframe modes crane.toml
 
-    Example: floatframe eig crane.toml --animate 1 --animate 2
+    Example: floatframe modes crane.toml --animate 1 --animate 2
 
-    Example: floatframe eig rotor.toml --speed 100 --axis z
+    Example: floatframe modes rotor.toml --speed 100 --axis z
     """
     from fe_models.foundation.words import nearest
     from floatframe.analyses import system_modes

@@ -42,7 +42,11 @@ if TYPE_CHECKING:
 
 __all__ = ["app"]
 
-app = commands("floatframe", "Flexible multibody dynamics: bodies from modal files, joints and forces become motion.")
+app = commands(
+    "floatframe",
+    "Flexible multibody dynamics: bodies from modal files, joints and forces become motion.",
+    hints={"eig": "modes", "eigen": "modes", "bode": "response", "simulate": "run", "study": "compare"},
+)
 
 ResultsFile = Annotated[Path, typer.Argument(help="A results file, as floatframe run writes it.")]
 
@@ -115,7 +119,7 @@ def run_command(
 OTHER_KINDS: "dict[str, Callable[..., None]]" = {
     "sweep": studies.sweep_command,
     "optimization": fits.optimize_command,
-    "laboratory": studies.study_command,
+    "laboratory": studies.compare_command,
     "shake": durability.shake_command,
     "fatigue": durability.fatigue_command,
 }
@@ -526,7 +530,7 @@ register(
             "run": run_command,
             "resume": resume_command,
             "static": analyses.static_command,
-            "eig": analyses.eig_command,
+            "modes": analyses.modes_command,
             "campbell": analyses.campbell_command,
             "response": linear.response_command,
             "linearize": linear.linearize_command,
@@ -544,7 +548,7 @@ register(
         "Vary": {
             "sweep": studies.sweep_command,
             "optimize": fits.optimize_command,
-            "study": studies.study_command,
+            "compare": studies.compare_command,
             "gradient": studies.gradient_command,
         },
         "Assess": {

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from floatframe.design.laboratory.laboratory import LaboratoryResult
     from floatframe.design.studies.study import StudyTable
 
-__all__ = ["gradient_command", "study_command", "sweep_command"]
+__all__ = ["compare_command", "gradient_command", "sweep_command"]
 
 
 # the command sweep: parameter studies of a system ---------------------------------------------------------------------
@@ -171,14 +171,14 @@ def sweep_csv(table: "StudyTable") -> str:
     return text.getvalue()
 
 
-# the command study: models of a flexible body compared with a reference -----------------------------------------------
+# the command compare: models of a flexible body compared with a reference ---------------------------------------------
 
 
 STUDY_KINDS = (".csv", ".json", ".png", ".svg", ".pdf")
 
 
 @guarded
-def study_command(
+def compare_command(
     file: Annotated[Path, typer.Argument(help="Laboratory file (TOML), see docs/laboratory.md.")],
     outputs: Annotated[
         list[Path] | None, typer.Option("--output", "-o", help="A .csv, .json, .png, .svg or .pdf file; repeatable.")
@@ -192,7 +192,7 @@ def study_command(
     with its reason. Without -o, a table and a picture are written next to the file: blade.toml gives blade.csv and
     blade.png.
 
-    Example: floatframe study blade.toml -o blade.csv -o blade.pdf
+    Example: floatframe compare blade.toml -o blade.csv -o blade.pdf
     """
     import io
 
@@ -271,12 +271,13 @@ def print_result(result: "LaboratoryResult") -> None:
 def gradient_command(
     system: Annotated[Path, typer.Argument(help="System file (TOML), see docs/system_file.md.")],
     outputs: Annotated[
-        list[str], typer.Option("--out", "-m", help='A column, "tip x"; "tip x:rms"; of eig "frequency 1"; repeatable.')
+        list[str],
+        typer.Option("--out", "-m", help='A column, "tip x"; "tip x:rms"; of modes "frequency 1"; repeatable.'),
     ] = [],  # noqa: B006
     parameters: Annotated[
         list[str], typer.Option("--parameter", "-p", help="KEY.PATH of a number in the file; repeatable.")
     ] = [],  # noqa: B006
-    analysis: Annotated[str, typer.Option(help="run, static, rotation or eig.")] = "run",
+    analysis: Annotated[str, typer.Option(help="run, static, rotation or modes.")] = "run",
     omega: Annotated[str | None, typer.Option(help='Of rotation: angular velocity "x,y,z", rad per time unit.')] = None,
     center: Annotated[str, typer.Option(help='Of rotation: a point of the axis, "x,y,z".')] = "0,0,0",
     method: Annotated[str, typer.Option(help="direct or adjoint.")] = "direct",
@@ -295,7 +296,7 @@ def gradient_command(
     Example: floatframe gradient governor.toml --analysis rotation --omega 0,0,6 -m "arm.distance value" -p
     forces.spring.stiffness
 
-    Example: floatframe gradient arm.toml --analysis eig -m "frequency 1" -p forces.bush.stiffness
+    Example: floatframe gradient arm.toml --analysis modes -m "frequency 1" -p forces.bush.stiffness
     """
     from fe_models.foundation.paths import replace_file
     from floatframe.cli.analyses import vector

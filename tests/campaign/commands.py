@@ -79,7 +79,7 @@ COMMANDS: dict[tuple[str, ...], dict[str, tuple[tuple[str, ...], tuple[str, ...]
         "": (("system.toml",), ("missing.toml", ".", "results.h5", "job.toml")),
         "-o": ((), ("results.h5", "half.h5", "nothing.h5", "/dev/null", "missing/out.h5", "half.h5.segments")),
     },
-    ("floatframe", "eig"): {
+    ("floatframe", "modes"): {
         "": (("system.toml",), ("missing.toml", ".", "results.h5", "/dev/null", "job.toml")),
         "--speed": (("0",), NO_NUMBER),
         "--axis": (("z", "0,0,1"), ("", "w", "0,0,0", "1,2", "nan,0,0", "a,b,c")),

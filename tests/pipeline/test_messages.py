@@ -84,17 +84,17 @@ def test_options_in_messages_exist(package):
 
 def test_commands_are_known_by_their_functions():
     """The check looks at what a command says with the options of that command."""
-    assert ("floatframe.cli.analyses", "eig_command") in SPEAKERS
+    assert ("floatframe.cli.analyses", "modes_command") in SPEAKERS
     assert sum(module.startswith("cms") for module, _ in SPEAKERS) > 5
 
 
 @pytest.mark.parametrize(
     ("module", "function", "text", "n"),
     [
-        ("floatframe.cli.analyses", "eig_command", "5 more modes (--modes)", 0),
+        ("floatframe.cli.analyses", "modes_command", "5 more modes (--modes)", 0),
         ("floatframe.cli.analyses", "static_command", "5 more modes (--modes)", 1),
         ("floatframe.results.recovery", "", "use --no-such-thing", 1),
-        ("cms.jobs.job", "", "Example: floatframe eig a.toml --animate 1 --to buckens", 1),
+        ("cms.jobs.job", "", "Example: floatframe modes a.toml --animate 1 --to buckens", 1),
         ("cms.jobs.job", "", "a -- b, and ---- or x--y", 0),
     ],
 )

@@ -60,7 +60,7 @@ __all__ = ["ANALYSES", "METHODS", "Sensitivities", "sensitivities"]
 
 log = logging.getLogger(__name__)
 
-ANALYSES = ("run", "static", "rotation", "eig")
+ANALYSES = ("run", "static", "rotation", "modes")
 METHODS = ("direct", "adjoint")
 TOLERANCE = 1e-12  #: tolerance of Newton's method in the differentiated steps
 SLOPE_STEP = 2e-4  #: step of differences of sensors, relative to the magnitude of the state
@@ -125,13 +125,13 @@ def sensitivities(
         Columns of sensors or joint coordinates, such as "tip x" or "hinge.angle value": the last value is meant. Or a
         dict from names to these, or to pairs such as ("tip x", "rms"), with what is taken over time, as in studies,
         or a function of the values (n_t,) that returns a number and its derivatives by them, (n_t,).
-        For "eig": "frequency 1", "damping 2", "real 1", "imaginary 3".
+        For "modes": "frequency 1", "damping 2", "real 1", "imaginary 3".
     parameters
         Key paths, "bodies.rod.mass" (docs/sensitivities.md), or a dict from names to them. Of a file: its keys, as in
         studies. Of a function: a dict from names to values.
     analysis
         "run", a motion by generalized-alpha; "static", the equilibrium at rest; "rotation", a steady rotation of the
-        whole system; "eig", the modes about the equilibrium at rest.
+        whole system; "modes", the modes about the equilibrium at rest.
     method
         "direct", whose cost grows with the parameters, or "adjoint", whose cost grows with the outputs.
     t_end, h, integrator, t_start, state
@@ -160,7 +160,7 @@ def sensitivities(
     family = family_of(system, parameters, steps=steps)
     require_no_memory(family.system)
     own = neighbour(family.system)
-    if analysis == "eig":
+    if analysis == "modes":
         return of_modes(family, own, wanted)
     columns = columns_of(family.system, wanted)
     if analysis == "static":

@@ -81,7 +81,7 @@ class QuantitySection(Table):
     """A number taken from the result of an evaluation."""
 
     of: str = Field(
-        description='a sensor and its column ("tip size"), of eig "frequency 1", "damping least", of response '
+        description='a sensor and its column ("tip size"), of modes "frequency 1", "damping least", of response '
         '"OUTPUT / INPUT"'
     )
     analysis: choice("analysis", lambda: (*ANALYSES, RESPONSE)) | None = Field(  # type: ignore[valid-type]
@@ -225,7 +225,7 @@ class DesignFile(Table):
                 raise ValueError(f'objectives.{plain[0]}: method = "least-squares" expects a target or a table')
         for name, o in self.objectives.items():
             analysis = o.analysis or self.analysis
-            if o.table is not None and analysis in ("eig", "static", RESPONSE):
+            if o.table is not None and analysis in ("modes", "static", RESPONSE):
                 raise ValueError(f"objectives.{name}: table: analysis = {analysis!r} has no times; take a target")
         for kind, sections in (("objectives", self.objectives), ("constraints", self.constraints)):
             for name, section in sections.items():

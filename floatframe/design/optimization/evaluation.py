@@ -137,16 +137,16 @@ class EvaluationFunction:
         design = self.design
         system, given = read_system(design.study.system, design.study.changes(design.point(values)))
         found: dict[str, Any] = {}
-        if {"eig", "response"} & set(design.analyses):
+        if {"modes", "response"} & set(design.analyses):
             found["response"] = linear = linearize(system, formulation=formulation_of(given))
-            found["eig"] = system_modes(linear) if "eig" in design.analyses else None
+            found["modes"] = system_modes(linear) if "modes" in design.analyses else None
         for analysis in set(design.analyses) - set(found):
             found[analysis] = StudyPoint(design.study_of(analysis)).motion(system, given)
         per_second = 1 / system.units.time
         numbers: list[tuple[float, ...]] = []
         for q in design.quantities:
-            if q.analysis == "eig":
-                numbers.append((output_value_of_modes(q.output, found["eig"], per_second)[0],))
+            if q.analysis == "modes":
+                numbers.append((output_value_of_modes(q.output, found["modes"], per_second)[0],))
             elif q.analysis == "response":
                 numbers.append((response_number(q, found["response"], per_second),))
             else:

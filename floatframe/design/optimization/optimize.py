@@ -123,7 +123,7 @@ def optimize(
     start_point = design.point(tuple(p.start for p in design.parameters))
     for analysis in design.analyses:
         study = design.study_of(analysis)
-        check(replace(study, analysis="eig", outputs=()) if analysis == "response" else study, start_point)
+        check(replace(study, analysis="modes", outputs=()) if analysis == "response" else study, start_point)
     files = read_system(design.study.system)[0].files
     kept = None if journal is None else open_journal(Path(journal), design, files)
     with tasks_of(design.workers if workers is None else workers) as tasks:

@@ -247,7 +247,7 @@ def check(study: Study, point: tuple[Any, ...]) -> None:
         if "unknown key" in str(error):
             raise
         system = plain  # the values of this point are impossible, which gives a failed row
-    if study.analysis == "eig":
+    if study.analysis == "modes":
         for output in study.outputs:
             mode_and_part(output)
         return
@@ -285,7 +285,7 @@ class StudyPoint:
         from floatframe.files.system_file.read_system import read_system
 
         system, given = read_system(self.study.system, self.study.changes(point))
-        if self.study.analysis == "eig":
+        if self.study.analysis == "modes":
             modes = system_modes(linearize(system, formulation=formulation_of(given)))
             found = [output_value_of_modes(output, modes, 1 / system.units.time) for output in self.study.outputs]
         else:

@@ -18,7 +18,7 @@ from floatframe.errors import SystemFileError
 
 __all__ = ["ANALYSES", "TAKES", "Output", "Parameter", "Study", "read_study", "workers_of_file"]
 
-ANALYSES = ("run", "static", "eig", "kinematics", "inverse")
+ANALYSES = ("run", "static", "modes", "kinematics", "inverse")
 COMBINATIONS = ("all", "together")
 SCALES = ("linear", "log")
 TAKES = {  # name -> function from the values over time, (n_t,), to a number
@@ -90,7 +90,7 @@ class ParameterSection(Table):
 class OutputSection(Table):
     """[outputs.NAME]: a number computed from the result of every point."""
 
-    of: str = Field(description='a sensor and its column ("tip size"), or of eig "frequency 1", "damping 1"')
+    of: str = Field(description='a sensor and its column ("tip size"), or of modes "frequency 1", "damping 1"')
     take: choice("way to take a number", lambda: tuple(TAKES)) = Field(  # type: ignore[valid-type]
         "last", description=f"one of {', '.join(TAKES)}"
     )

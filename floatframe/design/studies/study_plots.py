@@ -71,7 +71,7 @@ def plot_study_output(table: StudyTable, name: str, ax: "Axes") -> "Axes":
     unit = table.units[k]
     take = study.outputs[k].take
     ax.set_xlabel(f"{first.name} ({first.path})" if first.name != first.path else first.path)
-    ax.set_ylabel(f"{name}, {take} [{unit}]" if study.analysis not in ("eig", "static") else f"{name} [{unit}]")
+    ax.set_ylabel(f"{name}, {take} [{unit}]" if study.analysis not in ("modes", "static") else f"{name} [{unit}]")
     ax.grid(alpha=0.3)
     if ax.get_legend_handles_labels()[0]:
         ax.legend(fontsize="small")

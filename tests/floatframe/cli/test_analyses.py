@@ -1,4 +1,4 @@
-"""The commands static, eig, linearize and campbell: what they say is what the functions return; refusals in words."""
+"""The commands static, modes, linearize and campbell: what they say is what the functions return; refusals in words."""
 
 import json
 
@@ -66,9 +66,9 @@ of = "hinge"
 
 
 def test_eig_tells_the_frequency_of_the_textbook(pendulum):
-    record = json.loads(invoke("eig", pendulum, "--json"))
+    record = json.loads(invoke("modes", pendulum, "--json"))
     assert_allclose(record["modes"][0]["frequency_hz"], np.sqrt(1.5 * 9.81) / (2 * np.pi), rtol=1e-8)
-    assert "rod 100 %" in invoke("eig", pendulum)
+    assert "rod 100 %" in invoke("modes", pendulum)
 
 
 def test_linearize_writes_the_state_space_of_the_pendulum(pendulum, tmp_path):
@@ -97,9 +97,9 @@ def test_campbell_draws_a_picture_and_writes_a_table(pendulum, tmp_path):
     [
         (["linearize", "--input", "rod/tip"], "or body/interface:component"),
         (["linearize", "--input", "rode:x"], "no body 'rode'; did you mean 'rod'"),
-        (["eig", "--axis", "up"], "expected x, y, z or three numbers"),
+        (["modes", "--axis", "up"], "expected x, y, z or three numbers"),
         (["campbell", "--speeds", "0:5"], 'expected "from:to:number"'),
-        (["eig", "--speed", "3", "--axis", "x"], "does not allow a rotation"),
+        (["modes", "--speed", "3", "--axis", "x"], "does not allow a rotation"),
     ],
 )
 def test_what_cannot_be_understood_is_refused_with_words(pendulum, words, message):
@@ -109,7 +109,7 @@ def test_what_cannot_be_understood_is_refused_with_words(pendulum, words, messag
 
 def test_a_system_without_a_run_can_be_analysed_but_not_run(pendulum):
     pendulum.write_text(PENDULUM[: PENDULUM.index("[run]")])
-    for command in ("static", "eig", "linearize"):
+    for command in ("static", "modes", "linearize"):
         invoke(command, pendulum)
     invoke("campbell", pendulum, "--speeds", "0:0:1", "-o", pendulum.with_suffix(".csv"))
     for command in ("run", "kinematics"):

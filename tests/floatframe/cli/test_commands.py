@@ -272,6 +272,22 @@ def test_help_names_the_commands_and_loads_nothing_heavy():
         assert f"'{heavy}'" not in loaded
 
 
+@pytest.mark.parametrize(("name", "now"), [("eig", "modes"), ("study", "compare"), ("simulate", "run")])
+def test_a_command_under_another_name_is_answered_with_its_name_here(name, now):
+    result = CliRunner().invoke(app, [name, "swing.toml"])
+    assert result.exit_code == 2
+    assert f"No such command '{name}'. Use floatframe {now}." in " ".join(result.output.replace("│", " ").split())
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_of_a_shell_offers_the_commands(shell):
+    typed = {"COMP_WORDS": "floatframe anim", "COMP_CWORD": "1", "_TYPER_COMPLETE_ARGS": "floatframe anim",
+             "_TYPER_COMPLETE_FISH_ACTION": "get-args"}  # fmt: skip
+    environment = ENVIRONMENT | typed | {"_FLOATFRAME_COMPLETE": f"complete_{shell}"}
+    result = subprocess.run(PROGRAM, env=environment, capture_output=True, text=True)
+    assert "animate" in result.stdout, result.stderr
+
+
 def test_version():
     assert run("--version").stdout.startswith("floatframe ")
 

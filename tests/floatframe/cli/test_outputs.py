@@ -27,7 +27,7 @@ h = 1e-5
 """
 STUDY = """
 system = "system.toml"
-analysis = "eig"
+analysis = "modes"
 [parameters.mass]
 path = "bodies.ball.mass"
 values = [1.0]

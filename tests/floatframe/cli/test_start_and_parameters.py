@@ -166,7 +166,7 @@ def test_set_replaces_parameters_and_keys_and_the_results_record_them(folder):
     assert [body.mass for body in system.bodies] == [4.0, 3.0]
 
 
-@pytest.mark.parametrize("command", ["static", "eig", "linearize"])
+@pytest.mark.parametrize("command", ["static", "modes", "linearize"])
 def test_analyses_take_the_values_of_set(folder, command):
     result = CliRunner().invoke(app, [command, str(folder / "cart.toml"), "--set", "nothing=1"])
     assert result.exit_code == 2
@@ -205,7 +205,7 @@ def test_an_unknown_kind_is_refused_with_the_nearest(folder):
 
 def test_run_runs_a_sweep_by_its_kind(folder):
     (folder / "sweep.toml").write_text(
-        'kind = "sweep"\nsystem = "cart.toml"\nanalysis = "eig"\n[parameters.stiffness]\npath = "stiffness"\n'
+        'kind = "sweep"\nsystem = "cart.toml"\nanalysis = "modes"\n[parameters.stiffness]\npath = "stiffness"\n'
         'values = [125.0, 500.0]\n[outputs.f]\nof = "frequency 2"\n'
     )
     result = run("run", folder / "sweep.toml", "-o", folder / "sweep.csv")

@@ -291,7 +291,7 @@ of = "{of}"
 @pytest.mark.parametrize("units", UNITS)
 @pytest.mark.parametrize(
     ("analysis", "of", "take", "unit"),
-    [("eig", "frequency 1", "", "1"), ("eig", "real 1", "", "1"), ("static", "tip z", 'take = "last"', "m")],
+    [("modes", "frequency 1", "", "1"), ("modes", "real 1", "", "1"), ("static", "tip z", 'take = "last"', "m")],
 )
 def test_sweeps_of_a_file_are_alike_in_other_units(analysis, of, take, unit, units, tmp_path):
     """Frequencies and decay stand in hertz and per second in any unit system; what sensors measure, in its units."""

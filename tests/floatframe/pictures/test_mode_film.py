@@ -79,18 +79,18 @@ def test_eig_draws_modes_into_films_and_pictures(tmp_path, monkeypatch):
     path = tmp_path / "pendulum.toml"
     path.write_text(PENDULUM)
 
-    def eig(*words, code=0):
-        result = CliRunner().invoke(app, ["eig", str(path), *(str(word) for word in words)])
+    def modes(*words, code=0):
+        result = CliRunner().invoke(app, ["modes", str(path), *(str(word) for word in words)])
         assert result.exit_code == code, result.output
         return " ".join(result.output.split())
 
-    assert "pendulum.mode1.gif" in eig("--animate", 1)
+    assert "pendulum.mode1.gif" in modes("--animate", 1)
     assert (tmp_path / "pendulum.mode1.gif").read_bytes().startswith(b"GIF8")
-    eig("-a", 1, "-o", tmp_path / "one.png")
+    modes("-a", 1, "-o", tmp_path / "one.png")
     assert (tmp_path / "one.png").read_bytes().startswith(b"\x89PNG")
-    assert "expected 1 to 1, the modes" in eig("-a", 4, code=2)
-    assert "expected --animate with the number of one mode" in eig("-o", tmp_path / "x.gif", code=2)
-    assert "did you mean 'von-mises'" in eig("-a", 1, "--color", "von-mise", code=2)
+    assert "expected 1 to 1, the modes" in modes("-a", 4, code=2)
+    assert "expected --animate with the number of one mode" in modes("-o", tmp_path / "x.gif", code=2)
+    assert "did you mean 'von-mises'" in modes("-a", 1, "--color", "von-mise", code=2)
 
 
 def test_joints_springs_and_bushings_are_drawn_and_move_with_the_mode():

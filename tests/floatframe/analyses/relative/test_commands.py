@@ -70,16 +70,16 @@ def test_a_linearised_system_has_states_named_after_its_joints(arm):
 
 
 def test_equilibria_and_modes_do_not_depend_on_the_formulation(arm):
-    for command in ("static", "eig"):
+    for command in ("static", "modes"):
         one, other = (json.loads(run(command, arm / f"{name}.toml", "--json")) for name in ("arm", "joints"))
         assert one["is_stable"]
         assert other["is_stable"]
-        if command == "eig":
+        if command == "modes":
             pairs = zip(one["modes"], other["modes"], strict=True)
             assert all(abs(a["frequency_hz"] - b["frequency_hz"]) < 1e-8 for a, b in pairs)
 
 
 def test_a_formulation_that_is_none_is_refused(arm):
-    result = CliRunner().invoke(app, ["eig", str(arm / "arm.toml"), "--formulation", "relatve"])
+    result = CliRunner().invoke(app, ["modes", str(arm / "arm.toml"), "--formulation", "relatve"])
     assert result.exit_code != 0
     assert "did you mean 'relative'" in result.output

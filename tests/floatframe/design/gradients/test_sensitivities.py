@@ -219,7 +219,7 @@ def test_frequencies_of_an_oscillator_have_their_closed_form():
     k, c, m = 40.0, 0.6, 2.0
     paths = ["forces.spring.stiffness", "forces.spring.damping", "bodies.mass.mass"]
     system = oscillator(k, c, m)
-    found = ff.sensitivities(system, ["frequency 1", "damping 1", "real 1", "imaginary 1"], paths, analysis="eig")
+    found = ff.sensitivities(system, ["frequency 1", "damping 1", "real 1", "imaginary 1"], paths, analysis="modes")
     w0 = np.sqrt(k / m)
     zeta = c / (2 * m * w0)
     w = np.sqrt(k / m - (c / (2 * m)) ** 2)
@@ -237,7 +237,7 @@ def test_a_frequency_follows_the_equilibrium_it_is_taken_about():
     spring = ff.JointForce("twist", "hinge 1", "angle", stiffness=9.0)
     system = replace(system, forces=(*system.forces, spring))
     paths = ["bodies.rod 1.mass", "forces.twist.stiffness", "bodies.rod 1.center_of_mass.0"]
-    found = ff.sensitivities(system, ["frequency 1"], paths, analysis="eig")
+    found = ff.sensitivities(system, ["frequency 1"], paths, analysis="modes")
     for k, path in enumerate(paths):
         p, step = value_at(system, path), 1e-3
 
@@ -257,7 +257,7 @@ def test_a_repeated_frequency_splits_into_its_branches():
     bush = ff.Bushing("bush", ff.Marker(ff.GROUND), ff.Marker("mass"), np.diag([50.0, 50.0, 90.0, 1.0, 1.0, 1.0]))
     system = ff.System([body], [hold], [bush])
     paths = ["forces.bush.stiffness.0.0", "forces.bush.stiffness.1.1", "bodies.mass.mass"]
-    found = ff.sensitivities(system, ["frequency 1", "frequency 2", "frequency 3"], paths, analysis="eig")
+    found = ff.sensitivities(system, ["frequency 1", "frequency 2", "frequency 3"], paths, analysis="modes")
     f = np.sqrt(50 / 2) / (2 * np.pi)
     assert found.repeated == ("frequency 1", "frequency 2")
     one = f / (2 * 50)
@@ -307,7 +307,7 @@ def test_bad_input_is_told():
     )
     refused("a force jumps at t = 0.005", made=replace(system, forces=(*system.forces, jump)))
     free = replace(crank(), forces=())
-    refused("is not unique", of=["frequency 1"], analysis="eig", made=free)
+    refused("is not unique", of=["frequency 1"], analysis="modes", made=free)
 
 
 @pytest.mark.parametrize("path", ["run.h", "run.t_end", "outputs.tip.position.0", "scene.0.color"])

@@ -250,7 +250,7 @@ def test_command_and_picture(folder, result, tmp_path, capsys, monkeypatch):
         text = text.replace(f'"{name}"', f'"{folder / name}"')
     file.write_text(text)
     outputs = [tmp_path / name for name in ("a.csv", "a.json", "a.svg")]
-    monkeypatch.setattr("sys.argv", ["floatframe", "study", str(file), *(w for o in outputs for w in ("-o", str(o)))])
+    monkeypatch.setattr("sys.argv", ["floatframe", "compare", str(file), *(w for o in outputs for w in ("-o", str(o)))])
     with pytest.raises(SystemExit) as end:
         main()
     assert not end.value.code, capsys.readouterr().err
@@ -328,9 +328,9 @@ def test_cms_study_names_the_command(capsys, monkeypatch):
     from cms.cli.app import app
 
     with pytest.raises(SystemExit) as end:
-        app(["study", "blade.toml"])
+        app(["compare", "blade.toml"])
     assert end.value.code == 2
-    assert "floatframe study blade.toml" in " ".join(capsys.readouterr().err.split())
+    assert "floatframe compare blade.toml" in " ".join(capsys.readouterr().err.split())
 
 
 LINES_JOB = """

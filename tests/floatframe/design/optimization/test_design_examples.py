@@ -192,7 +192,7 @@ def test_a_system_is_not_written_away_from_the_files_that_it_names(copied):
     ("band = [0.1, 0.15]", "band = [0.15, 0.1]", "expected two numbers, [from, to], the second greater"),
     ("band = [0.1, 0.15]", "band = [0.1, 0.15]\nat = 0.12", "got both"),
     ("band = [0.1, 0.15]", 'band = [0.1, 0.15]\ntake = "last"', "take = 'last': expected one of greatest, least"),
-    ("band = [0.1, 0.15]", 'analysis = "eig"\nband = [0.1, 0.15]', 'band and at are of analysis = "response"'),
+    ("band = [0.1, 0.15]", 'analysis = "modes"\nband = [0.1, 0.15]', 'band and at are of analysis = "response"'),
     ('method = "slsqp"', 'method = "least-squares"', "makes a sum of squares small"),
     ('"forces.tuned.damping"', '[{ path = "forces.tuned.damping", factor = 0 }]', "expected a number other than 0"),
 ])  # fmt: skip

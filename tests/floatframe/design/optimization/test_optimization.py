@@ -112,7 +112,7 @@ table = "y.csv"
 BARS = {"crank": 0.3, "coupler": 0.9, "rocker": 0.7, "along": 0.45, "across": 0.2}
 LONGER = """
 system = "pendulum.toml"
-analysis = "eig"
+analysis = "modes"
 method = "slsqp"
 workers = 1
 [parameters.d]
@@ -164,7 +164,7 @@ damping = 0.04
 """
 ABSORB = """
 system = "absorber.toml"
-analysis = "eig"
+analysis = "modes"
 method = "differential-evolution"
 workers = 1
 population = 12
@@ -237,7 +237,7 @@ def test_bars_of_a_four_bar_linkage_are_found_from_points_of_its_path(folder):
 @pytest.mark.parametrize("method", METHODS)
 def test_a_pendulum_swings_fastest_about_its_radius_of_gyration(folder, method):
     """f = sqrt(m g d / (I + m d^2)) is greatest at d = sqrt(I / m); F is flat there: d to the root of its noise."""
-    text = LONGER.replace("slsqp", method).replace('analysis = "eig"', 'analysis = "eig"\npopulation = 8')
+    text = LONGER.replace("slsqp", method).replace('analysis = "modes"', 'analysis = "modes"\npopulation = 8')
     if method == "differential-evolution":
         text = text.replace("[parameters", "tolerance = 1e-7\n[parameters", 1)
     (folder / "longer.toml").write_text(text)
@@ -252,7 +252,7 @@ def test_a_pendulum_swings_fastest_about_its_radius_of_gyration(folder, method):
 def test_a_limit_holds_where_the_best_without_it_breaks_it(folder, method):
     """f(d) grows up to d = 0.2887; the frequency at d = 0.15 as the limit leaves d = 0.15 as the best."""
     limit = frequency(0.15)
-    text = LONGER.replace("slsqp", method).replace('analysis = "eig"', 'analysis = "eig"\npopulation = 8')
+    text = LONGER.replace("slsqp", method).replace('analysis = "modes"', 'analysis = "modes"\npopulation = 8')
     text = text.replace("lower = 0.05", "lower = 0.05\nstart = 0.1").replace("upper = 1.0", "upper = 0.25")
     if method == "differential-evolution":
         text = text.replace("[parameters", "iterations = 12\n[parameters", 1)

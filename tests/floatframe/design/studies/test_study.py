@@ -22,7 +22,7 @@ from tests.floatframe.cli.examples import PENDULUM
 SENSOR = '\n[sensors.tip]\ntype = "velocity"\nbody = "rod"\nmarker = [1, 0, 0]\n'
 STUDY = """
 system = "pendulum.toml"
-analysis = "eig"
+analysis = "modes"
 
 [parameters.gravity]
 path = "system.gravity.1"
@@ -161,13 +161,13 @@ def test_what_nobody_foresaw_is_a_row_too(folder, monkeypatch):
 
 
 def test_equilibria_and_driven_motions_can_be_varied_too(folder):
-    text = STUDY.replace('"eig"', '"static"').replace('"frequency 1"', '"hinge.angle value"')
+    text = STUDY.replace('"modes"', '"static"').replace('"frequency 1"', '"hinge.angle value"')
     (folder / "study.toml").write_text(text)
     table = run_study(read_study(folder / "study.toml"), workers=1)
     assert_allclose(np.abs(table.column("swing")), np.pi / 2, rtol=1e-8)
     drive = '\n[joints.hinge.motions.angle]\ntype = "harmonic"\namplitude = 1.0\nomega = 2.0\n'
     (folder / "pendulum.toml").write_text(PENDULUM.replace("\n[run]", drive + "\n[run]").replace("1e-3", "5e-2"))
-    text = STUDY.replace('"eig"', '"inverse"').replace('"frequency 1"', '"hinge.angle force"\ntake = "first"')
+    text = STUDY.replace('"modes"', '"inverse"').replace('"frequency 1"', '"hinge.angle force"\ntake = "first"')
     (folder / "study.toml").write_text(text)
     table = run_study(read_study(folder / "study.toml"), workers=1)
     assert_allclose(table.column("swing"), [m * -g * 0.5 for g, m in (row.values for row in table.rows)], rtol=1e-9)
@@ -183,15 +183,15 @@ def test_study_without_any_result_says_why_and_fails(folder):
 
 @pytest.mark.parametrize(("old", "new", "words"), [
     ('"pendulum.toml"', '"pendulm.toml"', "no such file"),
-    ('"eig"', '"eigs"', "did you mean 'eig'"),
+    ('"modes"', '"mode"', "did you mean 'modes'"),
     ('"system.gravity.1"', '"system.gravity.7"', "expected an index of 0 to 2, got '7'"),
     ('"bodies.rod.mass"', '"bodies.rodd.mass"', "there is no 'rodd'; did you mean 'rod'"),
     ('"bodies.rod.mass"', '"bodies.rod.maas"', "unknown key; did you mean 'mass'"),
     ('"frequency 1"', '"frequncy 1"', "expected one of frequency, damping, real, imaginary"),
     ("number = 3\n", "", "expected values, or first, last and number"),
     ("first = 1.0", "first = -1.0", "expected first and last above 0"),
-    ('analysis = "eig"', 'combine = "together"', "expected as many values of each parameter, got gravity 2, mass 3"),
-    ('analysis = "eig"', 'analysis = "run"', "of = 'frequency 1': no such sensor; choices: hinge.angle, tip"),
+    ('analysis = "modes"', 'combine = "together"', "expected as many values of each parameter, got gravity 2, mass 3"),
+    ('analysis = "modes"', 'analysis = "run"', "of = 'frequency 1': no such sensor; choices: hinge.angle, tip"),
     ("[outputs.swing]\nof = \"frequency 1\"", "[outputs]", "expected one table [outputs.NAME] at least"),
 ])  # fmt: skip
 def test_mistakes_are_answered_before_any_work(folder, old, new, words):
@@ -202,7 +202,7 @@ def test_mistakes_are_answered_before_any_work(folder, old, new, words):
 
 
 def test_column_of_a_sensor_is_named_with_its_choices(folder):
-    text = STUDY.replace('"eig"', '"run"').replace('"frequency 1"', '"{}"')
+    text = STUDY.replace('"modes"', '"run"').replace('"frequency 1"', '"{}"')
     for of, words in (("tip", "expected one of its columns: x, y, z, size"), ("tip siz", "did you mean 'size'")):
         (folder / "study.toml").write_text(text.format(of))
         assert words in sweep(folder / "study.toml", code=2)
