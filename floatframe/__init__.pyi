@@ -139,6 +139,7 @@ from .files.importers.robot_system import robot_system as robot_system
 from .files.importers.system_robot import robot_of_system as robot_of_system
 from .files.importers.system_robot import write_urdf as write_urdf
 from .files.system_file.read_system import read_system as read_system
+from .files.system_file.recorded_system import read_results as read_results
 from .integrators import EnergyDecaying as EnergyDecaying
 from .integrators import EnergyMomentum as EnergyMomentum
 from .integrators import GeneralizedAlpha as GeneralizedAlpha
@@ -203,6 +204,7 @@ from .results.export import export_csv as export_csv
 from .results.export import export_vtk as export_vtk
 from .results.joint_coordinates import joint_coordinate as joint_coordinate
 from .results.joint_coordinates import joint_coordinates as joint_coordinates
+from .results.motion import Motion as Motion
 from .results.place_motion import interface_motion as interface_motion
 from .results.place_motion import largest_von_mises as largest_von_mises
 from .results.place_motion import nodal_stress as nodal_stress
@@ -231,7 +233,6 @@ from .results.sensors import StressSensor as StressSensor
 from .results.sensors import VonMisesSensor as VonMisesSensor
 from .results.sensors import measured as measured
 from .results.trajectory import Trajectory as Trajectory
-from .results.trajectory import read_results as read_results
 from .results.validity import ValidityNote as ValidityNote
 from .simulation.events import Event as Event
 from .simulation.foreign_units import Coupling as Coupling

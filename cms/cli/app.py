@@ -18,7 +18,11 @@ __all__ = ["app"]
 app = commands(
     "cms",
     "Component mode synthesis: a meshed part becomes a small, exact, portable flexible body.",
-    hints={"validate": "check", "convert": "export", "craig-bampton": "reduce"},
+    hints={
+        "study": "floatframe compare FILE for models of a body in a mechanism, or cms compare JOB for mode sets",
+        "validate": "cms check",
+        "convert": "cms export",
+    },
 )
 
 
@@ -468,18 +472,6 @@ def compare_command(
         CompareRequest(
             job, sets, modes, output, band, reference_modes, tuple(load or ()), pulse_at, motion, stills, workers
         )
-    )
-
-
-@app.command("study", hidden=True, context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
-@guarded
-def study_command(context: typer.Context) -> None:
-    """Name the command that studies a body in the motion of a mechanism; it belongs to floatframe."""
-    from cms.errors import JobError
-
-    raise JobError(
-        f"cms study: a study runs the body in a mechanism: floatframe compare {' '.join(context.args) or 'FILE'} "
-        "(docs/laboratory.md); mode sets of the body alone, against its full model: cms compare JOB"
     )
 
 

@@ -119,7 +119,7 @@ def commands(name: str, help: str, *, hints: Mapping[str, str] | None = None) ->
     class Hinting(TyperGroup):
         def resolve_command(self, ctx: Any, args: list[str]) -> Any:
             if args[0] in known and args[0] not in self.commands:
-                ctx.fail(f"No such command {args[0]!r}. Use {name} {known[args[0]]}.")
+                ctx.fail(f"No such command {args[0]!r}. Use {known[args[0]]}.")
             return super().resolve_command(ctx, args)
 
     app = Commands(

@@ -45,7 +45,13 @@ __all__ = ["app"]
 app = commands(
     "floatframe",
     "Flexible multibody dynamics: bodies from modal files, joints and forces become motion.",
-    hints={"eig": "modes", "eigen": "modes", "bode": "response", "simulate": "run", "study": "compare"},
+    hints={
+        "eig": "floatframe modes",
+        "study": "floatframe compare",
+        "bode": "floatframe response",
+        "simulate": "floatframe run",
+        "reduce": "cms reduce",
+    },
 )
 
 ResultsFile = Annotated[Path, typer.Argument(help="A results file, as floatframe run writes it.")]

@@ -36,6 +36,7 @@ from floatframe.model.checked_values import number
 from floatframe.model.state import State
 from floatframe.model.system import System
 from floatframe.results.head import Head
+from floatframe.results.motion import Motion, motion_of
 from floatframe.results.results_file import MemorySource, validity_text
 from floatframe.results.sensors import measured
 from floatframe.results.trajectory import Trajectory, read_results
@@ -92,7 +93,7 @@ def integrate(
     progress: Callable[[Progress], None] | None = None,
     formulation: str | None = None,
     watch: str = "stop",
-) -> Trajectory:
+) -> Motion:
     """Compute a motion from t_start to t_end.
 
     Parameters
@@ -128,7 +129,7 @@ def integrate(
 
     Returns
     -------
-    Trajectory
+    Motion
         The motion; with `output` it is read from the file when asked for.
 
     Raises
@@ -225,7 +226,7 @@ def resume(
     output: str | os.PathLike[str],
     *,
     progress: Callable[[Progress], None] | None = None,
-) -> Trajectory:
+) -> Motion:
     """Resume an interrupted run, with the same motion bit for bit as without interruption.
 
     Parameters
@@ -410,7 +411,7 @@ class Run:
         batch_steps: int,
         progress: Callable[[Progress], None] | None,
         raise_if_interrupted: Callable[[], None],
-    ) -> Trajectory:
+    ) -> Motion:
         """Take the remaining steps, in batches that end where a run can be resumed; return the motion."""
         self.jumps = self.steps.jumps = jumps_of_steps(self.system, self.t_start, self.h, self.n_total)
         laws = LawWatch(self.system, self.t_start, self.h, self.jumps, n_done)
@@ -520,15 +521,15 @@ class Run:
         if time.monotonic() - self.closed > SEGMENT_SECONDS:
             self.close_segment()
 
-    def finished(self, memory: Memory) -> Trajectory:
+    def finished(self, memory: Memory) -> Motion:
         """Return the motion, whose steps have all been stored."""
         self.look()
         if self.writer is None:
             head = replace(self.head, summary=self.summary(memory))
             arrays = MemorySource(joint_rows(self.system, self.kept))
-            return Trajectory(head, arrays, is_complete=True, validity=self.watch.notes)
+            return Motion(head, arrays, is_complete=True, validity=self.watch.notes, known=self.system)
         self.writer.finish(self.summary(memory))
-        return read_results(self.writer.path)
+        return motion_of(read_results(self.writer.path), self.system)
 
 
 @dataclass(frozen=True, eq=False)
@@ -584,10 +585,12 @@ def energetic(run: Run, t: float) -> ConvergenceError:
     return ConvergenceError(words + where, t=t, h=run.h, residual=float("inf"), trajectory=trajectory)
 
 
-def motion_so_far(run: Run) -> tuple[Trajectory, str]:
+def motion_so_far(run: Run) -> tuple[Motion, str]:
     """Return the motion of a run that ends early, and its location for messages; "" if it is in memory."""
     if run.writer is None:
         arrays = MemorySource(joint_rows(run.system, run.kept))
-        return Trajectory(run.head, arrays, is_complete=False, validity=run.watch.notes), ""
+        return Motion(run.head, arrays, is_complete=False, validity=run.watch.notes, known=run.system), ""
     run.writer.close_segment()
-    return read_results(run.writer.folder), f"; the motion so far is in {str(run.writer.folder)!r}"
+    return motion_of(
+        read_results(run.writer.folder), run.system
+    ), f"; the motion so far is in {str(run.writer.folder)!r}"

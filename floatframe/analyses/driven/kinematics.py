@@ -36,9 +36,10 @@ from floatframe.integrators.integrator import turned_on, with_angles
 from floatframe.model.joints.rows import is_held, is_held_velocity
 from floatframe.model.state import State
 from floatframe.model.system import System
+from floatframe.results.motion import Motion, motion_of
 from floatframe.results.results_file import MemorySource
 from floatframe.results.small_motions.joint_rates import coordinate_rows, driven_coordinates
-from floatframe.results.trajectory import Trajectory, read_results
+from floatframe.results.trajectory import read_results
 from floatframe.results.writer import ResultsPlace, ResultsWriter
 from floatframe.simulation.motion_head import head_of, joint_rows
 
@@ -159,7 +160,7 @@ def kinematics(
     state: State | None = None,
     output: str | os.PathLike[str] | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> Trajectory:
+) -> Motion:
     """Return the motion of a fully driven system at given times, with its reactions and drive forces.
 
     Parameters
@@ -229,10 +230,10 @@ def kinematics(
                     progress(k + 1, len(t))
         except ConvergenceError as error:
             if writer is None:
-                error.trajectory = Trajectory(head, MemorySource(joint_rows(system, kept)), is_complete=False)
+                error.trajectory = Motion(head, MemorySource(joint_rows(system, kept)), is_complete=False, known=system)
             else:
                 writer.close_segment()
-                error.trajectory = read_results(writer.folder)
+                error.trajectory = motion_of(read_results(writer.folder), system)
                 error.args = (f"{error}; the motion so far is in {str(writer.folder)!r}",)
             raise
         except BaseException:
@@ -240,9 +241,9 @@ def kinematics(
                 writer.close_segment()
             raise
         if writer is None:
-            return Trajectory(head, MemorySource(joint_rows(system, kept)), is_complete=True)
+            return Motion(head, MemorySource(joint_rows(system, kept)), is_complete=True, known=system)
         writer.finish()
-        return read_results(writer.path)
+        return motion_of(read_results(writer.path), system)
 
 
 def first_instant(system: System, work: Work, state: State, t: float, elasticity: Elasticity) -> Instant:

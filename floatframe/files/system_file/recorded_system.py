@@ -1,17 +1,40 @@
 """The system of a recorded motion, read again from the system file that its results name."""
 
 import logging
+import os
+from functools import partial
 from pathlib import Path
 
 from fe_models.foundation.digest import file_digest
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ResultsError
 from floatframe.model.system import System
+from floatframe.results.motion import Motion, motion_of
 from floatframe.results.trajectory import Trajectory
+from floatframe.results.trajectory import read_results as read_trajectory
 
-__all__ = ["recorded_system"]
+__all__ = ["read_results", "recorded_system"]
 
 log = logging.getLogger(__name__)
+
+
+def read_results(path: str | os.PathLike[str], system: System | None = None) -> Motion:
+    """Return the motion in a results file, or the part left by a killed run (with `is_complete` False).
+
+    Parameters
+    ----------
+    path
+        Name of the results file.
+    system
+        The system that moved; None: that of the system file which the results name, read when it is needed.
+
+    Raises
+    ------
+    ResultsError
+        If there is no such file, or it is of another kind, of a newer version, or damaged.
+    """
+    trajectory = read_trajectory(path)
+    return motion_of(trajectory, partial(recorded_system, trajectory) if system is None else system)
 
 
 def recorded_system(trajectory: Trajectory, path: str | Path | None = None) -> System | None:

@@ -9,6 +9,8 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import FrozenMapping, frozen_copies
 from fe_models.foundation.units import Units
+from fe_models.foundation.words import nearest, quoted
+from floatframe.errors import ResultsError
 from floatframe.model.system import System
 from floatframe.results.small_motions.rows import LinearColumns
 from floatframe.results.small_motions.small_motions import SmallMotions
@@ -20,7 +22,7 @@ __all__ = ["Measurement", "Sensor", "unit_words", "vector_columns"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """Columns over time, by name, such as x, y, z, size."""
+    """Columns over time, by name, such as x, y, z, size: `measurement.x`, `measurement["von Mises"]`."""
 
     sensor: str
     t: Array  #: (n_t,) [s]
@@ -32,6 +34,27 @@ class Measurement:
     def __post_init__(self) -> None:
         object.__setattr__(self, "columns", FrozenMapping(dict(self.columns)))
         object.__setattr__(self, "units", FrozenMapping(dict(self.units)))
+
+    def __getitem__(self, column: str) -> Array:
+        """Return a column by its name, (n_t,); `ResultsError` if there is none."""
+        if column not in self.columns:
+            raise ResultsError(
+                f"sensor {self.sensor!r}: no column {quoted(column)}{nearest(column, list(self.columns))}; it has "
+                f"{', '.join(self.columns)}"
+            )
+        return self.columns[column]
+
+    def __getattr__(self, name: str) -> Array:
+        columns = self.__dict__.get("columns", {})
+        if name not in columns:
+            raise AttributeError(
+                f"sensor {self.__dict__.get('sensor')!r} has no {name!r}; columns: {', '.join(columns)}"
+            )
+        values: Array = columns[name]
+        return values
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *(name for name in self.columns if name.isidentifier())]
 
     @property
     def quantities(self) -> dict[str, Array]:

@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
 from cms.body.modal_file.file import write
+from cms.cli.app import app as cms_app
 from floatframe.cli.app import app
 from floatframe.pictures.animation import bodies_of
 from floatframe.results.energy_balance import balance_defect, energy_scale
@@ -272,11 +273,19 @@ def test_help_names_the_commands_and_loads_nothing_heavy():
         assert f"'{heavy}'" not in loaded
 
 
-@pytest.mark.parametrize(("name", "now"), [("eig", "modes"), ("study", "compare"), ("simulate", "run")])
-def test_a_command_under_another_name_is_answered_with_its_name_here(name, now):
-    result = CliRunner().invoke(app, [name, "swing.toml"])
+@pytest.mark.parametrize(
+    ("program", "name", "now"),
+    [
+        (app, "eig", "floatframe modes"),
+        (app, "study", "floatframe compare"),
+        (app, "reduce", "cms reduce"),
+        (cms_app, "study", "floatframe compare FILE for models of a body in a mechanism"),
+    ],
+)
+def test_a_command_under_another_name_is_answered_with_its_name_here(program, name, now):
+    result = CliRunner().invoke(program, [name, "swing.toml"])
     assert result.exit_code == 2
-    assert f"No such command '{name}'. Use floatframe {now}." in " ".join(result.output.replace("│", " ").split())
+    assert f"No such command '{name}'. Use {now}" in " ".join(result.output.replace("│", " ").split())
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

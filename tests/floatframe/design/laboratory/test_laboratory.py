@@ -324,15 +324,6 @@ def test_cases_share_one_factorisation_and_one_search_for_modes(folder, monkeypa
     assert_allclose(shared.geometric.spin, alone.geometric.spin, rtol=0, atol=1e-6 * np.abs(alone.geometric.spin).max())
 
 
-def test_cms_study_names_the_command(capsys, monkeypatch):
-    from cms.cli.app import app
-
-    with pytest.raises(SystemExit) as end:
-        app(["compare", "blade.toml"])
-    assert end.value.code == 2
-    assert "floatframe compare blade.toml" in " ".join(capsys.readouterr().err.split())
-
-
 LINES_JOB = """
 [body]
 name = "blade"

@@ -1,0 +1,218 @@
+"""A motion that knows its system: joints, bodies and sensors by name, tables for pandas and xarray.
+
+motion = integrate(system, GeneralizedAlpha(), t_end=1.0, h=1e-3)      # or read_results("crank.h5")
+motion.joint("pin").angle                                              # (n_t,), counted through full turns
+motion.body("rod").interface("big_end").position                       # (n_t, 3), in ground axes
+motion.sensor("tip").x
+motion.to_dataframe("tip", "pin.angle")
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import cached_property
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from cms.body.reduced_body import ReducedBody
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.presentation import presented
+from fe_models.foundation.words import nearest, quoted
+from floatframe.errors import ResultsError
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.system import System
+from floatframe.results.joint_coordinates import CoordinateMotion, joint_coordinate
+from floatframe.results.place_motion import PlaceMotion, interface_motion, nodal_stress
+from floatframe.results.recovery import nodal_displacements
+from floatframe.results.sensors import measured, measurement_of, sensor_of, sensors_of
+from floatframe.results.sensors.measurement import Measurement
+from floatframe.results.trajectory import BodyMotion, Drift, Reaction, Trajectory
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+    from xarray import Dataset
+
+__all__ = ["JointMotion", "Motion", "MovedBody", "motion_of"]
+
+
+@presented
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class Motion(Trajectory):
+    """A motion with its system."""
+
+    known: System | Callable[[], System | None] | None = None  #: the system, or a function that finds it when needed
+
+    @cached_property
+    def system(self) -> System:
+        """The system that moved; `ResultsError` if it is not known."""
+        found = self.known if self.known is None or isinstance(self.known, System) else self.known()
+        if found is None:
+            raise ResultsError(
+                f"motion of {self.head.system!r}: its system is not known here; give it, as in "
+                "floatframe.read_results(path, system=system)"
+            )
+        return found
+
+    def body(self, name: str) -> "MovedBody":
+        """Return the motion of a body, with places on it."""
+        motion = super().body(name)
+        return MovedBody(*(getattr(motion, part.name) for part in fields(BodyMotion)), motion=self, name=name)
+
+    def joint(self, name: str) -> "JointMotion":
+        """Return coordinates, reaction and constraint error of a joint; `ResultsError` if there is none."""
+        if name not in self.head.joints:
+            raise ResultsError(f"motion: no joint {quoted(name)}{nearest(name, self.head.joints)}")
+        return JointMotion(self, name)
+
+    def sensor(self, name: str) -> Measurement:
+        """Return what a sensor, a joint coordinate ("pin.angle") or one of their columns ("tip x") measured.
+
+        Raises
+        ------
+        ModelError
+            If there is no such sensor, coordinate or column.
+        """
+        owner, _, column = name.rpartition(" ")
+        if owner and owner in {sensor.name for sensor in self.system.sensors}:
+            name = f"{owner}.{column}"
+        return measurement_of(self.system, self, name)
+
+    def measurements(self, *names: str) -> tuple[Measurement, ...]:
+        """Return the measurements of sensors by name; without names, of all joint coordinates and all sensors."""
+        if names:
+            return tuple(self.sensor(name) for name in names)
+        system = self.system
+        coordinates = [sensor_of(system, f"{joint.name}.{c}") for joint in system.joints for c in joint.coordinates]
+        return tuple(measured(system, self, [*coordinates, *sensors_of(system)]).values())
+
+    def to_dataframe(self, *names: str) -> "DataFrame":
+        """Return a pandas DataFrame of measurements over time (see `measurements`), columns such as "tip x".
+
+        The units stand in `attrs["units"]`, by column. Needs pandas (`pip install "floatframe[tables]"`).
+        """
+        columns, units = columns_of(self.measurements(*names))
+        pandas = required("pandas")
+        frame: DataFrame = pandas.DataFrame(columns, index=pandas.Index(self.t, name="t"))
+        frame.attrs["units"] = units | {"t": self.units.time_symbol}
+        return frame
+
+    def to_xarray(self, *names: str) -> "Dataset":
+        """Return an xarray Dataset of measurements over t (see `measurements`), each with its unit in `attrs`.
+
+        Needs xarray (`pip install "floatframe[tables]"`).
+        """
+        columns, units = columns_of(self.measurements(*names))
+        xarray = required("xarray")
+        found: Dataset = xarray.Dataset(
+            {name: ("t", values, {"units": units[name]}) for name, values in columns.items()},
+            coords={"t": ("t", self.t, {"units": self.units.time_symbol})},
+        )
+        return found
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MovedBody(BodyMotion):
+    """Motion of a body of a motion, with places on it."""
+
+    motion: Motion
+    name: str
+
+    @property
+    def reduced(self) -> ReducedBody:
+        """The reduced body; `ResultsError` if this body is rigid."""
+        body = self.motion.system.body(self.name)
+        if not isinstance(body, FlexibleBody):
+            raise ResultsError(f"body {self.name!r}: it is rigid; it has no interfaces, nodes or stress")
+        return body.reduced
+
+    def interface(self, name: str) -> PlaceMotion:
+        """Return the motion of an interface and its axes, in ground axes."""
+        return interface_motion(self.motion, self.name, self.reduced, name)
+
+    def displacement(self, i_time: int) -> Array:
+        """Return the elastic displacement of the kept nodes at an output time, axes of B, (n_kept, 3) [m]."""
+        return nodal_displacements(self.motion, self.name, self.reduced, i_time)
+
+    def stress(self, i_time: int) -> Array:
+        """Return the stress at the kept nodes at an output time, axes of B, (n_kept, 6) [Pa]: xx yy zz yz xz xy."""
+        return nodal_stress(self.motion, self.name, self.reduced, i_time)
+
+
+@dataclass(frozen=True, eq=False)
+class JointMotion:
+    """A joint of a motion: `angle`, `angle_rate` and `angle_force` for a coordinate "angle", and so on, each (n_t,)."""
+
+    motion: Motion
+    name: str
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of its coordinates."""
+        joints = {joint.name: tuple(joint.coordinates) for joint in self.motion.system.joints}
+        return joints[self.name]
+
+    @property
+    def reaction(self) -> Reaction:
+        """Force and moment on its marker A, in ground axes."""
+        return self.motion.reaction(self.name)
+
+    @property
+    def drift(self) -> Drift:
+        """Its constraint error."""
+        return self.motion.drift(self.name)
+
+    def coordinate(self, name: str) -> CoordinateMotion:
+        """Return a coordinate with its rate and the force along it; `ResultsError` if there is none."""
+        if name not in self.coordinates:
+            choices = self.coordinates
+            raise ResultsError(
+                f"joint {self.name!r}: no coordinate {quoted(name)}{nearest(name, choices)}; it has "
+                f"{', '.join(choices) or 'none'}"
+            )
+        return joint_coordinate(self.motion.system, self.motion, self.name, name)
+
+    def __getattr__(self, name: str) -> Array:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        coordinate, part = name, "value"
+        for end in ("rate", "force"):
+            if name.endswith(f"_{end}") and name not in self.coordinates:
+                coordinate, part = name.removesuffix(f"_{end}"), end
+        if coordinate not in self.coordinates:
+            raise AttributeError(
+                f"joint {self.name!r} has no {name!r}; its coordinates are {', '.join(self.coordinates) or 'none'}"
+            )
+        values: Array = getattr(self.coordinate(coordinate), part)
+        return values
+
+    def __dir__(self) -> list[str]:
+        ends = ("", "_rate", "_force")
+        return [*super().__dir__(), *(f"{name}{end}" for name in self.coordinates for end in ends)]
+
+
+def motion_of(trajectory: Trajectory, system: System | Callable[[], System | None] | None) -> Motion:
+    """Return a motion with its system, or with a function that finds it when it is needed."""
+    t = trajectory
+    return Motion(t.head, t.source, t.is_complete, t.path, t.validity, system)
+
+
+def columns_of(measurements: tuple[Measurement, ...]) -> tuple[dict[str, Array], dict[str, str]]:
+    """Return the columns of measurements as "sensor column", and their units."""
+    columns: dict[str, Array] = {}
+    units: dict[str, str] = {}
+    for measurement in measurements:
+        for name, values in measurement.columns.items():
+            sensor = measurement.sensor
+            whole = sensor.replace(".", " ") if sensor.endswith(f".{name}") else f"{sensor} {name}"
+            columns[whole], units[whole] = values, measurement.units[name]
+    return columns, units
+
+
+def required(name: str) -> Any:
+    """Return an optional library; `ResultsError` with the way to install it if it is missing."""
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise ResultsError(f'{name} is not installed: pip install "floatframe[tables]"') from error
