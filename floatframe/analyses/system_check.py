@@ -81,10 +81,10 @@ def check_system(
             records.append(step_record(system, found, h, has_fixed_steps=has_fixed_steps))
     if t_end is not None and h is not None:
         n_steps = max(1, ceil(t_end / h * (1 - 1e-12)))
-        told = [*frequency_words(system, 0.0, h, n_steps, has_steps_of_one_size=has_fixed_steps)]
-        told += knot_words(system, 0.0, h, n_steps)
+        missed = [*frequency_words(system, 0.0, h, n_steps, has_steps_of_one_size=has_fixed_steps)]
+        missed += knot_words(system, 0.0, h, n_steps)
         records += [
-            record("function of time", "Functions of time", "warn", words, "change h or the table") for words in told
+            record("function of time", "Functions of time", "warn", words, "change h or the table") for words in missed
         ]
     records += [body_record(body, system) for body in system.bodies if isinstance(body, FlexibleBody)]
     return tuple(records)
@@ -122,12 +122,12 @@ def mobility_record(system: System) -> QualityRecord:
 def redundant_words(found: Mobility) -> str:
     """Return the redundant constraints by joint, with flexible bodies and as if all were rigid."""
 
-    def told(counts: Mapping[str, int]) -> str:
+    def by_joint(counts: Mapping[str, int]) -> str:
         return ", ".join(f"{count} of joint {name!r}" for name, count in counts.items())
 
-    words = f"; redundant: {told(found.redundant)}" if found.n_redundant else "; no constraint is redundant"
+    words = f"; redundant: {by_joint(found.redundant)}" if found.n_redundant else "; no constraint is redundant"
     if found.n_redundant_rigid > found.n_redundant:
-        words += f"; if all bodies were rigid: {told(found.redundant_rigid)}"
+        words += f"; if all bodies were rigid: {by_joint(found.redundant_rigid)}"
     return words
 
 
@@ -147,11 +147,11 @@ def start_records(system: System, state: State | None, made: ConsistentState) ->
     action = "place it at its joints: from this distance it can end in another configuration"
     yield record("placement", "Placement", "pass" if share <= REPORTED else "warn", words, action, share, REPORTED)
     first = compiled.model.bodies.u0[:-1]
-    told = []
+    parts = []
     for what, values, unit in (("speed", made.state.u, ""), ("acceleration", made.u_dot, "²")):
         sizes = np.linalg.norm([values[u : u + 3] for u in first], axis=1)
         i = int(np.argmax(sizes))
-        told.append(
+        parts.append(
             f"the largest {what} is {sizes[i]:.3g} {units.length_symbol}/{units.time_symbol}{unit}, of body "
             f"{compiled.body_names[i]!r}"
         )
@@ -159,12 +159,12 @@ def start_records(system: System, state: State | None, made: ConsistentState) ->
         M = tangents(compiled.model, work_at(compiled, made)).M
         change = made.state.u - given.u
         changed = np.sqrt(max(float(change @ M @ change), 0.0) / float(given.u @ M @ given.u))
-        told.append(
+        parts.append(
             f"the joints change the given velocities by {changed:.2g} of their size"
             if changed > NEAR
             else "the given velocities fit the joints"
         )
-    yield record("start", "State at the start", "pass", "; ".join(told))
+    yield record("start", "State at the start", "pass", "; ".join(parts))
 
 
 def work_at(compiled: CompiledSystem, made: ConsistentState) -> Work:
