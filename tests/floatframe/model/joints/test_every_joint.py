@@ -260,6 +260,20 @@ def test_coordinates_of_driven_joints_are_their_motions_and_forces_those_of_newt
         joint_coordinate(one, integrate(one, GeneralizedAlpha(), 0.01, 1e-3), "hub", "turn")
 
 
+MOVES = {name: make for name, (make, _) in JOINTS.items() if make(Marker("a"), Marker("b")).coordinates}
+MOVES["distance"] = DRIVEN["distance"]  # else it keeps its length
+
+
+@pytest.mark.parametrize("make", MOVES.values(), ids=MOVES)
+def test_rates_of_coordinates_between_two_flying_bodies_are_the_slopes_of_their_values(make):
+    system = pair(make)
+    motion = integrate(system, GeneralizedAlpha(0.9, 1e-11), 0.1, 5e-4)
+    for name, coordinate in joint_coordinates(system, motion).items():
+        slope = (coordinate.value[2:] - coordinate.value[:-2]) / (motion.t[2:] - motion.t[:-2])
+        assert np.abs(coordinate.rate).max() > 0.05, name
+        assert_allclose(slope, coordinate.rate[1:-1], rtol=0, atol=2e-5 * np.abs(coordinate.rate).max(), err_msg=name)
+
+
 def cheap_rates(model_table, work_table):
     model, work = as_model(model_table), as_work(work_table)
     for c in range(model.connections.size.shape[0]):
