@@ -16,10 +16,9 @@ import scipy.linalg as la
 from scipy.linalg.lapack import dpstrf
 
 from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
-from cms.linear_algebra.solvers.tall import combine, dots, inner, squares
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.tall.on_disk import beside
+from fe_models.foundation.tall.columns import beside, combine, dots, inner, squares
 
 __all__ = [
     "Basis", "Columns", "Products", "gram", "gram_in_blocks", "independent_basis", "independent_columns",

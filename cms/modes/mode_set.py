@@ -3,15 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
 from cms.errors import ModeSetError
-from fe_models.foundation.arrays import Array, frozen, require_finite
+from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.ranks.spread_columns import SpreadColumns, on_rows
-from fe_models.foundation.tall.on_disk import row_slices
+from fe_models.foundation.tall.columns import are_finite, frozen_columns
 
 __all__ = ["ModeSet"]
 
@@ -34,10 +32,7 @@ class ModeSet:
     data: Mapping[str, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        columns: Any = self.columns
-        is_spread = isinstance(columns, SpreadColumns)
-        if not is_spread:
-            object.__setattr__(self, "columns", frozen(self.columns))
+        object.__setattr__(self, "columns", frozen_columns(self.columns))
         object.__setattr__(self, "labels", tuple(self.labels))
         groups = tuple(self.groups) or tuple(label.rsplit(" ", 1)[0] for label in self.labels)
         object.__setattr__(self, "groups", groups)
@@ -50,17 +45,10 @@ class ModeSet:
                 f"mode set {self.name!r}: {n_columns} columns need as many labels and frequencies, got "
                 f"{len(self.labels)} and {self.frequencies.shape}"
             )
-        for rows in () if is_spread else row_slices(len(self.columns), self.columns):
-            require_finite(f"mode set {self.name!r}", self.columns[rows])
-        if is_spread and not all(on_rows(columns.layout, are_finite, columns)):
+        if not are_finite(self.columns):
             raise ModeSetError(f"mode set {self.name!r}: expected finite numbers, got NaN or infinite ones")
 
     @property
     def is_static(self) -> np.ndarray:
         """Whether each column is static, (n_columns,) bool."""
         return np.isnan(self.frequencies)
-
-
-def are_finite(X: Array) -> bool:
-    """Return whether all numbers are finite."""
-    return bool(np.isfinite(X).all())

@@ -12,7 +12,6 @@ import numpy as np
 from cms.body.invariants import NEGATIVITY, Moments, NodalSums, moments_from_gram
 from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.errors import BodyError, ModeSetError
-from cms.linear_algebra.solvers.tall import inner, rows_times
 from cms.modes.families.families import Families, body_of
 from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.modes.mode_set import ModeSet
@@ -49,8 +48,8 @@ from fe_models.body.kept_nodes import keep_nodes
 from fe_models.body.load_cases import LoadCase, ReducedLoadCase
 from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.ranks.spread_columns import SpreadColumns
-from fe_models.foundation.tall.on_disk import in_memory, release, zeros_like
+from fe_models.foundation.tall.columns import in_memory, inner, rows_times
+from fe_models.foundation.tall.on_disk import release, zeros_like
 
 __all__ = ["assembled", "reduce"]
 
@@ -216,14 +215,11 @@ def assembled(
 
 def kept_translations(body: FEBody, Phi: Array, nodes: IntArray, axes: Array) -> Array:
     """Return the translations of the shapes at some nodes in axes of B, (n, 3, n_q), in blocks of shapes."""
-    if isinstance(Phi, SpreadColumns):  # only the rows of these nodes
-        moved = rows_times(translation_rows(body, nodes), Phi).reshape(len(nodes), 3, -1)
-        return np.einsum("ba,nbk->nak", axes, moved)
-    kept = zeros_like(Phi, (len(nodes), 3, Phi.shape[1]))
+    kept, rows = zeros_like(Phi, (len(nodes), 3, Phi.shape[1])), translation_rows(body, nodes)
     for first in range(0, Phi.shape[1], SHAPES_AT_ONCE):
         some = slice(first, first + SHAPES_AT_ONCE)
-        # exact zeros stay exact if the axes are aligned
-        kept[:, :, some] = np.einsum("ba,nbk->nak", axes, body.translations(Phi[:, some])[nodes])
+        moved = rows_times(rows, Phi[:, some]).reshape(len(nodes), 3, -1)
+        kept[:, :, some] = np.einsum("ba,nbk->nak", axes, moved)  # exact zeros stay exact if the axes are aligned
         release(kept)
     return kept
 
@@ -321,7 +317,7 @@ def reduced_load_case(body: FEBody, case: LoadCase, Phi: Array, frame: BodyFrame
     """Return the modal forces of a load case, and its resultant about the origin of B."""
     wrench = geometric_rigid_modes(body, origin=frame.origin).T @ case.f
     R = frame.axes.T
-    h = inner(Phi, case.f[:, None])[:, 0] if isinstance(Phi, SpreadColumns) else Phi.T @ case.f
+    h = inner(Phi, case.f[:, None])[:, 0]
     return ReducedLoadCase(case.name, case.kind, force=R @ wrench[:3], torque=R @ wrench[3:], h=h)
 
 

@@ -22,9 +22,10 @@ from fe_models.foundation.arrays import (
 from fe_models.foundation.errors import BodyError
 from fe_models.foundation.presentation import Summary, listed, presented
 from fe_models.foundation.ranks.row_layout import RowLayout
-from fe_models.foundation.ranks.spread_columns import SpreadColumns, spread_parts
+from fe_models.foundation.ranks.spread_columns import spread_parts
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
-from fe_models.foundation.tall.on_disk import in_memory, is_on_disk, release, row_slices, zeros_like
+from fe_models.foundation.tall.columns import elsewhere, in_memory
+from fe_models.foundation.tall.on_disk import is_on_disk, release, row_slices, zeros_like
 from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.numbering import Numbering
@@ -380,6 +381,11 @@ class FEBody:
         return len(self.dofs)
 
     @property
+    def layout(self) -> RowLayout | None:
+        """How the rows of K and M are distributed over ranks; None if they are matrices of this process."""
+        return self.K.layout if isinstance(self.K, SpreadMatrix) else None
+
+    @property
     def is_coupled(self) -> bool:
         """Whether every interface has its boundary dofs."""
         return all(interface.dofs is not None for interface in self.interfaces)
@@ -424,23 +430,17 @@ class FEBody:
         """
         if self.recovery is None:
             return u
-        if isinstance(u, SpreadColumns):
-            return self._spread_displacement(u)
+        T, layout = self.recovery.matrix, self.recovery.layout
+        if (far := elsewhere(u)) is not None and layout is not None:
+            return spread_parts(layout, far.shape[1], (T @ x for _, x in far.parts()))
         if not is_on_disk(u) or not u.flags.c_contiguous:  # a few columns of an array on disk fit in memory
-            return self.recovery.matrix @ in_memory(u)
-        T = sp.csr_array(self.recovery.matrix)
+            return T @ in_memory(u)
+        T = sp.csr_array(T)
         result = zeros_like(u, (T.shape[0], u.shape[1]))
         for rows in row_slices(T.shape[0], result):
             result[rows] = T[rows] @ u
             release(u)
         return result
-
-    def _spread_displacement(self, u: SpreadColumns) -> Any:
-        assert self.recovery is not None
-        T = self.recovery.matrix
-        if self.recovery.layout is None:
-            return T @ in_memory(u)
-        return spread_parts(self.recovery.layout, u.shape[1], (T @ x for _, x in u.parts()))
 
     def translations(self, u: Array) -> Array:
         """Return the translations at all nodes, (n_nodes, 3, k) [m], of displacement columns u, (n_dof, k).

@@ -19,7 +19,7 @@ from fe_models.body.couplings.couplings import couple
 from fe_models.foundation.ranks.mpi import all_ranks
 from fe_models.foundation.ranks.row_layout import asked
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
-from fe_models.foundation.tall.on_disk import in_memory
+from fe_models.foundation.tall.columns import in_memory
 from tests.bodies import bar
 
 # krylov by whole blocks: a number of modes cuts between directions that are as significant, where rounding chooses

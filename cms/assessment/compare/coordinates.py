@@ -12,9 +12,9 @@ import scipy.linalg as la
 
 from cms.assessment.quality.reference.ports import Ports
 from cms.linear_algebra.independent import Columns, Products, gram, independent_columns
-from cms.linear_algebra.solvers.tall import inner, subtract
 from cms.modes.families.families import Families
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.tall.columns import inner, subtract
 
 __all__ = ["Coordinates", "ReferenceBasis"]
 

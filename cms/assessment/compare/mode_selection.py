@@ -22,7 +22,7 @@ from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets import MODE_SETS
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.tall.on_disk import in_memory
+from fe_models.foundation.tall.columns import in_memory
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["MEASURES", "Selection", "Trial", "select_modes"]

@@ -19,7 +19,7 @@ from cms.modes.families.families import Families
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets import MODE_SETS
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.tall.on_disk import in_memory
+from fe_models.foundation.tall.columns import in_memory
 
 __all__ = ["SetPart", "counts_of_parts", "joined_parts", "set_part", "set_result"]
 

@@ -29,7 +29,7 @@ from cms.assessment.quality.reference.transient import Snapshots
 from cms.body.reduced_body import ReducedBody
 from cms.modes.mode_set import ModeSet
 from fe_models.body.fe_body import FEBody
-from fe_models.foundation.tall.on_disk import of_this_process
+from fe_models.foundation.tall.columns import of_this_process
 
 __all__ = ["check_reduction", "require_same_units"]
 

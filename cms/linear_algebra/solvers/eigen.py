@@ -16,14 +16,12 @@ from cms.linear_algebra.solvers.mode_search import DenseSearch, KrylovSearch
 from cms.linear_algebra.solvers.petsc.factor import PetscFactor
 from cms.linear_algebra.solvers.shift_inverted import ModeRequest, Modes, ShiftInverted
 from cms.linear_algebra.solvers.slepc_modes import RankSpace, SlepcSearch
-from cms.linear_algebra.solvers.tall import combine
 from cms.linear_algebra.solvers.tall_space import ArraySpace
 from fe_models.body.couplings.submatrix import PrincipalBlock
-from fe_models.foundation.arrays import Array, IntArray, frozen
-from fe_models.foundation.ranks.spread_columns import SpreadColumns
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 from fe_models.foundation.solver import Solver
-from fe_models.foundation.tall.on_disk import in_memory
+from fe_models.foundation.tall.columns import combine, frozen_columns, in_memory, of_this_process
 from fe_models.foundation.threads import one_blas_thread
 
 __all__ = ["EigenResult", "FactorMismatchError", "eigenmodes", "orientation", "turn"]
@@ -60,8 +58,7 @@ class EigenResult:
 
     def __post_init__(self) -> None:
         for name in ("omega2", "frequencies", "Phi", "residuals"):
-            value = getattr(self, name)
-            object.__setattr__(self, name, value if isinstance(value, SpreadColumns) else frozen(value))
+            object.__setattr__(self, name, frozen_columns(getattr(self, name)))
 
 
 def eigenmodes(
@@ -170,12 +167,12 @@ def eigenmodes(
                 "energy"
             )
         omega2 = np.where(modes.omega2 <= zero, 0.0, modes.omega2)
-        columns, whole = modes.expand(), modes.space.whole
+        columns = modes.expand()
         del search, modes, operator  # frees the basis before the modes are copied
         if space is not None:
             space.close()
-        stays = space is not None and isinstance(K, PrincipalBlock) and space.has_rows_of(K)
-        Phi = space.columns(columns) if space is not None and stays else whole(columns)
+        stays = space is not None and space.has_rows_of(K)
+        Phi = columns if stays else of_this_process(columns)
         del columns  # before the space is closed, when ranks drop data without references
         Phi = combine(Phi, orientation(Phi, omega2)[:, :k], order="C")
     omega2 = omega2[:k]
@@ -265,7 +262,7 @@ def _require_match(K: Matrix, M: Matrix, Phi: Array, omega2: Array, shift: float
 
 def _combination(Phi: Any, c: Array) -> Array:
     """Return Phi c, (n,), on rank 0."""
-    return in_memory(combine(Phi, c[:, None]))[:, 0] if isinstance(Phi, SpreadColumns) else np.asarray(Phi @ c)
+    return of_this_process(combine(Phi, c[:, None]))[:, 0]
 
 
 def _hertz(omega2: float) -> float:

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from cms.errors import FactorizationError
 from cms.linear_algebra.solvers.registry import solver_of
-from fe_models.body.couplings.submatrix import PrincipalBlock, principal_block
+from fe_models.body.couplings.submatrix import PrincipalBlock, principal_block, spread_block
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix, spread_sum, whole_matrix
 from fe_models.foundation.solver import Factor, Solver
@@ -167,8 +167,7 @@ def factorize(A: Matrix, *, definite: bool = True, solver: str | Solver | None =
 
 def _ready(A: Matrix, definite: bool, solver: Solver) -> Callable[[], Factor]:
     """Step (1): return a function that makes the factor; distributed rows stay distributed if the solver allows."""
-    block = A.spread() if isinstance(A, PrincipalBlock) and solver.spread is not None else None
-    if block is not None and solver.spread is not None:
+    if solver.spread is not None and (block := spread_block(A)) is not None:
         if definite:
             _require_positive(A.diagonal())
         return partial(solver.spread, block, definite=definite)

@@ -17,6 +17,7 @@ from cms.linear_algebra.solvers.shift_inverted import (
 )
 from cms.linear_algebra.solvers.tall_space import TallProduct, TallSpace
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.tall.columns import combine, combined, inner, subtract
 
 __all__ = ["BlockLanczos", "DenseSearch", "KrylovSearch", "RitzPairs"]
 
@@ -109,9 +110,9 @@ class BlockLanczos:
         self.m = last
         self.n_solves += M_new.shape[1]
         W = self.solve(M_new)  # (1)
-        A = self.space.inner(M_new, W)  # (2)
+        A = inner(M_new, W)  # (2)
         near = np.concatenate([self._R[:, self._coupled :].T, A])
-        self.space.subtract(W, self._basis.columns(self._coupled, self.m), near)
+        subtract(W, self._basis.columns(self._coupled, self.m), near)
         C, R, M_next = self._append(W, np.linalg.norm(near, axis=0).max())  # (3), (4)
         C[self._coupled :] += near  # (5)
         self._T[:last, block] = C
@@ -158,7 +159,7 @@ class BlockLanczos:
 
         `length` is the length of the part removed from W earlier; a remainder is rounding relative to it.
         """
-        V, inner, combined = self.V, self.space.inner, self.space.combined
+        V = self.V
         C_sum = np.zeros((self.m, W.shape[1]))
         R_sum = np.eye(W.shape[1])
         M_W = self.M @ W
@@ -166,7 +167,7 @@ class BlockLanczos:
             C = inner(V, M_W)
             gram = _symmetric(inner(W, M_W))
             longest = np.sqrt(max(np.diag(gram).max(initial=0.0), 0.0))
-            self.space.subtract(W, V, C)
+            subtract(W, V, C)
             C_sum += C @ R_sum
             gram -= C.T @ C  # Gram matrix of W - V C, accurate as long as cancellation is small
             taken = np.abs(C).max(initial=0.0)
@@ -238,7 +239,7 @@ class KrylovSearch:
                 self._is_clean = defect <= max(VISIBLE, 100 * residual)
             if not self._is_clean:
                 n_kept = leading_count(ritz.theta, k, k + GUARDS)
-                X = operator.space.combine(self._lanczos.V, ritz.S[:, :n_kept])
+                X = combine(self._lanczos.V, ritz.S[:, :n_kept])
                 modes = refined_modes(operator, X, ritz.theta[:n_kept], k)
                 residual = modes.residuals.max(initial=0.0)
             if residual <= operator.tolerance:
@@ -317,7 +318,6 @@ def improved_modes(lanczos: BlockLanczos, ritz: RitzPairs, k: int, shift: float)
         ritz.residuals[:k],
         lanczos.V_and_next,
         np.concatenate([ritz.S[:, :p] @ Z, g @ Z]),
-        lanczos.space,
     )
 
 

@@ -12,6 +12,7 @@ from cms.linear_algebra.solvers.inverse import Inverse
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.linear_algebra.solvers.tall_space import ArraySpace, TallSpace
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.tall.columns import combine, inner, subtract
 
 __all__ = ["ModeRequest", "Modes", "ShiftInverted", "measured_residual", "refined_modes"]
 
@@ -69,11 +70,10 @@ class Modes:
     residuals: Array  #: residuals of the wanted modes before the last improvement, (n_wanted,)
     Y: Any  #: columns of the space, (n, p)
     Z: Array  #: coefficients, M-orthonormal Phi = Y Z, (p, n_wanted + n_guards)
-    space: TallSpace
 
     def expand(self) -> Any:
         """Return the M-orthonormal modes Phi, columns of the space, (n, n_wanted + n_guards)."""
-        return self.space.combine(self.Y, self.Z)
+        return combine(self.Y, self.Z)
 
 
 def refined_modes(operator: ShiftInverted, X: Any, theta: Array, n_wanted: int) -> Modes:
@@ -82,18 +82,18 @@ def refined_modes(operator: ShiftInverted, X: Any, theta: Array, n_wanted: int) 
     (1) Y = S X / theta; residuals |Y - X|_M
     (2) Yᵀ (K - sigma M) Y = Yᵀ M X / theta = H,  Yᵀ M Y = G;  H z = (omega² - sigma) G z
     """
-    space, M = operator.space, operator.M_product
+    M = operator.M_product
     M_X = M @ X
     Y = operator.solve(M_X)
-    space.scale(Y, 1 / theta)
-    H = space.inner(Y, M_X) / theta
+    Y *= 1 / theta
+    H = inner(Y, M_X) / theta
     del M_X
-    space.subtract(X, Y, np.eye(len(theta)))
-    residuals = np.sqrt(np.maximum(np.diag(space.inner(X, M @ X)), 0.0))[:n_wanted]
+    subtract(X, Y, np.eye(len(theta)))
+    residuals = np.sqrt(np.maximum(np.diag(inner(X, M @ X)), 0.0))[:n_wanted]
     del X
-    G = space.inner(Y, M @ Y)
+    G = inner(Y, M @ Y)
     mu, Z = la.eigh((H + H.T) / 2, (G + G.T) / 2)
-    return Modes(mu + operator.shift, n_wanted, residuals, Y, Z, space)
+    return Modes(mu + operator.shift, n_wanted, residuals, Y, Z)
 
 
 def measured_residual(operator: ShiftInverted, modes: Modes) -> tuple[float, float]:
@@ -112,11 +112,11 @@ def measured_residual(operator: ShiftInverted, modes: Modes) -> tuple[float, flo
     k = modes.n_wanted
     Z, above_shift = modes.Z[:, :k], modes.omega2[:k] - operator.shift
     signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(k, SAMPLES))
-    space, M = operator.space, operator.M_product
-    r = space.combine(modes.Y, Z @ signs)
-    size = np.sqrt(np.trace(space.inner(r, r)))
-    S_x = operator.solve(M @ space.combine(modes.Y, Z @ (above_shift[:, None] * signs)))
-    space.subtract(r, S_x, np.eye(SAMPLES))
-    squared = np.trace(space.inner(r, M @ r))
-    left = np.sqrt(np.trace(space.inner(r, r)))
+    M = operator.M_product
+    r = combine(modes.Y, Z @ signs)
+    size = np.sqrt(np.trace(inner(r, r)))
+    S_x = operator.solve(M @ combine(modes.Y, Z @ (above_shift[:, None] * signs)))
+    subtract(r, S_x, np.eye(SAMPLES))
+    squared = np.trace(inner(r, M @ r))
+    left = np.sqrt(np.trace(inner(r, r)))
     return float(np.sqrt(max(squared, 0.0) / SAMPLES)), float(left / size) if size else 0.0

@@ -2,7 +2,6 @@
 
 import weakref
 from collections.abc import Callable
-from itertools import count
 from typing import Any
 
 import numpy as np
@@ -15,18 +14,17 @@ from cms.linear_algebra.solvers.petsc.factor import CHUNK, PetscFactor, communic
 from cms.linear_algebra.solvers.petsc.libraries import petsc, slepc
 from cms.linear_algebra.solvers.shift_inverted import ModeRequest, Modes, ShiftInverted
 from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
-from cms.linear_algebra.solvers.tall import combine, inner, subtract
-from cms.linear_algebra.solvers.tall_space import ArrayBasis, ArraySpace, dealt
-from fe_models.body.couplings.submatrix import PrincipalBlock
+from cms.linear_algebra.solvers.tall_space import ArrayBasis, dealt
+from fe_models.body.couplings.submatrix import spread_block
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.ranks.product import RowsProduct
 from fe_models.foundation.ranks.ranks import Ranks
-from fe_models.foundation.ranks.row_layout import RowLayout
-from fe_models.foundation.ranks.rows import Rows, collected, own_rows, spread
-from fe_models.foundation.ranks.spread_columns import Part, SpreadColumns, own_part
+from fe_models.foundation.ranks.row_layout import RowLayout, dropped, new_key
+from fe_models.foundation.ranks.rows import Rows, collected, spread
+from fe_models.foundation.ranks.spread_columns import Part, SpreadColumns, own_part, spread_columns
 from fe_models.foundation.ranks.trim import give_back
 
-__all__ = ["RankColumns", "RankSpace", "SlepcSearch"]
+__all__ = ["RankSpace", "SlepcSearch"]
 
 
 # the tall columns of an iteration, distributed by rows: rank 0 holds keys of them, and small matrices -----------------
@@ -35,42 +33,29 @@ __all__ = ["RankColumns", "RankSpace", "SlepcSearch"]
 # through rank 0.
 
 
-numbers = count()
-
-
-class RankColumns:
-    """Distributed columns, (n, k); freed when the last reference is dropped."""
-
-    def __init__(self, space: "RankSpace", part: Part, source: object = None) -> None:
-        """Refer to columns; source: their owner, if they are a part of others."""
-        self.part, self.shape, self.source = part, (space.n, part.last - part.first), source
-        if source is None:
-            weakref.finalize(self, space.dropped.append, part.key).atexit = False
-
-
 class RankBasis:
     """A growing number of distributed columns."""
 
     def __init__(self, space: "RankSpace", capacity: int) -> None:
-        self.space, self.capacity, self.key = space, capacity, new_key()
-        space.ask(None, basis_here, self.key, space.rows, capacity)
-        weakref.finalize(self, space.dropped.append, self.key).atexit = False
+        self.layout, self.capacity, self.key = space.layout, capacity, new_key()
+        self.layout.ask(basis_here, self.key, space.rows, capacity)
+        weakref.finalize(self, dropped.append, self.key).atexit = False
 
-    def columns(self, first: int, last: int) -> RankColumns:
+    def columns(self, first: int, last: int) -> SpreadColumns:
         """Return some columns, (n, last - first)."""
-        return RankColumns(self.space, Part(self.key, first, last), self)
+        return SpreadColumns(self.layout, Part(self.key, first, last), self)
 
-    def put(self, first: int, X: RankColumns) -> None:
+    def put(self, first: int, X: SpreadColumns) -> None:
         """Write columns, starting at index `first`."""
-        self.space.ask(None, put_here, self.key, first, X.part)
+        self.layout.ask(put_here, self.key, first, X.part)
 
     def turn(self, m: int, C: Array) -> None:
         """Replace the first k columns by V C, where V are the first m columns."""
-        self.space.ask(None, turn_here, self.key, m, C)
+        self.layout.ask(turn_here, self.key, m, C)
 
     def grow(self, capacity: int, m: int) -> None:
         """Allocate memory for more columns; the first m columns stay."""
-        self.space.ask(None, grow_here, self.key, capacity, m)
+        self.layout.ask(grow_here, self.key, capacity, m)
         self.capacity = capacity
 
 
@@ -79,15 +64,15 @@ class RankProduct:
 
     def __init__(self, space: "RankSpace", A: Matrix) -> None:
         self.space, self.key = space, new_key()
-        block = A.spread() if isinstance(A, PrincipalBlock) else None
+        block = spread_block(A)
         if block is not None and block.rows == space.rows:
             block.keep(self.key)
         else:
             space.ranks.store[self.key] = matrix_of(A)
-        space.ask(None, product_here, self.key, space.rows)
-        weakref.finalize(self, space.dropped.append, self.key).atexit = False
+        space.layout.ask(product_here, self.key, space.rows)
+        weakref.finalize(self, dropped.append, self.key).atexit = False
 
-    def __matmul__(self, x: RankColumns) -> RankColumns:
+    def __matmul__(self, x: SpreadColumns) -> SpreadColumns:
         """Return A x, (n, k)."""
         return self.space.made(x.shape[1], multiplied_here, self.key, x.part)
 
@@ -99,125 +84,50 @@ class RankSpace:
         """Distribute columns like the rows of the factor; numbering: as for `ArraySpace`."""
         self.numbering = numbering
         self.factor, self.ranks, self.rows, self.n = factor, factor.ranks, factor.rows, factor.n
-        self.dropped: list[str] = []  #: keys without references; ranks drop their data with the next request
+        self.layout = RowLayout(factor.ranks, np.arange(factor.n), factor.rows)
 
-    def ask(self, key: str | None, function: Callable[..., Any], *arguments: Any) -> list[Any]:
-        """Call function(ranks, *arguments) on all ranks; each keeps its result under the key (None: returns it)."""
-        dropped = [self.dropped.pop() for _ in range(len(self.dropped))]
-        return self.ranks.everywhere(kept_here, dropped, key, function, *arguments)
-
-    def made(self, k: int, function: Callable[..., Any], *arguments: Any) -> RankColumns:
-        """Return new columns, (n, k), whose rows the function returns on each rank."""
-        key = new_key()
-        self.ask(key, function, *arguments)
-        return RankColumns(self, Part(key, 0, k))
+    def made(self, k: int, function: Callable[..., Any], *arguments: Any) -> SpreadColumns:
+        """Return new columns, (n, k), whose rows function(ranks, *arguments) returns on each rank."""
+        found = SpreadColumns(self.layout, Part(new_key(), 0, k))
+        self.layout.ask(rows_kept_here, found.part.key, function, *arguments)
+        return found
 
     def close(self) -> None:
         """Free data without references, on all ranks."""
-        self.ask(None, give_back_here)
+        self.layout.ask(give_back_here)
 
-    def random(self, generator: np.random.Generator, k: int) -> RankColumns:
+    def random(self, generator: np.random.Generator, k: int) -> SpreadColumns:
         """Return columns of normally distributed numbers, (n, k), equal to those of a single process."""
-        self.ranks.store["columns"] = dealt(generator.standard_normal((k, self.n)).T, self.numbering)
-        return self.made(k, given_here, self.rows)
-
-    def inner(self, X: RankColumns, Y: RankColumns) -> Array:
-        """Return Xᵀ Y, (k, l), summed in the order of ranks."""
-        return np.asarray(np.sum(self.ask(None, inner_here, X.part, Y.part), axis=0))
-
-    def combine(self, X: RankColumns, C: Array) -> RankColumns:
-        """Return X C, (n, l)."""
-        return self.made(C.shape[1], combine_here, X.part, C)
-
-    def combined(self, X: RankColumns, C: Array) -> RankColumns:
-        """Return X C, (n, l), in new memory; X is freed with its last reference."""
-        return self.combine(X, C)
-
-    def subtract(self, Y: RankColumns, X: RankColumns, C: Array) -> None:
-        """Subtract X C from Y in place."""
-        self.ask(None, subtract_here, Y.part, X.part, C)
-
-    def scale(self, X: RankColumns, factors: Array) -> None:
-        """Multiply every column by its factor, (k,), in place."""
-        self.ask(None, scale_here, X.part, factors)
+        return spread_columns(self.layout, dealt(generator.standard_normal((k, self.n)).T, self.numbering))
 
     def basis(self, capacity: int) -> RankBasis:
         """Allocate memory for `capacity` columns."""
         return RankBasis(self, capacity)
 
-    def whole(self, X: RankColumns) -> Array:
-        """Return columns as an array of rank 0, (n, k)."""
-        return self.ask(None, collected_here, self.rows, X.part)[0]
-
-    def has_rows_of(self, A: PrincipalBlock) -> bool:
-        """Return whether the rows of a block are distributed like those of the columns."""
-        block = A.spread()
+    def has_rows_of(self, A: Matrix) -> bool:
+        """Return whether the rows of a matrix are distributed like those of the columns."""
+        block = spread_block(A)
         return block is not None and block.rows == self.rows
-
-    def columns(self, X: RankColumns) -> SpreadColumns:
-        """Return the columns as `SpreadColumns`; they end with the space, but results computed from them stay."""
-        return SpreadColumns(RowLayout(self.ranks, np.arange(self.n), self.rows), X.part, X)
 
     def product(self, A: Matrix) -> RankProduct:
         """Distribute the rows of a symmetric matrix, (n, n), if necessary, and return the product with it."""
         return RankProduct(self, A)
 
-    def solver(self, factorization: Inverse) -> Callable[[RankColumns], RankColumns]:
+    def solver(self, factorization: Inverse) -> Callable[[SpreadColumns], SpreadColumns]:
         """Return the function that solves for columns with the factor of this space."""
         assert isinstance(factorization, Factorization)
         assert factorization.factor is self.factor
         return lambda b: self.made(b.shape[1], solved_here, self.factor.key, self.rows, b.part)
 
 
-def new_key() -> str:
-    """Return a key that no rank has used."""
-    return f"columns {next(numbers)}"
-
-
-def kept_here(ranks: Ranks, dropped: list[str], key: str | None, function: Callable[..., Any], *arguments: Any) -> Any:
-    """Drop data without references; call the function, and keep its result or return it."""
-    for each in dropped:
-        ranks.store.pop(each, None)
-    answer = function(ranks, *arguments)
-    if key is None:
-        return answer
-    ranks.store[key] = answer
-    return None
+def rows_kept_here(ranks: Ranks, key: str, function: Callable[..., Any], *arguments: Any) -> None:
+    """Keep the rows of columns that a function returns on this rank."""
+    ranks.store[key] = function(ranks, *arguments)
 
 
 def give_back_here(ranks: Ranks) -> None:
     """Return freed memory to the system."""
     give_back()
-
-
-def given_here(ranks: Ranks, rows: Rows) -> Array:
-    """Return this rank's rows of columns that rank 0 holds."""
-    return own_rows(ranks, rows, ranks.store.pop("columns", None))
-
-
-def collected_here(ranks: Ranks, rows: Rows, X: Part) -> Array | None:
-    """Return the columns on rank 0."""
-    return collected(ranks, rows, own_part(ranks, X))
-
-
-def inner_here(ranks: Ranks, X: Part, Y: Part) -> Array:
-    """Return the contribution of this rank's rows to Xᵀ Y."""
-    return inner(own_part(ranks, X), own_part(ranks, Y))
-
-
-def combine_here(ranks: Ranks, X: Part, C: Array) -> Array:
-    """Return this rank's rows of X C."""
-    return combine(own_part(ranks, X), C)
-
-
-def subtract_here(ranks: Ranks, Y: Part, X: Part, C: Array) -> None:
-    """Subtract this rank's rows of X C from those of Y."""
-    subtract(own_part(ranks, Y), own_part(ranks, X), C)
-
-
-def scale_here(ranks: Ranks, X: Part, factors: Array) -> None:
-    """Multiply columns by their factors."""
-    ArraySpace(0).scale(own_part(ranks, X), factors)
 
 
 def basis_here(ranks: Ranks, key: str, rows: Rows, capacity: int) -> None:
@@ -281,7 +191,7 @@ class SlepcSearch:
         self.operator, self.factor = operator, factor
         version = ".".join(str(k) for k in slepc().Sys.getVersion())
         self.description = f"Krylov-Schur (SLEPc {version})"
-        self.key = f"mass {next(numbers)}"
+        self.key = new_key()
         factor.ranks.store[self.key] = lower_triangle(operator.M_product.A)
         factor.ranks.everywhere(spread_mass, self.key, factor.rows)
 
@@ -305,7 +215,7 @@ class SlepcSearch:
         if len(omega2) < k:
             raise EigenError(f"eigenmodes: SLEPc found {len(omega2)} of {k} modes to {tolerance:.1e}")
         operator.report(k, wanted.count or 0)
-        return Modes(omega2, k, errors[:k], Phi, np.eye(len(omega2)), operator.space)
+        return Modes(omega2, k, errors[:k], Phi, np.eye(len(omega2)))
 
 
 def spread_mass(ranks: Ranks, key: str, rows: Rows) -> None:

@@ -8,12 +8,9 @@ from typing import Any, Literal
 import numpy as np
 import scipy.sparse as sp
 
-from cms.linear_algebra.solvers.tall import ordered
 from fe_models.body.couplings.submatrix import scalar_part
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.ranks.spread_columns import SpreadColumns
-from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
-from fe_models.foundation.tall.on_disk import in_memory
+from fe_models.foundation.tall.columns import elsewhere, in_memory, ordered
 from fe_models.foundation.threads import n_threads
 
 __all__ = ["SymmetricProduct"]
@@ -37,8 +34,8 @@ class SymmetricProduct:
 
     def __init__(self, A: sp.csc_array, *, columns: int = COLUMNS) -> None:
         self.A, self._columns = A, columns
-        self._is_spread = isinstance(A, SpreadMatrix)
-        if self._is_spread:
+        self._is_elsewhere = not sp.issparse(A)
+        if self._is_elsewhere:
             return
         S = scalar_part(A) if A.nnz > SMALL else sp.csr_array((0, 0))
         self._n_lead = 3 * S.shape[0] if 6 * S.shape[0] > A.shape[0] else 0
@@ -51,8 +48,8 @@ class SymmetricProduct:
 
     def __matmul__(self, x: Any) -> Any:
         """Return A x, (n, k), in the memory order of x; the product of distributed columns is distributed."""
-        if self._is_spread:
-            return self.A @ (x if isinstance(x, SpreadColumns) else in_memory(x))
+        if self._is_elsewhere:
+            return self.A @ (x if elsewhere(x) is not None else in_memory(x))
         x = in_memory(x)
         order: Literal["C", "F"] = "F" if x.flags.f_contiguous else "C"
         result = np.empty(x.shape)

@@ -1,6 +1,7 @@
-"""Storage of the tall columns of an iteration, (n, k) with n much larger than k, and operations on them.
+"""Where an iteration on tall columns, (n, k) with n much larger than k, keeps them and multiplies them.
 
 `ArraySpace` uses arrays of this process; `cms.linear_algebra.solvers.slepc_modes` distributes the rows over ranks.
+The operations on the columns themselves are those of `fe_models.foundation.tall.columns`.
 """
 
 from collections.abc import Callable
@@ -10,8 +11,8 @@ import numpy as np
 
 from cms.linear_algebra.solvers.inverse import Inverse
 from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
-from cms.linear_algebra.solvers.tall import combine, combined, inner, put, subtract
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.tall.columns import put
 
 __all__ = ["ArraySpace", "TallBasis", "TallProduct", "TallSpace"]
 
@@ -44,33 +45,15 @@ class TallBasis(Protocol):
 
 
 class TallSpace(Protocol):
-    """Operations of an iteration on its columns, which are arrays or refer to rows on ranks."""
+    """The columns of an iteration: their start, their storage, and the maps between them."""
 
     n: int
 
     def random(self, generator: np.random.Generator, k: int) -> Any:
         """Return columns of normally distributed numbers, (n, k)."""
 
-    def inner(self, X: Any, Y: Any) -> Array:
-        """Return Xᵀ Y, (k, l)."""
-
-    def combine(self, X: Any, C: Array) -> Any:
-        """Return X C, (n, l)."""
-
-    def combined(self, X: Any, C: Array) -> Any:
-        """Return X C, (n, l), for columns X that are no longer needed, in their memory if possible."""
-
-    def subtract(self, Y: Any, X: Any, C: Array) -> None:
-        """Subtract X C from Y in place."""
-
-    def scale(self, X: Any, factors: Array) -> None:
-        """Multiply every column by its factor, (k,), in place."""
-
     def basis(self, capacity: int) -> TallBasis:
         """Allocate memory for `capacity` columns."""
-
-    def whole(self, X: Any) -> Array:
-        """Return columns as an array of this process, (n, k)."""
 
     def product(self, A: Any) -> TallProduct:
         """Return the product with a symmetric matrix, (n, n)."""
@@ -118,23 +101,11 @@ class ArraySpace:
         """Return columns of normally distributed numbers, (n, k)."""
         return dealt(generator.standard_normal((k, self.n)).T, self.numbering)
 
-    inner = staticmethod(inner)
-    combine = staticmethod(combine)
-    combined = staticmethod(combined)
-    subtract = staticmethod(subtract)
     product = SymmetricProduct
-
-    def scale(self, X: Array, factors: Array) -> None:
-        """Multiply every column by its factor, (k,), in place."""
-        X *= factors
 
     def basis(self, capacity: int) -> ArrayBasis:
         """Allocate memory for `capacity` columns."""
         return ArrayBasis(self.n, capacity)
-
-    def whole(self, X: Array) -> Array:
-        """Return the columns."""
-        return X
 
     def solver(self, factorization: Inverse) -> Callable[[Array], Array]:
         """Return the function that solves for columns with a factorisation, in the memory order of the factor."""

@@ -13,7 +13,6 @@ from cms.errors import BodyError, ModeSetError
 from cms.linear_algebra.solvers.eigen import EigenResult
 from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
 from cms.linear_algebra.solvers.registry import solver_of
-from cms.linear_algebra.solvers.tall import combine, rows_times
 from cms.modes.families.fixed_interface import FixedInterfaceBody, fix_interfaces
 from cms.modes.families.flexibility import BoundaryConditions, CondensedBody, Flexibility
 from cms.modes.families.interface_cost import large_interfaces
@@ -30,10 +29,10 @@ from cms.modes.families.static_modes import (
 from cms.modes.families.vibration_modes import elastic_modes, fixed_interface_modes, no_modes
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, IntArray
-from fe_models.foundation.ranks.spread_columns import SpreadColumns
 from fe_models.foundation.ranks.spread_matrix import largest_entry
 from fe_models.foundation.solver import Solver
-from fe_models.foundation.tall.on_disk import of_this_process, release
+from fe_models.foundation.tall.columns import combine, elsewhere, of_this_process, rows_times
+from fe_models.foundation.tall.on_disk import release
 
 __all__ = ["Families", "body_of", "families_of"]
 
@@ -250,7 +249,7 @@ class Families:
     def without_boundary(self, Phi: Any) -> Any:
         """Return Phi - Psi_C Phi_h, (n_dof, k): zero on the held dofs, and with the same span together with Psi_C."""
         at_rest = combine(self.Psi_C, Phi[self.h])
-        return Phi - (at_rest if isinstance(Phi, SpreadColumns) else of_this_process(at_rest))
+        return Phi - (at_rest if elsewhere(Phi) is not None else of_this_process(at_rest))
 
     # -- Labels ----------------------------------------------------------------------------------------------------
 

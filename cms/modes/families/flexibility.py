@@ -14,7 +14,6 @@ import scipy.sparse as sp
 
 from cms.errors import BodyError, EigenError
 from cms.linear_algebra.solvers.factorization import Inertia, factorize, shifted_matrix
-from cms.linear_algebra.solvers.tall import combine, inner
 from cms.modes.families.fixed_interface import FixedInterfaceBody
 from cms.modes.families.mechanism import free_motions, mechanism_words
 from fe_models.body.couplings.coupling_on_ranks import spread_extension
@@ -23,7 +22,7 @@ from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 from fe_models.foundation.solver import Solver
-from fe_models.foundation.tall.on_disk import of_this_process
+from fe_models.foundation.tall.columns import combine, inner, of_this_process
 
 __all__ = ["BoundaryConditions", "CondensedBody", "Flexibility", "held_factor"]
 
@@ -192,14 +191,15 @@ class Flexibility:
         if load is None and self.T is None:
             return A
         fixed = self.condensed.fixed
+        is_spread = fixed.body.layout is not None
         if load is not None:
             h, n = fixed.b, A.shape[0]
             row, column = np.nonzero(load)
             added = sp.csc_array((load[row, column], (h[row], h[column])), shape=(n, n))
-            A = spread_extension(A, np.arange(n), added) if isinstance(A, SpreadMatrix) else sp.csc_array(A + added)
+            A = spread_extension(A, np.arange(n), added) if is_spread else sp.csc_array(A + added)
         if self.T is None:
             return A
-        if isinstance(A, SpreadMatrix):
+        if is_spread:
             return spread_extension(A, fixed.i, _boundary_entries(A, fixed, self.conditions.Z))
         if self.T.shape[1] == len(self.condensed.fixed.i):
             return principal_block(A, self.condensed.fixed.i)

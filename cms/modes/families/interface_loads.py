@@ -10,7 +10,7 @@ from cms.errors import BodyError, ModeSetError
 from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
-from fe_models.foundation.tall.on_disk import of_this_process
+from fe_models.foundation.tall.columns import of_this_process
 
 __all__ = ["InterfaceLoad", "boundary_load", "condensed_load", "point_load"]
 

@@ -8,10 +8,9 @@ stiffest part.
 import numpy as np
 import scipy.linalg as la
 
-from cms.linear_algebra.solvers.tall import combine, dots, squares
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.tall.on_disk import of_this_process
+from fe_models.foundation.tall.columns import combine, dots, of_this_process, squares
 from fe_models.foundation.words import node_list
 
 __all__ = ["free_motions", "mechanism_words", "moving_nodes", "rounding_of_energy", "without_energy"]

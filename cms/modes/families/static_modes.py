@@ -7,14 +7,13 @@ import numpy as np
 from cms.linear_algebra.independent import gram_in_blocks
 from cms.linear_algebra.solvers.eigen import EigenResult
 from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
-from cms.linear_algebra.solvers.tall import combine
 from cms.modes.families.fixed_interface import FixedInterfaceBody
 from cms.modes.families.flexibility import Flexibility
 from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
 from fe_models.foundation.ranks.spread_columns import spread_parts
-from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
-from fe_models.foundation.tall.on_disk import of_this_process, on_disk, release
+from fe_models.foundation.tall.columns import combine, of_this_process
+from fe_models.foundation.tall.on_disk import on_disk, release
 
 __all__ = [
     "attachment_modes",
@@ -46,8 +45,8 @@ def constraint_modes(fixed: FixedInterfaceBody, *, to_disk: bool = False) -> Arr
         (n_dof, n_b), translations per translation [-] or per rotation [m].
     """
     body, n = fixed.body, len(fixed.b)
-    if isinstance(body.K, SpreadMatrix):
-        return spread_parts(body.K.layout, n, _blocks_of_constraint_modes(fixed, BLOCK_OF_RANKS))  # type: ignore[return-value]
+    if body.layout is not None:
+        return spread_parts(body.layout, n, _blocks_of_constraint_modes(fixed, BLOCK_OF_RANKS))  # type: ignore[return-value]
     Psi_C, first = on_disk((body.n_dof, n)) if to_disk else np.zeros((body.n_dof, n)), 0
     for block in _blocks_of_constraint_modes(fixed, BLOCK):
         last = first + block.shape[1]

@@ -13,7 +13,6 @@ from cms.modes.families.flexibility import Flexibility
 from cms.modes.families.mechanism import rounding_of_energy, without_energy
 from fe_models.body.couplings.submatrix import PrincipalBlock
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.ranks.spread_columns import SpreadColumns
 
 __all__ = ["elastic_modes", "fixed_interface_modes", "no_modes"]
 
@@ -28,13 +27,7 @@ def fixed_interface_modes(fixed: FixedInterfaceBody, wanted: ModeCount) -> Eigen
     blocks = PrincipalBlock(fixed.body.K, fixed.i), PrincipalBlock(fixed.body.M, fixed.i)
     numbering = np.searchsorted(np.sort(fixed.i), fixed.i)
     modes = eigenmodes(*blocks, wanted, factorization=fixed.factorization, numbering=numbering)
-    if isinstance(modes.Phi, SpreadColumns):
-        block = blocks[0].spread()
-        assert block is not None  # the modes are distributed like the block
-        return replace(modes, Phi=block.expanded(modes.Phi))
-    Phi = np.zeros((fixed.body.n_dof, modes.Phi.shape[1]))
-    Phi[fixed.i] = modes.Phi
-    return replace(modes, Phi=Phi)
+    return replace(modes, Phi=blocks[0].expanded(modes.Phi))
 
 
 def elastic_modes(flexibility: Flexibility, wanted: ModeCount) -> EigenResult:

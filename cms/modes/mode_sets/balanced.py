@@ -11,7 +11,6 @@ from cms.errors import EigenError, ModeSetError
 from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
 from cms.linear_algebra.independent import gram, independent_columns
 from cms.linear_algebra.solvers.eigen import EigenResult
-from cms.linear_algebra.solvers.tall import combine
 from cms.modes.families.families import Families, body_of, families_of
 from cms.modes.families.receptance import boundary_scale
 from cms.modes.families.static_modes import boundary_names
@@ -19,6 +18,7 @@ from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets.blocks import mode_set, require_interfaces, rigid_block, static_block
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray, frozen
+from fe_models.foundation.tall.columns import combine
 from fe_models.foundation.words import nearest
 
 __all__ = ["BalancedSystem", "balance", "balanced_truncation"]

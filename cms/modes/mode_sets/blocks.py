@@ -15,8 +15,7 @@ from cms.modes.mode_set import ModeSet
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.ranks.spread_columns import spread_beside
-from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
-from fe_models.foundation.tall.on_disk import beside
+from fe_models.foundation.tall.columns import beside
 
 __all__ = [
     "Block",
@@ -104,8 +103,8 @@ def mode_set(
 
 def side_by_side(body: FEBody, columns: Sequence[Array]) -> Array:
     """Return blocks of columns side by side; distributed if the matrices of the body are."""
-    if isinstance(body.K, SpreadMatrix):
-        return spread_beside(body.K.layout, *columns)  # type: ignore[return-value]
+    if body.layout is not None:
+        return spread_beside(body.layout, *columns)  # type: ignore[return-value]
     return beside(*columns) if len(columns) > 1 else columns[0]
 
 

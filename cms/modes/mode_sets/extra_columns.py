@@ -14,7 +14,7 @@ from cms.modes.mode_set import ModeSet
 from fe_models.body.fe_body import FEBody
 from fe_models.body.load_cases import LoadCase, load_columns
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.tall.on_disk import in_memory
+from fe_models.foundation.tall.columns import in_memory
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["EXTRA_COLUMNS", "with_centrifugal", "with_load_cases"]

@@ -7,7 +7,6 @@ import scipy.linalg as la
 
 from cms.linear_algebra.solvers.eigen import EigenResult
 from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
-from cms.linear_algebra.solvers.tall import combine
 from cms.modes.families.families import Families, families_of
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets.blocks import (
@@ -22,6 +21,7 @@ from cms.modes.mode_sets.blocks import (
 )
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.tall.columns import combine
 
 __all__ = ["craig_chang", "dual_craig_bampton", "herting", "macneal", "normal_modes", "rubin"]
 

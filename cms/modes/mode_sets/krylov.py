@@ -20,7 +20,6 @@ from cms.modes.mode_sets.blocks import mode_set, require_interfaces, rigid_block
 from fe_models.body.couplings.submatrix import PrincipalBlock
 from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 
 __all__ = ["krylov"]
 
@@ -227,7 +226,7 @@ def _shifted_expansion(families: Families, shift: float, F_extra: Array, stack: 
     """Return the expansion at a shift; the stack keeps its factorisation open."""
     body = families.body
     sigma = (2 * np.pi * shift) ** 2
-    order = body.K.order if isinstance(body.K, SpreadMatrix) else np.arange(body.n_dof)
+    order = np.arange(body.n_dof) if body.layout is None else body.layout.order
     A = shifted_matrix(PrincipalBlock(body.K, order), PrincipalBlock(body.M, order), sigma)
     try:
         factor = stack.enter_context(factorize(A, definite=False, solver=families.solver))
@@ -243,7 +242,7 @@ def _shifted_expansion(families: Families, shift: float, F_extra: Array, stack: 
         return solve(np.hstack([F, F_extra]))
 
     def solve(F: Array) -> Array:
-        if not isinstance(body.K, SpreadMatrix):
+        if body.layout is None:
             return factor.solve(F)
         x = np.empty(F.shape)
         x[order] = factor.solve(F[order])

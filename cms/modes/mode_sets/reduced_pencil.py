@@ -14,7 +14,7 @@ from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets.free_interface import rubin
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
-from fe_models.foundation.tall.on_disk import in_memory
+from fe_models.foundation.tall.columns import in_memory
 
 __all__ = [
     "ReducedPencil",

@@ -18,14 +18,13 @@ from cms.linear_algebra.independent import (
     within,
 )
 from cms.linear_algebra.solvers.eigen import orientation
-from cms.linear_algebra.solvers.tall import combine, combined, inner, squares, subtract
 from cms.modes.families.mechanism import mechanism_words, rounding_of_energy, without_energy
 from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.frames import FrameCondition
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.ranks.spread_columns import SpreadColumns, on_rows
-from fe_models.foundation.tall.on_disk import copied, in_memory, row_slices
+from fe_models.foundation.tall.columns import combine, combined, copied, elsewhere, in_memory, inner, squares, subtract
+from fe_models.foundation.tall.on_disk import row_slices
 
 __all__ = ["IN_SPAN", "FinishedBasis", "elastic_directions", "finish", "orthonormal_motions"]
 
@@ -201,8 +200,8 @@ def elastic_pencil(
 
 def turn_in_place(Phi: Any, turn: Array) -> None:
     """Replace Phi by Phi turn; modes of which only the sign changes are not mixed with others."""
-    if isinstance(Phi, SpreadColumns):
-        on_rows(Phi.layout, turn_in_place, Phi, turn)
+    if (far := elsewhere(Phi)) is not None:
+        far.on_rows(turn_in_place, Phi, turn)
         return
     is_mixed = np.count_nonzero(turn, axis=0) > 1
     mixed = np.flatnonzero(is_mixed | (np.count_nonzero(turn, axis=1) > 1))

@@ -14,11 +14,11 @@ import scipy.sparse as sp
 from cms.body.reduced_body import BodyFrame
 from cms.errors import BodyError
 from cms.linear_algebra.lu_factors import solve_factored
-from cms.linear_algebra.solvers.tall import inner, rows_times
 from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.node_motion import node_weights, weighted_rigid_modes
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, IntArray
+from fe_models.foundation.tall.columns import inner, rows_times
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.numbering import Numbering
 

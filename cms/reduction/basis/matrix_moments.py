@@ -12,7 +12,7 @@ import numpy as np
 from cms.modes.families.rigid_modes import geometric_rigid_modes
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.tall.on_disk import in_memory
+from fe_models.foundation.tall.columns import in_memory
 
 __all__ = ["gram_from_matrices"]
 

@@ -9,7 +9,7 @@ from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.tall.on_disk import in_memory
+from fe_models.foundation.tall.columns import in_memory
 
 __all__ = [
     "are_spread",

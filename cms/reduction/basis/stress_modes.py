@@ -6,8 +6,8 @@ from cms.body.reduced_body import BodyFrame
 from cms.body.stress import PointStress
 from fe_models.body.fe_body import FEBody, StressPointModel
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.ranks.spread_columns import SpreadColumns
-from fe_models.foundation.tall.on_disk import in_memory, is_on_disk, release, zeros_like
+from fe_models.foundation.tall.columns import elsewhere, in_memory
+from fe_models.foundation.tall.on_disk import is_on_disk, release, zeros_like
 
 __all__ = ["nodal_stress_modes", "point_stress_modes", "turned_stress"]
 
@@ -37,9 +37,9 @@ def nodal_stress_modes(body: FEBody, Phi: Array, nodes: IntArray, axes: Array) -
     if model is None or not model.has_nodal_stress:
         return None
     modes = zeros_like(Phi, (len(nodes), 6, Phi.shape[1]))
-    is_elsewhere = is_on_disk(Phi) or isinstance(Phi, SpreadColumns)
-    room = BYTES_FROM_DISK if is_elsewhere else BYTES_AT_ONCE
-    fewest = FEWEST_OF_RANKS if isinstance(Phi, SpreadColumns) else FEWEST
+    is_on_ranks = elsewhere(Phi) is not None
+    room = BYTES_FROM_DISK if is_on_ranks or is_on_disk(Phi) else BYTES_AT_ONCE
+    fewest = FEWEST_OF_RANKS if is_on_ranks else FEWEST
     # wide blocks, because the geometry is computed once per block
     width = max(fewest, int(room / (48 * len(body.nodes))))
     for begin in range(0, Phi.shape[1], width):

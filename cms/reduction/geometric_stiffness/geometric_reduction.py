@@ -13,7 +13,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from cms.body.geometric_stiffness import GeometricStiffness, stiffness_of_loads
-from cms.linear_algebra.solvers.tall import rows_times
 from cms.modes.families.families import Families, body_of
 from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.frames import FrameCondition
@@ -23,7 +22,7 @@ from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.mass_loads import MassLoads, rotation_work
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.tall.on_disk import beside
+from fe_models.foundation.tall.columns import beside, rows_times
 
 __all__ = [
     "elastic_part",

@@ -16,7 +16,6 @@ import scipy.linalg as la
 from cms.body.geometric_stiffness import SPIN_PAIRS
 from cms.body.reduced_body import BodyFrame
 from cms.errors import BodyError
-from cms.linear_algebra.solvers.tall import combine
 from cms.modes.families.families import Families, body_of, families_of
 from cms.modes.families.flexibility import held_factor
 from cms.modes.families.rigid_modes import geometric_rigid_modes
@@ -25,7 +24,7 @@ from cms.reduction.basis.node_motion import node_weights, reference_motion, weig
 from fe_models.body.fe_body import FEBody
 from fe_models.body.mass_loads import MassLoads
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.tall.on_disk import of_this_process
+from fe_models.foundation.tall.columns import combine, of_this_process
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = [

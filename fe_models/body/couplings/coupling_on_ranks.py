@@ -71,7 +71,7 @@ def spread_body(body: FEBody, ranks: Ranks) -> FEBody:
     The rows are ordered so that neighbours are near, and are cut into parts with about as many entries of K each. With
     one rank, or if the body is distributed already (as bodies of solid meshes are), the body itself is returned.
     """
-    if ranks.size == 1 or isinstance(body.K, SpreadMatrix):
+    if ranks.size == 1 or body.layout is not None:
         return body
     order = nearby_order(body.K, body.dofs, np.arange(body.n_dof))
     rows = even_rows(np.concatenate([[0], np.cumsum(np.diff(body.K.indptr)[order])]), ranks.size)

@@ -114,7 +114,7 @@ def couple(body: FEBody) -> FEBody:
         if body.node_volumes is None
         else np.concatenate([body.node_volumes, np.zeros(len(references))]),
         numbering=body.numbering.with_nodes_added(len(references)),
-        recovery=Recovery(recovery, body.dofs, body.K.layout if isinstance(body.K, SpreadMatrix) else None)
+        recovery=Recovery(recovery, body.dofs, body.layout)
         if body.recovery is None
         else replace(body.recovery, matrix=sp.csr_array(body.recovery.matrix @ recovery)),
         load_cases=tuple(replace(case, f=recovery.T @ case.f) for case in body.load_cases),

@@ -1,16 +1,18 @@
 """Parts of large sparse matrices in one pass, where SciPy's indexing needs several, and the order of their rows."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.ranks.spread_matrix import SpreadBlock, SpreadMatrix
+from fe_models.foundation.ranks.spread_matrix import SpreadBlock, SpreadMatrix, whole_matrix
+from fe_models.foundation.tall.columns import elsewhere
 from fe_models.foundation.threads import in_threads
 
-__all__ = ["PrincipalBlock", "nearby_order", "principal_block", "scalar_part"]
+__all__ = ["PrincipalBlock", "nearby_order", "principal_block", "scalar_part", "spread_block"]
 
 SMALL = 200_000  #: number of stored entries below which compiled loops cost more than they save
 
@@ -33,19 +35,30 @@ class PrincipalBlock:
 
     def __matmul__(self, x: Array) -> Array:
         """Return the product with one column (n,) or many (n, k)."""
+        return np.asarray((self.A @ self.expanded(x))[self.index])
+
+    def expanded(self, x: Any) -> Any:
+        """Return one column (n,) or many (n, k) over all rows of A, zero outside the submatrix.
+
+        Columns that are distributed like the submatrix stay distributed.
+        """
+        if elsewhere(x) is not None and (block := spread_block(self)) is not None:
+            return block.expanded(x)
         whole = np.zeros((self.A.shape[0], *x.shape[1:]))
         whole[self.index] = x
-        return np.asarray((self.A @ whole)[self.index])
+        return whole
 
-    def spread(self) -> SpreadBlock | None:
-        """Return the submatrix distributed over the ranks of A; None if A is not distributed, or in another order."""
-        return self.A.block(self.index) if isinstance(self.A, SpreadMatrix) else None
+
+def spread_block(A: Any) -> SpreadBlock | None:
+    """Return a submatrix distributed over ranks; None for other matrices, and for submatrices in another order."""
+    if isinstance(A, PrincipalBlock) and isinstance(A.A, SpreadMatrix):
+        return A.A.block(A.index)
+    return None
 
 
 def principal_block(A: sp.csc_array, index: IntArray) -> sp.csc_array:
     """Return A[index][:, index], (n, n), with sorted row indices; the index may have any order."""
-    if isinstance(A, SpreadMatrix):
-        A = A.whole()
+    A = whole_matrix(A)
     n = len(index)
     if n == A.shape[0] and (index[1:] > index[:-1]).all():
         return A

@@ -30,9 +30,10 @@ from fe_models.foundation.ranks.product import RowsProduct
 from fe_models.foundation.ranks.ranks import Ranks
 from fe_models.foundation.ranks.row_layout import RowLayout
 from fe_models.foundation.ranks.rows import Rows
-from fe_models.foundation.ranks.spread_columns import Part, SpreadColumns, own_part, spread_columns
+from fe_models.foundation.ranks.spread_columns import Part, own_part, spread_columns
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
-from fe_models.foundation.tall.on_disk import in_memory, row_slices
+from fe_models.foundation.tall.columns import elsewhere, in_memory
+from fe_models.foundation.tall.on_disk import row_slices
 from fe_models.foundation.threads import n_threads
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
@@ -164,7 +165,7 @@ class SolidModel:
         """
         require_rows("geometric_stiffness", u, 3 * len(self.mesh.nodes))
         require_rows("geometric_stiffness", Phi, 3 * len(self.mesh.nodes))
-        if isinstance(Phi, SpreadColumns) and self.parts is not None:
+        if elsewhere(Phi) is not None and self.parts is not None:
             rules = {"incompatible": self.incompatible, "integration": self.integration}
             return spread_geometric_stiffness(self.parts, self.materials, u, Phi, rules)
         return projected_geometric_stiffness(

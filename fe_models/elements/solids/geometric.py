@@ -24,7 +24,8 @@ from fe_models.foundation.ranks.product import Halo
 from fe_models.foundation.ranks.ranks import Ranks
 from fe_models.foundation.ranks.rows import Rows
 from fe_models.foundation.ranks.spread_columns import Part, SpreadColumns, own_part, spread_columns
-from fe_models.foundation.tall.on_disk import in_memory, row_slices
+from fe_models.foundation.tall.columns import in_memory
+from fe_models.foundation.tall.on_disk import row_slices
 from fe_models.foundation.threads import n_threads, one_blas_thread
 from fe_models.meshes.cell_shapes import CELL_SHAPES, shape_values
 from fe_models.meshes.mesh import Mesh

@@ -1,5 +1,7 @@
 """Tall columns distributed by rows over all ranks: rank 0 holds its own rows, and a key for the others.
 
+They implement the protocol `fe_models.foundation.tall.columns.Columns`.
+
 The rows are distributed like those of the matrices of a body (`SpreadMatrix`), so products need no redistribution. All
 ranks compute operations such as Xᵀ Y with their own rows at once, and rank 0 sums the small results.
 """
@@ -18,8 +20,7 @@ from fe_models.foundation.ranks.rows import Rows, collected, own_rows, receive, 
 from fe_models.foundation.ranks.trim import give_back
 
 __all__ = [
-    "Part", "SpreadColumns", "on_rows", "own_part", "rows_of", "spread_beside", "spread_columns", "spread_parts",
-    "spread_with",
+    "Part", "SpreadColumns", "own_part", "rows_of", "spread_beside", "spread_columns", "spread_parts",
 ]  # fmt: skip
 
 COLUMNS = 4  #: number of columns that pass through rank 0 at a time
@@ -79,27 +80,50 @@ class SpreadColumns:
                 part = Part(self.part.key, self.part.first + first, self.part.first + max(first, last))
                 return SpreadColumns(self.layout, part, self)
         index = np.arange(self.shape[1])[columns]
-        return spread_with(self.layout, len(index), chosen, self, index)
+        return self.made(len(index), chosen, self, index)
 
     def __add__(self, other: "SpreadColumns") -> "SpreadColumns":
         if not isinstance(other, SpreadColumns):
             return NotImplemented
-        return spread_with(self.layout, self.shape[1], operator.add, self, other)
+        return self.made(self.shape[1], operator.add, self, other)
 
     def __sub__(self, other: "SpreadColumns") -> "SpreadColumns":
         if not isinstance(other, SpreadColumns):
             return NotImplemented
-        return spread_with(self.layout, self.shape[1], operator.sub, self, other)
+        return self.made(self.shape[1], operator.sub, self, other)
 
     def __mul__(self, factors: Any) -> "SpreadColumns":
         """Return the columns times a number, or times one factor each, (k,)."""
-        return spread_with(self.layout, self.shape[1], operator.mul, self, factors)
+        return self.made(self.shape[1], operator.mul, self, factors)
 
     __rmul__ = __mul__
 
+    def __imul__(self, factors: Any) -> "SpreadColumns":
+        """Multiply the columns by a number, or by one factor each, (k,), in place."""
+        self.on_rows(scale, self, factors)
+        return self
+
     def __truediv__(self, factors: Any) -> "SpreadColumns":
         """Return the columns divided by a number, or by one factor each, (k,)."""
-        return spread_with(self.layout, self.shape[1], operator.truediv, self, factors)
+        return self.made(self.shape[1], operator.truediv, self, factors)
+
+    def on_rows(self, function: Callable[..., Any], *arguments: Any) -> list[Any]:
+        """Call function(*arguments) on all ranks, each with its own rows of distributed columns; return the results."""
+        return self.layout.ask(called_here, function, named(arguments))
+
+    def made(self, k: int, function: Callable[..., Array], *arguments: Any) -> "SpreadColumns":
+        """Return the columns, (n, k), whose rows function(*arguments) returns on each rank; see `on_rows`."""
+        found = SpreadColumns(self.layout, Part(new_key(), 0, k))
+        self.layout.ask(kept_here, found.part.key, function, named(arguments))
+        return found
+
+    def like(self, X: Any) -> "SpreadColumns":
+        """Return columns X, (n, l), distributed by rows like these columns."""
+        return spread_columns(self.layout, X)
+
+    def beside(self, *blocks: Any) -> "SpreadColumns":
+        """Return a copy of blocks of columns, side by side, distributed by rows like these columns."""
+        return spread_beside(self.layout, *blocks)
 
     def parts(self, width: int = COLUMNS) -> Iterator[tuple[slice, Array]]:
         """Yield blocks of columns as arrays of rank 0, (n, width), with the slice of their columns."""
@@ -145,18 +169,6 @@ def spread_parts(layout: RowLayout, k: int, blocks: Iterable[Any]) -> SpreadColu
     return found
 
 
-def on_rows(layout: RowLayout, function: Callable[..., Any], *arguments: Any) -> list[Any]:
-    """Call function(*arguments) on all ranks, each with its own rows of `SpreadColumns`; return the results."""
-    return layout.ask(called_here, function, named(arguments))
-
-
-def spread_with(layout: RowLayout, k: int, function: Callable[..., Array], *arguments: Any) -> SpreadColumns:
-    """Return the columns, (n, k), whose rows function(*arguments) returns on each rank; see `on_rows`."""
-    found = SpreadColumns(layout, Part(new_key(), 0, k))
-    layout.ask(kept_here, found.part.key, function, named(arguments))
-    return found
-
-
 def rows_of(X: SpreadColumns, index: IntArray) -> Array:
     """Return some rows of the columns, (len(index), k), on rank 0."""
     place = X.layout.position[index]
@@ -196,6 +208,11 @@ def kept_here(ranks: Ranks, key: str, function: Callable[..., Array], arguments:
 def chosen(X: Array, columns: IntArray) -> Array:
     """Return some columns of this rank's rows."""
     return X[:, columns]
+
+
+def scale(X: Array, factors: Any) -> None:
+    """Multiply this rank's rows of columns by a number, or by one factor for each column."""
+    X *= factors
 
 
 def room_here(ranks: Ranks, key: str, rows: Rows, k: int) -> None:

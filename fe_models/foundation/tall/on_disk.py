@@ -3,7 +3,6 @@
 They behave like other NumPy arrays. Pages of a map that were touched count as memory of the process until they are
 released (`release`). Computations therefore go through slices of rows (`row_slices`) and release each slice. Large
 results computed from an array on disk also go to disk (`zeros_like`), so callers need not pass the location on.
-`in_memory`, `copied` and `beside` also accept distributed columns (`SpreadColumns`).
 """
 
 import mmap
@@ -16,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fe_models.foundation.errors import StorageError
-from fe_models.foundation.ranks.spread_columns import SpreadColumns, spread_beside
 
-__all__ = ["beside", "copied", "in_memory", "is_on_disk", "on_disk", "release", "row_slices", "zeros_like"]
+__all__ = ["is_on_disk", "on_disk", "release", "row_slices", "zeros_like"]
 
 Array = NDArray[np.float64]
 
@@ -64,7 +62,7 @@ def mapped(X: Any) -> mmap.mmap | None:
     return X if isinstance(X, mmap.mmap) else None
 
 
-def is_on_disk(X: Array) -> bool:
+def is_on_disk(X: Any) -> bool:
     """Return whether an array lies on disk."""
     return mapped(X) is not None
 
@@ -76,7 +74,7 @@ def release(X: Array) -> None:
         found.madvise(mmap.MADV_DONTNEED)
 
 
-def zeros_like(X: Array, shape: tuple[int, ...]) -> Array:
+def zeros_like(X: Any, shape: tuple[int, ...]) -> Array:
     """Return zeros for a result computed from X: on disk if X is on disk and the result is large; C order."""
     is_large = 8 * int(np.prod(shape)) >= LARGE
     return on_disk(shape) if is_large and is_on_disk(X) else np.zeros(shape)
@@ -105,40 +103,3 @@ def row_slices(rows: slice | int, *arrays: Array, height: int | None = None) -> 
         yield slice(first, min(first + height, whole.stop))
         for X in stored:
             release(X)
-
-
-def copied(X: Any) -> Any:
-    """Return a copy in the same place: in memory, on disk or distributed."""
-    return beside(X)
-
-
-def beside(*arrays: Any) -> Any:
-    """Return arrays with equally many rows side by side, (n, k).
-
-    The result is on disk if one array is on disk and the result is large; it is distributed if one array is.
-    """
-    if found := [X for X in arrays if isinstance(X, SpreadColumns)]:
-        return spread_beside(found[0].layout, *arrays)
-    width = sum(X.shape[1] for X in arrays)
-    stored = next((X for X in arrays if is_on_disk(X)), arrays[0])
-    result = zeros_like(stored, (len(stored), width))
-    for rows in row_slices(len(stored), *arrays, result):
-        np.concatenate([X[rows] for X in arrays], axis=1, out=result[rows])
-    return result
-
-
-def in_memory(X: Any) -> Array:
-    """Return the array itself, or a copy in memory in C order if it is on disk or distributed."""
-    if isinstance(X, SpreadColumns):
-        return X.whole()
-    if not is_on_disk(X):
-        return X
-    result = np.empty(X.shape)
-    for rows in row_slices(len(X), X):
-        result[rows] = X[rows]
-    return result
-
-
-def of_this_process(X: Any) -> Array:
-    """Return the array itself, in memory or on disk, or a copy in memory of distributed columns."""
-    return X.whole() if isinstance(X, SpreadColumns) else X

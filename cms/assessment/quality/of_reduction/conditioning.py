@@ -5,9 +5,9 @@ import numpy as np
 from cms.assessment.quality.record import QualityRecord, judge
 from cms.assessment.quality.reference.free_basis import FreeBasis
 from cms.linear_algebra.independent import independent_columns
-from cms.linear_algebra.solvers.tall import inner
 from cms.modes.mode_set import ModeSet
 from fe_models.body.fe_body import FEBody
+from fe_models.foundation.tall.columns import inner
 
 __all__ = ["column_condition", "conditioning_record", "dropped_record"]
 

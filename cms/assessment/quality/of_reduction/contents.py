@@ -44,7 +44,7 @@ from cms.reduction.reduction import assembled, kept_nodes, reduced_damping, redu
 from fe_models.body.fe_body import FEBody
 from fe_models.errors import FeModelsError
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.tall.on_disk import in_memory
+from fe_models.foundation.tall.columns import in_memory
 
 __all__ = ["CONTENTS", "ReductionOptions", "contents_records"]
 

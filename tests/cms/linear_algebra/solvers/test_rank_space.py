@@ -13,8 +13,9 @@ from cms.linear_algebra.solvers.mode_search import BlockLanczos
 from cms.linear_algebra.solvers.slepc_modes import RankSpace
 from cms.linear_algebra.solvers.tall_space import ArraySpace
 from fe_models.body.couplings.couplings import couple
-from fe_models.body.couplings.submatrix import PrincipalBlock
+from fe_models.body.couplings.submatrix import PrincipalBlock, spread_block
 from fe_models.foundation.ranks.rows import collected, even_rows, own_rows
+from fe_models.foundation.tall.columns import combine, inner, subtract
 from tests.bodies import bar
 from tests.thread_ranks import ThreadRanks
 
@@ -54,12 +55,12 @@ def test_columns_on_ranks_are_combined_as_arrays(space):
     X, Y = (here.random(a, k) for k in (3, 5))
     X_r, Y_r = (space.random(b, k) for k in (3, 5))
     C = a.standard_normal((3, 5))
-    assert_allclose(space.inner(X_r, Y_r), X.T @ Y, rtol=0, atol=1e-12)
-    assert_array_equal(space.whole(X_r), X)
-    assert_allclose(space.whole(space.combine(X_r, C)), X @ C, rtol=0, atol=1e-13)
-    space.scale(X_r, np.array([2.0, -1.0, 0.5]))
-    space.subtract(Y_r, X_r, C)
-    assert_allclose(space.whole(Y_r), Y - X * [2.0, -1.0, 0.5] @ C, rtol=0, atol=1e-13)
+    assert_allclose(inner(X_r, Y_r), X.T @ Y, rtol=0, atol=1e-12)
+    assert_array_equal(X_r.whole(), X)
+    assert_allclose(combine(X_r, C).whole(), X @ C, rtol=0, atol=1e-13)
+    X_r *= np.array([2.0, -1.0, 0.5])
+    subtract(Y_r, X_r, C)
+    assert_allclose(Y_r.whole(), Y - X * [2.0, -1.0, 0.5] @ C, rtol=0, atol=1e-13)
 
 
 def test_a_lanczos_basis_on_ranks_is_that_of_one_process(space, pencil):
@@ -77,7 +78,7 @@ def test_a_lanczos_basis_on_ranks_is_that_of_one_process(space, pencil):
             lanczos.advance()
     assert here.m == there.m
     assert_allclose(there.ritz().theta, here.ritz().theta, rtol=1e-10, atol=1e-12 * here.ritz().theta[0])
-    V = space.whole(there.V)
+    V = there.V.whole()
     assert_allclose(V.T @ (M @ V), np.eye(there.m), rtol=0, atol=1e-12)
     far = V - here.V @ (here.V.T @ (M @ V))
     assert_allclose(far, 0, rtol=0, atol=1e-8)
@@ -91,7 +92,7 @@ def test_columns_that_nobody_names_are_forgotten_on_every_rank(space):
     del basis
     gc.collect()
     space.close()
-    assert_array_equal(space.whole(part), space.whole(kept))  # the part holds the basis
+    assert_array_equal(part.whole(), kept.whole())  # the part holds the basis
     del part
     gc.collect()
     space.close()
@@ -104,10 +105,10 @@ def test_a_matrix_by_rows_on_the_ranks_of_a_space_is_multiplied_there(size, monk
     one = couple(bar(nx=5, kind="hexahedron"))
     i = body.K.ordered(body.i) if size > 1 else body.i
     block = PrincipalBlock(body.M, i)
-    rows = block.spread().rows if size > 1 else even_rows(one.M.indptr[: len(i) + 1], 1)
+    rows = spread_block(block).rows if size > 1 else even_rows(one.M.indptr[: len(i) + 1], 1)
     space = RankSpace(SimpleNamespace(ranks=ranks, rows=rows, n=len(i), key="factor"))
     if size > 1:
         monkeypatch.setattr("cms.linear_algebra.solvers.slepc_modes.matrix_of", None)  # nothing is collected
     X = space.random(np.random.default_rng(0), 3)
-    expected = PrincipalBlock(one.M, i) @ space.whole(X)
-    assert_allclose(space.whole(space.product(block) @ X), expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+    expected = PrincipalBlock(one.M, i) @ X.whole()
+    assert_allclose((space.product(block) @ X).whole(), expected, rtol=0, atol=1e-13 * np.abs(expected).max())

@@ -9,7 +9,7 @@ from numpy.testing import assert_array_equal
 from fe_models.foundation.errors import BodyError
 from fe_models.foundation.ranks.row_layout import RowLayout
 from fe_models.foundation.ranks.rows import Rows
-from fe_models.foundation.ranks.spread_columns import COLUMNS, spread_beside, spread_columns, spread_parts, spread_with
+from fe_models.foundation.ranks.spread_columns import COLUMNS, spread_beside, spread_columns, spread_parts
 from tests.thread_ranks import ThreadRanks
 
 N, K = 30, COLUMNS + 3
@@ -68,7 +68,7 @@ def test_columns_whose_making_fails_are_forgotten(layout, X):
 
     for make in (
         lambda: spread_parts(layout, K, blocks()),
-        lambda: spread_with(layout, K, failing, spread_columns(layout, X)),
+        lambda: spread_columns(layout, X).made(K, failing, spread_columns(layout, X)),
     ):
         with pytest.raises(BodyError, match="no "):
             make()
@@ -101,5 +101,5 @@ def test_columns_that_nobody_names_are_forgotten(layout, X):
 
 
 def test_what_is_made_on_the_ranks_stays_there(layout, X):
-    made = spread_with(layout, 1, np.sum, spread_columns(layout, X), 1, None, None, True)
+    made = spread_columns(layout, X).made(1, np.sum, spread_columns(layout, X), 1, None, None, True)
     assert_array_equal(made.whole(), X.sum(axis=1, keepdims=True))

@@ -6,13 +6,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import cms
 from cms.linear_algebra.memory.size import resident_bytes
-from cms.linear_algebra.solvers.tall import combine, combined, inner, squares, subtract
 from cms.modes.families.families import Families
 from fe_models.elements.solids.body import solid_body
 from fe_models.elements.solids.interfaces import nodes_interface, rigid_interface
 from fe_models.foundation.errors import StorageError
 from fe_models.foundation.tall import on_disk as room
-from fe_models.foundation.tall.on_disk import beside, copied, in_memory, is_on_disk, on_disk, release, row_slices
+from fe_models.foundation.tall.columns import beside, combine, combined, copied, in_memory, inner, squares, subtract
+from fe_models.foundation.tall.on_disk import is_on_disk, on_disk, release, row_slices
 from fe_models.meshes.selections import NodeSet
 from tests.bodies import STEEL, box_mesh
 
