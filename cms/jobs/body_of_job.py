@@ -264,8 +264,24 @@ def uncoupled_body(
     mesh: "Mesh | None" = None,
     ranks: Ranks | None = None,
 ) -> FEBody:
-    """Run a job up to the body with uncoupled interfaces, with the requested nodes and points."""
-    body = made_body(job, stages, on_report, mesh, ranks)
+    """Run a job up to the body with uncoupled interfaces, with the requested nodes and points.
+
+    Its source is a deck, a shell, a frame, a solid mesh, or matrices.
+    """
+    if job.body.deck is not None:
+        from cms.jobs.deck_body import body_of_deck
+
+        body = body_of_deck(job, job.body.deck, stages, on_report)
+    elif job.shells:
+        from cms.jobs.shell_body import body_of_shell
+
+        body = body_of_shell(job, stages, on_report)
+    elif job.sections and not job.ties:
+        body = body_of_frame(job, stages, on_report)
+    elif job.body.mesh is not None:
+        body = body_of_mesh(job, stages, on_report, mesh, ranks)
+    else:
+        body = body_of_matrices(job, stages, on_report)
     if job.body.keep:
         from fe_models.body.kept_nodes import keep_nodes
 
@@ -277,31 +293,6 @@ def uncoupled_body(
     if job.reduction.stress is False:
         raise JobError("body.stress_points: with reduction.stress = false no stress is kept; remove one of them")
     return element_points(body, job.body.stress_points)
-
-
-def made_body(
-    job: Job,
-    stages: Stages,
-    on_report: Callable[[Any], None] | None,
-    mesh: "Mesh | None" = None,
-    ranks: Ranks | None = None,
-) -> FEBody:
-    """Make the body of a job from its source: a deck, a mesh, tables or matrices."""
-    if job.body.deck is not None:
-        from cms.jobs.deck_body import body_of_deck
-
-        return body_of_deck(job, job.body.deck, stages, on_report)
-    if job.shells:
-        from cms.jobs.shell_body import body_of_shell
-
-        return body_of_shell(job, stages, on_report)
-    if job.sections and not job.ties:
-        return body_of_frame(job, stages, on_report)
-    if job.body.mesh is not None:
-        return body_of_mesh(job, stages, on_report, mesh, ranks)
-    if job.body.matrices is not None:
-        return body_of_matrices(job, stages, on_report)
-    raise JobError("job: expected either mesh or matrices, got neither")
 
 
 def is_of_mesh(job: Job) -> bool:

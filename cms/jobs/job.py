@@ -31,7 +31,6 @@ from cms.jobs.deck_tables import (
 from cms.jobs.reduction_table import DampingSection, ReductionSection, mode_set_options, named_interfaces
 from cms.jobs.shell_tables import ShellSection, check_shells
 from cms.jobs.tables.material_table import MaterialSection
-from cms.jobs.tables.mesh_size_table import MeshSizeSection, check_mesh_size
 from cms.jobs.tables.recovery_section import RecoverySection
 from fe_models.body.fe_body import INTERFACE_KINDS
 from fe_models.body.load_cases import LOAD_CASE_KINDS
@@ -252,6 +251,51 @@ class BodySection(Table):
                 f"expected either mesh or matrices, got {got}; beams may have tables of nodes and lines instead"
             )
         return self
+
+
+class MeshSizeSection(Table):
+    """[mesh_size]: largest element size, and adaptation to the geometry."""
+
+    size: Positive = Field(description="a number above 0, the largest edge of an element")
+    smallest: Positive | None = Field(None, description="a number above 0, the smallest edge for curved surfaces")
+    curvature: Annotated[float, Field(ge=0, le=1000)] = Field(
+        12.0, description="a number from 3 to 1000, elements around a circle, or 0: the size does not follow curvature"
+    )
+    order: Annotated[int, Field(ge=1, le=2)] = Field(2, description="1 (tetra) or 2 (tetra10)")
+    optimise: bool = Field(True, description="true or false, whether elements are improved after meshing")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> "MeshSizeSection":
+        if self.smallest is not None and self.smallest > self.size:
+            raise ValueError(f"smallest: expected at most the size {self.size:g}, got {self.smallest:g}")
+        if 0 < self.curvature < 3:
+            raise ValueError(f"curvature: expected 3 to 1000 elements around a circle, or 0, got {self.curvature:g}")
+        return self
+
+
+def check_mesh_size(table: MeshSizeSection | None, mesh: Path | None, *, has_others: bool) -> None:
+    """Raise `ValueError` unless a CAD file has its table, and no other source has one.
+
+    Parameters
+    ----------
+    mesh
+        Source file of the body.
+    has_others
+        Whether the job has shells or beams.
+    """
+    is_cad = mesh is not None and mesh.suffix.lower() in CAD_SUFFIXES
+    if is_cad and table is None:
+        raise ValueError(
+            "mesh_size: missing; a CAD file has to be meshed: expected a table [mesh_size] with size, the largest edge "
+            "of an element"
+        )
+    if table is not None and not is_cad:
+        raise ValueError("mesh_size: belongs to a CAD file; a mesh has its sizes, remove the table")
+    if is_cad and has_others:
+        raise ValueError(
+            "body.mesh: of a CAD file the solids are meshed, without shells and beams; remove [shells] and [sections], "
+            "or give a mesh"
+        )
 
 
 class PlaneSection(Table):

@@ -30,7 +30,7 @@ from fe_models.body.mass_loads import MassLoads
 from fe_models.body.weld import WeldedModel, block_damping, points_side_by_side
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
-from fe_models.meshes.numbering import NONE, NamedSet, Numbering, no_numbers, numbering_side_by_side
+from fe_models.meshes.numbering import NO_NUMBERS, NONE, NamedSet, Numbering, numbering_side_by_side
 
 __all__ = ["Joined", "MasslessNodes", "Part", "join"]
 
@@ -209,7 +209,7 @@ def _numbering(
         sets.append(NamedSet(name, "nodes", rows, len(np.unique(members))))
     has = whole.nodes != NONE
     if numbers is None:
-        return replace(whole, nodes=no_numbers(), on_skin=no_numbers(), sets=(*sets, *whole.sets))
+        return replace(whole, nodes=NO_NUMBERS, on_skin=NO_NUMBERS, sets=(*sets, *whole.sets))
     return replace(whole, nodes=np.where(has, numbers[whole.nodes], NONE), sets=(*sets, *whole.sets))
 
 

@@ -20,7 +20,7 @@ import scipy.sparse.linalg as spla
 
 from fe_models.body.material import AnyMaterial, Material, assign_materials
 from fe_models.body.rigid_motion import rigid_motion_of_points
-from fe_models.elements.solids.assembly import assemble, elastic_properties, expand_scalar_mass
+from fe_models.elements.solids.assembly import assemble, expand_scalar_mass
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.meshes.boundary import boundary_nodes
 from fe_models.meshes.connectivity import facet_pairs
@@ -99,8 +99,7 @@ def first_order_error(
     given, of_cell = assign_materials(mesh, STEEL if materials is None else materials)
     piece, chosen = piece_of(mesh)  # (1)
     number = np.concatenate([of_cell[kind] for kind in mesh.cells])[chosen]
-    properties, tensors = elastic_properties(given)
-    K, M_s = assemble(piece, properties, by_type(piece, number), incompatible=incompatible_modes, tensors=tensors)
+    K, M_s = assemble(piece, given, by_type(piece, number), incompatible=incompatible_modes)
     coarse = LowestModes(K, expand_scalar_mass(M_s))  # (2)
     if set(piece.cells) in ({"tetra"}, {"hexahedron"}):  # (3)
         finer, P = quadratic_mesh(piece)
@@ -108,7 +107,7 @@ def first_order_error(
         cut, P, owner = tetrahedra_of(piece)
         finer, P_2 = quadratic_mesh(cut)
         P, number = sp.csr_array(P_2 @ P), number[owner]
-    K, M_s = assemble(finer, properties, by_type(finer, number), tensors=tensors)
+    K, M_s = assemble(finer, given, by_type(finer, number))
     second = coarse.improved(K, expand_scalar_mass(M_s), finer.nodes, P)
     error = np.sqrt(coarse.omega2[:N_MODES] / second[:N_MODES]).max() - 1  # (4)
     return FirstOrderError(float(max(error, 0.0)), len(chosen), len(chosen) == mesh.n_cells, kinds)

@@ -65,7 +65,8 @@ def write_sealed(content: Content, path: str | os.PathLike[str]) -> None:
     path = Path(path)
     kind = Kind(content.format, content.version, ModalFileError, "")
     try:
-        if size_of(content) >= LARGE and not is_stream(path):  # a large image in memory would be wasteful
+        size = sum(each.values.nbytes for each in content.datasets.values() if isinstance(each.values, np.ndarray))
+        if size >= LARGE and not is_stream(path):  # a large image in memory would be wasteful
             whole = path.resolve()  # resolve a link, so that it remains a link
             write_sealed_file(whole, kind, lambda file: fill(file, content), part=part_of(whole))
             return
@@ -121,11 +122,6 @@ def fill(file: Any, content: Content) -> None:
     for path, group in attributes.items():
         manifest.attributes(path, group)
     manifest.close()
-
-
-def size_of(content: Content) -> int:
-    """Return the size of all numbers of the content [bytes]."""
-    return sum(each.values.nbytes for each in content.datasets.values() if isinstance(each.values, np.ndarray))
 
 
 def walk(file: Any, path: Path, kind: Kind) -> tuple[dict[str, Dataset], dict[str, dict[str, Attribute]]]:

@@ -17,7 +17,6 @@ __all__ = [
     "boundary_nodes",
     "boundary_owners",
     "boundary_triangles",
-    "cells_of_facets",
     "face_triangles",
     "facet_weights",
     "first_of_equal_rows",
@@ -38,16 +37,20 @@ Facets = Mapping[str, IntArray]
 _known: WeakKeyDictionary[Mesh, tuple[Facets, Facets]] = WeakKeyDictionary()
 
 
-def all_facets(mesh: Mesh) -> dict[str, IntArray]:
-    """Return all facets of the solid cells by face type, (n_cells x facets per cell, nodes per facet), outward.
+def all_facets(mesh: Mesh) -> dict[str, tuple[IntArray, IntArray]]:
+    """Return all facets of the solid cells by face type, (n, nodes per facet), outward, and the cell of each, (n,).
 
-    A facet between two cells appears twice.
+    A facet between two cells appears twice. Cells are numbered through all types.
     """
-    parts: dict[str, list[IntArray]] = {}
+    facets: dict[str, list[IntArray]] = {}
+    owners: dict[str, list[IntArray]] = {}
+    first = 0
     for kind, cells in mesh.cells.items():
         for face_kind, local in facet_tables(kind).items():
-            parts.setdefault(face_kind, []).append(cells[:, local].reshape(-1, local.shape[1]))
-    return {face_kind: np.concatenate(blocks) for face_kind, blocks in parts.items()}
+            facets.setdefault(face_kind, []).append(cells[:, local].reshape(-1, local.shape[1]))
+            owners.setdefault(face_kind, []).append(np.repeat(first + np.arange(len(cells)), len(local)))
+        first += len(cells)
+    return {kind: (np.concatenate(facets[kind]), np.concatenate(owners[kind])) for kind in facets}
 
 
 def boundary_facets(mesh: Mesh) -> Mapping[str, IntArray]:
@@ -73,42 +76,24 @@ def boundary_owners(mesh: Mesh) -> IntArray:
 
 def _boundary(mesh: Mesh) -> tuple[Facets, Facets]:
     """Return the facets by face type, and the cell of each facet by face type."""
-    if mesh not in _known:
-        facets, owners = _single_facets(mesh)
-        _known[mesh] = (
-            MappingProxyType({kind: frozen_int(f) for kind, f in facets.items()}),
-            MappingProxyType({kind: frozen_int(cells) for kind, cells in owners.items()}),
-        )
-    return _known[mesh]
-
-
-def _single_facets(mesh: Mesh) -> tuple[dict[str, IntArray], dict[str, IntArray]]:
-    facets, cells = all_facets(mesh), cells_of_facets(mesh)
-    boundary: dict[str, IntArray] = {}
+    if mesh in _known:
+        return _known[mesh]
+    every = all_facets(mesh)
+    facets: dict[str, IntArray] = {}
     owners: dict[str, IntArray] = {}
     for n_corners in (3, 4):
-        kinds = [kind for kind in facets if CORNERS[kind] == n_corners]
+        kinds = [kind for kind in every if CORNERS[kind] == n_corners]
         if not kinds:
             continue
-        corners = np.concatenate([facets[kind][:, :n_corners] for kind in kinds])
-        first, count = first_of_equal_rows(np.sort(corners, axis=1))
-        single = (count == 1)[first]
-        ends = np.cumsum([len(facets[kind]) for kind in kinds])
-        for kind, mask in zip(kinds, np.split(single, ends[:-1]), strict=True):
-            if mask.any():
-                boundary[kind], owners[kind] = facets[kind][mask], cells[kind][mask]
-    return boundary, owners
-
-
-def cells_of_facets(mesh: Mesh) -> dict[str, IntArray]:
-    """Return the cell of each of `all_facets` by face type; cells are numbered through all types."""
-    parts: dict[str, list[IntArray]] = {}
-    first = 0
-    for kind, cells in mesh.cells.items():
-        for face_kind, local in facet_tables(kind).items():
-            parts.setdefault(face_kind, []).append(np.repeat(first + np.arange(len(cells)), len(local)))
-        first += len(cells)
-    return {face_kind: np.concatenate(blocks) for face_kind, blocks in parts.items()}
+        corners = np.concatenate([every[kind][0][:, :n_corners] for kind in kinds])
+        classes, count = first_of_equal_rows(np.sort(corners, axis=1))
+        is_single = (count == 1)[classes]
+        ends = np.cumsum([len(every[kind][0]) for kind in kinds])
+        for kind, own in zip(kinds, np.split(is_single, ends[:-1]), strict=True):
+            if own.any():
+                facets[kind], owners[kind] = (frozen_int(array[own]) for array in every[kind])
+    _known[mesh] = MappingProxyType(facets), MappingProxyType(owners)
+    return _known[mesh]
 
 
 def first_of_equal_rows(rows: IntArray) -> tuple[IntArray, IntArray]:

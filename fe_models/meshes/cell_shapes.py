@@ -30,11 +30,6 @@ class CellShape:
     exponents: tuple[tuple[int, ...], ...]
 
     @property
-    def n_nodes(self) -> int:
-        """Number of nodes of one cell."""
-        return len(self.corners) + len(self.middles)
-
-    @property
     def is_pyramid(self) -> bool:
         """Whether its shape functions are rational: polynomials in x/(1 - z), y/(1 - z) and 1 - z."""
         return len(self.corners) == 5

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import IntArray, frozen_int
-from fe_models.meshes.boundary import CORNERS, all_facets, boundary_facets, cells_of_facets, first_of_equal_rows
+from fe_models.meshes.boundary import CORNERS, all_facets, boundary_facets, first_of_equal_rows
 from fe_models.meshes.mesh import Mesh, used_nodes
 
 __all__ = ["Connectivity", "coincident_nodes", "connectivity", "facet_pairs"]
@@ -66,15 +66,15 @@ def facet_pairs(mesh: Mesh) -> IntArray:
 
 def _facet_pairs(mesh: Mesh) -> tuple[IntArray, int, int]:
     """Return pairs of cells with a common facet, (n_pairs, 2), and the counts of overlapping and mismatched facets."""
-    facets, owners = all_facets(mesh), cells_of_facets(mesh)
+    facets = all_facets(mesh)
     pairs, n_overlapping, n_mismatched = [np.zeros((0, 2), np.int64)], 0, 0
     for n_corners in (3, 4):
         kinds = [kind for kind in facets if CORNERS[kind] == n_corners]
         if not kinds:
             continue
-        corners = np.sort(np.concatenate([facets[kind][:, :n_corners] for kind in kinds]), axis=1)
-        middles = np.concatenate([facets[kind][:, n_corners:].sum(axis=1) for kind in kinds])
-        cell = np.concatenate([owners[kind] for kind in kinds])
+        corners = np.sort(np.concatenate([facets[kind][0][:, :n_corners] for kind in kinds]), axis=1)
+        middles = np.concatenate([facets[kind][0][:, n_corners:].sum(axis=1) for kind in kinds])
+        cell = np.concatenate([facets[kind][1] for kind in kinds])
         classes, count = first_of_equal_rows(corners)
         n_overlapping += int((count > 2).sum())
         order = np.argsort(classes, kind="stable")

@@ -8,12 +8,11 @@ from fe_models.foundation.arrays import IntArray
 from fe_models.meshes.boundary import boundary_owners
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.mesh import Mesh
-from fe_models.meshes.numbering import NONE, NamedSet, Numbering, no_numbers
+from fe_models.meshes.numbering import NO_NUMBERS, NONE, NamedSet, Numbering
 from fe_models.meshes.shell_mesh import ShellMesh
 
 __all__ = ["line_numbering", "node_sets", "shell_numbering", "solid_numbering"]
 
-NO_NUMBERS = no_numbers()
 CellSets = Mapping[str, Mapping[str, IntArray]]
 
 

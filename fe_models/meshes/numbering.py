@@ -7,6 +7,7 @@ file. Messages, sensors, tables and exported files take names only from here.
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -16,16 +17,12 @@ from fe_models.foundation.errors import BodyError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["NONE", "NamedSet", "Numbering", "no_numbers", "node_place", "numbering_side_by_side"]
+__all__ = ["NONE", "NO_NUMBERS", "NamedSet", "Numbering", "node_place", "numbering_side_by_side"]
 
 NONE = -1  #: marks a node or element without a user number, such as the reference node of an interface
 SHOWN = 3  #: how many of the nearest numbers a message lists
 KINDS = ("nodes", "elements")
-
-
-def no_numbers() -> IntArray:
-    """Return an empty array, which stands for unknown numbers."""
-    return frozen_int(np.zeros(0))
+NO_NUMBERS = frozen_int(np.zeros(0))  #: stands for unknown numbers
 
 
 @frozen_copies
@@ -55,16 +52,22 @@ class Numbering:
     An empty array means that the numbers are unknown. Messages then name nodes by their index, and say so.
     """
 
-    nodes: IntArray = field(default_factory=no_numbers)  #: number of each node, `NONE` where it has none, (n_nodes,)
+    nodes: IntArray = field(
+        default_factory=lambda: NO_NUMBERS
+    )  #: number of each node, `NONE` where it has none, (n_nodes,)
     #: 1: the row is a point of a skin (of beams or shells) that moves with the node of that number; 0: the row is the
     #: node itself, (n_nodes,); empty: all rows are nodes
-    on_skin: IntArray = field(default_factory=no_numbers)
-    elements: IntArray = field(default_factory=no_numbers)  #: number of the element behind each triangle, (n_tri,)
+    on_skin: IntArray = field(default_factory=lambda: NO_NUMBERS)
+    elements: IntArray = field(
+        default_factory=lambda: NO_NUMBERS
+    )  #: number of the element behind each triangle, (n_tri,)
     #: names that distinguish repeated numbers: instances of parts, or bodies that were joined
     instances: tuple[str, ...] = ()
-    node_instance: IntArray = field(default_factory=no_numbers)  #: instance of each node, `NONE` for none, (n_nodes,)
+    node_instance: IntArray = field(
+        default_factory=lambda: NO_NUMBERS
+    )  #: instance of each node, `NONE` for none, (n_nodes,)
     #: instance of the element of each triangle, `NONE` for none, (n_tri,)
-    element_instance: IntArray = field(default_factory=no_numbers)
+    element_instance: IntArray = field(default_factory=lambda: NO_NUMBERS)
     sets: tuple[NamedSet, ...] = ()
 
     def __post_init__(self) -> None:
@@ -218,12 +221,10 @@ class Numbering:
 
     def with_nodes_added(self, n: int) -> "Numbering":
         """Return the numbering with n more nodes at the end, which have no user number."""
-        return replace(
-            self,
-            nodes=extended_numbers(self.nodes, n, NONE),
-            on_skin=extended_numbers(self.on_skin, n, 0),
-            node_instance=extended_numbers(self.node_instance, n, NONE),
-        )
+        given = {"nodes": NONE, "on_skin": 0, "node_instance": NONE}
+        known = {name: getattr(self, name) for name in given if getattr(self, name).size}
+        extended: dict[str, Any] = {name: np.append(a, np.full(n, given[name])) for name, a in known.items()}
+        return replace(self, **extended)
 
     def of_rows(self, rows: IntArray, n_nodes: int) -> "Numbering":
         """Return the numbering of the given rows of n_nodes, in that order, (n,); triangles stay the same."""
@@ -257,7 +258,7 @@ class Numbering:
     def without_indices(self, indices: IntArray) -> "Numbering":
         """Return the numbering without node numbers if they equal these indices, (n_nodes,)."""
         if np.array_equal(self.nodes, indices) and not self.instances and not self.on_skin.any():
-            return replace(self, nodes=no_numbers(), on_skin=no_numbers())
+            return replace(self, nodes=NO_NUMBERS, on_skin=NO_NUMBERS)
         return self
 
 
@@ -269,11 +270,6 @@ def split_name(where: str, what: str, asked: int | str) -> tuple[str | None, int
     if not number.strip().lstrip("-").isdigit():
         raise BodyError(f'{where}: {what}: expected a whole number, or text "INSTANCE.number", got {asked!r}')
     return (prefix if dot else None), int(number)
-
-
-def extended_numbers(values: IntArray, n: int, filling: int) -> IntArray:
-    """Return an array with n equal values appended; an empty array stays empty."""
-    return np.concatenate([values, np.full(n, filling)]) if values.size else values
 
 
 def numbering_side_by_side(

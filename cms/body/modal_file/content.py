@@ -20,7 +20,7 @@ from fe_models.body.load_cases import ReducedLoadCase
 from fe_models.foundation.arrays import require_shape
 from fe_models.foundation.sealed_hdf5 import Attribute, Content, Dataset
 from fe_models.foundation.units import UNIT_SYSTEMS, Units
-from fe_models.meshes.numbering import NamedSet, Numbering, no_numbers
+from fe_models.meshes.numbering import NO_NUMBERS, NamedSet, Numbering
 
 __all__ = ["FORMAT", "Contents", "body_of", "content_of", "require_same_frequencies", "require_same_invariants"]
 
@@ -248,7 +248,7 @@ def body_of(content: Content) -> ReducedBody:
 def numbering_of(contents: Contents) -> Numbering:
     """Return the user's numbers and sets; empty if the file has none, as before version 5."""
     known = contents.content.datasets
-    arrays = {name: contents.array(path) if path in known else no_numbers() for path, name in NUMBERS.items()}
+    arrays = {name: contents.array(path) if path in known else NO_NUMBERS for path, name in NUMBERS.items()}
     sets = []
     for group in contents.numbered("/sets"):
         name, kind, size = (contents.attribute(group, key, what) for key, what in SET_KEYS.items())

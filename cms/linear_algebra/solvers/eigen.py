@@ -14,9 +14,8 @@ from cms.linear_algebra.solvers.inverse import Inverse
 from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
 from cms.linear_algebra.solvers.mode_search import DenseSearch, KrylovSearch
 from cms.linear_algebra.solvers.petsc.factor import PetscFactor
-from cms.linear_algebra.solvers.shift_inverted import ModeRequest, Modes, ShiftInverted
+from cms.linear_algebra.solvers.shift_inverted import ArraySpace, ModeRequest, Modes, ShiftInverted
 from cms.linear_algebra.solvers.slepc_modes import RankSpace, SlepcSearch
-from cms.linear_algebra.solvers.tall_space import ArraySpace
 from fe_models.body.couplings.submatrix import PrincipalBlock
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
@@ -249,20 +248,16 @@ def _require_match(K: Matrix, M: Matrix, Phi: Array, omega2: Array, shift: float
     if not len(omega2):
         return
     signs = np.random.default_rng(0).choice([-1.0, 1.0], size=len(omega2)) / np.sqrt(omega2 - shift)
-    force = K @ _combination(Phi, signs)
-    inertia = M @ _combination(Phi, omega2 * signs)
-    size = np.linalg.norm(force) + np.linalg.norm(M @ _combination(Phi, (omega2 - shift) * signs))
+    factors = np.stack([np.ones(len(omega2)), omega2, omega2 - shift], axis=1) * signs[:, None]
+    x = of_this_process(combine(Phi, factors, order="F"))
+    force, inertia = K @ x[:, 0], M @ x[:, 1]
+    size = np.linalg.norm(force) + np.linalg.norm(M @ x[:, 2])
     defect = np.linalg.norm(force - inertia) / size
     if not defect < max(MISMATCH, 1e3 * tolerance):
         raise FactorMismatchError(
             f"eigenmodes: K x - omega² M x is {defect:.1e} of its terms; expected a factorisation of K - shift M "
             f"(shift = {shift:g}) of these very matrices"
         )
-
-
-def _combination(Phi: Any, c: Array) -> Array:
-    """Return Phi c, (n,), on rank 0."""
-    return of_this_process(combine(Phi, c[:, None]))[:, 0]
 
 
 def _hertz(omega2: float) -> float:

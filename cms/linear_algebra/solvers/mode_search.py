@@ -12,10 +12,11 @@ from cms.linear_algebra.solvers.shift_inverted import (
     ModeRequest,
     Modes,
     ShiftInverted,
+    TallProduct,
+    TallSpace,
     measured_residual,
     refined_modes,
 )
-from cms.linear_algebra.solvers.tall_space import TallProduct, TallSpace
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.tall.columns import combine, combined, inner, subtract
 
@@ -66,8 +67,9 @@ class BlockLanczos:
         self.solve, self.M, self.space, self.n, self.block = solve, M, space, space.n, block
         self.n_solves = 0
         self.m = 0  # number of columns of V that are in T
-        self._basis = space.basis(min(capacity, self.n) + block)
-        self._T = np.zeros((self._basis.capacity, self._basis.capacity))
+        self.capacity = min(capacity, self.n)  #: number of columns that V can hold before a restart
+        self._basis = space.basis(self.capacity + block)
+        self._T = np.zeros((self.capacity + block, self.capacity + block))
         self._random = np.random.default_rng(0)
         self._M_next = self._start()  # M V_{j+1}; V_{j+1} itself is stored after V
         self._R = np.zeros((self._M_next.shape[1], 0))  # coupling of the next block to all of V
@@ -88,15 +90,11 @@ class BlockLanczos:
         """Whether V spans the complete range of the operator."""
         return self._M_next.shape[1] == 0
 
-    @property
-    def capacity(self) -> int:
-        """Number of columns that V can hold before a restart."""
-        return self._basis.capacity - self.block
-
     def grow(self, capacity: int) -> None:
         """Allocate memory for more columns."""
-        size = min(capacity, self.n) + self.block
-        if size > self._basis.capacity:
+        if min(capacity, self.n) > self.capacity:
+            self.capacity = min(capacity, self.n)
+            size = self.capacity + self.block
             T = np.zeros((size, size))
             T[: self.m, : self.m] = self._T[: self.m, : self.m]
             self._basis.grow(size, self.V_and_next.shape[1])

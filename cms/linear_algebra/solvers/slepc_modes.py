@@ -12,9 +12,8 @@ from cms.linear_algebra.solvers.factorization import Factorization, Matrix, lowe
 from cms.linear_algebra.solvers.inverse import Inverse
 from cms.linear_algebra.solvers.petsc.factor import CHUNK, PetscFactor, communicator, rows_here, solved_rows
 from cms.linear_algebra.solvers.petsc.libraries import petsc, slepc
-from cms.linear_algebra.solvers.shift_inverted import ModeRequest, Modes, ShiftInverted
+from cms.linear_algebra.solvers.shift_inverted import ArrayBasis, ModeRequest, Modes, ShiftInverted, dealt
 from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
-from cms.linear_algebra.solvers.tall_space import ArrayBasis, dealt
 from fe_models.body.couplings.submatrix import spread_block
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.ranks.product import RowsProduct
@@ -37,7 +36,7 @@ class RankBasis:
     """A growing number of distributed columns."""
 
     def __init__(self, space: "RankSpace", capacity: int) -> None:
-        self.layout, self.capacity, self.key = space.layout, capacity, new_key()
+        self.layout, self.key = space.layout, new_key()
         self.layout.ask(basis_here, self.key, space.rows, capacity)
         weakref.finalize(self, dropped.append, self.key).atexit = False
 
@@ -56,7 +55,6 @@ class RankBasis:
     def grow(self, capacity: int, m: int) -> None:
         """Allocate memory for more columns; the first m columns stay."""
         self.layout.ask(grow_here, self.key, capacity, m)
-        self.capacity = capacity
 
 
 class RankProduct:

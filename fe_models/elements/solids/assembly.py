@@ -9,7 +9,7 @@
 (5) assemble the scalar mass M_s once and expand it by components, M = M_s ⊗ 1₃.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
@@ -18,15 +18,16 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from fe_models.body.material import AnyMaterial, Material, isotropic_tensor
+from fe_models.body.material import AnyMaterial, Material
 from fe_models.elements.solids.elements import ReferenceElement, reference_element
 from fe_models.elements.solids.incompatible import KIND, brick_chunks, brick_stiffness
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.threads import in_threads, n_threads
+from fe_models.meshes.cell_shapes import CELL_SHAPES
 from fe_models.meshes.mesh import Mesh
 
-__all__ = ["Progress", "assemble", "elastic_properties", "expand_scalar_mass"]
+__all__ = ["Progress", "assemble", "expand_scalar_mass"]
 
 Progress = Callable[[float], None]  #: receives the finished fraction, 0 to 1
 
@@ -53,22 +54,21 @@ class Elasticity:
     is_general: np.ndarray  #: whether a material is not isotropic, (n_materials,) bool
 
     @staticmethod
-    def of(properties: Array, tensors: Mapping[int, Array] | None) -> "Elasticity":
-        """Make it from lam, mu, rho and the stiffness matrices of the materials that are not isotropic."""
-        given = dict(tensors or {})
-        every = [given.get(k, isotropic_tensor(lam, mu)) for k, (lam, mu, _) in enumerate(properties)]
-        return Elasticity(properties, np.array(every), np.isin(np.arange(len(properties)), list(given)))
+    def of(materials: Sequence[AnyMaterial]) -> "Elasticity":
+        """Return the constants of these materials."""
+        rows = [(m.lam, m.mu, m.rho) if isinstance(m, Material) else (0.0, 0.0, m.rho) for m in materials]
+        is_general = np.array([not isinstance(m, Material) for m in materials])
+        return Elasticity(np.array(rows), np.array([m.stiffness for m in materials]), is_general)
 
 
 def assemble(
     mesh: Mesh,
-    properties: Array,
+    materials: Sequence[AnyMaterial],
     of_cell: Mapping[str, IntArray],
     *,
     incompatible: bool = False,
     integration: str = "full",
     mass: str = "consistent",
-    tensors: Mapping[int, Array] | None = None,
     progress: Progress | None = None,
 ) -> tuple[sp.csc_array, sp.csr_array]:
     """Assemble the stiffness and the scalar mass of all solid cells.
@@ -77,8 +77,8 @@ def assemble(
     ----------
     mesh
         Every node must belong to a solid cell.
-    properties
-        lam [Pa], mu [Pa], rho [kg/m³] of each material, (n_materials, 3).
+    materials
+        The materials in use.
     of_cell
         Index of the material of each cell, (n_cells,), by cell type.
     incompatible
@@ -86,9 +86,6 @@ def assemble(
     integration, mass
         Names in `INTEGRATIONS` and `MASSES` of `fe_models.elements.solids.elements`. A lumped element mass is the
         diagonal of the consistent mass, scaled to the mass of the element.
-    tensors
-        Stiffness of each material that is not isotropic, by its index: maps strain to stress, (6, 6) [Pa], rows xx yy
-        zz yz xz xy. The lam and mu of these materials are not used.
     progress
         Called with the finished fraction.
 
@@ -111,7 +108,7 @@ def assemble(
         K_data, M_data = assembled_data(
             mesh.nodes,
             lists,
-            Elasticity.of(properties, tensors),
+            Elasticity.of(materials),
             of_cell,
             graph,
             pool,
@@ -122,12 +119,6 @@ def assemble(
     row_start = graph.row_start.astype(np.int32) if len(M_data) <= LARGEST_INT32 else graph.row_start
     M_s = sp.csr_array((M_data, graph.columns, row_start), shape=2 * (len(mesh.nodes),))
     return expanded_stiffness(graph, K_data), M_s
-
-
-def elastic_properties(materials: tuple[AnyMaterial, ...]) -> tuple[Array, dict[int, Array]]:
-    """Return lam, mu, rho of each material, (n, 3), and the stiffness matrices of those that are not isotropic."""
-    rows = [(m.lam, m.mu, m.rho) if isinstance(m, Material) else (0.0, 0.0, m.rho) for m in materials]
-    return np.array(rows), {k: m.stiffness for k, m in enumerate(materials) if not isinstance(m, Material)}
 
 
 def expand_scalar_mass(M_s: sp.csr_array) -> sp.csc_array:
@@ -195,7 +186,7 @@ def assembled_data(
     for kind, cells in lists.items():
         element = reference_element(kind, *rules)
         tables = kernel_tables(element)
-        n_a = element.n_nodes
+        n_a = len(element.nodes)
         # 9 + 1 numbers for each pair of nodes
         n_batch = min(len(cells), max(n_parts, int(BATCH_BYTES / (80 * n_a**2))))
         K_e, M_e = np.empty((n_batch, 3 * n_a, 3 * n_a)), np.empty((n_batch, n_a, n_a))
@@ -325,7 +316,7 @@ def require_assemblable(mesh: Mesh) -> list[str]:
         )
     n_nodes = len(mesh.nodes)
     for kind in kinds:
-        cells, expected = mesh.cells[kind], reference_element(kind).n_nodes
+        cells, expected = mesh.cells[kind], len(CELL_SHAPES[kind].nodes)
         if cells.ndim != 2 or cells.shape[1] != expected:
             raise MeshError(f"assembly: {kind}: expected (n_cells, {expected}) nodes, got {cells.shape}")
         if cells.min() < 0 or cells.max() >= n_nodes:

@@ -18,6 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
+from fe_models.body.material import AnyMaterial
 from fe_models.elements.solids.assembly import assemble, node_graph, require_assemblable
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray
@@ -65,13 +66,17 @@ class SpreadMesh:
 
 
 def assemble_on_ranks(
-    ranks: Ranks, mesh: Mesh, properties: Array, of_cell: Mapping[str, IntArray], options: Mapping[str, Any]
+    ranks: Ranks,
+    mesh: Mesh,
+    materials: tuple[AnyMaterial, ...],
+    of_cell: Mapping[str, IntArray],
+    options: Mapping[str, Any],
 ) -> tuple[SpreadMatrix, SpreadMatrix, SpreadMatrix, SpreadMesh]:
     """Return K, M = M_s ⊗ 1₃, M_s and the mesh, all distributed over the ranks.
 
     Parameters
     ----------
-    properties, of_cell
+    materials, of_cell
         As for `fe_models.elements.solids.assembly.assemble`.
     options
         Its keyword arguments.
@@ -81,11 +86,11 @@ def assemble_on_ranks(
     order, rows = node_order(list(lists.values()), len(mesh.nodes), ranks.size)  # (1)
     ranks.store[KEY] = [mesh_part(mesh, lists, of_cell, order, rows, rank) for rank in range(ranks.size)]  # (2)
     try:
-        asked(ranks, assemble_here, properties, dict(options))  # (3)
+        asked(ranks, assemble_here, materials, dict(options))  # (3)
     # the message refers to a part of the mesh; a single process finds the same fault in the complete mesh
     except MeshError:
         asked(ranks, forget_here)  # drop the rows of the ranks that found no fault
-        assemble(mesh, properties, of_cell, **options)
+        assemble(mesh, materials, of_cell, **options)
         raise
     of_dofs = (3 * order[:, None] + np.arange(3)).ravel()
     dof_rows = Rows(tuple(3 * start for start in rows.starts))
@@ -132,7 +137,7 @@ def mesh_part(
     )
 
 
-def assemble_here(ranks: Ranks, properties: Array, options: dict[str, Any]) -> None:
+def assemble_here(ranks: Ranks, materials: tuple[AnyMaterial, ...], options: dict[str, Any]) -> None:
     """Assemble and keep this rank's rows of K, M and M_s, with columns in the global order: step (3)."""
     parts = ranks.store.pop(KEY, None) or [None] * ranks.size
     part: MeshPart = parts[0] if ranks.size == 1 else ranks.comm.alltoall(parts)[0]
@@ -142,7 +147,7 @@ def assemble_here(ranks: Ranks, properties: Array, options: dict[str, Any]) -> N
         for name in MATRICES:
             ranks.store[f"{KEY} {name}"] = OwnRows(np.zeros(1, np.int32), np.zeros(0, np.int32), np.zeros(0))
         return
-    K, M_s = assemble(part.mesh, properties, part.of_cell, **options)
+    K, M_s = assemble(part.mesh, materials, part.of_cell, **options)
     dofs = (3 * part.own[:, None] + np.arange(3)).ravel()
     # columns of a symmetric matrix are its rows
     own_K = sp.csr_array((K.data, K.indices, K.indptr), shape=K.shape)[dofs]

@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.mass_loads import MassLoads
 from fe_models.body.material import AnyMaterial, assign_materials, material_words
-from fe_models.elements.solids.assembly import Progress, assemble, elastic_properties, expand_scalar_mass
+from fe_models.elements.solids.assembly import Progress, assemble, expand_scalar_mass
 from fe_models.elements.solids.assembly_on_ranks import SpreadMesh, assemble_on_ranks
 from fe_models.elements.solids.elements import INTEGRATIONS, MASSES, reference_element
 from fe_models.elements.solids.geometric import (
@@ -240,18 +240,12 @@ def solid_body(
     rule_words = _rule_words(integration, mass)
     mesh = as_mesh(mesh)
     used, of_cell = assign_materials(mesh, materials)
-    properties, tensors = elastic_properties(used)
-    rules: dict[str, Any] = {
-        "incompatible": incompatible_modes,
-        "integration": integration,
-        "mass": mass,
-        "tensors": tensors,
-    }
+    rules: dict[str, Any] = {"incompatible": incompatible_modes, "integration": integration, "mass": mass}
     if ranks is None or ranks.size == 1:
-        K, M_s = assemble(mesh, properties, of_cell, progress=progress, **rules)
+        K, M_s = assemble(mesh, used, of_cell, progress=progress, **rules)
         M, parts = expand_scalar_mass(M_s), None
     else:
-        K, M, M_s, parts = assemble_on_ranks(ranks, mesh, properties, of_cell, rules)
+        K, M, M_s, parts = assemble_on_ranks(ranks, mesh, used, of_cell, rules)
     n_nodes = len(mesh.nodes)
     return FEBody(
         name=name,

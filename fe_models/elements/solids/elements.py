@@ -97,11 +97,6 @@ class ReferenceElement:
         """Positions of the nodes in the reference cell, (n_nodes, 3)."""
         return CELL_SHAPES[self.kind].nodes
 
-    @property
-    def n_nodes(self) -> int:
-        """Nodes per element."""
-        return CELL_SHAPES[self.kind].n_nodes
-
 
 def quadrature(cell: str, degree: Degree) -> tuple[Array, Array]:
     """Return points (n_points, 3) and weights (n_points,) of a rule on "tet", "hex", "wedge" or "pyramid".
@@ -191,7 +186,7 @@ def reference_element(kind: str, integration: str = "full", mass: str = "consist
     (stress_cell, stress_degree), low_order = STRESS_RULES[kind]
     stress_points, stress_weights = quadrature(stress_cell, stress_degree)
     if low_order is None:
-        extrapolation = np.ones((CELL_SHAPES[kind].n_nodes, len(stress_points)))
+        extrapolation = np.ones((len(CELL_SHAPES[kind].nodes), len(stress_points)))
     else:
         nodes = CELL_SHAPES[kind].nodes
         at_nodes = shape_table(low_order, nodes, np.ones(len(nodes))).values

@@ -28,7 +28,7 @@ def enclosed_volume(nodes, triangles):
 @pytest.mark.parametrize("kind", CELL_SHAPES)
 def test_shape_functions_are_one_at_their_node_and_sum_to_one(kind):
     shape = CELL_SHAPES[kind]
-    assert_allclose(shape_values(kind, shape.nodes)[0], np.eye(shape.n_nodes), rtol=0, atol=ROUNDOFF)
+    assert_allclose(shape_values(kind, shape.nodes)[0], np.eye(len(shape.nodes)), rtol=0, atol=ROUNDOFF)
     N, dN = shape_values(kind, quadrature(kind)[0])
     assert_allclose(N.sum(axis=1), 1, rtol=0, atol=ROUNDOFF)
     assert_allclose(dN.sum(axis=1), 0, rtol=0, atol=10 * ROUNDOFF)
@@ -45,7 +45,7 @@ def test_shape_functions_are_those_of_scikit_fem(kind):
 @pytest.mark.parametrize("kind", SOLID_TYPES)
 def test_quadrature_of_a_curved_cell_equals_a_rule_of_much_higher_degree(kind):
     rng = np.random.default_rng(1)
-    X = CELL_SHAPES[kind].nodes + rng.uniform(-0.05, 0.05, (CELL_SHAPES[kind].n_nodes, 3))
+    X = CELL_SHAPES[kind].nodes + rng.uniform(-0.05, 0.05, (len(CELL_SHAPES[kind].nodes), 3))
     points, weights = quadrature(kind)
     volume = cell_jacobians(kind, X[None], points)[0] @ weights
     x, w = np.polynomial.legendre.leggauss(8)
@@ -102,13 +102,13 @@ def test_boundary_of_a_mixed_mesh_hides_the_facets_between_cell_types():
 @pytest.mark.parametrize("kind", ["triangle", "triangle6", "quad", "quad8", "quad9"])
 def test_drawing_triangles_cover_a_flat_face_once(kind):
     shape = CELL_SHAPES[kind]
-    nodes = np.column_stack([shape.nodes, np.zeros(shape.n_nodes)])
-    triangles = face_triangles({kind: np.arange(shape.n_nodes)[None]})
+    nodes = np.column_stack([shape.nodes, np.zeros(len(shape.nodes))])
+    triangles = face_triangles({kind: np.arange(len(shape.nodes))[None]})
     a, b, c = (nodes[triangles[:, k]] for k in range(3))
     areas = np.cross(b - a, c - a)[:, 2] / 2
     assert (areas > 0).all()
     assert_allclose(areas.sum(), 0.5 if kind.startswith("tri") else 1.0, rtol=ROUNDOFF, atol=0)
-    assert_array_equal(np.unique(triangles), np.arange(shape.n_nodes))
+    assert_array_equal(np.unique(triangles), np.arange(len(shape.nodes)))
 
 
 def test_corners_of_flat_quadratic_triangles_weigh_nothing_and_middles_a_third():

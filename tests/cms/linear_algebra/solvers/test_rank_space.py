@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from cms.linear_algebra.solvers.factorization import factorize
 from cms.linear_algebra.solvers.mode_search import BlockLanczos
+from cms.linear_algebra.solvers.shift_inverted import ArraySpace
 from cms.linear_algebra.solvers.slepc_modes import RankSpace
-from cms.linear_algebra.solvers.tall_space import ArraySpace
 from fe_models.body.couplings.couplings import couple
 from fe_models.body.couplings.submatrix import PrincipalBlock, spread_block
 from fe_models.foundation.ranks.rows import collected, even_rows, own_rows

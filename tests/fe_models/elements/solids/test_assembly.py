@@ -38,12 +38,8 @@ MESHES = {
 }
 
 
-def steel_properties():
-    return np.array([[STEEL.lam, STEEL.mu, STEEL.rho], [ALUMINIUM.lam, ALUMINIUM.mu, ALUMINIUM.rho]])
-
-
 def assembled(mesh, number=0):
-    return assemble(mesh, steel_properties(), {kind: np.full(len(c), number) for kind, c in mesh.cells.items()})
+    return assemble(mesh, (STEEL, ALUMINIUM), {kind: np.full(len(c), number) for kind, c in mesh.cells.items()})
 
 
 def skfem_and_own_mesh(kind, amount):
@@ -302,6 +298,6 @@ def test_garbage_is_refused(nodes, cells, message):
 def test_progress_rises_to_one():
     seen = []
     mesh = box_mesh(4, 4, 4, kind="hexahedron27")
-    assemble(mesh, steel_properties(), {"hexahedron27": np.zeros(64, int)}, progress=seen.append)
+    assemble(mesh, (STEEL, ALUMINIUM), {"hexahedron27": np.zeros(64, int)}, progress=seen.append)
     assert seen == sorted(seen)
     assert_allclose(seen[-1], 1.0, rtol=1e-15)
