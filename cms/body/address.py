@@ -21,13 +21,27 @@ NEAREST = 3  #: how many nodes a message lists
 @presented
 @dataclass(frozen=True, eq=False)
 class FoundNodes:
-    """The kept nodes that an address selects."""
+    """The kept nodes that an address selects.
 
-    asked: str  #: text of the address
-    rows: IntArray  #: rows of `ReducedBody.nodes`, (n,), n >= 1; for a node: the node, or the skin points that it moves
-    distance: float  #: distance from the requested position to the node; 0 for a number or name
-    names: tuple[str, ...]  #: the user's names of the nodes, (n,)
-    place: Array  #: mean of the undeformed positions in mesh axes, (3,) [m]
+    Parameters
+    ----------
+    asked
+        Text of the address.
+    rows
+        Rows of `ReducedBody.nodes`, (n,), n >= 1; for a node: the node, or the skin points that it moves.
+    distance
+        Distance from the requested position to the node; 0 for a number or name.
+    names
+        The user's names of the nodes, (n,).
+    place
+        Mean of the undeformed positions in mesh axes, (3,) [m].
+    """
+
+    asked: str
+    rows: IntArray
+    distance: float
+    names: tuple[str, ...]
+    place: Array
 
     def description(self) -> str:
         """Describe the selected place, and its distance from the requested one."""
@@ -45,17 +59,30 @@ class FoundNodes:
 class Address:
     """One place on a body, given by exactly one of node, element, set and position.
 
+    Parameters
+    ----------
+    node
+        The user's number; "INSTANCE.number" if several instances have it.
+    element
+        The same for an element: selects the kept nodes of its surface.
+    set
+        Name of a set; selects its kept nodes, or the kept nodes of its elements.
+    position
+        Position in mesh axes, (3,) [m]; selects the nearest kept node.
+    tolerance
+        Largest distance of that node from the position, relative to the size of the body.
+
     Raises
     ------
     BodyError
         If none or several of them are given.
     """
 
-    node: int | str | None = None  #: the user's number; "INSTANCE.number" if several instances have it
-    element: int | str | None = None  #: the same for an element: selects the kept nodes of its surface
-    set: str | None = None  #: name of a set; selects its kept nodes, or the kept nodes of its elements
-    position: Any = None  #: in mesh axes, (3,) [m]; selects the nearest kept node
-    tolerance: float = TOLERANCE  #: largest distance of that node from the position, relative to the size of the body
+    node: int | str | None = None
+    element: int | str | None = None
+    set: str | None = None
+    position: Any = None
+    tolerance: float = TOLERANCE
 
     def __post_init__(self) -> None:
         if self.position is not None:

@@ -28,12 +28,23 @@ class RotatedLoads:
 
     It is (e_x × c)ᵀ K_geo(sigma_j) phi_k for rotations about the axes x of B. With it, K_j is transformed to the shapes
     of another frame, phi - Psi_R C. For translations it is zero, and for two rotations it follows from the load.
+
+    Parameters
+    ----------
+    translation
+        Matrices of the translations, (3, 3, n_q) [sqrt(kg) per q].
+    rotation
+        Matrices of the rotations, (3, 3, n_q) [sqrt(kg) m per q].
+    spin
+        Matrices of the products of angular velocities, (6, 3, n_q) [sqrt(kg) m per q].
+    interfaces
+        (n_loaded, 6, 3, n_q) [1/sqrt(kg) and 1/(sqrt(kg) m) per q].
     """
 
-    translation: Array  #: (3, 3, n_q) [sqrt(kg) per q]
-    rotation: Array  #: (3, 3, n_q) [sqrt(kg) m per q]
-    spin: Array  #: (6, 3, n_q) [sqrt(kg) m per q]
-    interfaces: Array  #: (n_loaded, 6, 3, n_q) [1/sqrt(kg) and 1/(sqrt(kg) m) per q]
+    translation: Array
+    rotation: Array
+    spin: Array
+    interfaces: Array
 
     def __post_init__(self) -> None:
         n, n_interfaces = np.asarray(self.translation).shape[-1], len(np.asarray(self.interfaces))
@@ -50,11 +61,20 @@ class SpreadLoads:
     Load a = 0-2 is the force (w_i/w) e_a at every node, and load 3 + a is the force (w_i/w) e_a × c_i. `NodalSums` has
     their resultants, which do not suffice to rotate the loads: a node transmits forces on its followers as a force and
     a moment, and a moment counts by half when it is rotated.
+
+    Parameters
+    ----------
+    K
+        Matrices as in `GeometricStiffness`, (6, n_q, n_q) [1/(kg m) and 1/kg per q²].
+    turned
+        Matrices as in `RotatedLoads`, (6, 3, n_q) [1/sqrt(kg) and m/sqrt(kg) per q].
+    turned_rigid
+        Work of load j alone, rotated about an axis, on the rotations e_b × c, (6, 3, 3) [m and m²].
     """
 
-    K: Array  #: as in `GeometricStiffness`, (6, n_q, n_q) [1/(kg m) and 1/kg per q²]
-    turned: Array  #: as in `RotatedLoads`, (6, 3, n_q) [1/sqrt(kg) and m/sqrt(kg) per q]
-    turned_rigid: Array  #: work of load j alone, rotated about an axis, on the rotations e_b × c, (6, 3, 3) [m and m²]
+    K: Array
+    turned: Array
+    turned_rigid: Array
 
     def __post_init__(self) -> None:
         n = np.asarray(self.K).shape[-1]
@@ -72,25 +92,38 @@ class GeometricStiffness:
     All arrays are in the frame B of the reduced body, over its modes q, with the same support for all loads (theory.md
     §7). A tensile stress makes K_j positive. 1/2 qᵀ K_j q is minus the work of f_j on the second-order displacement.
 
+    Parameters
+    ----------
+    translation
+        K_t,a, unit load -rho e_a: frame acceleration minus gravity, (3, n_q, n_q) [1/m per q²].
+    rotation
+        K_r,a, unit load -rho e_a × c: angular acceleration, (3, n_q, n_q) [1 per q²].
+    spin
+        K_ab for unit load -rho/2 [e_a × (e_b × c) + e_b × (e_a × c)], (a, b) as in `SPIN_PAIRS`, (6, n_q, n_q) [1 per
+        q²].
+    interfaces
+        Matrices for a unit force (3) and a unit moment (3) at each loaded interface, axes of B, (n_loaded, 6, n_q, n_q)
+        [1/(kg m) and 1/(kg m²) per q²].
+    turned
+        Needed to transform the matrices to other frames; None: not recorded, a rotation is then assumed to rotate the
+        loads.
+    spread
+        Needed to transform them to a Buckens frame; None: left out, or not recorded.
+    is_loaded
+        Whether the loads of each of `ReducedBody.interfaces` are in `interfaces`; loads of other interfaces do not
+        stiffen the body; empty: all are included.
+
     References
     ----------
     .. [1] Schwertassek & Wallrapp (1999), docs/bibliography.md; derived in docs/theory.md §7.
     """
 
-    translation: Array  #: K_t,a, unit load -rho e_a: frame acceleration minus gravity, (3, n_q, n_q) [1/m per q²]
-    rotation: Array  #: K_r,a, unit load -rho e_a × c: angular acceleration, (3, n_q, n_q) [1 per q²]
-    #: K_ab for unit load -rho/2 [e_a × (e_b × c) + e_b × (e_a × c)], (a, b) as in `SPIN_PAIRS`, (6, n_q, n_q) [1 per
-    #: q²]
+    translation: Array
+    rotation: Array
     spin: Array
-    #: for a unit force (3) and a unit moment (3) at each loaded interface, axes of B, (n_loaded, 6, n_q, n_q) [1/(kg m)
-    #: and 1/(kg m²) per q²]
     interfaces: Array
-    #: needed to transform the matrices to other frames; None: not recorded, a rotation is then assumed to rotate the
-    #: loads
     turned: RotatedLoads | None = None
-    spread: SpreadLoads | None = None  #: needed to transform them to a Buckens frame; None: left out, or not recorded
-    #: for each of `ReducedBody.interfaces`, whether its loads are in `interfaces`; loads of other interfaces do not
-    #: stiffen the body; empty: all are included
+    spread: SpreadLoads | None = None
     is_loaded: tuple[bool, ...] = ()
 
     def __post_init__(self) -> None:

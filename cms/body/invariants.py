@@ -34,19 +34,38 @@ class Moments:
     A body reduced by another program may not provide all moments. `missing` then names the invariants that do not
     follow. The corresponding parts of P and S_kl are zero, and access to such an invariant raises `BodyError`.
 
+    Parameters
+    ----------
+    m
+        Mass, ∫ 1 [kg].
+    S
+        First moment, ∫ c_a, (3,) [kg m].
+    R
+        Second moment, ∫ c_a c_b, (3, 3) [kg m²].
+    C1
+        1C, ∫ phi_a,k, (3, n_q) [kg].
+    P
+        ∫ c_a phi_b,k, (3, 3, n_q) [kg m].
+    S_kl
+        ∫ phi_a,k phi_b,l, (3, 3, n_q, n_q) [kg].
+    is_exact
+        False: from bare matrices that are not M_s ⊗ 1.
+    missing
+        Unknown terms of `INERTIA_TERMS`, in their order.
+
     References
     ----------
     .. [1] Wallrapp (1994), docs/bibliography.md, has them as standard input data; derived in docs/theory.md §5.
     """
 
-    m: float  #: mass, ∫ 1 [kg]
-    S: Array  #: first moment, ∫ c_a, (3,) [kg m]
-    R: Array  #: second moment, ∫ c_a c_b, (3, 3) [kg m²]
-    C1: Array  #: 1C, ∫ phi_a,k, (3, n_q) [kg]
-    P: Array  #: ∫ c_a phi_b,k, (3, 3, n_q) [kg m]
-    S_kl: Array  #: ∫ phi_a,k phi_b,l, (3, 3, n_q, n_q) [kg]
-    is_exact: bool = True  #: False: from bare matrices that are not M_s ⊗ 1
-    missing: tuple[str, ...] = ()  #: unknown terms of `INERTIA_TERMS`, in their order
+    m: float
+    S: Array
+    R: Array
+    C1: Array
+    P: Array
+    S_kl: Array
+    is_exact: bool = True
+    missing: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         n = np.asarray(self.C1).shape[-1]

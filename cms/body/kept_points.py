@@ -25,15 +25,24 @@ SOURCES = {
 class KeptPoints:
     """Rotations of kept nodes over the modes; the translations are in `ReducedBody.Phi`, as for all kept nodes.
 
+    Parameters
+    ----------
+    nodes
+        Rows of `ReducedBody.nodes`, ascending, (n,).
+    rotation
+        Rotation vectors in B, zero if unknown, (n, 3, n_q) [1/m].
+    source
+        One of `SOURCES` for each, (n,).
+
     Raises
     ------
     BodyError
         If shapes do not fit, or a source is unknown.
     """
 
-    nodes: IntArray  #: rows of `ReducedBody.nodes`, ascending, (n,)
-    rotation: Array  #: rotation vectors in B, zero if unknown, (n, 3, n_q) [1/m]
-    source: tuple[str, ...]  #: one of `SOURCES` for each, (n,)
+    nodes: IntArray
+    rotation: Array
+    source: tuple[str, ...]
 
     def __post_init__(self) -> None:
         put = object.__setattr__

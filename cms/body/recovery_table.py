@@ -36,6 +36,35 @@ TEXTS = ("labels", "quantities", "entities", "components")
 class RecoveryTable:
     """Named rows of a reduced body; row components are in mesh axes or element axes, columns in axes of B.
 
+    Parameters
+    ----------
+    name
+        Name of the table.
+    labels
+        Label of each row, unique, such as "node 17 acceleration ux".
+    quantities
+        Quantity of each row, such as "acceleration" or "beam force".
+    entities
+        Kind of object of the row: "node", "element", "interface", "point" or "body".
+    numbers
+        Number of the node or element, (n_rows,); -1 if it only has a name.
+    components
+        Component of each row, such as "ux", "xx" or "end A My".
+    dimensions
+        Exponents of mass, length and time of each row, (n_rows, 3).
+    dynamic
+        Factors of z, dz/dt and d²z/dt², (3, n_rows, 6 + n_q).
+    loads
+        Name of each column of `static`.
+    load_dimensions
+        Exponents of mass, length and time of each amplitude, (n_loads, 3).
+    static
+        Residual static response to each load of unit amplitude, (n_rows, n_loads).
+    system
+        Unit system of all numbers.
+    truncated
+        Description of what the rows neglect.
+
     Raises
     ------
     BodyError
@@ -43,18 +72,18 @@ class RecoveryTable:
     """
 
     name: str
-    labels: tuple[str, ...]  #: label of each row, unique, such as "node 17 acceleration ux"
-    quantities: tuple[str, ...]  #: quantity of each row, such as "acceleration" or "beam force"
-    entities: tuple[str, ...]  #: kind of object of the row: "node", "element", "interface", "point" or "body"
-    numbers: IntArray  #: number of the node or element, (n_rows,); -1 if it only has a name
-    components: tuple[str, ...]  #: component of each row, such as "ux", "xx" or "end A My"
-    dimensions: Array  #: exponents of mass, length and time of each row, (n_rows, 3)
-    dynamic: Array  #: factors of z, dz/dt and d²z/dt², (3, n_rows, 6 + n_q)
-    loads: tuple[str, ...]  #: name of each column of `static`
-    load_dimensions: Array  #: exponents of mass, length and time of each amplitude, (n_loads, 3)
-    static: Array  #: residual static response to each load of unit amplitude, (n_rows, n_loads)
-    system: Units  #: unit system of all numbers
-    truncated: str = ""  #: description of what the rows neglect
+    labels: tuple[str, ...]
+    quantities: tuple[str, ...]
+    entities: tuple[str, ...]
+    numbers: IntArray
+    components: tuple[str, ...]
+    dimensions: Array
+    dynamic: Array
+    loads: tuple[str, ...]
+    load_dimensions: Array
+    static: Array
+    system: Units
+    truncated: str = ""
 
     def __post_init__(self) -> None:
         where = f"recovery {self.name!r}"

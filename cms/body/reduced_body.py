@@ -45,13 +45,25 @@ class BodyFrame:
     """The frame B in which elastic displacement is measured, as its position in the undeformed mesh.
 
     c_mesh = origin + axes @ c_B.
+
+    Parameters
+    ----------
+    kind
+        "nodal", "tisserand", "buckens", or "held": the body is held to the ground, and its frame cannot move.
+    origin
+        Origin in mesh coordinates, (3,) [m].
+    axes
+        Axes of B as columns, in mesh axes, (3, 3).
+    at
+        Interface that defines a nodal frame; "": other dofs.
+    dofs
+        Dofs that a nodal frame holds, (mesh node, component), (6, 2); empty: another kind, or not recorded.
     """
 
-    kind: str  #: "nodal", "tisserand", "buckens", or "held": the body is held to the ground, and its frame cannot move
-    origin: Array  #: in mesh coordinates, (3,) [m]
-    axes: Array = field(default_factory=lambda: np.eye(3))  #: axes of B as columns, in mesh axes, (3, 3)
-    at: str = ""  #: interface that defines a nodal frame; "": other dofs
-    #: dofs that a nodal frame holds, (mesh node, component), (6, 2); empty: another kind, or not recorded
+    kind: str
+    origin: Array
+    axes: Array = field(default_factory=lambda: np.eye(3))
+    at: str = ""
     dofs: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
 
     def __post_init__(self) -> None:
@@ -73,15 +85,32 @@ class BodyFrame:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ReducedInterface:
-    """An interface of a reduced body: its reference point in B and the motion of that point with q."""
+    """An interface of a reduced body: its reference point in B and the motion of that point with q.
+
+    Parameters
+    ----------
+    name
+        Name of the interface, unique on the body.
+    kind
+        "rigid", "distributing" or "nodes" (then Psi is the mean motion of the members).
+    position
+        Undeformed reference point in B, (3,) [m].
+    triad
+        Undeformed axes as columns in B, (3, 3).
+    Psi
+        Translation and rotation of the point in B for each mode, (6, n_q) [-, 1/m].
+    members
+        Member nodes, indices into `ReducedBody.nodes`, (n_members,).
+    has_rotation
+        False: Psi has no rotation (rows 3-5 are zero) and is the mean translation of the members, which are collinear.
+    """
 
     name: str
-    kind: str  #: "rigid", "distributing" or "nodes" (then Psi is the mean motion of the members)
-    position: Array  #: undeformed reference point in B, (3,) [m]
-    triad: Array  #: undeformed axes as columns in B, (3, 3)
-    Psi: Array  #: translation and rotation of the point in B for each mode, (6, n_q) [-, 1/m]
-    members: IntArray  #: member nodes, indices into `ReducedBody.nodes`, (n_members,)
-    #: False: Psi has no rotation (rows 3-5 are zero) and is the mean translation of the members, which are collinear
+    kind: str
+    position: Array
+    triad: Array
+    Psi: Array
+    members: IntArray
     has_rotation: bool = True
 
     def __post_init__(self) -> None:
@@ -102,41 +131,93 @@ class ReducedBody:
     """A body as r = c + Phi q in its frame B, with M-orthonormal, K-diagonal shapes (docs/theory.md §3-5).
 
     The unit of q follows from Phi.T M Phi = 1: sqrt(kg) m. Phi q is a length.
+
+    Parameters
+    ----------
+    name
+        Name of the body.
+    units
+        Unit system of all numbers of the body.
+    frame
+        The body frame B.
+    M
+        Phi.T M Phi, (n_q, n_q): identity, with zero diagonal entries for massless static shapes.
+    K
+        Phi.T K Phi, (n_q, n_q): diagonal of omega² [1/s²].
+    D
+        Modal damping, (n_q, n_q) [1/s]; zero if none was requested.
+    labels
+        Label of each mode: the sources of its energy.
+    energy_shares
+        Share of each group of source columns in the energy of each mode, (n_q, n_sources).
+    sources
+        Names of the groups of source columns, (n_sources,).
+    moments
+        Moments of mass of the body and its shapes in B.
+    free_frequencies
+        Elastic frequencies of the unsupported reduced body (of a held body: as held), ascending [Hz].
+    nodes
+        Kept nodes (surface, interfaces) in B, (n_kept, 3) [m].
+    node_ids
+        Indices of the kept nodes in the original model, (n_kept,); `numbering` has the user's numbers.
+    Phi
+        Translations of the kept nodes in B, (n_kept, 3, n_q).
+    surface
+        Triangles of kept nodes, (n_tri, 3).
+    interfaces
+        Places at which neighbours connect to the body.
+    provenance
+        Versions, digests, options, solver.
+    columns
+        Columns of the mode set; None: not recorded.
+    nodal_sums
+        Data for a Buckens frame; None: not recorded.
+    load_cases
+        Named loads over the modes.
+    stress
+        Stress of the modes at the kept nodes, xx yy zz yz xz xy in axes of B, (n_kept, 6, n_q) [Pa per unit of q];
+        None: left out or unknown. It is zero at reference nodes, which belong to no element.
+    point_stress
+        Stress of the modes at named points; None: left out, or there are none.
+    geometric
+        Geometric stiffness; None: left out, or not known.
+    quadratic
+        g_kl of the kept nodes in B, displacement ½ Σ q_k q_l g_kl, (n_kept, 3, n_q, n_q) [1/(kg m)]; None: left out.
+    numbering
+        The user's numbers of kept nodes and elements, and the sets.
+    kept
+        Kept nodes that have rotations; None: there are none.
+    recovery
+        Recovery matrices by name.
     """
 
     name: str
     units: Units
     frame: BodyFrame
-    M: Array  #: Phi.T M Phi, (n_q, n_q): identity, with zero diagonal entries for massless static shapes
-    K: Array  #: Phi.T K Phi, (n_q, n_q): diagonal of omega² [1/s²]
-    D: Array  #: modal damping, (n_q, n_q) [1/s]; zero if none was requested
-    labels: tuple[str, ...]  #: label of each mode: the sources of its energy
-    energy_shares: Array  #: share of each group of source columns in the energy of each mode, (n_q, n_sources)
-    sources: tuple[str, ...]  #: names of the groups of source columns, (n_sources,)
+    M: Array
+    K: Array
+    D: Array
+    labels: tuple[str, ...]
+    energy_shares: Array
+    sources: tuple[str, ...]
     moments: Moments
-    #: elastic frequencies of the unsupported reduced body (of a held body: as held), ascending [Hz]
     free_frequencies: Array
-    nodes: Array  #: kept nodes (surface, interfaces) in B, (n_kept, 3) [m]
-    #: indices of the kept nodes in the original model, (n_kept,); `numbering` has the user's numbers
+    nodes: Array
     node_ids: IntArray
-    Phi: Array  #: translations of the kept nodes in B, (n_kept, 3, n_q)
-    surface: IntArray  #: triangles of kept nodes, (n_tri, 3)
+    Phi: Array
+    surface: IntArray
     interfaces: tuple[ReducedInterface, ...]
-    provenance: Mapping[str, str] = field(default_factory=dict)  #: versions, digests, options, solver
-    columns: SourceColumns | None = None  #: columns of the mode set; None: not recorded
-    nodal_sums: NodalSums | None = None  #: data for a Buckens frame; None: not recorded
+    provenance: Mapping[str, str] = field(default_factory=dict)
+    columns: SourceColumns | None = None
+    nodal_sums: NodalSums | None = None
     load_cases: tuple[ReducedLoadCase, ...] = ()
-    #: stress of the modes at the kept nodes, xx yy zz yz xz xy in axes of B, (n_kept, 6, n_q) [Pa per unit of q]; None:
-    #: left out or unknown. It is zero at reference nodes, which belong to no element
     stress: Array | None = None
-    point_stress: PointStress | None = None  #: stress of the modes at named points; None: left out, or there are none
-    geometric: GeometricStiffness | None = None  #: for geometric stiffening; None: left out, or not known
-    #: g_kl of the kept nodes in B, displacement ½ Σ q_k q_l g_kl, (n_kept, 3, n_q, n_q) [1/(kg m)]; None: left out
+    point_stress: PointStress | None = None
+    geometric: GeometricStiffness | None = None
     quadratic: Array | None = None
-    #: the user's numbers of kept nodes and elements, and the sets
     numbering: Numbering = field(default_factory=Numbering)
-    kept: KeptPoints | None = None  #: kept nodes that have rotations; None: there are none
-    recovery: Mapping[str, RecoveryTable] = field(default_factory=dict)  #: recovery matrices by name
+    kept: KeptPoints | None = None
+    recovery: Mapping[str, RecoveryTable] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         where = f"reduced body {self.name!r}"

@@ -17,18 +17,32 @@ __all__ = ["ModeSet"]
 @presented
 @dataclass(frozen=True, eq=False)
 class ModeSet:
-    """Columns over all dofs of a coupled body, before the finishing step of `reduce`."""
+    """Columns over all dofs of a coupled body, before the finishing step of `reduce`.
 
-    name: str  #: key in the registry, such as "craig-bampton"
-    columns: Array  #: displacement columns, (n_dof, n_columns); `SpreadColumns` if the body is distributed over ranks
-    labels: tuple[str, ...]  #: label of each column, such as "constraint big_end ux", "fixed-interface 3"
-    #: frequency of each column in its own eigenvalue problem, (n_columns,) [Hz]; NaN for static columns
+    Parameters
+    ----------
+    name
+        Key in the registry, such as "craig-bampton".
+    columns
+        Displacement columns, (n_dof, n_columns); `SpreadColumns` if the body is distributed over ranks.
+    labels
+        Label of each column, such as "constraint big_end ux", "fixed-interface 3".
+    frequencies
+        Frequency of each column in its own eigenvalue problem, (n_columns,) [Hz]; NaN for static columns.
+    options
+        Requested options, and the solver that was used.
+    groups
+        Group of each column, such as "constraint big_end"; default: the label without its last word.
+    data
+        Numerical data of the set, such as Hankel singular values.
+    """
+
+    name: str
+    columns: Array
+    labels: tuple[str, ...]
     frequencies: Array
-    options: Mapping[str, str] = field(default_factory=dict)  #: requested options, and the solver that was used
-    groups: tuple[
-        str, ...
-    ] = ()  #: group of each column, such as "constraint big_end"; default: the label without its last word
-    #: numerical data of the set, such as Hankel singular values
+    options: Mapping[str, str] = field(default_factory=dict)
+    groups: tuple[str, ...] = ()
     data: Mapping[str, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -25,23 +25,48 @@ class BeamLine:
     Each law is a number, a `numpy.polynomial.Polynomial` of x, or a function of an array of x. Integrals of numbers and
     polynomials are exact between `breaks`. Functions are integrated as polynomials of degree 24.
 
+    Parameters
+    ----------
+    length
+        Length of the beam [m].
+    rho_A
+        Mass per length [kg/m].
+    EA
+        Axial stiffness [N].
+    EIy
+        Bending stiffness in the x-z plane, EI with I = ∫ z² dA [N m²].
+    EIz
+        Bending stiffness in the x-y plane, EI with I = ∫ y² dA [N m²].
+    GJ
+        Torsional stiffness [N m²].
+    rho_Iy
+        Rotary inertia per length, ∫ rho z² [kg m].
+    rho_Iz
+        Rotary inertia per length, ∫ rho y² [kg m].
+    GAy
+        Shear stiffness along y; infinite: sections stay normal to the axis [N].
+    GAz
+        Shear stiffness along z [N].
+    breaks
+        Ascending positions inside the length at which laws have a jump or a kink [m].
+
     Raises
     ------
     BodyError
         If the length is not positive, or the breaks are not ascending inside it; later, where a law is not positive.
     """
 
-    length: float  #: [m]
-    rho_A: Law  # noqa: N815  #: mass [kg/m]
-    EA: Law  #: axial stiffness [N]
-    EIy: Law  #: bending stiffness in the x-z plane, EI with I = ∫ z² dA [N m²]
-    EIz: Law  #: bending stiffness in the x-y plane, EI with I = ∫ y² dA [N m²]
-    GJ: Law  #: torsional stiffness [N m²]
-    rho_Iy: Law = 0.0  # noqa: N815  #: rotary inertia ∫ rho z² [kg m]
-    rho_Iz: Law = 0.0  # noqa: N815  #: rotary inertia ∫ rho y² [kg m]
-    GAy: Law = np.inf  #: shear stiffness along y; infinite: sections stay normal to the axis [N]
-    GAz: Law = np.inf  #: shear stiffness along z [N]
-    breaks: tuple[float, ...] = ()  #: ascending positions inside the length at which laws have a jump or a kink [m]
+    length: float
+    rho_A: Law  # noqa: N815
+    EA: Law
+    EIy: Law
+    EIz: Law
+    GJ: Law
+    rho_Iy: Law = 0.0  # noqa: N815
+    rho_Iz: Law = 0.0  # noqa: N815
+    GAy: Law = np.inf
+    GAz: Law = np.inf
+    breaks: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "length", float(self.length))

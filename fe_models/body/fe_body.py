@@ -173,15 +173,32 @@ class Interface:
     "rigid" (RBE2): the member nodes move rigidly with the reference node.
     "distributing" (RBE3): the reference node follows the weighted mean motion of the members.
     "nodes": every dof of every member node is a boundary dof.
+
+    Parameters
+    ----------
+    name
+        Name of the interface, unique on the body.
+    kind
+        "rigid", "distributing" or "nodes".
+    nodes
+        Member nodes, indices into `FEBody.nodes`, (n_members,).
+    reference
+        Reference point in mesh coordinates, (3,) [m].
+    triad
+        Interface axes as columns, in mesh axes, (3, 3).
+    weights
+        Weight of each member (its area), summing to 1, (n_members,); None: equal weights.
+    dofs
+        Boundary dofs, indices into `FEBody.dofs`; None until `couple` has created them.
     """
 
     name: str
     kind: str
-    nodes: IntArray  #: member nodes, indices into `FEBody.nodes`, (n_members,)
-    reference: Array  #: reference point in mesh coordinates, (3,) [m]
-    triad: Array = field(default_factory=lambda: np.eye(3))  #: interface axes as columns, in mesh axes, (3, 3)
-    weights: Array | None = None  #: weight of each member (its area), summing to 1, (n_members,); None: equal weights
-    dofs: IntArray | None = None  #: boundary dofs, indices into `FEBody.dofs`; None until `couple` has created them
+    nodes: IntArray
+    reference: Array
+    triad: Array = field(default_factory=lambda: np.eye(3))
+    weights: Array | None = None
+    dofs: IntArray | None = None
 
     def __post_init__(self) -> None:
         where = f"interface {self.name!r}"
@@ -269,6 +286,50 @@ class FEBody:
     Dof k is component `dofs[k, 1]` (0-2 translation, 3-5 rotation, `MULTIPLIER`) of node `dofs[k, 0]`, in mesh axes. A
     body is *coupled* if every interface has its boundary dofs (`cms.couple`). Mode sets need a coupled body.
 
+    Parameters
+    ----------
+    name
+        Name of the body.
+    M
+        Mass, (n_dof, n_dof) [kg, kg m²]; a `SpreadMatrix` if the body is distributed over ranks.
+    K
+        Stiffness, (n_dof, n_dof) [N/m, N m]; a `SpreadMatrix` if the body is distributed over ranks.
+    nodes
+        Positions in mesh axes, (n_nodes, 3) [m].
+    dofs
+        (node, component) of every dof, (n_dof, 2).
+    interfaces
+        Places at which neighbours connect to the body.
+    units
+        Unit system of all numbers of the body.
+    D
+        Viscous damping, (n_dof, n_dof) [N s/m, N m s].
+    surface
+        Triangles of nodes, (n_tri, 3).
+    element_model
+        None: bare matrices; only integrals that follow from the matrices are exact.
+    recovery
+        None: the dofs are the mesh dofs.
+    load_cases
+        Named loads over the dofs of this body.
+    stress_points
+        Stress at points that are not nodes; None: no such points.
+    node_volumes
+        Volume that each node represents, not negative, (n_nodes,) [m³]; None: unknown, all nodes with translations
+        count equally.
+    provenance
+        Origin of the body: file, digest, options.
+    is_held
+        Whether the body is intentionally held to the ground; a floating frame rejects it.
+    numbering
+        The user's numbers of nodes and elements, and the sets.
+    ties
+        Distributing interfaces inside the body.
+    mean_nodes
+        Nodes inside the body that follow the mean motion of others.
+    kept
+        Nodes that the reduced body keeps with translations and rotations, in addition to surface and interfaces, (n,).
+
     Raises
     ------
     BodyError
@@ -276,28 +337,24 @@ class FEBody:
     """
 
     name: str
-    M: sp.csc_array  #: mass, (n_dof, n_dof) [kg, kg m²]; a `SpreadMatrix` if the body is distributed over ranks
-    K: sp.csc_array  #: stiffness, (n_dof, n_dof) [N/m, N m]; a `SpreadMatrix` if the body is distributed over ranks
-    nodes: Array  #: positions in mesh axes, (n_nodes, 3) [m]
-    dofs: IntArray  #: (node, component) of every dof, (n_dof, 2)
+    M: sp.csc_array
+    K: sp.csc_array
+    nodes: Array
+    dofs: IntArray
     interfaces: tuple[Interface, ...] = ()
     units: Units = field(default_factory=lambda: unit_system("m-kg-s"))
-    D: sp.csc_array | None = None  #: viscous damping, (n_dof, n_dof) [N s/m, N m s]
-    surface: IntArray = field(default_factory=lambda: np.zeros((0, 3), np.int64))  #: triangles of nodes, (n_tri, 3)
-    #: None: bare matrices; only integrals that follow from the matrices are exact
+    D: sp.csc_array | None = None
+    surface: IntArray = field(default_factory=lambda: np.zeros((0, 3), np.int64))
     element_model: ElementModel | None = None
-    recovery: Recovery | None = None  #: None: the dofs are the mesh dofs
-    load_cases: tuple[LoadCase, ...] = ()  #: named loads over the dofs of this body
-    stress_points: StressPointModel | None = None  #: stress at points that are not nodes; None: no such points
-    #: volume that each node represents, not negative, (n_nodes,) [m³]; None: unknown, all nodes with translations count
-    #: equally
+    recovery: Recovery | None = None
+    load_cases: tuple[LoadCase, ...] = ()
+    stress_points: StressPointModel | None = None
     node_volumes: Array | None = None
-    provenance: Mapping[str, str] = field(default_factory=dict)  #: origin of the body: file, digest, options
-    is_held: bool = False  #: whether the body is intentionally held to the ground; a floating frame rejects it
-    numbering: Numbering = field(default_factory=Numbering)  #: the user's numbers of nodes and elements, and the sets
-    ties: tuple[Tie, ...] = ()  #: distributing interfaces inside the body
-    mean_nodes: tuple[MeanNode, ...] = ()  #: nodes inside the body that follow the mean motion of others
-    #: nodes that the reduced body keeps with translations and rotations, in addition to surface and interfaces, (n,)
+    provenance: Mapping[str, str] = field(default_factory=dict)
+    is_held: bool = False
+    numbering: Numbering = field(default_factory=Numbering)
+    ties: tuple[Tie, ...] = ()
+    mean_nodes: tuple[MeanNode, ...] = ()
     kept: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
 
     def summary(self) -> Summary:

@@ -22,11 +22,20 @@ class LoadCase:
     """A named load of unit amplitude: generalised forces over the dofs of its body.
 
     A coupling u_mesh = T u keeps the work and so transforms the forces to f = Tᵀ f_mesh; a reduction to Phiᵀ f.
+
+    Parameters
+    ----------
+    name
+        Name of the load case.
+    kind
+        Kind in one word, such as one of `LOAD_CASE_KINDS`.
+    f
+        Conjugate to the dofs of the body, mesh axes, (n_dof,) [N, N m].
     """
 
     name: str
-    kind: str  #: kind in one word, such as one of `LOAD_CASE_KINDS`
-    f: Array  #: conjugate to the dofs of the body, mesh axes, (n_dof,) [N, N m]
+    kind: str
+    f: Array
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "f", frozen(self.f))
@@ -41,13 +50,27 @@ class LoadCase:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ReducedLoadCase:
-    """A named load of unit amplitude on a reduced body: its resultant and its modal forces."""
+    """A named load of unit amplitude on a reduced body: its resultant and its modal forces.
+
+    Parameters
+    ----------
+    name
+        Name of the load case.
+    kind
+        Kind of the load case, such as "pressure", "gravity" or "force".
+    force
+        Resultant force in B, (3,) [N].
+    torque
+        Resultant about the undeformed origin of B, (3,) [N m].
+    h
+        Modal forces Phiᵀ f, (n_q,) [N per unit of Phi].
+    """
 
     name: str
     kind: str
-    force: Array  #: resultant in B, (3,) [N]
-    torque: Array  #: resultant about the undeformed origin of B, (3,) [N m]
-    h: Array  #: modal forces Phiᵀ f, (n_q,) [N per unit of Phi]
+    force: Array
+    torque: Array
+    h: Array
 
     def __post_init__(self) -> None:
         where = f"load case {self.name!r}"

@@ -30,6 +30,17 @@ SYMMETRY = 1e-9
 class Material:
     """Isotropic, linear elastic material.
 
+    Parameters
+    ----------
+    name
+        Name of the material, for messages and the record.
+    E
+        Young's modulus [Pa].
+    nu
+        Poisson's ratio [-].
+    rho
+        Density [kg/m³].
+
     Raises
     ------
     MaterialError
@@ -37,9 +48,9 @@ class Material:
     """
 
     name: str
-    E: float  #: Young's modulus [Pa]
-    nu: float  #: Poisson's ratio [-]
-    rho: float  #: density [kg/m³]
+    E: float
+    nu: float
+    rho: float
 
     def __post_init__(self) -> None:
         where = f"material {self.name!r}"
@@ -83,6 +94,21 @@ class OrthotropicMaterial:
     Pairs have the order 12, 13, 23. nu_12 is the contraction along 2 under stress along 1, so that nu_12 / E_1 = nu_21
     / E_2.
 
+    Parameters
+    ----------
+    name
+        Name of the material, for messages and the record.
+    young
+        Young's moduli E_1, E_2, E_3 [Pa].
+    shear
+        Shear moduli G_12, G_13, G_23 [Pa].
+    poisson
+        Poisson's ratios nu_12, nu_13, nu_23 [-].
+    rho
+        Density [kg/m³].
+    axes
+        Material axes 1, 2, 3 as rows, in mesh axes.
+
     Raises
     ------
     MaterialError
@@ -91,11 +117,11 @@ class OrthotropicMaterial:
     """
 
     name: str
-    young: tuple[float, float, float]  #: E_1, E_2, E_3 [Pa]
-    shear: tuple[float, float, float]  #: G_12, G_13, G_23 [Pa]
-    poisson: tuple[float, float, float]  #: nu_12, nu_13, nu_23 [-]
-    rho: float  #: density [kg/m³]
-    axes: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  #: rows 1, 2, 3
+    young: tuple[float, float, float]
+    shear: tuple[float, float, float]
+    poisson: tuple[float, float, float]
+    rho: float
+    axes: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
     def __post_init__(self) -> None:
         where = f"material {self.name!r}"
@@ -142,6 +168,17 @@ class OrthotropicMaterial:
 class AnisotropicMaterial:
     """Linear elastic material without any symmetry: 21 constants.
 
+    Parameters
+    ----------
+    name
+        Name of the material, for messages and the record.
+    elasticity
+        Maps strain to stress in the material axes, rows 11 22 33 23 13 12, engineering shear strains [Pa].
+    rho
+        Density [kg/m³].
+    axes
+        Material axes 1, 2, 3 as rows, in mesh axes.
+
     Raises
     ------
     MaterialError
@@ -150,11 +187,9 @@ class AnisotropicMaterial:
     """
 
     name: str
-    elasticity: tuple[
-        tuple[float, ...], ...
-    ]  #: maps strain to stress in the material axes, rows 11 22 33 23 13 12, engineering shear strains [Pa]
-    rho: float  #: density [kg/m³]
-    axes: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  #: rows 1, 2, 3
+    elasticity: tuple[tuple[float, ...], ...]
+    rho: float
+    axes: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
     def __post_init__(self) -> None:
         where = f"material {self.name!r}"

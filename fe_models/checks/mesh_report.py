@@ -90,30 +90,74 @@ class CellGeometry:
 @presented
 @dataclass(frozen=True, eq=False)
 class MeshReport(Report):
-    """Numbers of a mesh and findings about it."""
+    """Numbers of a mesh and findings about it.
+
+    Parameters
+    ----------
+    source
+        The file, or how the mesh was made.
+    units
+        Unit system of the numbers.
+    n_nodes
+        Number of nodes of solid cells.
+    n_unused_nodes
+        Number of nodes that belong to no solid cell.
+    n_cells
+        Number of cells by type.
+    lo
+        Bounding box of the used nodes, (3,) [m].
+    hi
+        Upper corner of the bounding box, (3,) [m].
+    volume
+        Volume of the cells [m³].
+    mass
+        [kg]; None: no material was given.
+    mass_centre
+        Centre of mass, (3,) [m].
+    n_parts
+        Number of parts without a common node.
+    part_cells
+        Number of cells of each part, largest first.
+    n_coincident
+        Number of nodes that coincide with another node.
+    inverted
+        Rows of cells with a Jacobian <= 0 at an integration point, by type.
+    degenerate
+        Rows of cells without volume, by type.
+    distorted
+        Rows of cells with a Jacobian <= 0 at a node only, by type.
+    findings
+        Faults of the mesh, and doubts about it.
+    first_order
+        None: no first-order cells, or not measured.
+    origin
+        Origin of the mesh, as the mesh states it.
+    angles
+        Smallest and largest angle between neighbouring faces of a cell [degrees].
+    lowest_jacobian
+        Smallest Jacobian of a cell divided by its mean, at integration points and nodes; 1 is best.
+    """
 
     source: str
     units: Units
-    n_nodes: int  #: number of nodes of solid cells
+    n_nodes: int
     n_unused_nodes: int
-    n_cells: Mapping[str, int]  #: number of cells by type
-    lo: Array  #: bounding box of the used nodes, (3,) [m]
-    hi: Array  #: (3,) [m]
-    volume: float  #: [m³]
-    mass: float | None  #: [kg]; None: no material was given
-    mass_centre: Array | None  #: (3,) [m]
-    n_parts: int  #: number of parts without a common node
-    part_cells: tuple[int, ...]  #: number of cells of each part, largest first
-    n_coincident: int  #: number of nodes that coincide with another node
-    inverted: Mapping[str, IntArray]  #: rows of cells with a Jacobian <= 0 at an integration point, by type
-    degenerate: Mapping[str, IntArray]  #: rows of cells without volume, by type
-    distorted: Mapping[str, IntArray]  #: rows of cells with a Jacobian <= 0 at a node only, by type
+    n_cells: Mapping[str, int]
+    lo: Array
+    hi: Array
+    volume: float
+    mass: float | None
+    mass_centre: Array | None
+    n_parts: int
+    part_cells: tuple[int, ...]
+    n_coincident: int
+    inverted: Mapping[str, IntArray]
+    degenerate: Mapping[str, IntArray]
+    distorted: Mapping[str, IntArray]
     findings: tuple[Finding, ...]
-    first_order: FirstOrderError | None = None  #: None: no first-order cells, or not measured
-    origin: Mapping[str, str] = field(default_factory=dict)  #: origin of the mesh, as the mesh states it
-    #: smallest and largest angle between neighbouring faces of a cell [degrees]
+    first_order: FirstOrderError | None = None
+    origin: Mapping[str, str] = field(default_factory=dict)
     angles: tuple[float, float] = (nan, nan)
-    #: smallest Jacobian of a cell divided by its mean, at integration points and nodes; 1 is best
     lowest_jacobian: float = nan
 
     def numbers(self) -> list[tuple[str, str]]:

@@ -11,11 +11,21 @@ __all__ = ["Finding", "Report"]
 
 @dataclass(frozen=True)
 class Finding:
-    """A fault of a mesh, or a doubt about it."""
+    """A fault of a mesh, or a doubt about it.
 
-    kind: str  #: "inverted", "degenerate", "parts", "overlap", "transition", "units"; others only warn
+    Parameters
+    ----------
+    kind
+        "inverted", "degenerate", "parts", "overlap", "transition", "units"; others only warn.
+    is_error
+        Whether the mesh is unusable; otherwise the finding is a warning.
+    text
+        Fault, place, and remedy.
+    """
+
+    kind: str
     is_error: bool
-    text: str  #: fault, place, and remedy
+    text: str
 
 
 class Report(ABC):

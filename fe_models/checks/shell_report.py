@@ -29,17 +29,41 @@ ASPECT_NOTED = 20.0  #: ratio of longest to shortest side above which a warning 
 @presented
 @dataclass(frozen=True, eq=False)
 class ShellReport(Report):
-    """Numbers of a mesh of shells, and findings about it."""
+    """Numbers of a mesh of shells, and findings about it.
+
+    Parameters
+    ----------
+    source
+        The file, or how the mesh was made.
+    units
+        Unit system of the numbers.
+    n_nodes
+        Number of nodes.
+    n_cells
+        Number of cells by type.
+    n_lines
+        Number of stiffener lines.
+    area
+        Area of the cells [m²].
+    warp
+        Largest warp of all quads [degree].
+    n_parts
+        Number of parts that are not joined by a cell, stiffener, link or spring.
+    n_free_edges
+        Number of edges that belong to one cell only.
+    findings
+        Faults of the mesh, and doubts about it.
+    """
 
     source: str
     units: Units
     n_nodes: int
-    n_cells: dict[str, int]  #: number of cells by type
-    n_lines: int  #: number of stiffener lines
-    area: float  #: [m²]
-    warp: float  #: largest warp of all quads [degree]
-    n_parts: int  #: number of parts that are not joined by a cell, stiffener, link or spring
-    n_free_edges: int  #: number of edges that belong to one cell only
+    n_cells: dict[str, int]
+    n_lines: int
+    area: float
+    warp: float
+    n_parts: int
+    n_free_edges: int
     findings: tuple[Finding, ...]
 
     def numbers(self) -> list[tuple[str, str]]:

@@ -17,12 +17,33 @@ class Units:
     """A coherent unit system: force = mass * length / time². Nothing is converted internally.
 
     The factors give the SI value of one unit: a length of 1 in this system is `length` metres.
+
+    Parameters
+    ----------
+    name
+        Key in `UNIT_SYSTEMS`, such as "mm-t-s".
+    length
+        [m] of one length unit.
+    mass
+        [kg] of one mass unit.
+    time
+        [s] of one time unit.
+    length_symbol
+        Symbol of the length unit, such as "mm".
+    mass_symbol
+        Symbol of the mass unit, such as "t".
+    time_symbol
+        Symbol of the time unit, such as "s".
+    force_symbol
+        Symbol of the force unit, such as "N".
+    stress_symbol
+        Symbol of the stress unit, such as "MPa".
     """
 
-    name: str  #: key in `UNIT_SYSTEMS`, such as "mm-t-s"
-    length: float  #: [m] of one length unit
-    mass: float  #: [kg] of one mass unit
-    time: float  #: [s] of one time unit
+    name: str
+    length: float
+    mass: float
+    time: float
     length_symbol: str
     mass_symbol: str
     time_symbol: str

@@ -23,27 +23,51 @@ __all__ = ["LineMesh", "divide_lines", "straight_line"]
 class LineMesh:
     """Nodes and two-node lines of one body.
 
+    Parameters
+    ----------
+    nodes
+        (n_nodes, 3), in the length unit of the model.
+    lines
+        End nodes, (n_lines, 2).
+    line_sets
+        Rows of `lines` of each group.
+    node_sets
+        Nodes of each group.
+    orientations
+        Vector towards the local y axis of each line, (n_lines, 3); NaN rows: default.
+    offsets
+        Vectors from node to axis end, mesh axes, (n_lines, 2, 3) [m]; None: zero.
+    source
+        File it was read from, or how it was made.
+    digest
+        sha256 of that file.
+    included
+        sha256 of each file that the source includes.
+    node_numbers
+        Numbers in the file, (n_nodes,); empty: none.
+    line_numbers
+        Numbers in the file, (n_lines,); empty: none.
+    notes
+        Descriptions of what the reader left out or changed.
+
     Raises
     ------
     BeamError
         If shapes do not fit, a line refers to an unknown node, or a coordinate is not finite.
     """
 
-    nodes: Array  #: (n_nodes, 3), in the length unit of the model
-    lines: IntArray  #: end nodes, (n_lines, 2)
-    line_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: rows of `lines` of each group
-    node_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: nodes of each group
-    orientations: Array | None = None  #: vector towards the local y axis of each line, (n_lines, 3); NaN rows: default
-    offsets: Array | None = None  #: vectors from node to axis end, mesh axes, (n_lines, 2, 3) [m]; None: zero
-    source: str = ""  #: file it was read from, or how it was made
-    digest: str = ""  #: sha256 of that file
-    #: sha256 of each file that the source includes
+    nodes: Array
+    lines: IntArray
+    line_sets: Mapping[str, IntArray] = field(default_factory=dict)
+    node_sets: Mapping[str, IntArray] = field(default_factory=dict)
+    orientations: Array | None = None
+    offsets: Array | None = None
+    source: str = ""
+    digest: str = ""
     included: Mapping[str, str] = field(default_factory=dict, kw_only=True)
-    #: numbers in the file, (n_nodes,); empty: none
     node_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
-    #: numbers in the file, (n_lines,); empty: none
     line_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
-    notes: tuple[str, ...] = ()  #: descriptions of what the reader left out or changed
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         put = object.__setattr__

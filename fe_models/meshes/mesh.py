@@ -30,26 +30,50 @@ FACE_TYPES = ("triangle", "triangle6", "quad", "quad8", "quad9")
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Nodes and cells of one body, in the node order of meshio (VTK)."""
+    """Nodes and cells of one body, in the node order of meshio (VTK).
 
-    nodes: Array  #: (n_nodes, 3), in the length unit of the model
-    cells: Mapping[str, IntArray]  #: solid cells by type in `SOLID_TYPES`, (n_cells, nodes per cell)
-    #: rows of `cells` of each group, by cell type
+    Parameters
+    ----------
+    nodes
+        (n_nodes, 3), in the length unit of the model.
+    cells
+        Solid cells by type in `SOLID_TYPES`, (n_cells, nodes per cell).
+    cell_sets
+        Rows of `cells` of each group, by cell type.
+    faces
+        Two-dimensional cells by type; they only serve to select nodes.
+    face_sets
+        Rows of `faces` of each group, by face type.
+    node_sets
+        Nodes of each group.
+    source
+        File it was read from, or how it was made.
+    digest
+        sha256 of that file.
+    included
+        sha256 of each file that the source includes.
+    node_numbers
+        Numbers in the file, (n_nodes,); empty: none.
+    cell_numbers
+        Numbers in the file, (n_cells,), by cell type.
+    notes
+        Descriptions of what the reader left out or changed.
+    origin
+        Origin of the mesh by label, such as the size of a geometry.
+    """
+
+    nodes: Array
+    cells: Mapping[str, IntArray]
     cell_sets: Mapping[str, Mapping[str, IntArray]] = field(default_factory=dict)
-    #: two-dimensional cells by type; they only serve to select nodes
     faces: Mapping[str, IntArray] = field(default_factory=dict)
-    #: rows of `faces` of each group, by face type
     face_sets: Mapping[str, Mapping[str, IntArray]] = field(default_factory=dict)
-    node_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: nodes of each group
-    source: str = ""  #: file it was read from, or how it was made
-    digest: str = ""  #: sha256 of that file
-    #: sha256 of each file that the source includes
+    node_sets: Mapping[str, IntArray] = field(default_factory=dict)
+    source: str = ""
+    digest: str = ""
     included: Mapping[str, str] = field(default_factory=dict, kw_only=True)
-    #: numbers in the file, (n_nodes,); empty: none
     node_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
-    cell_numbers: Mapping[str, IntArray] = field(default_factory=dict)  #: numbers in the file, (n_cells,), by cell type
-    notes: tuple[str, ...] = ()  #: descriptions of what the reader left out or changed
-    #: origin of the mesh by label, such as the size of a geometry
+    cell_numbers: Mapping[str, IntArray] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
     origin: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -16,20 +16,36 @@ __all__ = ["NodeCloud"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class NodeCloud:
-    """Nodes of solids, shells, beams or unknown elements; all nodes can be selected."""
+    """Nodes of solids, shells, beams or unknown elements; all nodes can be selected.
 
-    nodes: Array  #: (n_nodes, 3), in the length unit of the model
-    #: nodes of each group, including groups of lines and points
+    Parameters
+    ----------
+    nodes
+        (n_nodes, 3), in the length unit of the model.
+    node_sets
+        Nodes of each group, including groups of lines and points.
+    face_sets
+        Nodes of the faces of each group, by face type.
+    source
+        File it was read from.
+    digest
+        sha256 of that file.
+    included
+        sha256 of each file that the source includes.
+    node_numbers
+        Numbers in the file, (n_nodes,); empty: none.
+    notes
+        Descriptions of what the reader left out or changed.
+    """
+
+    nodes: Array
     node_sets: Mapping[str, IntArray] = field(default_factory=dict)
-    #: nodes of the faces of each group, by face type
     face_sets: Mapping[str, Mapping[str, IntArray]] = field(default_factory=dict)
-    source: str = ""  #: file it was read from
-    digest: str = ""  #: sha256 of that file
-    #: sha256 of each file that the source includes
+    source: str = ""
+    digest: str = ""
     included: Mapping[str, str] = field(default_factory=dict, kw_only=True)
-    #: numbers in the file, (n_nodes,); empty: none
     node_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
-    notes: tuple[str, ...] = ()  #: descriptions of what the reader left out or changed
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         put = object.__setattr__

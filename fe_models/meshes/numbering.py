@@ -28,12 +28,24 @@ NO_NUMBERS = frozen_int(np.zeros(0))  #: stands for unknown numbers
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class NamedSet:
-    """A set of the user, with the members that the body has kept."""
+    """A set of the user, with the members that the body has kept.
+
+    Parameters
+    ----------
+    name
+        Name of the set.
+    kind
+        "nodes" or "elements".
+    members
+        Rows of the nodes, or of the surface triangles of its elements, (n,).
+    size
+        Number of nodes or elements in the deck or mesh.
+    """
 
     name: str
-    kind: str  #: "nodes" or "elements"
-    members: IntArray  #: rows of the nodes, or of the surface triangles of its elements, (n,)
-    size: int  #: number of nodes or elements in the deck or mesh
+    kind: str
+    members: IntArray
+    size: int
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "members", frozen_int(self.members))
@@ -50,23 +62,31 @@ class Numbering:
     """The user's numbers of nodes and of elements at the surface, and the user's sets.
 
     An empty array means that the numbers are unknown. Messages then name nodes by their index, and say so.
+
+    Parameters
+    ----------
+    nodes
+        Number of each node, `NONE` where it has none, (n_nodes,).
+    on_skin
+        1: the row is a point of a skin (of beams or shells) that moves with the node of that number; 0: the row is the
+        node itself, (n_nodes,); empty: all rows are nodes.
+    elements
+        Number of the element behind each triangle, (n_tri,).
+    instances
+        Names that distinguish repeated numbers: instances of parts, or bodies that were joined.
+    node_instance
+        Instance of each node, `NONE` for none, (n_nodes,).
+    element_instance
+        Instance of the element of each triangle, `NONE` for none, (n_tri,).
+    sets
+        The user's sets of nodes and elements.
     """
 
-    nodes: IntArray = field(
-        default_factory=lambda: NO_NUMBERS
-    )  #: number of each node, `NONE` where it has none, (n_nodes,)
-    #: 1: the row is a point of a skin (of beams or shells) that moves with the node of that number; 0: the row is the
-    #: node itself, (n_nodes,); empty: all rows are nodes
+    nodes: IntArray = field(default_factory=lambda: NO_NUMBERS)
     on_skin: IntArray = field(default_factory=lambda: NO_NUMBERS)
-    elements: IntArray = field(
-        default_factory=lambda: NO_NUMBERS
-    )  #: number of the element behind each triangle, (n_tri,)
-    #: names that distinguish repeated numbers: instances of parts, or bodies that were joined
+    elements: IntArray = field(default_factory=lambda: NO_NUMBERS)
     instances: tuple[str, ...] = ()
-    node_instance: IntArray = field(
-        default_factory=lambda: NO_NUMBERS
-    )  #: instance of each node, `NONE` for none, (n_nodes,)
-    #: instance of the element of each triangle, `NONE` for none, (n_tri,)
+    node_instance: IntArray = field(default_factory=lambda: NO_NUMBERS)
     element_instance: IntArray = field(default_factory=lambda: NO_NUMBERS)
     sets: tuple[NamedSet, ...] = ()
 

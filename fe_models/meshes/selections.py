@@ -40,10 +40,17 @@ class FaceGroup:
 
     If the faces are facets of the solid, the nodes are those of the complete facets. Linear triangles over quadratic
     tetrahedra therefore select the middle nodes too.
+
+    Parameters
+    ----------
+    name
+        Name of the group of faces.
+    also
+        Further groups.
     """
 
     name: str
-    also: tuple[str, ...] = ()  #: further groups
+    also: tuple[str, ...] = ()
 
     def members(self, mesh: AnyMesh) -> IntArray:
         """Return the nodes of the groups, ascending."""
@@ -84,7 +91,13 @@ def _faces_of_group(mesh: Mesh | ShellMesh | NodeCloud, name: str) -> dict[str, 
 
 @dataclass(frozen=True)
 class NodeSet:
-    """The nodes of a named node set."""
+    """The nodes of a named node set.
+
+    Parameters
+    ----------
+    name
+        Name of the set of nodes.
+    """
 
     name: str
 
@@ -105,7 +118,13 @@ class NodeSet:
 @presented
 @dataclass(frozen=True)
 class NodeNumbers:
-    """Nodes selected by their numbers in the file."""
+    """Nodes selected by their numbers in the file.
+
+    Parameters
+    ----------
+    numbers
+        The user's numbers of the nodes.
+    """
 
     numbers: tuple[int, ...]
 
@@ -130,11 +149,20 @@ class NodeNumbers:
 
 @dataclass(frozen=True)
 class Plane:
-    """The surface nodes on a plane."""
+    """The surface nodes on a plane.
 
-    point: Vector  #: [m]
-    normal: Vector  #: normal vector of any length
-    #: largest distance from the plane [m]; None: 1e-6 of the diagonal of the bounding box
+    Parameters
+    ----------
+    point
+        Point of the plane, (3,) [m].
+    normal
+        Normal vector of any length.
+    tolerance
+        Largest distance from the plane [m]; None: 1e-6 of the diagonal of the bounding box.
+    """
+
+    point: Vector
+    normal: Vector
     tolerance: float | None = None
 
     def members(self, mesh: AnyMesh) -> IntArray:
@@ -156,13 +184,27 @@ class Plane:
 
 @dataclass(frozen=True)
 class Cylinder:
-    """The surface nodes on the curved surface of a cylinder."""
+    """The surface nodes on the curved surface of a cylinder.
 
-    point: Vector  #: point on the axis [m]
-    axis: Vector  #: axis vector of any length
-    radius: float  #: [m]
-    span: tuple[float, float] | None = None  #: range along the axis from `point` [m]; None: no limit
-    tolerance: float | None = None  #: largest difference from the radius [m]; None: 1e-3 of the radius
+    Parameters
+    ----------
+    point
+        Point on the axis [m].
+    axis
+        Axis vector of any length.
+    radius
+        Radius [m].
+    span
+        Range along the axis from `point` [m]; None: no limit.
+    tolerance
+        Largest difference from the radius [m]; None: 1e-3 of the radius.
+    """
+
+    point: Vector
+    axis: Vector
+    radius: float
+    span: tuple[float, float] | None = None
+    tolerance: float | None = None
 
     def members(self, mesh: AnyMesh) -> IntArray:
         """Return the surface nodes within the tolerance, ascending.
@@ -197,10 +239,18 @@ class Cylinder:
 
 @dataclass(frozen=True)
 class Box:
-    """The surface nodes inside a box whose edges are parallel to the mesh axes."""
+    """The surface nodes inside a box whose edges are parallel to the mesh axes.
 
-    lo: Vector  #: [m]
-    hi: Vector  #: [m]
+    Parameters
+    ----------
+    lo
+        Corner with the smallest coordinates, (3,) [m].
+    hi
+        Corner with the largest coordinates, (3,) [m].
+    """
+
+    lo: Vector
+    hi: Vector
 
     def members(self, mesh: AnyMesh) -> IntArray:
         """Return the surface nodes inside the box, ascending; its walls are moved outward by 1e-9 of the body size."""
@@ -223,9 +273,15 @@ class Box:
 
 @dataclass(frozen=True)
 class NearestNode:
-    """The surface node nearest to a point."""
+    """The surface node nearest to a point.
 
-    point: Vector  #: [m]
+    Parameters
+    ----------
+    point
+        Point to which the node is nearest, (3,) [m].
+    """
+
+    point: Vector
 
     def members(self, mesh: AnyMesh) -> IntArray:
         """Return that node, (1,)."""

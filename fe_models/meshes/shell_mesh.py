@@ -21,30 +21,54 @@ FLAT_TYPES = ("triangle", "quad")  #: meshio names and node order
 class ShellMesh:
     """Nodes and flat cells of one body; lines between its nodes may stiffen it.
 
+    Parameters
+    ----------
+    nodes
+        (n_nodes, 3), in the length unit of the model.
+    cells
+        Cells by type in `FLAT_TYPES`, (n_cells, 3) and (n_cells, 4).
+    cell_sets
+        Rows of `cells` of each group, by cell type.
+    lines
+        End nodes of stiffeners, (n_lines, 2).
+    line_sets
+        Rows of `lines` of each group.
+    node_sets
+        Nodes of each group.
+    source
+        File it was read from, or how it was made.
+    digest
+        sha256 of that file.
+    included
+        sha256 of each file that the source includes.
+    node_numbers
+        Numbers in the file, (n_nodes,); empty: none.
+    cell_numbers
+        Numbers in the file, (n_cells,), by cell type.
+    line_numbers
+        Numbers in the file, (n_lines,); empty: none.
+    notes
+        Descriptions of what the reader left out or changed.
+
     Raises
     ------
     ShellError
         If shapes do not fit, a cell refers to an unknown node, or a coordinate is not finite.
     """
 
-    nodes: Array  #: (n_nodes, 3), in the length unit of the model
-    cells: Mapping[str, IntArray]  #: by type in `FLAT_TYPES`, (n_cells, 3) and (n_cells, 4)
-    #: rows of `cells` of each group, by cell type
+    nodes: Array
+    cells: Mapping[str, IntArray]
     cell_sets: Mapping[str, Mapping[str, IntArray]] = field(default_factory=dict)
-    #: end nodes of stiffeners, (n_lines, 2)
     lines: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
-    line_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: rows of `lines` of each group
-    node_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: nodes of each group
-    source: str = ""  #: file it was read from, or how it was made
-    digest: str = ""  #: sha256 of that file
-    #: sha256 of each file that the source includes
+    line_sets: Mapping[str, IntArray] = field(default_factory=dict)
+    node_sets: Mapping[str, IntArray] = field(default_factory=dict)
+    source: str = ""
+    digest: str = ""
     included: Mapping[str, str] = field(default_factory=dict, kw_only=True)
-    #: numbers in the file, (n_nodes,); empty: none
     node_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
-    cell_numbers: Mapping[str, IntArray] = field(default_factory=dict)  #: numbers in the file, (n_cells,), by cell type
-    #: numbers in the file, (n_lines,); empty: none
+    cell_numbers: Mapping[str, IntArray] = field(default_factory=dict)
     line_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
-    notes: tuple[str, ...] = ()  #: descriptions of what the reader left out or changed
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         put = object.__setattr__

@@ -28,10 +28,20 @@ SomeMesh = Mesh | LineMesh | ShellMesh
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """Common boundary of two parts."""
+    """Common boundary of two parts.
 
-    name: str  #: name of the node set in both parts
-    point: Array  #: area centroid of the common facets, or the mean of the nodes for lines, (3,) [m]
+    Parameters
+    ----------
+    name
+        Name of the node set in both parts.
+    point
+        Area centroid of the common facets, or the mean of the nodes for lines, (3,) [m].
+    n_nodes
+        Number of nodes on the cut.
+    """
+
+    name: str
+    point: Array
     n_nodes: int
 
     def __post_init__(self) -> None:
@@ -41,11 +51,21 @@ class Cut:
 @presented
 @dataclass(frozen=True, eq=False)
 class Split(Generic[AnyMesh]):
-    """A mesh in parts along an axis; cut k is between parts k and k + 1, counted from 1."""
+    """A mesh in parts along an axis; cut k is between parts k and k + 1, counted from 1.
+
+    Parameters
+    ----------
+    parts
+        The meshes of the parts.
+    cuts
+        The cuts between the parts.
+    axis
+        Unit vector, (3,).
+    """
 
     parts: tuple[AnyMesh, ...]
     cuts: tuple[Cut, ...]
-    axis: Array  #: unit vector, (3,)
+    axis: Array
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", frozen(self.axis))

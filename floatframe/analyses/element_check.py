@@ -34,11 +34,21 @@ AXES = "xyz"
 
 @dataclass(frozen=True)
 class ElementCheck:
-    """The findings on an element."""
+    """The findings on an element.
+
+    Parameters
+    ----------
+    name
+        Name of the element.
+    findings
+        Description of each fault, one sentence each.
+    derivative_error
+        Largest difference from finite differences, relative to the largest entry of the row.
+    """
 
     name: str
-    findings: tuple[str, ...]  #: description of each fault, one sentence each
-    derivative_error: float  #: largest difference from finite differences, relative to the largest entry of the row
+    findings: tuple[str, ...]
+    derivative_error: float
 
     @property
     def is_good(self) -> bool:

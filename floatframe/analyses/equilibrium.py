@@ -91,16 +91,36 @@ PATIENCE = 40
 @presented
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """A state in which all forces balance."""
+    """A state in which all forces balance.
 
-    state: State  #: with the velocities of the steady rotation, zero at rest
-    u_dot: Array  #: accelerations of the steady rotation, zero at rest, (n_u,)
-    w: Array  #: wrenches of joints and spring-dampers on their markers A, in ground axes, (n_w,)
-    omega: Array  #: angular velocity of the steady rotation in ground axes, (3,) [rad/s]; zero at rest
-    residual: float  #: largest unbalanced force, relative to the acting forces
+    Parameters
+    ----------
+    state
+        State with the velocities of the steady rotation, zero at rest.
+    u_dot
+        Accelerations of the steady rotation, zero at rest, (n_u,).
+    w
+        Wrenches of joints and spring-dampers on their markers A, in ground axes, (n_w,).
+    omega
+        Angular velocity of the steady rotation in ground axes, (3,) [rad/s]; zero at rest.
+    residual
+        Largest unbalanced force, relative to the acting forces.
+    n_iterations
+        Number of iterations.
+    validity
+        Notes on bodies beyond the linear range of their frame, as for a motion.
+    t
+        Time at which all functions of time are evaluated [s].
+    """
+
+    state: State
+    u_dot: Array
+    w: Array
+    omega: Array
+    residual: float
     n_iterations: int
-    validity: tuple[ValidityNote, ...] = ()  #: notes on bodies beyond the linear range of their frame, as for a motion
-    t: float = 0.0  #: time at which all functions of time are evaluated [s]
+    validity: tuple[ValidityNote, ...] = ()
+    t: float = 0.0
 
 
 @dataclass(eq=False)

@@ -55,25 +55,55 @@ NO_WAY = 1e-11  #: size of an iteration below which the search has ended
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """Desired position or orientation of a marker, or both, in ground axes."""
+    """Desired position or orientation of a marker, or both, in ground axes.
+
+    Parameters
+    ----------
+    marker
+        Marker that is to be brought to the target.
+    position
+        (3,) [m]; None: any position.
+    rotation
+        Axes as columns, (3, 3); None: any orientation.
+    weight
+        Relative to other targets, above zero.
+    """
 
     marker: Marker
-    position: Array | Sequence[float] | None = None  #: (3,) [m]; None: any position
-    rotation: Array | None = None  #: axes as columns, (3, 3); None: any orientation
-    weight: float = 1.0  #: relative to other targets, above zero
+    position: Array | Sequence[float] | None = None
+    rotation: Array | None = None
+    weight: float = 1.0
 
 
 @presented
 @dataclass(frozen=True, eq=False)
 class ReachedPose:
-    """The result of inverse kinematics."""
+    """The result of inverse kinematics.
 
-    state: State  #: of the system, at rest
-    coordinates: Mapping[str, float]  #: of all joints, by "joint.coordinate"
-    position_error: float  #: largest distance from a target position [m]
-    rotation_error: float  #: largest rotation from a target orientation [rad]
-    is_reached: bool  #: whether all targets are met within the tolerance
-    at_limits: tuple[str, ...]  #: coordinates that are at a limit
+    Parameters
+    ----------
+    state
+        State of the system, at rest.
+    coordinates
+        Coordinates of all joints, by "joint.coordinate".
+    position_error
+        Largest distance from a target position [m].
+    rotation_error
+        Largest rotation from a target orientation [rad].
+    is_reached
+        Whether all targets are met within the tolerance.
+    at_limits
+        Coordinates that are at a limit.
+    n_iterations
+        Number of iterations.
+    """
+
+    state: State
+    coordinates: Mapping[str, float]
+    position_error: float
+    rotation_error: float
+    is_reached: bool
+    at_limits: tuple[str, ...]
     n_iterations: int
 
 

@@ -33,6 +33,13 @@ class EnergyMomentum(DiscreteScheme):
     Velocities fulfil joints in the mean over a step, at its ends to second order; accelerations and reactions in the
     results are those of the equations of motion at the output times, for velocities that fulfil the joints.
 
+    Parameters
+    ----------
+    tolerance
+        Largest last correction over the increments of the step.
+    max_iterations
+        Largest number of Newton iterations in a step.
+
     References
     ----------
     .. [1] Simo & Wong (1991), International Journal for Numerical Methods in Engineering 31, 19-52: the rigid body.
@@ -41,7 +48,7 @@ class EnergyMomentum(DiscreteScheme):
        constraints.
     """
 
-    tolerance: float = 1e-11  #: largest last correction over the increments of the step
+    tolerance: float = 1e-11
     max_iterations: int = 25
 
     def __post_init__(self) -> None:
@@ -71,13 +78,22 @@ class EnergyDecaying(DiscreteScheme):
     of Armero & Romero (2001) [1]_; the filter by frequency, which makes it of second order, is possible because K is
     constant here.
 
+    Parameters
+    ----------
+    rho_inf
+        Spectral radius of modes far above 1/h, 0 <= rho_inf <= 1; 1: `EnergyMomentum`.
+    tolerance
+        Largest last correction over the increments of the step.
+    max_iterations
+        Largest number of Newton iterations in a step.
+
     References
     ----------
     .. [1] Computer Methods in Applied Mechanics and Engineering 190, 2603-2649.
     """
 
-    rho_inf: float = 0.5  #: spectral radius of modes far above 1/h, 0 <= rho_inf <= 1; 1: `EnergyMomentum`
-    tolerance: float = 1e-11  #: largest last correction over the increments of the step
+    rho_inf: float = 0.5
+    tolerance: float = 1e-11
     max_iterations: int = 25
 
     def __post_init__(self) -> None:

@@ -81,6 +81,26 @@ class GeneralizedAlpha:
     another. The `h` of `integrate` is then the distance of output times and the longest step; output times are met
     exactly, by equal steps from one to the next.
 
+    Parameters
+    ----------
+    rho_inf
+        Spectral radius at infinite frequency, 0 <= rho_inf <= 1; 1: no numerical damping, so that reactions of joints
+        oscillate permanently by O(h).
+    tolerance
+        Largest last correction relative to the displacement due to the accelerations of the step.
+    max_iterations
+        Largest number of Newton iterations in a step.
+    error_tolerance
+        Largest local error of a body in a step relative to the size of the connected bodies; None: fixed step.
+    h_min
+        Smallest size of a divided step, after failure or at a contact [s]; None: a millionth of h, without division of
+        fixed steps in systems without contacts and dry friction.
+    parameters
+        alpha_m, alpha_f, beta, gamma instead of those from rho_inf (see `newmark`, `hht`).
+    stabilized
+        Enforce velocities of joints as well as positions, and integrate the spin of axisymmetric bodies separately;
+        False: the equations of reference 2 unchanged, whose steps sensitivities differentiate.
+
     References
     ----------
     .. [1] Arnold & Bruels (2007), Multibody System Dynamics 18, 185-202.
@@ -89,21 +109,12 @@ class GeneralizedAlpha:
        Negrut et al. memory to the index-3 equations of HHT, for all parameters; derived above.
     """
 
-    #: spectral radius at infinite frequency, 0 <= rho_inf <= 1; 1: no numerical damping, so that reactions of joints
-    #: oscillate permanently by O(h)
     rho_inf: float = 0.8
-    #: largest last correction relative to the displacement due to the accelerations of the step
     tolerance: float = 1e-8
     max_iterations: int = 25
-    #: largest local error of a body in a step relative to the size of the connected bodies; None: fixed step
     error_tolerance: float | None = None
-    #: smallest size of a divided step, after failure or at a contact [s]; None: a millionth of h, without division of
-    #: fixed steps in systems without contacts and dry friction
     h_min: float | None = None
-    #: alpha_m, alpha_f, beta, gamma instead of those from rho_inf (see `newmark`, `hht`)
     parameters: tuple[float, float, float, float] | None = None
-    #: enforce velocities of joints as well as positions, and integrate the spin of axisymmetric bodies separately;
-    #: False: the equations of reference 2 unchanged, whose steps sensitivities differentiate
     stabilized: bool = True
 
     def __post_init__(self) -> None:

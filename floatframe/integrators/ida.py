@@ -55,13 +55,20 @@ class Ida:
 
     Needs the extra `ida`: pip install "floatframe[ida]".
 
+    Parameters
+    ----------
+    rtol
+        Relative tolerance of a step.
+    atol
+        Absolute tolerance of a step, in the units of the system.
+
     References
     ----------
     .. [1] Hindmarsh et al. (2005), ACM Transactions on Mathematical Software 31, 363-396.
     """
 
-    rtol: float = 1e-8  #: relative tolerance of a step
-    atol: float = 1e-10  #: absolute tolerance of a step, in the units of the system
+    rtol: float = 1e-8
+    atol: float = 1e-10
 
     def __post_init__(self) -> None:
         for name in ("rtol", "atol"):

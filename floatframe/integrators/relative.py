@@ -47,17 +47,32 @@ class RelativeGeneralizedAlpha:
     Trees have no constraints: joints stay closed to rounding, positions, velocities and accelerations alike. Loops are
     closed by the constraints of their cut joints, of index 3, and begin as those of `GeneralizedAlpha` do. The error
     that steers the step is that of the unknowns, measured by how it moves the bodies, as there.
+
+    Parameters
+    ----------
+    rho_inf
+        Spectral radius at infinite frequency, 0 <= rho_inf <= 1.
+    tolerance
+        Largest last correction relative to the displacement due to the accelerations of the step.
+    max_iterations
+        Largest number of Newton iterations in a step.
+    error_tolerance
+        Largest local error of a body in a step, as in `GeneralizedAlpha`.
+    h_min
+        Smallest size of a divided step after failure [s]; None as in `GeneralizedAlpha`.
+    parameters
+        alpha_m, alpha_f, beta, gamma instead of those from rho_inf.
+    stabilized
+        Enforce velocities of joints that close loops as well as positions.
     """
 
-    rho_inf: float = 0.8  #: spectral radius at infinite frequency, 0 <= rho_inf <= 1
-    #: largest last correction relative to the displacement due to the accelerations of the step
+    rho_inf: float = 0.8
     tolerance: float = 1e-8
     max_iterations: int = 25
-    error_tolerance: float | None = None  #: largest local error of a body in a step, as in `GeneralizedAlpha`
-    h_min: float | None = None  #: smallest size of a divided step after failure [s]; None as in `GeneralizedAlpha`
-    #: alpha_m, alpha_f, beta, gamma instead of those from rho_inf
+    error_tolerance: float | None = None
+    h_min: float | None = None
     parameters: tuple[float, float, float, float] | None = None
-    stabilized: bool = True  #: enforce velocities of joints that close loops as well as positions
+    stabilized: bool = True
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parameters", self.absolute.parameters)

@@ -68,11 +68,20 @@ class RelativeOde:
     elements and user forces are unknowns of the solver beside coordinates and rates; multipliers of elements, and
     friction by the force in its joint, are found with the reactions by Newton's method. Elements that feel
     accelerations are for `RelativeGeneralizedAlpha`.
+
+    Parameters
+    ----------
+    method
+        "BDF", "Radau" or "LSODA" for stiff systems; "DOP853", "RK45" for others.
+    rtol
+        Relative tolerance of a step.
+    atol
+        Absolute tolerance of a step, in the units of the system.
     """
 
-    method: str = "BDF"  #: "BDF", "Radau" or "LSODA" for stiff systems; "DOP853", "RK45" for others
-    rtol: float = 1e-8  #: relative tolerance of a step
-    atol: float = 1e-10  #: absolute tolerance of a step, in the units of the system
+    method: str = "BDF"
+    rtol: float = 1e-8
+    atol: float = 1e-10
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:

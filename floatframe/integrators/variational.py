@@ -37,13 +37,20 @@ class Variational(DiscreteScheme):
 
     Friction by the normal force of a joint is refused.
 
+    Parameters
+    ----------
+    tolerance
+        Largest last correction over the increments of the step.
+    max_iterations
+        Largest number of Newton iterations in a step.
+
     References
     ----------
     .. [1] Bou-Rabee & Marsden (2009), Foundations of Computational Mathematics 9, 197-219.
     .. [2] Leyendecker, Marsden & Ortiz (2008), Journal of Applied Mathematics and Mechanics (ZAMM) 88, 677-708.
     """
 
-    tolerance: float = 1e-11  #: largest last correction over the increments of the step
+    tolerance: float = 1e-11
     max_iterations: int = 25
 
     def __post_init__(self) -> None:

@@ -20,20 +20,34 @@ class State:
     """Positions and velocities of all bodies, in the order of the system.
 
     For each body i, u contains v_GO in ground axes (3), omega_B in body axes (3), and q_dot (n_q of the body).
+
+    Parameters
+    ----------
+    r
+        Position of the frame origins, ground axes, (n_b, 3) [m].
+    p
+        Euler parameters (w, x, y, z) of R_GB, (n_b, 4).
+    q
+        Modal coordinates of all bodies, (n_q,).
+    u
+        Velocities, (6 n_b + n_q,).
+    w
+        Unknowns of the connections, (n_w,), such as those of an equilibrium; they include the states of elements and
+        user forces; None: initial values.
+    angle
+        Angles between bodies, counted through full turns, (n_angles,) [rad], such as those of a motion before; None, or
+        of another number: they begin between -pi and pi.
+    watched
+        Errors of steps and energy up to here, as the watch of a run has found them; a run that continues from here in
+        time is judged with that run as one motion; None: unknown.
     """
 
-    r: Array  #: position of the frame origins, ground axes, (n_b, 3) [m]
-    p: Array  #: Euler parameters (w, x, y, z) of R_GB, (n_b, 4)
-    q: Array  #: modal coordinates of all bodies, (n_q,)
-    u: Array  #: velocities, (6 n_b + n_q,)
-    #: unknowns of the connections, (n_w,), such as those of an equilibrium; they include the states of elements and
-    #: user forces; None: initial values
+    r: Array
+    p: Array
+    q: Array
+    u: Array
     w: Array | None = None
-    #: angles between bodies, counted through full turns, (n_angles,) [rad], such as those of a motion before; None, or
-    #: of another number: they begin between -pi and pi
     angle: Array | None = None
-    #: errors of steps and energy up to here, as the watch of a run has found them; a run that continues from here in
-    #: time is judged with that run as one motion; None: unknown
     watched: Mapping[str, Any] | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:

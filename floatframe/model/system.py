@@ -77,6 +77,43 @@ class Named(Protocol):
 class System:
     """Bodies, the joints between them and the forces on them.
 
+    Parameters
+    ----------
+    bodies
+        Bodies of the system; the ground is none of them.
+    joints
+        Couplers among them are moved to `couplers`.
+    forces
+        Forces, springs and loads.
+    units
+        Unit system of all numbers of the system.
+    name
+        Name of the system.
+    redundant
+        Redundant constraints: "refuse" rejects them with their names, "minimum-norm" distributes their reactions.
+    couplers
+        Couplers between coordinates of joints.
+    elements
+        Public elements, see `floatframe.model.elements`.
+    sensors
+        Quantities measured on its motions.
+    inputs
+        Forces that act as inputs when the system is linearised.
+    outputs
+        Observed quantities of the linearised system.
+    events
+        Actions of a run when a value passes a level.
+    fmus
+        Units of other programs, see `co_simulate`.
+    scene
+        Surroundings: ground, road, track.
+    source
+        Path of the system file, for the record; "": the system was made in Python.
+    data_files
+        Paths of base files, signals, tyres, roads and states that were used.
+    changes
+        Values that replaced those in the system file, by parameter or key path.
+
     Raises
     ------
     ModelError
@@ -85,27 +122,21 @@ class System:
     """
 
     bodies: Sequence[Body]
-    joints: Sequence[Joint] = ()  #: couplers among them are moved to `couplers`
+    joints: Sequence[Joint] = ()
     forces: Sequence[Force] = ()
     units: Units = field(default_factory=lambda: unit_system("m-kg-s"))
     name: str = "system"
-    #: redundant constraints: "refuse" rejects them with their names, "minimum-norm" distributes their reactions
     redundant: str = "refuse"
-    couplers: Sequence[CoordinateCoupler] = ()  #: couplers between coordinates of joints
-    elements: Sequence[Element] = field(default=(), kw_only=True)  #: public elements, see `floatframe.model.elements`
-    sensors: Sequence[Named] = field(default=(), kw_only=True)  #: quantities measured on its motions
-    #: forces that act as inputs when the system is linearised
+    couplers: Sequence[CoordinateCoupler] = ()
+    elements: Sequence[Element] = field(default=(), kw_only=True)
+    sensors: Sequence[Named] = field(default=(), kw_only=True)
     inputs: Sequence[Named] = field(default=(), kw_only=True)
-    outputs: Sequence[Named] = field(default=(), kw_only=True)  #: observed quantities of the linearised system
-    events: Sequence[Named] = field(default=(), kw_only=True)  #: actions of a run when a value passes a level
-    fmus: Sequence[Named] = field(default=(), kw_only=True)  #: units of other programs, see `co_simulate`
-    scene: Sequence[Shape | Geometry] = field(default=(), kw_only=True)  #: surroundings: ground, road, track
-    #: path of the system file, for the record; "": the system was made in Python
+    outputs: Sequence[Named] = field(default=(), kw_only=True)
+    events: Sequence[Named] = field(default=(), kw_only=True)
+    fmus: Sequence[Named] = field(default=(), kw_only=True)
+    scene: Sequence[Shape | Geometry] = field(default=(), kw_only=True)
     source: str = field(default="", kw_only=True)
-    data_files: Sequence[str] = field(
-        default=(), kw_only=True
-    )  #: paths of base files, signals, tyres, roads and states that were used
-    #: values that replaced those in the system file, by parameter or key path
+    data_files: Sequence[str] = field(default=(), kw_only=True)
     changes: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
 
     def __post_init__(self) -> None:

@@ -27,13 +27,27 @@ __all__ = ["ElementMotion", "element_motion", "placed_law"]
 @presented
 @dataclass(frozen=True, eq=False)
 class ElementMotion:
-    """Outputs, states and multipliers of an element over time, by name, (n_t,) each, and its wrenches."""
+    """Outputs, states and multipliers of an element over time, by name, (n_t,) each, and its wrenches.
 
-    t: Array  #: (n_t,) [s]
+    Parameters
+    ----------
+    t
+        Times, (n_t,) [s].
+    outputs
+        Outputs by name, (n_t,) each.
+    states
+        States by name, (n_t,) each.
+    multipliers
+        Multipliers by name, (n_t,) each.
+    wrench
+        Force and moment on the body of each marker, ground axes, (n_t, n_markers, 6) [N, N m].
+    """
+
+    t: Array
     outputs: Mapping[str, Array]
     states: Mapping[str, Array]
     multipliers: Mapping[str, Array]
-    wrench: Array  #: force and moment on the body of each marker, ground axes, (n_t, n_markers, 6) [N, N m]
+    wrench: Array
 
 
 def placed_law(system: System, name: str, where: str = "element_motion") -> PlacedLaw:

@@ -85,13 +85,27 @@ class Drift:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """A motion, in memory or on disk (arrays are then read on demand)."""
+    """A motion, in memory or on disk (arrays are then read on demand).
+
+    Parameters
+    ----------
+    head
+        Content of the results file besides arrays.
+    source
+        Arrays of the motion, in memory or in files.
+    is_complete
+        False for a run that was interrupted.
+    path
+        Results file, or None for a motion in memory.
+    validity
+        Notes of the run about its own validity, see `ValidityNote`.
+    """
 
     head: Head
     source: ArraySource
-    is_complete: bool  #: False for a run that was interrupted
-    path: Path | None = None  #: results file, or None for a motion in memory
-    validity: tuple[ValidityNote, ...] = ()  #: notes of the run about its own validity, see `ValidityNote`
+    is_complete: bool
+    path: Path | None = None
+    validity: tuple[ValidityNote, ...] = ()
 
     def summary(self) -> Summary:
         """Return what `repr` and notebooks show: times, bodies, joints and notes of the run."""

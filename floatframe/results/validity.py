@@ -26,18 +26,41 @@ class ValidityNote:
     that the steps do not resolve ("frequency", "knots" of a table, "law"), and for each bushing and bearing with large
     angles ("angles", "tilt": the difference between interpretations of the angles). These have their place in the
     system instead of a body.
+
+    Parameters
+    ----------
+    body
+        Name of the body, or the place in the system.
+    kind
+        One of `KINDS`.
+    limit
+        The limit that was exceeded.
+    largest
+        Largest value so far; rotation in rad, otherwise a ratio.
+    t_first
+        Time at which the limit was first exceeded [s].
+    t_largest
+        Time of the largest value [s].
+    is_stiffened
+        Whether the body has geometric stiffness in this run.
+    has_matrices
+        Whether the reduced body has geometric stiffness.
+    in_mean_axes
+        The same rotation relative to mean axes, if the body has another frame; -1: unknown.
+    advice
+        Remedy for steps or energy; for functions of time: problem and remedy.
     """
 
     body: str
-    kind: str  #: one of `KINDS`
+    kind: str
     limit: float
-    largest: float  #: largest value so far; rotation in rad, otherwise a ratio
-    t_first: float  #: time at which the limit was first exceeded [s]
-    t_largest: float  #: time of the largest value [s]
+    largest: float
+    t_first: float
+    t_largest: float
     is_stiffened: bool = False
-    has_matrices: bool = False  #: whether the reduced body has geometric stiffness
-    in_mean_axes: float = -1.0  #: the same rotation relative to mean axes, if the body has another frame; -1: unknown
-    advice: str = ""  #: remedy for steps or energy; for functions of time: problem and remedy
+    has_matrices: bool = False
+    in_mean_axes: float = -1.0
+    advice: str = ""
 
     @classmethod
     def of_law(cls, kind: str, words: str, t: float) -> "ValidityNote":

@@ -68,19 +68,44 @@ class Event:
     The time where a value passes its level is found to `tolerance` by steps of other sizes. A force or an element is
     off at the start if the first event that names it switches it on; a coupler (a latch, a clutch) if it is not
     `engaged`. An event that only records does not change the motion, bit for bit.
+
+    Parameters
+    ----------
+    name
+        Name of the event, unique in the system.
+    watch
+        Name of a sensor of the system, or "joint.coordinate"; "": the event has a time.
+    level
+        Level in the unit of the watched quantity.
+    direction
+        "rising", "falling" or "both".
+    column
+        Column of the sensor, such as "x" or "rate"; "": its first.
+    stop
+        End the run there.
+    switch_on
+        Names of forces, couplers and elements.
+    switch_off
+        Names of forces, couplers and elements.
+    tolerance
+        Tolerance of the time, relative to the step.
+    at
+        Instead of `watch`: the time of the event, after the start of the run [s].
+    record
+        Keep the results at this time, in addition to those of the output times.
     """
 
     name: str
-    watch: str = ""  #: name of a sensor of the system, or "joint.coordinate"; "": the event has a time
-    level: float = 0.0  #: in the unit of the watched quantity
-    direction: str = "both"  #: "rising", "falling" or "both"
-    column: str = ""  #: column of the sensor, such as "x" or "rate"; "": its first
-    stop: bool = False  #: end the run there
-    switch_on: tuple[str, ...] = ()  #: names of forces, couplers and elements
+    watch: str = ""
+    level: float = 0.0
+    direction: str = "both"
+    column: str = ""
+    stop: bool = False
+    switch_on: tuple[str, ...] = ()
     switch_off: tuple[str, ...] = ()
-    tolerance: float = 1e-9  #: tolerance of the time, relative to the step
-    at: float | None = None  #: instead of `watch`: the time of the event, after the start of the run [s]
-    record: bool = False  #: keep the results at this time, in addition to those of the output times
+    tolerance: float = 1e-9
+    at: float | None = None
+    record: bool = False
 
     @property
     def is_active(self) -> bool:

@@ -15,13 +15,27 @@ SCHEMES = ("explicit", "iterated")
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ForeignUnit:
-    """An FMU for co-simulation in a system: a controller, a tyre, hydraulics."""
+    """An FMU for co-simulation in a system: a controller, a tyre, hydraulics.
+
+    Parameters
+    ----------
+    name
+        Name of the unit, unique in the system.
+    file
+        Path of the FMU.
+    inputs
+        Its inputs, by sensors of the system, "tip.x".
+    outputs
+        Its outputs, by inputs of the system on which they act.
+    parameters
+        Its parameters by values.
+    """
 
     name: str
-    file: str  #: path of the FMU
-    inputs: Mapping[str, str] = field(default_factory=dict)  #: its inputs, by sensors of the system, "tip.x"
-    outputs: Mapping[str, str] = field(default_factory=dict)  #: its outputs, by inputs of the system on which they act
-    parameters: Mapping[str, float] = field(default_factory=dict)  #: its parameters by values
+    file: str
+    inputs: Mapping[str, str] = field(default_factory=dict)
+    outputs: Mapping[str, str] = field(default_factory=dict)
+    parameters: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for part in ("inputs", "outputs", "parameters"):
@@ -37,11 +51,22 @@ class Coupling:
     explicit: all take a macro-step with the inputs of its beginning, held; the error is of first order in the step.
     iterated: all take it again, from kept states, with the means of the inputs at its beginning and its end, until
     these no longer change; the error is of second order, and the coupling may be stiffer.
+
+    Parameters
+    ----------
+    step
+        Macro-step [s], a multiple of the step of the system; None: that step.
+    scheme
+        "explicit" or "iterated".
+    tolerance
+        Tolerance of the iteration, relative to the size of each signal.
+    max_iterations
+        Largest number of iterations in a macro-step.
     """
 
-    step: float | None = None  #: macro-step [s], a multiple of the step of the system; None: that step
+    step: float | None = None
     scheme: str = "explicit"
-    tolerance: float = 1e-9  #: of the iteration, relative to the size of each signal
+    tolerance: float = 1e-9
     max_iterations: int = 50
 
     def __post_init__(self) -> None:

@@ -68,15 +68,33 @@ SAME_TIME = 1e-6  #: fraction of a step by which a run may begin apart from the 
 
 @dataclass(frozen=True)
 class Progress:
-    """Progress of a run."""
+    """Progress of a run.
 
-    t: float  #: time reached [s]
+    Parameters
+    ----------
+    t
+        Time reached [s].
+    t_end
+        End of the run [s].
+    n_steps
+        Number of finished steps.
+    n_total
+        Number of steps of the whole run.
+    n_iterations
+        Number of Newton iterations so far.
+    notes
+        Notes of the run so far.
+    n_rejected
+        Number of rejected steps so far.
+    """
+
+    t: float
     t_end: float
-    n_steps: int  #: done
+    n_steps: int
     n_total: int
-    n_iterations: int  #: of Newton's method, so far
-    notes: tuple[ValidityNote, ...] = ()  #: notes of the run so far
-    n_rejected: int = 0  #: number of rejected steps so far
+    n_iterations: int
+    notes: tuple[ValidityNote, ...] = ()
+    n_rejected: int = 0
 
 
 def integrate(

@@ -25,16 +25,36 @@ VERDICTS: tuple[Verdict, ...] = ("info", "pass", "warn", "fail")  #: from harmle
 @presented
 @dataclass(frozen=True, eq=False)
 class QualityRecord:
-    """One question about a reduced body, and its answer."""
+    """One question about a reduced body, and its answer.
 
-    name: str  #: key in `LIMITS`, such as "frequency-error"
-    title: str  #: the same in words
-    value: float  #: without unit; NaN where the question does not apply
-    tolerance: float | None  #: largest value that passes; None: no verdict
+    Parameters
+    ----------
+    name
+        Key in `LIMITS`, such as "frequency-error".
+    title
+        The same in words.
+    value
+        Value without unit; NaN where the question does not apply.
+    tolerance
+        Largest value that passes; None: no verdict.
+    verdict
+        Verdict of the comparison of the value with the tolerance.
+    reason
+        Finding, in one sentence with its numbers.
+    action
+        Remedy; "" if none is needed.
+    data
+        Arrays, numbers and words behind it, for tables and plots.
+    """
+
+    name: str
+    title: str
+    value: float
+    tolerance: float | None
     verdict: Verdict
-    reason: str  #: finding, in one sentence with its numbers
-    action: str  #: remedy; "" if none is needed
-    data: Mapping[str, Any] = field(default_factory=dict)  #: arrays, numbers and words behind it, for tables and plots
+    reason: str
+    action: str
+    data: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "data", MappingProxyType(dict(self.data)))

@@ -35,29 +35,55 @@ Shapes = Callable[[IntArray], Array]  #: (node number, component) rows -> shapes
 @presented
 @dataclass(frozen=True, eq=False)
 class FullMass:
-    """The mass matrix of the full model, over dofs that the superelement recovers."""
+    """The mass matrix of the full model, over dofs that the superelement recovers.
 
-    M: sp.csc_array  #: both triangles, basic axes, (n_full, n_full)
-    dofs: IntArray  #: (node number, component 0-5) of every row, (n_full, 2)
-    places: Mapping[int, Array]  #: node number -> place, basic axes
+    Parameters
+    ----------
+    M
+        Both triangles, basic axes, (n_full, n_full).
+    dofs
+        (node number, component 0-5) of every row, (n_full, 2).
+    places
+        Node number -> place, basic axes.
+    """
+
+    M: sp.csc_array
+    dofs: IntArray
+    places: Mapping[int, Array]
 
 
 @presented
 @dataclass(frozen=True, eq=False)
 class NodalMasses:
-    """Point masses at nodes that the superelement recovers, such as its lumped mass."""
+    """Point masses at nodes that the superelement recovers, such as its lumped mass.
 
-    node_numbers: IntArray  #: (n,)
-    masses: Array  #: (n,)
+    Parameters
+    ----------
+    node_numbers
+        The user's numbers of the nodes, (n,).
+    masses
+        Masses of the nodes, (n,).
+    """
+
+    node_numbers: IntArray
+    masses: Array
 
 
 @presented
 @dataclass(frozen=True, eq=False)
 class MeshMass:
-    """The mesh behind the superelement, whose node numbers it recovers, and its density."""
+    """The mesh behind the superelement, whose node numbers it recovers, and its density.
+
+    Parameters
+    ----------
+    mesh
+        Mesh of the body, with its elements.
+    density
+        Density of all cells, or group name -> density.
+    """
 
     mesh: Mesh
-    density: float | Mapping[str, float]  #: of all cells, or group name -> density
+    density: float | Mapping[str, float]
 
 
 Inertia = FullMass | NodalMasses | MeshMass

@@ -19,15 +19,24 @@ class ModeCount:
     >>> ModeCount(cutoff=5000.0, verify=True)
     ModeCount(n=None, cutoff=5000.0, verify=True)
 
+    Parameters
+    ----------
+    n
+        Number of modes, 0 or more.
+    cutoff
+        All modes up to this frequency, instead of n [Hz, or 1/time unit of the body].
+    verify
+        Whether to prove by the inertia of a factorisation that no mode was missed.
+
     Raises
     ------
     ModeSetError
         If not exactly one of `n` and `cutoff` is given, or the number is invalid.
     """
 
-    n: int | None = None  #: number of modes, 0 or more
-    cutoff: float | None = None  #: all modes up to this frequency, instead of n [Hz, or 1/time unit of the body]
-    verify: bool = False  #: whether to prove by the inertia of a factorisation that no mode was missed
+    n: int | None = None
+    cutoff: float | None = None
+    verify: bool = False
 
     def __post_init__(self) -> None:
         if (self.n is None) == (self.cutoff is None):

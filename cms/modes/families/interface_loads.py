@@ -24,11 +24,20 @@ class InterfaceLoad:
 
     The motion of an interface is that of its reference point: three translations and three rotations along its own axes
     (its triad). Rows and columns follow the order of `interfaces`.
+
+    Parameters
+    ----------
+    interfaces
+        Names of the interfaces to which the neighbour connects.
+    M
+        Mass of the neighbour, (6 n, 6 n) [kg, kg m, kg m²].
+    K
+        Stiffness of the neighbour, (6 n, 6 n) [N/m, N, N m].
     """
 
     interfaces: tuple[str, ...]
-    M: Array  #: (6 n, 6 n) [kg, kg m, kg m²]
-    K: Array  #: (6 n, 6 n) [N/m, N, N m]
+    M: Array
+    K: Array
 
     def __post_init__(self) -> None:
         where = f"load of interfaces {', '.join(self.interfaces)}"

@@ -15,10 +15,18 @@ __all__ = ["CoupledField", "coupled_field"]
 @presented
 @dataclass(frozen=True, eq=False)
 class CoupledField:
-    """Columns over the dofs of a coupled body, and the part of the motion that rigid interfaces cannot follow."""
+    """Columns over the dofs of a coupled body, and the part of the motion that rigid interfaces cannot follow.
 
-    columns: Array  #: (n_dof, k)
-    departure: dict[str, float]  #: largest non-rigid share of the motion of the members of each rigid interface, 0 to 1
+    Parameters
+    ----------
+    columns
+        Displacement columns, (n_dof, k).
+    departure
+        Largest non-rigid share of the motion of the members of each rigid interface, 0 to 1.
+    """
+
+    columns: Array
+    departure: dict[str, float]
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "columns", frozen(self.columns))

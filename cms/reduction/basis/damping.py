@@ -29,9 +29,15 @@ CUSTOMARY_STEPS = ((100.0, 0.01), (1000.0, 0.1))  #: 1 % below 100 Hz, 10 % belo
 
 @dataclass(frozen=True)
 class ModalDamping:
-    """The same damping ratio for every mode: D = diag(2 ratio omega)."""
+    """The same damping ratio for every mode: D = diag(2 ratio omega).
 
-    ratio: float  #: ratio to critical damping, 0 <= ratio
+    Parameters
+    ----------
+    ratio
+        Ratio to critical damping, 0 <= ratio.
+    """
+
+    ratio: float
 
     def __post_init__(self) -> None:
         _require_ratios("ratio", (self.ratio,))
@@ -39,9 +45,15 @@ class ModalDamping:
 
 @dataclass(frozen=True)
 class PerModeDamping:
-    """A damping ratio for each mode in the order of the reduced body; the last ratio holds for all further modes."""
+    """A damping ratio for each mode in the order of the reduced body; the last ratio holds for all further modes.
 
-    ratios: tuple[float, ...]  #: ratios to critical damping
+    Parameters
+    ----------
+    ratios
+        Ratios to critical damping.
+    """
+
+    ratios: tuple[float, ...]
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "ratios", tuple(float(ratio) for ratio in self.ratios))
@@ -55,10 +67,17 @@ class RampDamping:
     """Damping ratios in steps of frequency. The default is customary: modes above the band of interest are suppressed.
 
     Each mode has the ratio of the first step whose frequency is above its own.
+
+    Parameters
+    ----------
+    steps
+        (frequency [Hz], ratio below it), ascending.
+    above
+        Ratio at and above the last frequency.
     """
 
-    steps: tuple[tuple[float, float], ...] = CUSTOMARY_STEPS  #: (frequency [Hz], ratio below it), ascending
-    above: float = 1.0  #: ratio at and above the last frequency
+    steps: tuple[tuple[float, float], ...] = CUSTOMARY_STEPS
+    above: float = 1.0
 
     def __post_init__(self) -> None:
         steps = tuple((float(frequency), float(ratio)) for frequency, ratio in self.steps)
@@ -71,10 +90,18 @@ class RampDamping:
 
 @dataclass(frozen=True)
 class RayleighDamping:
-    """D = alpha M + beta K."""
+    """D = alpha M + beta K.
 
-    alpha: float = 0.0  #: [1/s]
-    beta: float = 0.0  #: [s]
+    Parameters
+    ----------
+    alpha
+        Factor on the mass [1/s].
+    beta
+        Factor on the stiffness [s].
+    """
+
+    alpha: float = 0.0
+    beta: float = 0.0
 
     def __post_init__(self) -> None:
         if not (0 <= self.alpha < np.inf and 0 <= self.beta < np.inf):

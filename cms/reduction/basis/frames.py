@@ -38,13 +38,23 @@ class NodalFrame:
 
     Its origin is the reference point of the interface (or the centre of mass if none is named); its axes are the mesh
     axes. Of an interface of kind "nodes" six determinate dofs are held, chosen by pivoted QR.
+
+    Parameters
+    ----------
+    at
+        Name of the interface; None: given dofs, or six chosen from all boundary dofs.
+    origin
+        Origin in mesh coordinates, (3,) [m]; None: the default.
+    axes
+        x, y and z axis of the frame in mesh axes, orthonormal; None: the mesh axes.
+    dofs
+        Six statically determinate dofs, each (node, component): the node as an index from 0 with a component 0 to 5, or
+        as a number in the user's mesh (or "INSTANCE.number") with a component name "ux" to "rz".
     """
 
-    at: str | None = None  #: name of the interface; None: given dofs, or six chosen from all boundary dofs
-    origin: tuple[float, float, float] | None = None  #: in mesh coordinates [m], instead of the default
-    axes: Axes | None = None  #: x, y and z axis of the frame in mesh axes, orthonormal; None: the mesh axes
-    #: six statically determinate dofs, each (node, component): the node as an index from 0 with a component 0 to 5, or
-    #: as a number in the user's mesh (or "INSTANCE.number") with a component name "ux" to "rz"
+    at: str | None = None
+    origin: tuple[float, float, float] | None = None
+    axes: Axes | None = None
     dofs: tuple[tuple[int | str, int | str], ...] | None = None
 
 
@@ -52,13 +62,20 @@ class NodalFrame:
 class TisserandFrame:
     """Mean-axis frame: Psi_Rᵀ M u = 0, smallest relative kinetic energy; origin at the undeformed centre of mass [1]_.
 
+    Parameters
+    ----------
+    origin
+        Origin in mesh coordinates, (3,) [m]; None: the default.
+    axes
+        x, y and z axis of the frame in mesh axes, orthonormal; None: the mesh axes.
+
     References
     ----------
     .. [1] Canavin & Likins (1977), docs/bibliography.md; docs/theory.md §4.
     """
 
-    origin: tuple[float, float, float] | None = None  #: in mesh coordinates [m], instead of the default
-    axes: Axes | None = None  #: x, y and z axis of the frame in mesh axes, orthonormal; None: the mesh axes
+    origin: tuple[float, float, float] | None = None
+    axes: Axes | None = None
 
 
 @dataclass(frozen=True)
@@ -66,10 +83,17 @@ class BuckensFrame:
     """Frame of least deformation: Psi_Rᵀ W u = 0 minimises Σ w |u|² over the nodes; origin at their weighted centre.
 
     w is the volume of each node (`FEBody.node_volumes`), or 1 if it is unknown; only translations count.
+
+    Parameters
+    ----------
+    origin
+        Origin in mesh coordinates, (3,) [m]; None: the default.
+    axes
+        x, y and z axis of the frame in mesh axes, orthonormal; None: the mesh axes.
     """
 
-    origin: tuple[float, float, float] | None = None  #: in mesh coordinates [m], instead of the default
-    axes: Axes | None = None  #: x, y and z axis of the frame in mesh axes, orthonormal; None: the mesh axes
+    origin: tuple[float, float, float] | None = None
+    axes: Axes | None = None
 
 
 @dataclass(frozen=True)

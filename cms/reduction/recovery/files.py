@@ -315,16 +315,36 @@ class InterfaceRows:
 
 @dataclass(frozen=True, eq=False)
 class CraigBampton:
-    """Mass, stiffness and damping over (u_b, eta), and rigid motions in these coordinates."""
+    """Mass, stiffness and damping over (u_b, eta), and rigid motions in these coordinates.
+
+    Parameters
+    ----------
+    body
+        The reduced body.
+    M
+        Mass, (n, n), n = n_b + n_modes.
+    K
+        (n, n), without coupling between boundary and modes.
+    D
+        Damping, (n, n).
+    T
+        Transformation z = T y, (6 + n_q, n).
+    boundary
+        Name of each boundary dof, such as "tip ux", (n_b,).
+    about
+        Reference point of the rigid motions, mesh coordinates, (3,) [m].
+    rigid
+        Motions of the boundary dofs under the six rigid motions, mesh axes, (n_b, 6).
+    """
 
     body: ReducedBody
-    M: Array  #: (n, n), n = n_b + n_modes
-    K: Array  #: (n, n), without coupling between boundary and modes
-    D: Array  #: (n, n)
-    T: Array  #: z = T y, (6 + n_q, n)
-    boundary: tuple[str, ...]  #: name of each boundary dof, such as "tip ux", (n_b,)
-    about: Array  #: reference point of the rigid motions, mesh coordinates, (3,) [m]
-    rigid: Array  #: motions of the boundary dofs under the six rigid motions, mesh axes, (n_b, 6)
+    M: Array
+    K: Array
+    D: Array
+    T: Array
+    boundary: tuple[str, ...]
+    about: Array
+    rigid: Array
 
     @property
     def n_b(self) -> int:

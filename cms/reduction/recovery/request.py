@@ -25,18 +25,28 @@ Place = str | int
 class Rows:
     """Rows of one quantity at some places.
 
+    Parameters
+    ----------
+    quantity
+        One of `QUANTITIES`.
+    at
+        Nodes or elements by number; node sets or groups, interfaces, stress points by name; empty: all places, which is
+        not allowed for rows of nodes.
+    components
+        Components such as "uz" or "xx"; empty: all.
+    about
+        Reference point of net forces, mesh coordinates [m].
+
     Raises
     ------
     If the quantity is unknown, or does not fit the other fields.
         If the quantity is unknown, or does not go with what is given.
     """
 
-    quantity: str  #: one of `QUANTITIES`
-    #: nodes or elements by number; node sets or groups, interfaces, stress points by name; empty: all places, which is
-    #: not allowed for rows of nodes
+    quantity: str
     at: tuple[Place, ...] = ()
-    components: tuple[str, ...] = ()  #: components such as "uz" or "xx"; empty: all
-    about: tuple[float, float, float] | None = None  #: reference point of net forces, mesh coordinates [m]
+    components: tuple[str, ...] = ()
+    about: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "at", (self.at,) if isinstance(self.at, str | int) else tuple(self.at))
@@ -59,6 +69,15 @@ class Rows:
 class RecoveryRequest:
     """Rows of one table, in their order, and further loads for their static part.
 
+    Parameters
+    ----------
+    name
+        Name of the recovery table.
+    rows
+        The requested rows.
+    loads_at
+        Nodes or node sets at which forces act, in addition to the interfaces.
+
     Raises
     ------
     RecoveryError
@@ -67,7 +86,6 @@ class RecoveryRequest:
 
     name: str
     rows: tuple[Rows, ...]
-    #: nodes or node sets at which forces act, in addition to the interfaces
     loads_at: tuple[Place, ...] = field(default=())
 
     def __post_init__(self) -> None:

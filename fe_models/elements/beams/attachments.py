@@ -19,6 +19,17 @@ SYMMETRIC = 1e-9  #: relative asymmetry of a given matrix that counts as roundin
 class PointMass:
     """A rigid piece that a node carries.
 
+    Parameters
+    ----------
+    node
+        Index of the node that carries the mass.
+    mass
+        Mass [kg].
+    inertia
+        About the centre of mass, mesh axes, (3, 3) [kg m²], or three principal values, or one value for all axes.
+    offset
+        Vector from the node to the centre of mass, mesh axes, (3,) [m].
+
     Raises
     ------
     BeamError
@@ -26,10 +37,9 @@ class PointMass:
     """
 
     node: int
-    mass: float  #: [kg]
-    #: about the centre of mass, mesh axes, (3, 3) [kg m²], or three principal values, or one value for all axes
+    mass: float
     inertia: Any = 0.0
-    offset: Any = (0.0, 0.0, 0.0)  #: from the node to the centre of mass, mesh axes, (3,) [m]
+    offset: Any = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         where = f"point mass at node {self.node}"
@@ -57,6 +67,19 @@ class Spring:
     at that point: six components in the axes of the triad. Rigid-body motion therefore causes no force, wherever the
     nodes are.
 
+    Parameters
+    ----------
+    nodes
+        Indices of the two nodes.
+    stiffness
+        (6,) diagonal or (6, 6): three translations, three rotations [N/m, N, N m].
+    damping
+        Viscous damping, (6,) or (6, 6) [N s/m, N s, N m s]; None: no damping.
+    point
+        Point at which the spring acts, (3,) [m]; None: midway between the nodes.
+    triad
+        Axes as columns, (3, 3).
+
     Raises
     ------
     BeamError
@@ -64,10 +87,10 @@ class Spring:
     """
 
     nodes: tuple[int, int]
-    stiffness: Any  #: (6,) diagonal or (6, 6): three translations, three rotations [N/m, N, N m]
-    damping: Any = None  #: viscous damping, (6,) or (6, 6) [N s/m, N s, N m s]; None: no damping
-    point: Any = None  #: point at which the spring acts, (3,) [m]; None: midway between the nodes
-    triad: Any = field(default_factory=lambda: np.eye(3))  #: axes as columns, (3, 3)
+    stiffness: Any
+    damping: Any = None
+    point: Any = None
+    triad: Any = field(default_factory=lambda: np.eye(3))
 
     def __post_init__(self) -> None:
         where = f"spring between nodes {self.nodes[0]} and {self.nodes[1]}"
@@ -90,14 +113,21 @@ class Spring:
 class RigidLink:
     """Nodes that move rigidly with one node (RBE2 inside the body); their dofs are eliminated.
 
+    Parameters
+    ----------
+    node
+        The leader, which keeps its dofs.
+    followers
+        Nodes that follow, (n,).
+
     Raises
     ------
     BeamError
         If there is no follower, or the leader is one of the followers.
     """
 
-    node: int  #: the leader, which keeps its dofs
-    followers: Any  #: nodes that follow, (n,)
+    node: int
+    followers: Any
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "followers", frozen_int(np.atleast_1d(self.followers)))

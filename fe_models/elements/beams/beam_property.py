@@ -18,16 +18,33 @@ __all__ = ["BeamProperty", "assign_properties", "section_of"]
 
 @dataclass(frozen=True, eq=False)
 class BeamProperty:
-    """Section, material and beam theory of a group of lines."""
+    """Section, material and beam theory of a group of lines.
+
+    Parameters
+    ----------
+    section
+        Cross section of the beams.
+    material
+        Material of the beams.
+    offset
+        Offset of the centroid from the line, local (y, z) [m].
+    orientation
+        Vector towards local y; None: from the mesh, or else such that z points up.
+    shear
+        False: no shear deformation (Euler-Bernoulli).
+    rotary_inertia
+        False: no rotary inertia in bending; torsion keeps its inertia.
+    added_mass
+        Additional mass per length, without stiffness [kg/m].
+    """
 
     section: Section
     material: Material
-    offset: tuple[float, float] = (0.0, 0.0)  #: offset of the centroid from the line, local (y, z) [m]
-    #: vector towards local y; None: from the mesh, or else such that z points up
+    offset: tuple[float, float] = (0.0, 0.0)
     orientation: tuple[float, float, float] | None = None
-    shear: bool = True  #: False: no shear deformation (Euler-Bernoulli)
-    rotary_inertia: bool = True  #: False: no rotary inertia in bending; torsion keeps its inertia
-    added_mass: float = 0.0  #: additional mass per length, without stiffness [kg/m]
+    shear: bool = True
+    rotary_inertia: bool = True
+    added_mass: float = 0.0
 
     def __post_init__(self) -> None:
         require_isotropic("beam property", self.material)

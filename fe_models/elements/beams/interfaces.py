@@ -19,7 +19,13 @@ __all__ = ["NodeIndices", "line_interface", "node_interface"]
 @presented
 @dataclass(frozen=True)
 class NodeIndices:
-    """Selection of nodes by their index in the mesh."""
+    """Selection of nodes by their index in the mesh.
+
+    Parameters
+    ----------
+    nodes
+        Indices of the nodes, from 0.
+    """
 
     nodes: tuple[int, ...]
 

@@ -115,9 +115,15 @@ class Section(Protocol):
 
 @dataclass(frozen=True)
 class Circle:
-    """Solid circle."""
+    """Solid circle.
 
-    radius: float  #: [m]
+    Parameters
+    ----------
+    radius
+        Radius [m].
+    """
+
+    radius: float
 
     def __post_init__(self) -> None:
         require_lengths(self)
@@ -129,10 +135,18 @@ class Circle:
 
 @dataclass(frozen=True)
 class Tube:
-    """Hollow circle."""
+    """Hollow circle.
 
-    radius: float  #: outer [m]
-    thickness: float  #: wall thickness [m]
+    Parameters
+    ----------
+    radius
+        Outer radius [m].
+    thickness
+        Wall thickness [m].
+    """
+
+    radius: float
+    thickness: float
 
     def __post_init__(self) -> None:
         require_lengths(self)
@@ -146,10 +160,18 @@ class Tube:
 
 @dataclass(frozen=True)
 class Rectangle:
-    """Solid rectangle."""
+    """Solid rectangle.
 
-    width: float  #: along y [m]
-    height: float  #: along z [m]
+    Parameters
+    ----------
+    width
+        Width along y [m].
+    height
+        Height along z [m].
+    """
+
+    width: float
+    height: float
 
     def __post_init__(self) -> None:
         require_lengths(self)
@@ -183,12 +205,24 @@ class Rectangle:
 
 @dataclass(frozen=True)
 class BoxSection:
-    """Rectangular hollow section, given by its outer sides; webs are along z."""
+    """Rectangular hollow section, given by its outer sides; webs are along z.
 
-    width: float  #: outer, along y [m]
-    height: float  #: outer, along z [m]
-    web: float  #: thickness of the two walls along z [m]
-    flange: float  #: thickness of the two walls along y [m]
+    Parameters
+    ----------
+    width
+        Outer, along y [m].
+    height
+        Outer, along z [m].
+    web
+        Thickness of the two walls along z [m].
+    flange
+        Thickness of the two walls along y [m].
+    """
+
+    width: float
+    height: float
+    web: float
+    flange: float
 
     def __post_init__(self) -> None:
         require_lengths(self)
@@ -234,12 +268,24 @@ class BoxSection:
 
 @dataclass(frozen=True)
 class ISection:
-    """Doubly symmetric I or H section, web along z."""
+    """Doubly symmetric I or H section, web along z.
 
-    width: float  #: of the flanges, along y [m]
-    height: float  #: outer, along z [m]
-    web: float  #: thickness [m]
-    flange: float  #: thickness [m]
+    Parameters
+    ----------
+    width
+        Width of the flanges, along y [m].
+    height
+        Outer, along z [m].
+    web
+        Thickness of the web [m].
+    flange
+        Thickness of the flanges [m].
+    """
+
+    width: float
+    height: float
+    web: float
+    flange: float
 
     def __post_init__(self) -> None:
         require_lengths(self)
@@ -292,18 +338,35 @@ class GeneralSection:
     """A section given by its properties, in principal axes.
 
     Shear stress is not recovered. The outline is drawn, and its vertices show the normal stress.
+
+    Parameters
+    ----------
+    A
+        Area [m²].
+    Iy
+        Second moment of area, ∫ z² [m⁴].
+    Iz
+        Second moment of area, ∫ y² [m⁴].
+    J
+        Torsion constant [m⁴].
+    A_sy
+        Shear area along y [m²]; infinite: no shear deformation.
+    A_sz
+        Shear area along z [m²].
+    shear_center
+        (y, z) from the centroid [m].
+    outline
+        Polygon (y, z), anticlockwise, (n, 2) [m]; None: the rectangle with the same A, Iy, Iz.
     """
 
-    A: float  #: [m²]
-    Iy: float  #: ∫ z² [m⁴]
-    Iz: float  #: ∫ y² [m⁴]
-    J: float  #: torsion constant [m⁴]
-    A_sy: float = np.inf  #: shear area along y [m²]; infinite: no shear deformation
-    A_sz: float = np.inf  #: shear area along z [m²]
-    shear_center: tuple[float, float] = (0.0, 0.0)  #: (y, z) from the centroid [m]
-    outline: Array | None = (
-        None  #: polygon (y, z), anticlockwise, (n, 2) [m]; None: the rectangle with the same A, Iy, Iz
-    )
+    A: float
+    Iy: float
+    Iz: float
+    J: float
+    A_sy: float = np.inf
+    A_sz: float = np.inf
+    shear_center: tuple[float, float] = (0.0, 0.0)
+    outline: Array | None = None
 
     def properties(self, nu: float) -> SectionProperties:
         """Return the given properties."""

@@ -29,18 +29,33 @@ ROUNDING = 1e-9
 class ShellProperty:
     """Thickness, material and offset of a group of cells.
 
+    Parameters
+    ----------
+    thickness
+        Thickness [m].
+    material
+        Material of the shell.
+    offset
+        Distance of the middle surface from the nodes, along the normal of the cell [m].
+    added_mass
+        Additional mass per area, without stiffness, distributed through the thickness [kg/m²].
+    bending_ratio
+        Bending stiffness relative to that of a plate of this thickness (ribs, honeycomb).
+    shear_ratio
+        Transverse shear stiffness relative to that of a plate of this thickness.
+
     Raises
     ------
     ShellError
         Unless the thickness is positive, the added mass is not negative, and all numbers are finite.
     """
 
-    thickness: float  #: [m]
+    thickness: float
     material: Material
-    offset: float = 0.0  #: distance of the middle surface from the nodes, along the normal of the cell [m]
-    added_mass: float = 0.0  #: additional mass per area, without stiffness, distributed through the thickness [kg/m²]
-    bending_ratio: float = 1.0  #: bending stiffness relative to that of a plate of this thickness (ribs, honeycomb)
-    shear_ratio: float = 1.0  #: transverse shear stiffness relative to that of a plate of this thickness
+    offset: float = 0.0
+    added_mass: float = 0.0
+    bending_ratio: float = 1.0
+    shear_ratio: float = 1.0
 
     def __post_init__(self) -> None:
         require_isotropic("shell property", self.material)
@@ -61,6 +76,15 @@ class ShellProperty:
 class Layer:
     """One layer of a laminate.
 
+    Parameters
+    ----------
+    material
+        Material of the layer.
+    thickness
+        Thickness [m].
+    angle
+        Angle of material axis 1 from the layup direction, right-handed about the normal [degree].
+
     Raises
     ------
     ShellError
@@ -68,8 +92,8 @@ class Layer:
     """
 
     material: AnyMaterial
-    thickness: float  #: [m]
-    angle: float = 0.0  #: angle of material axis 1 from the layup direction, right-handed about the normal [degree]
+    thickness: float
+    angle: float = 0.0
 
     def __post_init__(self) -> None:
         _require_numbers("layer", self, ("thickness", "angle"))
@@ -92,18 +116,33 @@ class Layer:
 class LaminateProperty:
     """Layers and offset of a group of cells.
 
+    Parameters
+    ----------
+    layers
+        Layers from the bottom to the top, along the normal of the cell.
+    direction
+        Direction in mesh axes; its projection onto a cell is the first layup axis.
+    offset
+        Distance of the middle surface from the nodes, along the normal of the cell [m].
+    added_mass
+        Additional mass per area, without stiffness, distributed through the thickness [kg/m²].
+    bending_ratio
+        Bending stiffness relative to that of the layer; 1 if there are several layers.
+    shear_ratio
+        Transverse shear stiffness relative to that of the layers.
+
     Raises
     ------
     ShellError
         Unless there are layers, the direction is not zero, and all numbers are finite.
     """
 
-    layers: tuple[Layer, ...]  #: from the bottom to the top, along the normal of the cell
-    direction: tuple[float, float, float]  #: direction in mesh axes; its projection onto a cell is the first layup axis
-    offset: float = 0.0  #: distance of the middle surface from the nodes, along the normal of the cell [m]
-    added_mass: float = 0.0  #: additional mass per area, without stiffness, distributed through the thickness [kg/m²]
-    bending_ratio: float = 1.0  #: bending stiffness relative to that of the layer; 1 if there are several layers
-    shear_ratio: float = 1.0  #: transverse shear stiffness relative to that of the layers
+    layers: tuple[Layer, ...]
+    direction: tuple[float, float, float]
+    offset: float = 0.0
+    added_mass: float = 0.0
+    bending_ratio: float = 1.0
+    shear_ratio: float = 1.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "layers", tuple(self.layers))
@@ -138,6 +177,21 @@ class StiffnessProperty:
     The thickness is nominal. It is used for the stress, N/t + 12 z M/t³ and 3 Q/(2 t) (1 - 4 z²/t²), and for the skin.
     The mass has no rotary inertia.
 
+    Parameters
+    ----------
+    thickness
+        Nominal thickness [m].
+    stiffness
+        Rows of [[A, B], [B, D]], from eps_x eps_y gamma_xy kappa_x kappa_y kappa_xy to N_x N_y N_xy M_x M_y M_xy.
+    shear_stiffness
+        Rows of H, from gamma_xz gamma_yz to Q_x Q_y [N/m].
+    direction
+        Direction in mesh axes; its projection onto a cell is x.
+    offset
+        Distance of the middle surface from the nodes, along the normal of the cell [m].
+    added_mass
+        Mass per area [kg/m²].
+
     Raises
     ------
     ShellError
@@ -145,13 +199,12 @@ class StiffnessProperty:
         the mass is not negative, and all numbers are finite.
     """
 
-    thickness: float  #: nominal [m]
-    #: rows of [[A, B], [B, D]], from eps_x eps_y gamma_xy kappa_x kappa_y kappa_xy to N_x N_y N_xy M_x M_y M_xy
+    thickness: float
     stiffness: tuple[tuple[float, ...], ...]
-    shear_stiffness: tuple[tuple[float, ...], ...]  #: rows of H, from gamma_xz gamma_yz to Q_x Q_y [N/m]
-    direction: tuple[float, float, float]  #: direction in mesh axes; its projection onto a cell is x
-    offset: float = 0.0  #: distance of the middle surface from the nodes, along the normal of the cell [m]
-    added_mass: float = 0.0  #: mass per area [kg/m²]
+    shear_stiffness: tuple[tuple[float, ...], ...]
+    direction: tuple[float, float, float]
+    offset: float = 0.0
+    added_mass: float = 0.0
 
     def __post_init__(self) -> None:
         for name, n in (("stiffness", 6), ("shear_stiffness", 2)):

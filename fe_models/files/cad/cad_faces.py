@@ -19,23 +19,57 @@ INSIDE = 1e-5  #: of the diagonal: how far from a face the side of the material 
 
 @dataclass(frozen=True, eq=False)
 class CadFace:
-    """One face of the geometry, in the length unit of the job."""
+    """One face of the geometry, in the length unit of the job.
 
-    number: int  #: in the list, from 1
-    tag: int  #: of gmsh
-    kind: str  #: of its surface, in `FACE_KINDS`
+    Parameters
+    ----------
+    number
+        Number in the list of faces, from 1.
+    tag
+        Tag of the face in gmsh.
+    kind
+        Kind of its surface, in `FACE_KINDS`.
+    area
+        Area [square of the length unit].
+    centre
+        Centroid of the area, (3,).
+    lo
+        Bounding box, (3,).
+    hi
+        Upper corner of the bounding box, (3,).
+    normal
+        Outward, (3,), of a plane.
+    radius
+        Radius of a cylinder or sphere.
+    axis
+        Direction, (3,), of a cylinder; its first large component is positive.
+    point
+        Point on the axis of a cylinder nearest to the centroid, or centre of a sphere, (3,).
+    is_hole
+        Whether the material is outside of a cylinder or sphere.
+    name
+        Name in the file.
+    colour
+        Colour in the file, "#rrggbb".
+    solids
+        Numbers of the solids it bounds, from 1.
+    """
+
+    number: int
+    tag: int
+    kind: str
     area: float
-    centre: Array  #: centroid of the area, (3,)
-    lo: Array  #: bounding box, (3,)
+    centre: Array
+    lo: Array
     hi: Array
-    normal: Array | None = None  #: outward, (3,), of a plane
-    radius: float | None = None  #: of a cylinder or sphere
-    axis: Array | None = None  #: direction, (3,), of a cylinder; its first large component is positive
-    point: Array | None = None  #: on the axis of a cylinder nearest to the centroid, or centre of a sphere, (3,)
-    is_hole: bool | None = None  #: of cylinder or sphere: whether the material is outside
-    name: str = ""  #: in the file
-    colour: str = ""  #: in the file, "#rrggbb"
-    solids: tuple[int, ...] = ()  #: numbers of the solids it bounds, from 1
+    normal: Array | None = None
+    radius: float | None = None
+    axis: Array | None = None
+    point: Array | None = None
+    is_hole: bool | None = None
+    name: str = ""
+    colour: str = ""
+    solids: tuple[int, ...] = ()
 
     @property
     def is_inner(self) -> bool:

@@ -28,17 +28,30 @@ MOST_ELEMENTS = 5e6  #: estimated, above which a size is taken for a mistake in 
 class MeshSize:
     """How fine a CAD geometry is meshed.
 
+    Parameters
+    ----------
+    size
+        Largest edge of an element [length].
+    smallest
+        Least edge that curvature and small features ask for; None: 0.05 of the size.
+    curvature
+        Elements around a full circle; 0: the size does not follow curvature.
+    order
+        1: four-node tetrahedra, 2: ten-node ones with middle nodes on the surfaces.
+    optimise
+        Whether the tetrahedra are improved after meshing.
+
     Raises
     ------
     MeshError
         Unless sizes are above zero and in order, the order is 1 or 2, and the curvature is none or 3 and more.
     """
 
-    size: float  #: largest edge of an element [length]
-    smallest: float | None = None  #: least edge that curvature and small features ask for; None: 0.05 of the size
-    curvature: float = 12.0  #: elements around a full circle; 0: the size does not follow curvature
-    order: int = 2  #: 1: four-node tetrahedra, 2: ten-node ones with middle nodes on the surfaces
-    optimise: bool = True  #: whether the tetrahedra are improved after meshing
+    size: float
+    smallest: float | None = None
+    curvature: float = 12.0
+    order: int = 2
+    optimise: bool = True
 
     def __post_init__(self) -> None:
         for key in ("size", "smallest"):

@@ -37,17 +37,41 @@ KERNEL_UNITS = {1e-3: "MM", 1e-2: "CM", 1.0: "M", 1e3: "KM", 0.0254: "INCH", 0.3
 @presented
 @dataclass(frozen=True, eq=False)
 class CadPart:
-    """What a CAD file holds, in the length unit of the job."""
+    """What a CAD file holds, in the length unit of the job.
+
+    Parameters
+    ----------
+    path
+        The CAD file.
+    digest
+        sha256 of the file.
+    format
+        "STEP", "IGES" or "BREP".
+    unit
+        Length unit of the file; "" if it has none.
+    units
+        Unit system of the job.
+    solids
+        Names of the solids, or "" where they have none.
+    faces
+        The faces of the geometry, by ascending number.
+    volume
+        Volume of all solids [length³].
+    lo
+        Bounding box, (3,).
+    hi
+        Upper corner of the bounding box, (3,).
+    """
 
     path: Path
-    digest: str  #: sha256 of the file
-    format: str  #: "STEP", "IGES" or "BREP"
-    unit: str  #: of the file, "" where it has none
-    units: Units  #: of the job
-    solids: tuple[str, ...]  #: names of the solids, or "" where they have none
+    digest: str
+    format: str
+    unit: str
+    units: Units
+    solids: tuple[str, ...]
     faces: tuple[CadFace, ...]
-    volume: float  #: of all solids [length³]
-    lo: Array  #: bounding box, (3,)
+    volume: float
+    lo: Array
     hi: Array
 
     @property

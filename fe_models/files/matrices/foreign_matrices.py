@@ -27,31 +27,64 @@ class ForeignMatrices:
     A reader of one file fills what that file knows and leaves the rest; `joined` puts the files of a model together.
     Matrices are full: a reader that meets one stored triangle mirrors it, and says in `triangle` which it was.
 
+    Parameters
+    ----------
+    K
+        Stiffness, (n_dof, n_dof).
+    M
+        Mass, (n_dof, n_dof).
+    D
+        Viscous damping, (n_dof, n_dof).
+    dofs
+        (node number, component 0-5 or `SCALAR`) of every row, (n_dof, 2); None: not said.
+    row_nodes
+        Instead of dofs: the nodes of the rows in their order, 3 or 6 rows to each.
+    node_numbers
+        Numbers of `nodes`, (n_nodes,).
+    nodes
+        Positions in the basic axes of the model, (n_nodes, 3); None: not said.
+    systems
+        Node number -> R, (3, 3): columns are the axes, in basic axes, in which its dofs are written; others: basic
+        axes.
+    loads
+        Name -> forces over the rows, (n_dof,).
+    others
+        Further matrices of the files by name, as they stand.
+    triangle
+        Matrix -> what was stored: both, lower, upper, diagonal.
+    constrained
+        Rows that are held, (n,).
+    removed
+        Dofs without rows as they are held.
+    program
+        Program that wrote the files, if they name it.
+    files
+        Path -> sha256.
+    notes
+        What was left out, changed or assumed, in words.
+
     Raises
     ------
     MatrixError
         If shapes do not fit together.
     """
 
-    K: sp.csc_array | None = None  #: stiffness, (n_dof, n_dof)
-    M: sp.csc_array | None = None  #: mass, (n_dof, n_dof)
-    D: sp.csc_array | None = None  #: viscous damping, (n_dof, n_dof)
-    dofs: IntArray | None = None  #: (node number, component 0-5 or `SCALAR`) of every row, (n_dof, 2); None: not said
-    row_nodes: IntArray | None = None  #: instead of dofs: the nodes of the rows in their order, 3 or 6 rows to each
-    node_numbers: IntArray | None = None  #: of `nodes`, (n_nodes,)
-    nodes: Array | None = None  #: positions in the basic axes of the model, (n_nodes, 3); None: not said
-    #: node number -> R, (3, 3): columns are the axes, in basic axes, in which its dofs are written; others: basic axes
+    K: sp.csc_array | None = None
+    M: sp.csc_array | None = None
+    D: sp.csc_array | None = None
+    dofs: IntArray | None = None
+    row_nodes: IntArray | None = None
+    node_numbers: IntArray | None = None
+    nodes: Array | None = None
     systems: Mapping[int, Array] = field(default_factory=dict)
-    loads: Mapping[str, Array] = field(default_factory=dict)  #: name -> forces over the rows, (n_dof,)
-    others: Mapping[str, Any] = field(default_factory=dict)  #: further matrices of the files by name, as they stand
-    triangle: Mapping[str, str] = field(
-        default_factory=dict
-    )  #: matrix -> what was stored: both, lower, upper, diagonal
-    constrained: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))  #: rows that are held, (n,)
-    removed: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))  #: dofs without rows as they are held
-    program: str = ""  #: that wrote the files, as far as they say
-    files: Mapping[str, str] = field(default_factory=dict)  #: path -> sha256
-    notes: tuple[str, ...] = ()  #: what was left out, changed or assumed, in words
+    loads: Mapping[str, Array] = field(default_factory=dict)
+    others: Mapping[str, Any] = field(default_factory=dict)
+    triangle: Mapping[str, str] = field(default_factory=dict)
+    constrained: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
+    removed: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
+    program: str = ""
+    files: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         put = object.__setattr__

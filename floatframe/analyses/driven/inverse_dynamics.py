@@ -32,10 +32,18 @@ __all__ = ["InverseDynamics", "drive_forces", "inverse_dynamics", "with_motors"]
 @presented
 @dataclass(frozen=True, eq=False)
 class InverseDynamics:
-    """A prescribed motion and the forces it requires."""
+    """A prescribed motion and the forces it requires.
 
-    motion: Trajectory  #: includes the reactions of all joints
-    drives: Mapping[str, CoordinateMotion]  #: value, rate and force of the driven coordinates, by "joint.coordinate"
+    Parameters
+    ----------
+    motion
+        Includes the reactions of all joints.
+    drives
+        Value, rate and force of the driven coordinates, by "joint.coordinate".
+    """
+
+    motion: Trajectory
+    drives: Mapping[str, CoordinateMotion]
 
 
 def inverse_dynamics(

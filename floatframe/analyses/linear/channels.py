@@ -50,11 +50,21 @@ AnyInput = Channel | CoordinateChannel | DriveMotion | BaseMotion | ParameterInp
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """One column of a sensor as an output."""
+    """One column of a sensor as an output.
+
+    Parameters
+    ----------
+    sensor
+        The sensor.
+    column
+        Such as "force x".
+    name
+        Name of the output; default: "sensor.column".
+    """
 
     sensor: AnyOutput
-    column: str  #: such as "force x"
-    name: str = ""  #: name of the output; default: "sensor.column"
+    column: str
+    name: str = ""
 
     def __post_init__(self) -> None:
         if not self.name:

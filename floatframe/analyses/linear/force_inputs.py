@@ -39,10 +39,17 @@ class ForceInput:
     """A force of the system as an input: the change of its amplitude, or of the motor of a joint force.
 
     For a point force or load case, the input is a factor; for a joint force, it is the force or torque itself.
+
+    Parameters
+    ----------
+    name
+        Name of the input.
+    force
+        Name of a point force, a load case (`BodyLoad`) or a `JointForce`.
     """
 
     name: str
-    force: str  #: name of a point force, a load case (`BodyLoad`) or a `JointForce`
+    force: str
 
     def force_units(self, units: Units) -> str:
         """Return its unit, if it is known without the system."""

@@ -20,13 +20,27 @@ LEAST_DAMPING = 1e-4  #: least damping used for the width of a resonance, becaus
 @presented
 @dataclass(frozen=True, eq=False)
 class FrequencyResponse:
-    """Responses y/s at frequencies."""
+    """Responses y/s at frequencies.
 
-    frequencies: Array  #: ascending, (n_f,) [1/unit of time]
-    values: Array  #: (n_f, n_outputs, n_inputs), complex
+    Parameters
+    ----------
+    frequencies
+        Ascending frequencies, (n_f,) [1/unit of time].
+    values
+        Complex responses, (n_f, n_outputs, n_inputs).
+    inputs
+        Names of the inputs.
+    outputs
+        Names of the outputs.
+    units
+        Unit of each output divided by that of each input.
+    """
+
+    frequencies: Array
+    values: Array
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    units: tuple[tuple[str, ...], ...]  #: of each output divided by each input
+    units: tuple[tuple[str, ...], ...]
 
     @property
     def amplitudes(self) -> Array:

@@ -51,12 +51,24 @@ __all__ = [
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class DriveMotion:
-    """The prescribed motion of a joint coordinate as an input: its change about the steady value, or its rates."""
+    """The prescribed motion of a joint coordinate as an input: its change about the steady value, or its rates.
+
+    Parameters
+    ----------
+    name
+        Name of the input.
+    joint
+        Name of the joint that is driven.
+    coordinate
+        Name of the driven coordinate of the joint.
+    rate
+        Quantity of the input: 0 the value, 1 its rate, 2 its second rate.
+    """
 
     name: str
     joint: str
     coordinate: str
-    rate: int = 2  #: quantity of the input: 0 the value, 1 its rate, 2 its second rate
+    rate: int = 2
 
     def __post_init__(self) -> None:
         require_input_rate(f"input {self.name!r}", self.rate)
@@ -73,14 +85,29 @@ class BaseMotion:
 
     Several bases are several inputs, each with its `joints`; coordinates of these joints in couplers and user forces
     are included. All other parts of the ground stay at rest: gravity, and the reference of sensors.
+
+    Parameters
+    ----------
+    name
+        Name of the input.
+    direction
+        Ground axes, (3,).
+    quantity
+        "translation", or "rotation" about the direction.
+    about
+        a point on the axis of a rotation, (3,) [m].
+    joints
+        Moving joints, springs, bushings, couplers, user forces; None: all.
+    rate
+        Quantity of the input: 0 the displacement, 1 the velocity, 2 the acceleration.
     """
 
     name: str
-    direction: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))  #: ground axes, (3,)
-    quantity: str = "translation"  #: "translation", or "rotation" about the direction
-    about: Array = field(default_factory=lambda: np.zeros(3))  #: a point on the axis of a rotation, (3,) [m]
-    joints: Sequence[str] | None = None  #: moving joints, springs, bushings, couplers, user forces; None: all
-    rate: int = 2  #: quantity of the input: 0 the displacement, 1 the velocity, 2 the acceleration
+    direction: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
+    quantity: str = "translation"
+    about: Array = field(default_factory=lambda: np.zeros(3))
+    joints: Sequence[str] | None = None
+    rate: int = 2
 
     def __post_init__(self) -> None:
         where = f"input {self.name!r}"
@@ -100,10 +127,20 @@ class BaseMotion:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ParameterInput:
-    """A parameter of the expressions of a user force as an input: its change about its value."""
+    """A parameter of the expressions of a user force as an input: its change about its value.
+
+    Parameters
+    ----------
+    name
+        Name of the input.
+    force
+        Name of the user force.
+    parameter
+        Name of the parameter.
+    """
 
     name: str
-    force: str  #: name of the user force
+    force: str
     parameter: str
 
     def force_units(self, units: Units) -> str:

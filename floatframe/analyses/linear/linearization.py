@@ -102,39 +102,96 @@ class LinearSystem:
 
     M z'' + C z' + K z = B s + B_rate s' + B_acceleration s''
     y = L z + L_rate z' + L_acceleration z'' + D s + D_rate s' + D_acceleration s''
+
+    Parameters
+    ----------
+    equilibrium
+        The steady motion.
+    M
+        Mass, (n_z, n_z).
+    C
+        Damping with gyroscopic terms, (n_z, n_z).
+    K
+        Stiffness with geometric, centrifugal and circulatory terms, (n_z, n_z).
+    B
+        Coefficients of the equations above, (n_z, n_s).
+    L
+        Coefficients of the equations above, (n_outputs, n_z).
+    N
+        Motions of the bodies (translation and rotation in body axes, modes) per z, (n_u, n_z).
+    inputs
+        Names of the inputs s, (n_s,).
+    outputs
+        Names of the outputs y, (n_outputs,).
+    body_names
+        Names of the bodies.
+    body_masses
+        Mass matrix of each body, (6 + n_q, 6 + n_q).
+    B_rate
+        Coefficients of the equations above, (n_z, n_s).
+    B_acceleration
+        Coefficients of the equations above, (n_z, n_s).
+    L_rate
+        Coefficients of the equations above, (n_outputs, n_z).
+    L_acceleration
+        Coefficients of the equations above, (n_outputs, n_z).
+    D
+        Coefficients of the equations above, (n_outputs, n_s).
+    D_rate
+        Coefficients of the equations above, (n_outputs, n_s).
+    D_acceleration
+        Coefficients of the equations above, (n_outputs, n_s).
+    Y
+        Motions of the bodies per s, in addition to those of z, (n_u, n_s).
+    input_rates
+        r, if the input is the r-th derivative of s; 0 for forces.
+    input_units
+        Unit of each input.
+    output_units
+        Unit of each output.
+    output_values
+        Outputs in the steady motion, (n_outputs,).
+    left_out
+        Columns of outputs that are not linear here, with the reasons.
+    motions
+        Motions that can become states, see `state_space`.
+    states
+        Displacements along velocity constraints, and states of elements and user forces, the last entries of z: their
+        rows of C are those of a unit matrix, and their rows of M depend only on z''.
+    state_units
+        Unit of each state.
+    coordinates
+        Names of z, for relative coordinates without velocity constraints; else empty.
     """
 
     equilibrium: Equilibrium
-    M: Array  #: (n_z, n_z)
-    C: Array  #: with gyroscopic terms, (n_z, n_z)
-    K: Array  #: with geometric, centrifugal and circulatory terms, (n_z, n_z)
-    B: Array  #: (n_z, n_s)
-    L: Array  #: (n_outputs, n_z)
-    N: Array  #: motions of the bodies (translation and rotation in body axes, modes) per z, (n_u, n_z)
+    M: Array
+    C: Array
+    K: Array
+    B: Array
+    L: Array
+    N: Array
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     body_names: tuple[str, ...]
-    body_masses: tuple[Array, ...]  #: mass matrix of each body, (6 + n_q, 6 + n_q)
-    B_rate: Array = field(default_factory=empty)  #: (n_z, n_s)
-    B_acceleration: Array = field(default_factory=empty)  #: (n_z, n_s)
-    L_rate: Array = field(default_factory=empty)  #: (n_outputs, n_z)
-    L_acceleration: Array = field(default_factory=empty)  #: (n_outputs, n_z)
-    D: Array = field(default_factory=empty)  #: (n_outputs, n_s)
-    D_rate: Array = field(default_factory=empty)  #: (n_outputs, n_s)
-    D_acceleration: Array = field(default_factory=empty)  #: (n_outputs, n_s)
-    Y: Array = field(default_factory=empty)  #: motions of the bodies per s, in addition to those of z, (n_u, n_s)
-    input_rates: tuple[int, ...] = ()  #: r, if the input is the r-th derivative of s; 0 for forces
-    input_units: tuple[str, ...] = ()  #: of the inputs
+    body_masses: tuple[Array, ...]
+    B_rate: Array = field(default_factory=empty)
+    B_acceleration: Array = field(default_factory=empty)
+    L_rate: Array = field(default_factory=empty)
+    L_acceleration: Array = field(default_factory=empty)
+    D: Array = field(default_factory=empty)
+    D_rate: Array = field(default_factory=empty)
+    D_acceleration: Array = field(default_factory=empty)
+    Y: Array = field(default_factory=empty)
+    input_rates: tuple[int, ...] = ()
+    input_units: tuple[str, ...] = ()
     output_units: tuple[str, ...] = ()
-    output_values: Array = field(default_factory=empty)  #: outputs in the steady motion, (n_outputs,)
-    #: columns of outputs that are not linear here, with the reasons
+    output_values: Array = field(default_factory=empty)
     left_out: Mapping[str, str] = field(default_factory=dict)
-    motions: NamedMotions | None = None  #: motions that can become states, see `state_space`
-    #: displacements along velocity constraints, and states of elements and user forces, the last entries of z: their
-    #: rows of C are those of a unit matrix, and their rows of M depend only on z''
+    motions: NamedMotions | None = None
     states: tuple[str, ...] = ()
     state_units: tuple[str, ...] = ()
-    coordinates: tuple[str, ...] = ()  #: names of z, for relative coordinates without velocity constraints; else empty
+    coordinates: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         n_z, n_s, n_y = self.M.shape[0], len(self.inputs), len(self.outputs)

@@ -34,14 +34,30 @@ MOST_HALVINGS = 3  #: largest number of halvings of a step between values in whi
 @presented
 @dataclass(frozen=True, eq=False)
 class Locus:
-    """Eigenvalues as functions of a parameter; each column follows one mode."""
+    """Eigenvalues as functions of a parameter; each column follows one mode.
 
-    parameter: str  #: name of the parameter, with its unit
-    values: Array  #: (n_values,)
-    eigenvalues: Array  #: (n_values, n_modes) complex [1/s]; NaN where the mode does not exist
-    outputs: tuple[str, ...] = ()  #: names of the outputs of `campbell`
+    Parameters
+    ----------
+    parameter
+        Name of the parameter, with its unit.
+    values
+        Values of the parameter, (n_values,).
+    eigenvalues
+        (n_values, n_modes) complex [1/s]; NaN where the mode does not exist.
+    outputs
+        Names of the outputs of `campbell`.
+    output_units
+        Unit of each output.
+    steady
+        Steady values of outputs, (n_values, n_outputs).
+    """
+
+    parameter: str
+    values: Array
+    eigenvalues: Array
+    outputs: tuple[str, ...] = ()
     output_units: tuple[str, ...] = ()
-    steady: Array = field(default_factory=lambda: np.zeros((0, 0)))  #: steady values of outputs, (n_values, n_outputs)
+    steady: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def frequencies(self) -> Array:

@@ -35,12 +35,36 @@ NEW = 1e-9  #: smallest independent part that is not a rounding error, used if n
 @presented
 @dataclass(frozen=True, eq=False)
 class NamedStateSpace:
-    """A state space x_dot = A x + B u,  y = C x + D u, with the name and unit of each state, input and output."""
+    """A state space x_dot = A x + B u,  y = C x + D u, with the name and unit of each state, input and output.
 
-    A: Array  #: (n_x, n_x)
-    B: Array  #: (n_x, n_inputs)
-    C: Array  #: (n_outputs, n_x)
-    D: Array  #: (n_outputs, n_inputs)
+    Parameters
+    ----------
+    A
+        Matrix of the state space, (n_x, n_x).
+    B
+        Matrix of the state space, (n_x, n_inputs).
+    C
+        Matrix of the state space, (n_outputs, n_x).
+    D
+        Matrix of the state space, (n_outputs, n_inputs).
+    states
+        Names of the states.
+    state_units
+        Unit of each state.
+    inputs
+        Names of the inputs.
+    input_units
+        Unit of each input.
+    outputs
+        Names of the outputs.
+    output_units
+        Unit of each output.
+    """
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
     states: tuple[str, ...]
     state_units: tuple[str, ...]
     inputs: tuple[str, ...]

@@ -25,16 +25,32 @@ class SystemModes:
 
     A motion without resistance is listed as one mode with lambda = 0, although it has two eigenvalues, one for its
     position and one for its velocity.
+
+    Parameters
+    ----------
+    eigenvalues
+        Lambda, imaginary part >= 0, (n_modes,) complex [1/s].
+    shapes
+        Motions of the bodies (body axes), with 1 as the largest entry, (n_u, n_modes) complex.
+    energy_shares
+        Share of each body in the kinetic energy of the mode, (n_modes, n_bodies).
+    bodies
+        Names of the bodies.
+    states
+        Names of the states of elements and user forces.
+    state_shapes
+        Changes of states, scaled like the shapes, (n_states, n_modes) complex.
+    errors
+        Error bounds of lambda, (n_modes,) [1/s].
     """
 
-    eigenvalues: Array  #: lambda, imaginary part >= 0, (n_modes,) complex [1/s]
-    shapes: Array  #: motions of the bodies (body axes), with 1 as the largest entry, (n_u, n_modes) complex
-    energy_shares: Array  #: share of each body in the kinetic energy of the mode, (n_modes, n_bodies)
-    bodies: tuple[str, ...]  #: names of the bodies
-    states: tuple[str, ...] = ()  #: names of the states of elements and user forces
-    #: changes of states, scaled like the shapes, (n_states, n_modes) complex
+    eigenvalues: Array
+    shapes: Array
+    energy_shares: Array
+    bodies: tuple[str, ...]
+    states: tuple[str, ...] = ()
     state_shapes: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    errors: Array = field(default_factory=lambda: np.zeros(0))  #: error bounds of lambda, (n_modes,) [1/s]
+    errors: Array = field(default_factory=lambda: np.zeros(0))
 
     def summary(self) -> Summary:
         """Return what `repr` and notebooks show: frequency, damping and the bodies that move, of each mode."""

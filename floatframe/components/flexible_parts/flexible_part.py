@@ -19,7 +19,21 @@ __all__ = ["FlexiblePart", "PartMaker"]
 @presented
 @dataclass(frozen=True, eq=False)
 class FlexiblePart:
-    """Bodies, joints and forces for a system, and markers at named points of the part."""
+    """Bodies, joints and forces for a system, and markers at named points of the part.
+
+    Parameters
+    ----------
+    name
+        Name of the part; it begins the names of its bodies, joints and forces.
+    bodies
+        The bodies of the part.
+    joints
+        The joints of the part.
+    forces
+        The forces of the part.
+    markers
+        Markers by name, at which the part is joined to others.
+    """
 
     name: str
     bodies: tuple[Body, ...]

@@ -82,18 +82,42 @@ LANGUAGES: dict[str, Callable[[Routine, Sequence[str]], dict[str, str]]] = {
 @presented
 @dataclass(frozen=True, eq=False)
 class GeneratedCode:
-    """The text of a routine, and its number of operations."""
+    """The text of a routine, and its number of operations.
 
-    name: str  #: name of the function
+    Parameters
+    ----------
+    name
+        Name of the function.
+    what
+        The quantity that the routine computes.
+    language
+        Programming language of the routine.
+    files
+        Text by file name.
+    inputs
+        Length of each input by name, in the order of the arguments.
+    outputs
+        Shape of each output by name, in the order of the results.
+    operations
+        Operations of one call.
+    general
+        Additions and multiplications of the same recursion without simplification.
+    parameter_names
+        Names of the entries of the input `parameters`, in order.
+    parameter_values
+        Values of `parameters` in the system [kg, kg m, kg m², m/s²].
+    """
+
+    name: str
     what: str
     language: str
-    files: dict[str, str]  #: text by file name
-    inputs: dict[str, int]  #: length of each input by name, in the order of the arguments
-    outputs: dict[str, tuple[int, ...]]  #: shape of each output by name, in the order of the results
-    operations: Operations  #: operations of one call
-    general: tuple[int, int]  #: additions and multiplications of the same recursion without simplification
-    parameter_names: tuple[str, ...]  #: names of the entries of the input `parameters`, in order
-    parameter_values: Array  #: values of `parameters` in the system [kg, kg m, kg m², m/s²]
+    files: dict[str, str]
+    inputs: dict[str, int]
+    outputs: dict[str, tuple[int, ...]]
+    operations: Operations
+    general: tuple[int, int]
+    parameter_names: tuple[str, ...]
+    parameter_values: Array
 
     def write(self, directory: str | Path) -> tuple[Path, ...]:
         """Write the files into a directory, which is created if it does not exist; return their paths."""

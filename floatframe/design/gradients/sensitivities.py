@@ -69,16 +69,33 @@ SLOPE_STEP = 2e-4  #: step of differences of sensors, relative to the magnitude 
 @presented
 @dataclass(frozen=True, eq=False)
 class Sensitivities:
-    """Values of outputs and their derivatives by parameters."""
+    """Values of outputs and their derivatives by parameters.
+
+    Parameters
+    ----------
+    outputs
+        Names of the outputs.
+    parameters
+        Names of the parameters.
+    values
+        Values of the outputs, (n_out,).
+    gradient
+        d output/d parameter, (n_out, n_p).
+    units
+        Units of the outputs.
+    parameter_values
+        Values of the parameters, (n_p,).
+    repeated
+        Outputs of modes whose eigenvalue is repeated: their derivatives are those of one branch, parameter by
+        parameter, and do not add up for changes of several parameters.
+    """
 
     outputs: tuple[str, ...]
     parameters: tuple[str, ...]
-    values: Array  #: values of the outputs, (n_out,)
-    gradient: Array  #: d output/d parameter, (n_out, n_p)
-    units: tuple[str, ...]  #: units of the outputs
-    parameter_values: Array  #: (n_p,)
-    #: outputs of modes whose eigenvalue is repeated: their derivatives are those of one branch, parameter by parameter,
-    #: and do not add up for changes of several parameters
+    values: Array
+    gradient: Array
+    units: tuple[str, ...]
+    parameter_values: Array
     repeated: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:

@@ -42,16 +42,33 @@ BASE = ("base F_x", "base F_y", "base F_z", "base M_x", "base M_y", "base M_z")
 @presented
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """A motion with its measurements."""
+    """A motion with its measurements.
+
+    Parameters
+    ----------
+    samples
+        The motion at the sampled instants.
+    torques
+        Torques of the coordinates, (n, n_c) [N, N m].
+    reactions
+        Force and moment of the ground on the tree about `point`, ground axes, (n, 6).
+    point
+        Reference point of the reactions, (3,) [m]; None: the origin.
+    time
+        Times, (n,) [s].
+    smooth
+        Filter over the instants (axis 0), for the measurements and for the linear form; None: no filter.
+    used
+        Instants to use, after filtering.
+    """
 
     samples: TreeSamples
-    torques: Array | None = None  #: torques of the coordinates, (n, n_c) [N, N m]
-    reactions: Array | None = None  #: force and moment of the ground on the tree about `point`, ground axes, (n, 6)
-    point: Array | None = None  #: reference point of the reactions, (3,) [m]; None: the origin
-    time: Array | None = None  #: (n,) [s]
-    #: filter over the instants (axis 0), for the measurements and for the linear form; None: no filter
+    torques: Array | None = None
+    reactions: Array | None = None
+    point: Array | None = None
+    time: Array | None = None
     smooth: Callable[[Array], Array] | None = None
-    used: slice = field(default_factory=lambda: slice(None))  #: instants to use, after filtering
+    used: slice = field(default_factory=lambda: slice(None))
 
     def __post_init__(self) -> None:
         n, n_c = len(self.samples.x), self.samples.n_independent

@@ -36,23 +36,49 @@ SMALLER = 9  #: number of decreasing amplitudes that are tried to satisfy torque
 
 @dataclass(frozen=True)
 class MotionLimits:
-    """The limits of a coordinate."""
+    """The limits of a coordinate.
 
-    low: float  #: lower limit of the position [m or rad]
+    Parameters
+    ----------
+    low
+        Lower limit of the position [m or rad].
+    high
+        Upper limit of the position [m or rad].
+    rate
+        Largest rate [m/s or rad/s].
+    acceleration
+        Largest acceleration [m/s² or rad/s²].
+    torque
+        Largest torque, with the parameters of the system [N or N m].
+    """
+
+    low: float
     high: float
-    rate: float  #: largest rate [m/s or rad/s]
-    acceleration: float = np.inf  #: largest acceleration [m/s² or rad/s²]
-    torque: float = np.inf  #: largest torque, with the parameters of the system [N or N m]
+    rate: float
+    acceleration: float = np.inf
+    torque: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)
 class ExcitingMotion:
-    """A periodic motion."""
+    """A periodic motion.
 
-    names: tuple[str, ...]  #: names of the coordinates
-    period: float  #: period [s]
-    coefficients: Array  #: c, a_1, b_1, ..., a_N, b_N of each coordinate, (n_c, 1 + 2 N)
-    condition: float  #: condition number of the rows of base parameters in typical units
+    Parameters
+    ----------
+    names
+        Names of the coordinates.
+    period
+        Period [s].
+    coefficients
+        c, a_1, b_1, ..., a_N, b_N of each coordinate, (n_c, 1 + 2 N).
+    condition
+        Condition number of the rows of base parameters in typical units.
+    """
+
+    names: tuple[str, ...]
+    period: float
+    coefficients: Array
+    condition: float
 
     def at(self, t: Array) -> tuple[Array, Array, Array]:
         """Return positions, rates and accelerations, each (n, n_c), at times, (n,) [s]."""

@@ -55,10 +55,18 @@ TOLERANCE = 1e-10  #: tolerance of Newton iterations in compared runs
 @presented
 @dataclass(frozen=True, eq=False)
 class MeasuredOutputs:
-    """Outputs measured at equidistant times, from the beginning of the run."""
+    """Outputs measured at equidistant times, from the beginning of the run.
 
-    time: Array  #: times, (n,) [s]
-    values: Mapping[str, Array]  #: by column of a sensor or coordinate, "tip y", "shoulder.angle force", (n,) each
+    Parameters
+    ----------
+    time
+        Times, (n,) [s].
+    values
+        Values by column of a sensor or coordinate, "tip y", "shoulder.angle force", (n,) each.
+    """
+
+    time: Array
+    values: Mapping[str, Array]
 
     def __post_init__(self) -> None:
         t = np.asarray(self.time, dtype=float)
@@ -83,18 +91,42 @@ class MeasuredOutputs:
 
 @dataclass(frozen=True, eq=False)
 class OutputFit:
-    """Estimated parameters, and the quality of their fit."""
+    """Estimated parameters, and the quality of their fit.
+
+    Parameters
+    ----------
+    names
+        Names of the parameters.
+    values
+        Estimated values, (n_p,).
+    covariance
+        Covariance of the values, (n_p, n_p).
+    channels
+        Names of the measured channels.
+    sigma
+        Noise of the channels, (channels,).
+    predicted
+        Outputs of the system with the values, (n, channels).
+    residuals
+        Measured minus predicted outputs, (n, channels).
+    slopes
+        Derivatives of the outputs by the parameters, (n, channels, n_p).
+    condition
+        Condition number of the derivatives divided by the noise, columns of length one.
+    n_runs
+        Number of computed motions.
+    """
 
     names: tuple[str, ...]
-    values: Array  #: (n_p,)
-    covariance: Array  #: (n_p, n_p)
+    values: Array
+    covariance: Array
     channels: tuple[str, ...]
-    sigma: Array  #: noise of the channels, (channels,)
-    predicted: Array  #: outputs of the system with the values, (n, channels)
-    residuals: Array  #: measured minus predicted outputs, (n, channels)
-    slopes: Array  #: derivatives of the outputs by the parameters, (n, channels, n_p)
-    condition: float  #: condition number of the derivatives divided by the noise, columns of length one
-    n_runs: int  #: number of computed motions
+    sigma: Array
+    predicted: Array
+    residuals: Array
+    slopes: Array
+    condition: float
+    n_runs: int
 
     @property
     def deviations(self) -> Array:

@@ -11,13 +11,27 @@ __all__ = ["Case", "grid"]
 
 @dataclass(frozen=True)
 class Case:
-    """One description of the body."""
+    """One description of the body.
 
-    mode_set: str = "craig-bampton"  #: name of a mode set, as in a job
-    n_modes: int = 10  #: number of vibration modes of each part
-    frame: str = "tisserand"  #: "tisserand", "buckens", or "nodal:INTERFACE"
-    stiffening: bool = True  #: whether geometric stiffness is included
-    parts: int = 1  #: number of parts of equal length, each with its own frame (mean axes if there are several)
+    Parameters
+    ----------
+    mode_set
+        Name of a mode set, as in a job.
+    n_modes
+        Number of vibration modes of each part.
+    frame
+        "tisserand", "buckens", or "nodal:INTERFACE".
+    stiffening
+        Whether geometric stiffness is included.
+    parts
+        Number of parts of equal length, each with its own frame (mean axes if there are several).
+    """
+
+    mode_set: str = "craig-bampton"
+    n_modes: int = 10
+    frame: str = "tisserand"
+    stiffening: bool = True
+    parts: int = 1
 
     def __post_init__(self) -> None:
         kind, _, at = self.frame.partition(":")

@@ -21,9 +21,14 @@ class ExactBeam:
 
     The finer motion is the reference; errors fall with the square of the element, so that a third of the difference of
     both is its own error.
+
+    Parameters
+    ----------
+    elements
+        Smallest number of elements of all lines together.
     """
 
-    elements: int = 32  #: of all lines together, at least
+    elements: int = 32
 
     def __post_init__(self) -> None:
         if self.elements < 1:

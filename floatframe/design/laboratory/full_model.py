@@ -21,9 +21,15 @@ MOST_DOFS = 1200  #: largest number of dofs, because dense matrices of this size
 
 @dataclass(frozen=True)
 class FullModel:
-    """Reference: the body of the job unreduced, all of its dofs run in the system by the integrator of the study."""
+    """Reference: the body of the job unreduced, all of its dofs run in the system by the integrator of the study.
 
-    most_dofs: int = MOST_DOFS  #: more are refused: matrices are dense, a factorisation costs their third power
+    Parameters
+    ----------
+    most_dofs
+        More are refused: matrices are dense, a factorisation costs their third power.
+    """
+
+    most_dofs: int = MOST_DOFS
 
     @property
     def description(self) -> str:

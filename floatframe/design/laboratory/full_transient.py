@@ -42,25 +42,53 @@ MOST_NUMBERS = 2.5e8  #: largest number of results in memory, 2 GB
 
 @dataclass(frozen=True, eq=False)
 class FrameAcceleration:
-    """Motion of the frame relative to which the body deforms, as inertia load; components in mesh axes."""
+    """Motion of the frame relative to which the body deforms, as inertia load; components in mesh axes.
 
-    acceleration: Array  #: acceleration of `origin` minus the acceleration of free fall, (n_t, 3) [m/s²]
-    omega: Array  #: angular velocity, (n_t, 3) [rad/s]
-    alpha: Array  #: angular acceleration, (n_t, 3) [rad/s²]
-    origin: Array = field(default_factory=lambda: np.zeros(3))  #: reference point in mesh coordinates, (3,) [m]
+    Parameters
+    ----------
+    acceleration
+        Acceleration of `origin` minus the acceleration of free fall, (n_t, 3) [m/s²].
+    omega
+        Angular velocity, (n_t, 3) [rad/s].
+    alpha
+        Angular acceleration, (n_t, 3) [rad/s²].
+    origin
+        Reference point in mesh coordinates, (3,) [m].
+    """
+
+    acceleration: Array
+    omega: Array
+    alpha: Array
+    origin: Array = field(default_factory=lambda: np.zeros(3))
 
 
 @presented
 @dataclass(frozen=True, eq=False)
 class FullTransient:
-    """Motion of the selected rows, and forces at the interfaces with prescribed motion."""
+    """Motion of the selected rows, and forces at the interfaces with prescribed motion.
 
-    t: Array  #: (n_t,)
-    u: Array  #: selected displacements, (n_t, n_rows)
-    u_dot: Array  #: their rates, (n_t, n_rows)
-    u_ddot: Array  #: their second rates, (n_t, n_rows)
-    forces: Mapping[str, Array]  #: forces on the dofs of each interface, mesh axes, (n_t, n_dofs) [N, N m]
-    n_dof: int  #: number of integrated dofs
+    Parameters
+    ----------
+    t
+        Times, (n_t,).
+    u
+        Selected displacements, (n_t, n_rows).
+    u_dot
+        Their rates, (n_t, n_rows).
+    u_ddot
+        Their second rates, (n_t, n_rows).
+    forces
+        Forces on the dofs of each interface, mesh axes, (n_t, n_dofs) [N, N m].
+    n_dof
+        Number of integrated dofs.
+    """
+
+    t: Array
+    u: Array
+    u_dot: Array
+    u_ddot: Array
+    forces: Mapping[str, Array]
+    n_dof: int
 
 
 def full_transient(

@@ -52,11 +52,21 @@ LEAST_RANGE = 1e-6  #: range of a column, relative to the largest column of its 
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """Columns of a reference over time."""
+    """Columns of a reference over time.
+
+    Parameters
+    ----------
+    words
+        Description of the reference.
+    t
+        Times, (n_t,).
+    columns
+        "sensor column" -> (n_t,).
+    """
 
     words: str
-    t: Array  #: (n_t,)
-    columns: Mapping[str, Array]  #: "sensor column" -> (n_t,)
+    t: Array
+    columns: Mapping[str, Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,13 +120,27 @@ class CaseResult:
 @presented
 @dataclass(frozen=True, eq=False)
 class LaboratoryResult:
-    """All cases, compared with the reference."""
+    """All cases, compared with the reference.
+
+    Parameters
+    ----------
+    name
+        Name of the laboratory.
+    reference
+        Description of the reference.
+    columns
+        Compared columns.
+    cases
+        The results of the cases.
+    settled
+        Error of the reference itself; None if unknown.
+    """
 
     name: str
-    reference: str  #: description of the reference
-    columns: tuple[str, ...]  #: compared columns
+    reference: str
+    columns: tuple[str, ...]
     cases: tuple[CaseResult, ...]
-    settled: float | None = None  #: error of the reference itself; None if unknown
+    settled: float | None = None
 
     def table(self) -> list[dict[str, Any]]:
         """Return one row per case, for a data frame, CSV or JSON."""

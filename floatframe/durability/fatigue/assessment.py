@@ -49,11 +49,21 @@ SAME_PLACE = 1e-9  #: distance, relative to the size of the body, within which a
 @presented
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """A fatigue result with its programme."""
+    """A fatigue result with its programme.
+
+    Parameters
+    ----------
+    result
+        The damage at the places of the body.
+    given
+        The fatigue file that was assessed.
+    blocks
+        Load blocks; empty for spectra.
+    """
 
     result: FatigueResult
     given: FatigueFile
-    blocks: tuple[LoadBlock, ...]  #: load blocks; empty for spectra
+    blocks: tuple[LoadBlock, ...]
 
     @property
     def life(self) -> Array:

@@ -30,12 +30,24 @@ FROBENIUS = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
 
 @dataclass(frozen=True)
 class Criterion:
-    """A criterion. Its stresses equal those of a bar under tension, so that curves measured on bars apply."""
+    """A criterion. Its stresses equal those of a bar under tension, so that curves measured on bars apply.
 
-    name: str = "signed-von-mises"  #: one of `CRITERIA`
-    tensor: str = "full"  #: one of `TENSORS`, for signed-von-mises and principal
-    n_planes: int = 18  #: number of planes over 180 degrees
-    findley_k: float = 0.3  #: weight of the normal stress in findley
+    Parameters
+    ----------
+    name
+        One of `CRITERIA`.
+    tensor
+        One of `TENSORS`, for signed-von-mises and principal.
+    n_planes
+        Number of planes over 180 degrees.
+    findley_k
+        Weight of the normal stress in findley.
+    """
+
+    name: str = "signed-von-mises"
+    tensor: str = "full"
+    n_planes: int = 18
+    findley_k: float = 0.3
 
     def __post_init__(self) -> None:
         for what, name, known in (("criterion", self.name, CRITERIA), ("tensor", self.tensor, TENSORS)):

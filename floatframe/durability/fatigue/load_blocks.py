@@ -18,14 +18,30 @@ GAP = 10.0  #: ratio to the median time step above which a step is a gap
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class LoadBlock:
-    """A history of modal coordinates with its number of `repeats` in a load programme."""
+    """A history of modal coordinates with its number of `repeats` in a load programme.
+
+    Parameters
+    ----------
+    name
+        Name of the block.
+    q
+        Modal coordinates, (n_t, n_q).
+    t
+        Times, (n_t,) [s]; empty if unknown.
+    repeats
+        How often the history is repeated.
+    scale
+        Factor on the loads.
+    has_gaps
+        Whether time steps that are much longer than the others are intended.
+    """
 
     name: str
-    q: Array  #: modal coordinates, (n_t, n_q)
-    t: Array = field(default_factory=lambda: np.zeros(0))  #: times, (n_t,) [s]; empty if unknown
+    q: Array
+    t: Array = field(default_factory=lambda: np.zeros(0))
     repeats: float = 1.0
-    scale: float = 1.0  #: factor on the loads
-    has_gaps: bool = False  #: whether time steps that are much longer than the others are intended
+    scale: float = 1.0
+    has_gaps: bool = False
 
     def __post_init__(self) -> None:
         where = f"load block {self.name!r}"

@@ -41,11 +41,21 @@ MEAN_STRESS = {
 
 @dataclass(frozen=True)
 class MeanStress:
-    """A mean stress correction and its parameter."""
+    """A mean stress correction and its parameter.
 
-    name: str = "none"  #: one of `MEAN_STRESS`
-    value: float = 0.0  #: a strength [Pa], Walker's exponent, or the sensitivity M
-    credit_compression: bool = False  #: goodman, soderberg, morrow: whether a compressive mean is beneficial
+    Parameters
+    ----------
+    name
+        One of `MEAN_STRESS`.
+    value
+        a strength [Pa], Walker's exponent, or the sensitivity M.
+    credit_compression
+        Goodman, soderberg, morrow: whether a compressive mean is beneficial.
+    """
+
+    name: str = "none"
+    value: float = 0.0
+    credit_compression: bool = False
 
     def __post_init__(self) -> None:
         if self.name not in MEAN_STRESS:

@@ -19,14 +19,27 @@ __all__ = ["FatigueMaterial", "Places", "assessed_places", "point_number"]
 
 @dataclass(frozen=True, eq=False)
 class FatigueMaterial:
-    """A material of places: its S-N curve with factors, and its mean stress correction."""
+    """A material of places: its S-N curve with factors, and its mean stress correction.
 
-    curve: SNCurve  #: in stress units of the body
+    Parameters
+    ----------
+    curve
+        S-N curve in stress units of the body.
+    mean_stress
+        Correction for the mean stress.
+    name
+        Name of the material.
+    nodes
+        Kept nodes of the material; with `points` also None, the material applies to all places without another one.
+    points
+        Rows of the stress points of the material.
+    """
+
+    curve: SNCurve
     mean_stress: MeanStress = NO_CORRECTION
     name: str = ""
-    #: kept nodes of the material; with `points` also None, the material applies to all places without another one
     nodes: IntArray | None = None
-    points: IntArray | None = None  #: rows of the stress points of the material
+    points: IntArray | None = None
 
 
 @dataclass(frozen=True, eq=False)

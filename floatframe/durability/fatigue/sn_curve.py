@@ -29,15 +29,32 @@ class SNCurve:
     S is the stress amplitude, half the range, in stress units of the body. Line j holds from amplitude `bottom[j]` up
     to that of the line before. Below the last line there is no damage. Above `greatest` the curve was never measured:
     cycles there are counted on the first line and told, or refused.
+
+    Parameters
+    ----------
+    amplitude
+        S_j, one point on each line, beginning with the highest load, (n_lines,) [Pa].
+    cycles
+        N_j at that point, (n_lines,).
+    slope
+        Slopes k_j >= 1, (n_lines,).
+    bottom
+        Smallest amplitude of each line, (n_lines,) [Pa]; 0 for the last line means no fatigue limit.
+    greatest
+        Largest amplitude for which the curve is known [Pa].
+    stress_ratio
+        R, the smallest stress in the tests divided by the largest.
+    notes
+        Notes on applied factors and conversions.
     """
 
-    amplitude: Array  #: S_j, one point on each line, beginning with the highest load, (n_lines,) [Pa]
-    cycles: Array  #: N_j at that point, (n_lines,)
-    slope: Array  #: k_j >= 1, (n_lines,)
-    bottom: Array  #: smallest amplitude of each line, (n_lines,) [Pa]; 0 for the last line means no fatigue limit
-    greatest: float  #: largest amplitude for which the curve is known [Pa]
-    stress_ratio: float = -1.0  #: R, the smallest stress in the tests divided by the largest
-    notes: tuple[str, ...] = ()  #: notes on applied factors and conversions
+    amplitude: Array
+    cycles: Array
+    slope: Array
+    bottom: Array
+    greatest: float
+    stress_ratio: float = -1.0
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("amplitude", "cycles", "slope", "bottom"):

@@ -40,23 +40,61 @@ MOST_BEYOND = 0.01
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class FatigueResult:
-    """Damage at places of a body for one pass through a load programme; the life is 1 / damage passes."""
+    """Damage at places of a body for one pass through a load programme; the life is 1 / damage passes.
+
+    Parameters
+    ----------
+    body
+        The reduced body.
+    nodes
+        Kept node of each place, index into `body.nodes`, -1 at a stress point, (n,).
+    points
+        Row of the stress points of the body, -1 at a node, (n,).
+    material
+        Index of its material in `materials`, (n,).
+    block_names
+        Names of the load blocks, (n_blocks,).
+    block_damage
+        Damage of each block with its repeats, (n_blocks, n); NaN at excluded places.
+    bound
+        Upper bound of the damage, (n,).
+    is_counted
+        Whether the place was counted, (n,); if not, its bound is negligible.
+    cycles
+        Number of cycles in the programme, (n,).
+    beyond
+        Number of cycles beyond the S-N curve, (n,); for spectra, their fraction of the damage.
+    largest
+        Largest equivalent amplitude, (n,) [Pa]; for spectra, three standard deviations.
+    plane
+        Critical plane, (n,).
+    materials
+        The materials.
+    criterion
+        The multiaxial criterion.
+    method
+        Residue of rainflow counting, one of `RESIDUES`, or one of `SPECTRAL_METHODS`.
+    is_spectral
+        Whether the damage follows from spectra.
+    notes
+        Notes for the report.
+    """
 
     body: ReducedBody
-    nodes: IntArray  #: kept node of each place, index into `body.nodes`, -1 at a stress point, (n,)
-    points: IntArray  #: row of the stress points of the body, -1 at a node, (n,)
-    material: IntArray  #: index of its material in `materials`, (n,)
+    nodes: IntArray
+    points: IntArray
+    material: IntArray
     block_names: tuple[str, ...]
-    block_damage: Array  #: damage of each block with its repeats, (n_blocks, n); NaN at excluded places
-    bound: Array  #: upper bound of the damage, (n,)
-    is_counted: Array  #: whether the place was counted, (n,); if not, its bound is negligible
-    cycles: Array  #: number of cycles in the programme, (n,)
-    beyond: Array  #: number of cycles beyond the S-N curve, (n,); for spectra, their fraction of the damage
-    largest: Array  #: largest equivalent amplitude, (n,) [Pa]; for spectra, three standard deviations
-    plane: IntArray  #: critical plane, (n,)
+    block_damage: Array
+    bound: Array
+    is_counted: Array
+    cycles: Array
+    beyond: Array
+    largest: Array
+    plane: IntArray
     materials: tuple[FatigueMaterial, ...]
     criterion: Criterion
-    method: str  #: residue of rainflow counting, one of `RESIDUES`, or one of `SPECTRAL_METHODS`
+    method: str
     is_spectral: bool = False
     notes: tuple[str, ...] = ()
 

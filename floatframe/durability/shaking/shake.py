@@ -29,35 +29,74 @@ LITTLE_MASS = 0.9  #: fraction of the mass in modes of a direction below which a
 
 @dataclass(frozen=True)
 class NotchRequest:
-    """Limits for one kind of test, or one test."""
+    """Limits for one kind of test, or one test.
+
+    Parameters
+    ----------
+    limits
+        The limits that notch the test.
+    kind
+        Kind of test, "sine" or "random".
+    tests
+        Names; (): all of the kind.
+    deepest
+        Largest allowed depth of a notch [dB].
+    """
 
     limits: Sequence[Limit]
-    kind: str  #: kind of test, "sine" or "random"
-    tests: Sequence[str] = ()  #: names; (): all of the kind
-    deepest: float = DEEPEST  #: largest allowed depth of a notch [dB]
+    kind: str
+    tests: Sequence[str] = ()
+    deepest: float = DEEPEST
 
 
 @presented
 @dataclass(frozen=True, eq=False)
 class ShakeJob:
-    """The structure, its bases and damping, the tests, and the requested outputs."""
+    """The structure, its bases and damping, the tests, and the requested outputs.
+
+    Parameters
+    ----------
+    structure
+        The shaken structure.
+    base
+        Name -> what it holds: interfaces of a body; joints, springs and bushings of a system. Or one of them.
+    points
+        Reference points of bases, coordinates of mesh or ground.
+    damping
+        Damping of the structure.
+    outputs
+        The observed places.
+    sine
+        The sine tests.
+    random
+        The random tests.
+    shock
+        The shocks and transients.
+    notch
+        The requests for notching.
+    uncertainty
+        Factors on the responses, and uncertainty of the frequencies.
+    residual_above
+        Frequency above which modes respond statically [Hz].
+    title
+        Title of the report.
+    source
+        File of the structure, for the record.
+    """
 
     structure: ReducedBody | System
-    #: name -> what it holds: interfaces of a body; joints, springs and bushings of a system. Or one of them
     base: Mapping[str, Sequence[str]] | str | None = None
-    points: Mapping[str, Array] = field(
-        default_factory=dict
-    )  #: reference points of bases, coordinates of mesh or ground
+    points: Mapping[str, Array] = field(default_factory=dict)
     damping: Damping = field(default_factory=lambda: Damping(ratio=0.02))
     outputs: Sequence[Observed] = ()
     sine: Sequence[SineTest] = ()
     random: Sequence[RandomTest] = ()
-    shock: Sequence[TimeTest] = ()  #: and transients
+    shock: Sequence[TimeTest] = ()
     notch: Sequence[NotchRequest] = ()
     uncertainty: Uncertainty = field(default_factory=Uncertainty)
-    residual_above: float | None = None  #: frequency above which modes respond statically [Hz]
+    residual_above: float | None = None
     title: str = ""
-    source: str = ""  #: file of the structure, for the record
+    source: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +124,27 @@ class EffectiveMasses:
 @presented
 @dataclass(frozen=True, eq=False)
 class ShakeResult:
-    """All runs of a job."""
+    """All runs of a job.
+
+    Parameters
+    ----------
+    job
+        The job.
+    model
+        The model of the shaken structure.
+    masses
+        Effective masses of the modes.
+    sine
+        Results of the sine tests.
+    random
+        Results of the random tests.
+    time
+        Results of the shocks and transients.
+    notched
+        (kind, test, direction) -> the notched input.
+    notes
+        Notes for the report.
+    """
 
     job: ShakeJob
     model: ShakenModel
@@ -93,7 +152,7 @@ class ShakeResult:
     sine: tuple[SineRun, ...]
     random: tuple[RandomRun, ...]
     time: tuple[TimeRun, ...]
-    notched: Mapping[tuple[str, str, str], NotchedRun]  #: (kind, test, direction) -> the notched input
+    notched: Mapping[tuple[str, str, str], NotchedRun]
     notes: tuple[str, ...]
 
 

@@ -97,11 +97,21 @@ def mobility(system: System) -> Mobility:
 @presented
 @dataclass(frozen=True, eq=False)
 class ConsistentState:
-    """A state that fulfils the joints, with its accelerations and reactions."""
+    """A state that fulfils the joints, with its accelerations and reactions.
+
+    Parameters
+    ----------
+    state
+        The state that satisfies all constraints.
+    u_dot
+        Accelerations, (n_u,).
+    w
+        Wrenches of the connections on their markers A, ground axes, (n_w,).
+    """
 
     state: State
-    u_dot: Array  #: (n_u,)
-    w: Array  #: wrenches of the connections on their markers A, ground axes, (n_w,)
+    u_dot: Array
+    w: Array
 
 
 def consistent_state(

@@ -27,21 +27,51 @@ __all__ = ["BodyEquations", "body_equations"]
 @presented
 @dataclass(frozen=True, eq=False)
 class BodyEquations:
-    """Invariants of a body about its frame, and the terms of its equations; all in axes of the frame."""
+    """Invariants of a body about its frame, and the terms of its equations; all in axes of the frame.
 
-    m: float  #: mass [kg]
-    S: Array  #: first moment, (3,) [kg m]
-    J0: Array  #: inertia about the frame origin, undeformed, (3, 3) [kg m²]
-    C1: Array  #: 1C = ∫ phi_a,k, (3, n) [kg^(1/2) with M-orthonormal shapes]
-    C2: Array  #: 2C = ∫ c × phi_k, (3, n)
-    C3: Array  #: 3C_k = ∫ (c·phi_k 1 - phi_k cᵀ), (n, 3, 3)
-    C4: Array  #: 4C_kl = ∫ phi_l × phi_k, (n, n, 3)
-    S_ab: Array  #: ∫ phi_a,k phi_b,l, (3, 3, n, n); for a stiffened body including K_ab and K_r (§7)
-    M: Array  #: modal mass M*, (n, n)
-    K: Array  #: modal stiffness K*, (n, n)
-    D: Array  #: modal damping D*, (n, n)
-    K_t: Array  #: geometric stiffness for unit accelerations, (3, n, n); zero unless stiffened
-    K_r: Array  #: geometric stiffness for unit angular accelerations, (3, n, n); zero unless stiffened
+    Parameters
+    ----------
+    m
+        Mass [kg].
+    S
+        First moment, (3,) [kg m].
+    J0
+        Inertia about the frame origin, undeformed, (3, 3) [kg m²].
+    C1
+        1C = ∫ phi_a,k, (3, n) [kg^(1/2) with M-orthonormal shapes].
+    C2
+        2C = ∫ c × phi_k, (3, n).
+    C3
+        3C_k = ∫ (c·phi_k 1 - phi_k cᵀ), (n, 3, 3)
+    C4
+        4C_kl = ∫ phi_l × phi_k, (n, n, 3).
+    S_ab
+        ∫ phi_a,k phi_b,l, (3, 3, n, n); for a stiffened body including K_ab and K_r (§7).
+    M
+        Modal mass M*, (n, n).
+    K
+        Modal stiffness K*, (n, n).
+    D
+        Modal damping D*, (n, n).
+    K_t
+        Geometric stiffness for unit accelerations, (3, n, n); zero unless stiffened.
+    K_r
+        Geometric stiffness for unit angular accelerations, (3, n, n); zero unless stiffened.
+    """
+
+    m: float
+    S: Array
+    J0: Array
+    C1: Array
+    C2: Array
+    C3: Array
+    C4: Array
+    S_ab: Array
+    M: Array
+    K: Array
+    D: Array
+    K_t: Array
+    K_r: Array
 
     @property
     def n_q(self) -> int:

@@ -66,16 +66,34 @@ class Equations:
 
     A stiffened flexible body is computed in mean axes (docs/equations.md). `state` and `vectors` convert vectors to
     states in the frames of the files, as in results and sensors, and back.
+
+    Parameters
+    ----------
+    system
+        The system.
+    compiled
+        The compiled system.
+    model
+        Numbers of the model, without the compliance of redundant rows.
+    work
+        Working arrays of the evaluation.
+    structure
+        Structure of its rows.
+    configurations
+        The maps x (+) dx, log, T, and conversions between velocities and rates.
+    layout
+        Names and units of x, v, lam.
+    near
+        Unknowns of connections at which counting the angles of couplers and user forces starts, (n_w,), see `followed`.
     """
 
     system: System
     compiled: CompiledSystem
-    model: Model  #: without the compliance of redundant rows
+    model: Model
     work: Work
-    structure: Structure  #: of its rows
-    configurations: Configurations  #: the maps x (+) dx, log, T, and conversions between velocities and rates
-    layout: Layout  #: names and units of x, v, lam
-    #: unknowns of connections at which counting the angles of couplers and user forces starts, (n_w,), see `followed`
+    structure: Structure
+    configurations: Configurations
+    layout: Layout
     near: Array
 
     @property

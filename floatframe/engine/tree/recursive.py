@@ -62,6 +62,17 @@ class RelativeModel:
     rates: rotations turn by R exp(dz). `names` and `rate_names` say what each number is.
 
     The working arrays belong to the model: two threads need two.
+
+    Parameters
+    ----------
+    expansion
+        Nodes of the tree, and the relation of their numbers to the bodies.
+    work
+        Results of the recursions.
+    marker_work
+        Working arrays of the markers and forces.
+    ready
+        Records of the tree.
     """
 
     expansion: Expansion

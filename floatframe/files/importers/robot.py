@@ -155,6 +155,19 @@ class RobotJoint:
 class Robot:
     """A robot: links, and joints that connect them to one tree.
 
+    Parameters
+    ----------
+    name
+        Name of the robot.
+    links
+        The links.
+    joints
+        The joints between the links.
+    source
+        Path of its file, "": made in Python.
+    notes
+        Elements of the file that are not read.
+
     Raises
     ------
     UrdfError
@@ -165,8 +178,8 @@ class Robot:
     name: str
     links: Sequence[Link]
     joints: Sequence[RobotJoint] = ()
-    source: str = ""  #: path of its file, "": made in Python
-    notes: Sequence[str] = ()  #: elements of the file that are not read
+    source: str = ""
+    notes: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         for name in ("links", "joints", "notes"):

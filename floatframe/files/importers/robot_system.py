@@ -57,24 +57,49 @@ class FlexibleLink:
 
     Its mass and inertia take the place of those of the description, and the joints of the link stand at its
     interfaces. The position of an interface must be that of its joint; its triad may be any.
+
+    Parameters
+    ----------
+    body
+        Or the path of its modal file.
+    interfaces
+        Names of interfaces, by the names of the joints of the link.
+    position
+        Position of the mesh origin in the frame of the link, (3,) [m].
+    rotation_vector
+        Rotation vector of the mesh axes in the frame of the link, (3,) [rad].
     """
 
-    body: ReducedBody | str | os.PathLike[str]  #: or the path of its modal file
-    interfaces: Mapping[str, str]  #: names of interfaces, by the names of the joints of the link
-    position: Array = field(default_factory=lambda: np.zeros(3))  #: of the mesh origin in the frame of the link [m]
-    rotation_vector: Array = field(default_factory=lambda: np.zeros(3))  #: of the mesh axes in it, (3,) [rad]
+    body: ReducedBody | str | os.PathLike[str]
+    interfaces: Mapping[str, str]
+    position: Array = field(default_factory=lambda: np.zeros(3))
+    rotation_vector: Array = field(default_factory=lambda: np.zeros(3))
 
 
 @presented
 @dataclass(frozen=True, eq=False)
 class RobotSystem:
-    """A robot as a system, and where its links are in it."""
+    """A robot as a system, and where its links are in it.
+
+    Parameters
+    ----------
+    system
+        The system.
+    robot
+        The robot as its file describes it.
+    values
+        Coordinates of the joints as placed, by name.
+    carriers
+        The body (or the ground) of each link, and the frame of the link in it.
+    interfaces
+        Interfaces of flexible links by joint, for each link.
+    """
 
     system: System
     robot: Robot
-    values: Mapping[str, float]  #: of the joints as placed, by name
-    carriers: Mapping[str, tuple[str, Frame]]  #: by link: the body (or the ground), and the frame of the link in it
-    interfaces: Mapping[str, Mapping[str, str]]  #: of flexible links, by link: interfaces by joint
+    values: Mapping[str, float]
+    carriers: Mapping[str, tuple[str, Frame]]
+    interfaces: Mapping[str, Mapping[str, str]]
 
     def place(self, link: str) -> Marker:
         """Return the frame of a link as a marker.

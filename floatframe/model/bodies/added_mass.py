@@ -29,13 +29,23 @@ __all__ = ["AddedMass", "second_moments", "with_masses"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class AddedMass:
-    """A small rigid mass fixed to an interface."""
+    """A small rigid mass fixed to an interface.
 
-    interface: str  #: name of the interface
-    mass: float  #: [kg]
-    #: position of the centre of mass relative to the interface node, in the axes of the interface, (3,) [m]
+    Parameters
+    ----------
+    interface
+        Name of the interface.
+    mass
+        Mass [kg].
+    offset
+        Position of the centre of mass relative to the interface node, in the axes of the interface, (3,) [m].
+    inertia
+        Inertia tensor about the centre of mass, in the axes of the interface, (3, 3) [kg m²].
+    """
+
+    interface: str
+    mass: float
     offset: Array = field(default_factory=lambda: np.zeros(3))
-    #: inertia tensor about the centre of mass, in the axes of the interface, (3, 3) [kg m²]
     inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
 
     def __post_init__(self) -> None:

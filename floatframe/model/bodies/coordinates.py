@@ -15,20 +15,38 @@ __all__ = ["AxialAngle", "AxialDistance", "Coordinate", "JointCoordinate", "Poin
 
 @dataclass(frozen=True)
 class JointCoordinate:
-    """A coordinate of a joint, a distance or an angle, free or prescribed."""
+    """A coordinate of a joint, a distance or an angle, free or prescribed.
 
-    joint: str  #: name of the joint
-    coordinate: str  #: name of its coordinate, such as "angle"
+    Parameters
+    ----------
+    joint
+        Name of the joint.
+    coordinate
+        Name of its coordinate, such as "angle".
+    """
+
+    joint: str
+    coordinate: str
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class AxialDistance:
-    """Distance of the point of marker B from that of marker A along an axis of A; its force acts at the point of B."""
+    """Distance of the point of marker B from that of marker A along an axis of A; its force acts at the point of B.
+
+    Parameters
+    ----------
+    marker_a
+        Marker A.
+    marker_b
+        Marker B.
+    axis
+        Direction of the axis, in the axes of marker A, (3,).
+    """
 
     marker_a: Marker
     marker_b: Marker
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", unit_vector("AxialDistance: axis", self.axis))
@@ -41,11 +59,20 @@ class AxialAngle:
 
     It is intended for markers that rotate relative to each other about that axis. If the axis of B tilts by a small
     angle, value and rate are inconsistent by the square of this angle.
+
+    Parameters
+    ----------
+    marker_a
+        Marker A.
+    marker_b
+        Marker B.
+    axis
+        Direction of the axis, in the axes of marker A, (3,).
     """
 
     marker_a: Marker
     marker_b: Marker
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", unit_vector("AxialAngle: axis", self.axis))
@@ -54,7 +81,15 @@ class AxialAngle:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class PointDistance:
-    """Distance between the points of two markers; its force acts along the line between them."""
+    """Distance between the points of two markers; its force acts along the line between them.
+
+    Parameters
+    ----------
+    marker_a
+        Marker A.
+    marker_b
+        Marker B.
+    """
 
     marker_a: Marker
     marker_b: Marker

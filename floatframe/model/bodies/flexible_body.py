@@ -29,6 +29,35 @@ class FlexibleBody:
     Position and motion are those of the *mesh* axes. A body therefore stands where its mesh was drawn unless it is
     moved, and the input does not change if the same part is reduced in another body frame (nodal or Tisserand).
 
+    Parameters
+    ----------
+    name
+        Name of the body, unique in the system; markers name the body by it.
+    reduced
+        The reduced body.
+    position
+        Initial position of the mesh origin, in ground axes, (3,) [m].
+    orientation
+        Euler parameters of the mesh axes, (4,).
+    velocity
+        Initial velocity of the body point at the mesh origin, in ground axes, (3,) [m/s].
+    omega_B
+        Angular velocity in mesh axes, (3,) [rad/s].
+    q
+        Initial modal coordinates, (n_q,); empty: undeformed.
+    q_dot
+        Initial rates of the modal coordinates, (n_q,); empty: zero.
+    source
+        Path of the modal file, stored in results and used for films.
+    stiffening
+        Whether to use the geometric stiffness, by which loads stiffen or soften the body (theory.md §7); "auto": if
+        present.
+    leave_out_missing
+        Whether to neglect inertia terms that the reduced body lacks (`Moments.missing`); the motion is then exact to
+        first order in speeds and deformation. False: a body without them is refused.
+    shapes
+        Shapes drawn besides its surface, in mesh axes or in those of interfaces.
+
     Raises
     ------
     ModelError
@@ -37,24 +66,15 @@ class FlexibleBody:
 
     name: str
     reduced: ReducedBody
-    position: Array = field(default_factory=lambda: np.zeros(3))  #: of the mesh origin, in ground axes, (3,) [m]
-    #: Euler parameters of the mesh axes, (4,)
+    position: Array = field(default_factory=lambda: np.zeros(3))
     orientation: Array = field(default_factory=lambda: np.array([1.0, 0, 0, 0]))
-    #: of the body point at the mesh origin, in ground axes, (3,) [m/s]
     velocity: Array = field(default_factory=lambda: np.zeros(3))
-    #: angular velocity in mesh axes, (3,) [rad/s]
     omega_B: Array = field(default_factory=lambda: np.zeros(3))  # noqa: N815
-    q: Array = field(default_factory=lambda: np.zeros(0))  #: initial modal coordinates, (n_q,); empty: undeformed
-    #: initial rates of the modal coordinates, (n_q,); empty: zero
+    q: Array = field(default_factory=lambda: np.zeros(0))
     q_dot: Array = field(default_factory=lambda: np.zeros(0))
-    source: str = ""  #: path of the modal file, stored in results and used for films
-    #: whether to use the geometric stiffness, by which loads stiffen or soften the body (theory.md §7); "auto": if
-    #: present
+    source: str = ""
     stiffening: bool | Literal["auto"] = "auto"
-    #: whether to neglect inertia terms that the reduced body lacks (`Moments.missing`); the motion is then exact to
-    #: first order in speeds and deformation. False: a body without them is refused
     leave_out_missing: bool = False
-    #: shapes drawn besides its surface, in mesh axes or in those of interfaces
     shapes: Sequence[Shape | Geometry] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:

@@ -7,7 +7,13 @@ __all__ = ["GROUND", "Ground"]
 
 @dataclass(frozen=True)
 class Ground:
-    """The inertial frame as a body; markers on it are at rest."""
+    """The inertial frame as a body; markers on it are at rest.
+
+    Parameters
+    ----------
+    name
+        Name of the ground.
+    """
 
     name: str = "ground"
 

@@ -31,17 +31,35 @@ class Marker:
     position and a triad in the body frame (default: the body frame itself). Sensors and channels also accept a point on
     a flexible body that is not an interface: a kept node, given by its number in the user's mesh or its position there,
     or the mean motion of the nodes of an element or a set.
+
+    Parameters
+    ----------
+    body
+        The body or its name.
+    interface
+        Interface of a flexible body.
+    position
+        Position in the body frame of a rigid body or the ground, (3,) [m]; None: the origin.
+    triad
+        Axes of the marker as columns, in those of the body or interface, (3, 3); None: the same axes.
+    node
+        Number of a kept node; "INSTANCE.number" where instances have the same numbers.
+    element
+        Number of an element on the surface.
+    set
+        Name of a set of nodes or elements.
+    tolerance
+        How far a node may be from a position, of the size of the body.
     """
 
-    body: str | Named  #: the body or its name
-    interface: str | None = None  #: interface of a flexible body
-    position: Array | None = None  #: in the body frame of a rigid body or the ground, (3,) [m]; None: the origin
-    #: axes of the marker as columns, in those of the body or interface, (3, 3); None: the same axes
+    body: str | Named
+    interface: str | None = None
+    position: Array | None = None
     triad: Array | None = None
-    node: int | str | None = None  #: number of a kept node; "INSTANCE.number" where instances have the same numbers
-    element: int | str | None = None  #: number of an element on the surface
-    set: str | None = None  #: name of a set of nodes or elements
-    tolerance: float = TOLERANCE  #: how far a node may be from a position, of the size of the body
+    node: int | str | None = None
+    element: int | str | None = None
+    set: str | None = None
+    tolerance: float = TOLERANCE
 
     def __post_init__(self) -> None:
         where = f"marker on {body_name(self.body)!r}"

@@ -29,7 +29,7 @@ class RigidBody:
     name
         Unique in the system; markers name the body by it.
     mass
-        [kg]
+        Mass [kg].
     inertia
         Inertia tensor about the centre of mass, not about the frame origin, in body axes, (3, 3) [kg m²].
     center_of_mass

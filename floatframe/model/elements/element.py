@@ -70,6 +70,71 @@ class GapSpring:
 class ElementLaw:
     """The contribution of an element to the equations of motion; its function is described in the module docstring.
 
+    Parameters
+    ----------
+    function
+        The compiled function of the law.
+    data
+        All numbers, tables and grids of the element, in one flat array.
+    states
+        Names of the states.
+    start
+        Initial values of the states.
+    state_units
+        Unit of each state.
+    state_sizes
+        Typical magnitudes, by which convergence is measured; default: from the values.
+    multipliers
+        Names of the unknowns lam, with the equations g = 0.
+    multiplier_units
+        Unit of each multiplier.
+    multiplier_sizes
+        Typical magnitudes of multipliers that hold nothing, as `state_sizes`.
+    holds
+        What each multiplier holds: POSITION, VELOCITY or NOTHING.
+    held_units
+        Units of g; default "m", or "m/s" for a velocity; "rad" and "1" are measured as angles.
+    outputs
+        Names of quantities that sensors and reports can read.
+    output_units
+        Unit of each output.
+    off
+        Function used while events have switched the element off; default: it does nothing.
+    tangent
+        Derivatives: "differences" (central), "complex" (a step along the imaginary axis: exact, see
+        `floatframe.model.elements.smooth`), or tangent(t, x, z, lam, data, slopes), which writes d(wrench, z_dot, g) by
+        dr, dphi, dv, domega of each marker (3 each, ground axes), z and lam, into slopes (6 n + n_z + n_lam, 12 n + n_z
+        + n_lam).
+    rest
+        Function used in statics instead of `function`; default: the same.
+    acts
+        Load on each marker: "wrench" (default), "force", "moment" or "none".
+    is_opposite
+        Whether, for two markers, the force on the second is the negative of that on the first.
+    length
+        Length scale on which the law changes [m]; default: the size of its smallest body.
+    time
+        Time scale on which it changes with time alone and with velocities [s]; `math.inf` if time does not enter;
+        default: unknown.
+    accelerations
+        Whether accelerations are inputs.
+    energy
+        Name of the output that is the stored energy.
+    power_in
+        Name of the output that is the power supplied to the system from outside.
+    power_lost
+        Name of the output that is the power dissipated.
+    stops
+        Outputs that end a run if they are above zero after a step, each with the message of the run.
+    knots
+        Times at which the law jumps, and steps of a run end [s].
+    switches
+        Outputs at whose zeros the law jumps during the motion. For each, the engine appends a sign to `data`: 1 or -1,
+        constant within a step; 0 outside of runs, where the law uses the sign of its own value.
+    gaps
+        Outputs that are gaps (below zero: minus the depth of a contact), with the contact spring; steps become short
+        near it.
+
     Raises
     ------
     ModelError
@@ -77,45 +142,32 @@ class ElementLaw:
     """
 
     function: Callable[..., None]
-    data: Array | Sequence[float] = ()  #: all numbers, tables and grids of the element, in one flat array
+    data: Array | Sequence[float] = ()
     states: Sequence[str] = ()
-    start: Sequence[float] = ()  #: initial values of the states
+    start: Sequence[float] = ()
     state_units: Sequence[str] = ()
-    state_sizes: Sequence[float] = ()  #: typical magnitudes, by which convergence is measured; default: from the values
-    multipliers: Sequence[str] = ()  #: names of the unknowns lam, with the equations g = 0
+    state_sizes: Sequence[float] = ()
+    multipliers: Sequence[str] = ()
     multiplier_units: Sequence[str] = ()
-    multiplier_sizes: Sequence[float] = ()  #: typical magnitudes of multipliers that hold nothing, as `state_sizes`
-    holds: Sequence[int] = ()  #: for each multiplier: POSITION, VELOCITY or NOTHING
-    #: units of g; default "m", or "m/s" for a velocity; "rad" and "1" are measured as angles
+    multiplier_sizes: Sequence[float] = ()
+    holds: Sequence[int] = ()
     held_units: Sequence[str] = ()
-    outputs: Sequence[str] = ()  #: names of quantities that sensors and reports can read
+    outputs: Sequence[str] = ()
     output_units: Sequence[str] = ()
-    #: function used while events have switched the element off; default: it does nothing
     off: Callable[..., None] | None = None
-    #: derivatives: "differences" (central), "complex" (a step along the imaginary axis: exact, see
-    #: `floatframe.model.elements.smooth`), or tangent(t, x, z, lam, data, slopes), which writes d(wrench, z_dot, g) by
-    #: dr, dphi, dv, domega of each marker (3 each, ground axes), z and lam, into slopes (6 n + n_z + n_lam,
-    #: 12 n + n_z + n_lam)
     tangent: Callable[..., None] | str = "differences"
-    rest: Callable[..., None] | None = None  #: function used in statics instead of `function`; default: the same
-    acts: Sequence[str] | None = None  #: load on each marker: "wrench" (default), "force", "moment" or "none"
-    is_opposite: bool = False  #: for two markers: whether the force on the second is the negative of that on the first
-    length: float | None = None  #: length scale on which the law changes [m]; default: the size of its smallest body
-    #: time scale on which it changes with time alone and with velocities [s]; `math.inf` if time does not enter;
-    #: default: unknown
+    rest: Callable[..., None] | None = None
+    acts: Sequence[str] | None = None
+    is_opposite: bool = False
+    length: float | None = None
     time: float | None = None
-    accelerations: bool = False  #: whether accelerations are inputs
-    energy: str | None = None  #: name of the output that is the stored energy
-    power_in: str | None = None  #: name of the output that is the power supplied to the system from outside
-    power_lost: str | None = None  #: name of the output that is the power dissipated
-    #: outputs that end a run if they are above zero after a step, each with the message of the run
+    accelerations: bool = False
+    energy: str | None = None
+    power_in: str | None = None
+    power_lost: str | None = None
     stops: Mapping[str, str] = field(default_factory=dict)
-    knots: Sequence[float] = ()  #: times at which the law jumps, and steps of a run end [s]
-    #: outputs at whose zeros the law jumps during the motion. For each, the engine appends a sign to `data`: 1 or -1,
-    #: constant within a step; 0 outside of runs, where the law uses the sign of its own value
+    knots: Sequence[float] = ()
     switches: Sequence[str] = ()
-    #: outputs that are gaps (below zero: minus the depth of a contact), with the contact spring; steps become short
-    #: near it
     gaps: Mapping[str, GapSpring] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

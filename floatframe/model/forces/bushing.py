@@ -39,17 +39,35 @@ class Bushing:
 
     A body given instead of a marker is attached at the position of the other marker, with zero deformation as
     assembled.
+
+    Parameters
+    ----------
+    name
+        Name of the force, unique in the system.
+    marker_a
+        Marker A; a body, or its name, is attached where the other marker is.
+    marker_b
+        Marker B; a body, or its name, is attached where the other marker is.
+    stiffness
+        Stiffness K, symmetric, (6, 6) [N/m, N, N m], or its diagonal (6,).
+    damping
+        Damping D, (6, 6) [N s/m, N s, N m s], or its diagonal (6,).
+    preload
+        Force and torque on A at zero deformation, (6,) [N, N m].
+    characteristics
+        Functions of one deformation ("x", ..., "rz"), such as tables, whose values are added [N, N m].
+    axes
+        Axes in which it acts: those of marker "a" or marker "b", or "half way" between them.
     """
 
     name: str
     marker_a: Place
     marker_b: Place
-    stiffness: Array = field(default_factory=lambda: np.zeros((6, 6)))  #: K, symmetric, (6, 6), or its diagonal (6,)
-    damping: Array = field(default_factory=lambda: np.zeros((6, 6)))  #: D, (6, 6), or its diagonal (6,)
-    preload: Array = field(default_factory=lambda: np.zeros(6))  #: force and torque on A at zero deformation, (6,)
-    #: functions of one deformation ("x", ..., "rz"), such as tables, whose values are added [N, N m]
+    stiffness: Array = field(default_factory=lambda: np.zeros((6, 6)))
+    damping: Array = field(default_factory=lambda: np.zeros((6, 6)))
+    preload: Array = field(default_factory=lambda: np.zeros(6))
     characteristics: Mapping[str, TimeFunction] = field(default_factory=dict, metadata=NOT_OF_TIME)
-    axes: str = "a"  #: axes in which it acts: those of marker "a" or marker "b", or "half way" between them
+    axes: str = "a"
 
     def __post_init__(self) -> None:
         where = f"force {self.name!r}"

@@ -23,9 +23,15 @@ __all__ = ["BodyLoad", "Gravity", "PointForce"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Gravity:
-    """A uniform gravitational acceleration, which acts on every particle of the deformed bodies."""
+    """A uniform gravitational acceleration, which acts on every particle of the deformed bodies.
 
-    acceleration: Array  #: ground axes, (3,) [m/s²], such as (0, 0, -9.81)
+    Parameters
+    ----------
+    acceleration
+        Ground axes, (3,) [m/s²], such as (0, 0, -9.81).
+    """
+
+    acceleration: Array
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "acceleration", array_of_shape("gravity", self.acceleration, (3,)))
@@ -41,12 +47,23 @@ class BodyLoad:
 
     Its resultant acts on the undeformed body, and its modal forces act on the modes. The first-order change of its
     torque due to the deformation is neglected.
+
+    Parameters
+    ----------
+    name
+        Name of the force, unique in the system.
+    body
+        a flexible body.
+    load_case
+        Name of the load case in the modal file.
+    amplitude
+        Factor: a number or a function of time.
     """
 
     name: str
-    body: str | Named  #: a flexible body
-    load_case: str  #: name of the load case in the modal file
-    amplitude: TimeFunction | float = field(default=1.0)  #: factor: a number or a function of time
+    body: str | Named
+    load_case: str
+    amplitude: TimeFunction | float = field(default=1.0)
 
     def __post_init__(self) -> None:
         if isinstance(self.amplitude, int | float):
@@ -65,14 +82,30 @@ class BodyLoad:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class PointForce:
-    """A force and a torque on a marker."""
+    """A force and a torque on a marker.
+
+    Parameters
+    ----------
+    name
+        Name of the force, unique in the system.
+    marker
+        Marker at which the force acts.
+    force
+        Force, (3,) [N].
+    torque
+        Torque, (3,) [N m].
+    is_follower
+        True: components in the axes of the (deformed) marker; False: ground axes.
+    amplitude
+        Function of time that multiplies both; None: one.
+    """
 
     name: str
     marker: Marker
-    force: Array = field(default_factory=lambda: np.zeros(3))  #: (3,) [N]
-    torque: Array = field(default_factory=lambda: np.zeros(3))  #: (3,) [N m]
-    is_follower: bool = False  #: True: components in the axes of the (deformed) marker; False: ground axes
-    amplitude: TimeFunction | None = None  #: function of time that multiplies both; None: one
+    force: Array = field(default_factory=lambda: np.zeros(3))
+    torque: Array = field(default_factory=lambda: np.zeros(3))
+    is_follower: bool = False
+    amplitude: TimeFunction | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.amplitude, TimeFunction | None):

@@ -76,22 +76,53 @@ class SphereContact:
     f = k xⁿ (1 + h x_dot/v_0) for a depth x > 0, and never negative; v_0 is the approach speed at the start of each
     contact. Friction is mu f V/sqrt(|V|² + v_s²) against the slip velocity V. Without radius_a the contact is with a
     plane.
+
+    Parameters
+    ----------
+    name
+        Name of the force, unique in the system.
+    marker_a
+        Marker A.
+    marker_b
+        Marker B.
+    radius_b
+        Radius of the sphere on B [m].
+    radius_a
+        Radius of the sphere on A [m]; None: a plane.
+    axis
+        Normal of the plane, axes of A, towards B.
+    modulus
+        Hertz modulus E* [Pa]; determines stiffness and exponent 3/2.
+    stiffness
+        k, instead of the modulus [N/mⁿ].
+    exponent
+        Exponent n of the depth.
+    restitution
+        Coefficient of restitution e, above 0.
+    dissipation
+        Law of h(e): exact, hunt-crossley, lankarani-nikravesh or flores.
+    friction
+        Coefficient of friction mu.
+    friction_speed
+        v_s, the slip at which friction is 0.71 of its value [m/s].
+    slow
+        Smallest speed of impact v_0 [m/s].
     """
 
     name: str
     marker_a: Marker
     marker_b: Marker
-    radius_b: float  #: radius of the sphere on B [m]
-    radius_a: float | None = None  #: radius of the sphere on A [m]; None: a plane
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: normal of the plane, axes of A, towards B
-    modulus: float | None = None  #: Hertz modulus E* [Pa]; determines stiffness and exponent 3/2
-    stiffness: float | None = None  #: k, instead of the modulus [N/mⁿ]
-    exponent: float = 1.5  #: n
-    restitution: float = 1.0  #: coefficient of restitution e, above 0
-    dissipation: str = "exact"  #: law of h(e): exact, hunt-crossley, lankarani-nikravesh or flores
-    friction: float = 0.0  #: mu
-    friction_speed: float = SLOW  #: v_s, the slip at which friction is 0.71 of its value [m/s]
-    slow: float = SLOW  #: smallest v_0 [m/s]
+    radius_b: float
+    radius_a: float | None = None
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    modulus: float | None = None
+    stiffness: float | None = None
+    exponent: float = 1.5
+    restitution: float = 1.0
+    dissipation: str = "exact"
+    friction: float = 0.0
+    friction_speed: float = SLOW
+    slow: float = SLOW
 
     def __post_init__(self) -> None:
         where = f"force {self.name!r}"

@@ -26,16 +26,34 @@ class SpringDamper:
 
     l is the length of that line. A spring has no direction where its markers coincide. If that can happen, set
     free_length = 0 and no preload, or keep the markers apart.
+
+    Parameters
+    ----------
+    name
+        Name of the force, unique in the system.
+    marker_a
+        Marker A.
+    marker_b
+        Marker B.
+    stiffness
+        Stiffness k [N/m].
+    damping
+        Damping c [N s/m].
+    free_length
+        l_0 [m]; None: the assembled distance.
+    preload
+        Constant part of the tension [N].
+    characteristic
+        A function of l - l_0, such as a table [N].
     """
 
     name: str
     marker_a: Marker
     marker_b: Marker
-    stiffness: float = 0.0  #: k [N/m]
-    damping: float = 0.0  #: c [N s/m]
-    free_length: float | None = None  #: l_0 [m]; None: the assembled distance
-    preload: float = 0.0  #: constant part of the tension [N]
-    #: a function of l - l_0, such as a table [N]
+    stiffness: float = 0.0
+    damping: float = 0.0
+    free_length: float | None = None
+    preload: float = 0.0
     characteristic: TimeFunction | None = field(default=None, metadata=NOT_OF_TIME)
 
     def __post_init__(self) -> None:
@@ -70,21 +88,46 @@ class JointForce:
 
     N is the magnitude of the joint force normal to its axis. An angle is taken between -pi and pi from its free value.
     Regularised Coulomb friction creeps: it holds a load only while x_dot stays below v_0.
+
+    Parameters
+    ----------
+    name
+        Name of the force, unique in the system.
+    joint
+        Name of the joint.
+    coordinate
+        Name of the coordinate of the joint, such as "angle".
+    stiffness
+        Stiffness k [N/m, N m/rad].
+    free
+        Coordinate without force x_0 [m, rad].
+    damping
+        Damping c [N s/m, N m s/rad].
+    preload
+        Constant force or torque [N, N m].
+    motor
+        A function of time [N, N m].
+    characteristic
+        A function of x - x_0, such as a table [N, N m].
+    friction
+        Coulomb friction T [N, N m].
+    friction_coefficient
+        Coefficient mu; for an angle, mu times the bearing radius [1, m].
+    friction_speed
+        v_0, the speed at which friction reaches tanh(1) of its value [m/s, rad/s].
     """
 
     name: str
-    joint: str  #: name of the joint
-    coordinate: str  #: name of the coordinate of the joint, such as "angle"
-    stiffness: float = 0.0  #: k [N/m, N m/rad]
-    free: float = 0.0  #: x_0 [m, rad]
-    damping: float = 0.0  #: c [N s/m, N m s/rad]
-    preload: float = 0.0  #: [N, N m]
-    motor: TimeFunction | None = None  #: a function of time [N, N m]
-    #: a function of x - x_0, such as a table [N, N m]
+    joint: str
+    coordinate: str
+    stiffness: float = 0.0
+    free: float = 0.0
+    damping: float = 0.0
+    preload: float = 0.0
+    motor: TimeFunction | None = None
     characteristic: TimeFunction | None = field(default=None, metadata=NOT_OF_TIME)
-    friction: float = 0.0  #: Coulomb friction T [N, N m]
-    friction_coefficient: float = 0.0  #: coefficient mu; for an angle, mu times the bearing radius [1, m]
-    #: v_0, the speed at which friction reaches tanh(1) of its value [m/s, rad/s]
+    friction: float = 0.0
+    friction_coefficient: float = 0.0
     friction_speed: float = FRICTION_SPEED
 
     @property

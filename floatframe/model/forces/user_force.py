@@ -36,22 +36,45 @@ class UserForce:
     z_dot) with arrays in the order of coordinates and states, and writes Q, (n_forces,), and z_dot, (n_states,). A
     function compiled by `numba.njit` runs at full speed, a Python function slowly. Its derivatives are computed by
     finite differences. It must depend only on its arguments, because it is called more than once per step.
+
+    Parameters
+    ----------
+    name
+        Name of the force, unique in the system.
+    coordinates
+        Observed coordinates, along which forces may act, by name.
+    forces
+        Expressions by coordinate, or names.
+    rates
+        Expressions of the rates of the states.
+    states
+        Initial values of the states.
+    parameters
+        Constants in expressions.
+    functions
+        Functions of one variable in expressions.
+    function
+        Instead of expressions.
+    knots
+        Times at which the function jumps; steps of a run end there [s].
+    switches
+        Expressions at whose zeros forces and rates jump. In other expressions, the name of a switch stands for its
+        sign, 1 (also at zero) or -1. The sign is constant within a step, and steps of a run end at the zeros.
+    length
+        Length scale on which the function changes [m]; None: the size of the smaller body.
     """
 
     name: str
-    coordinates: Mapping[str, Coordinate]  #: observed coordinates, along which forces may act, by name
-    forces: Mapping[str, str] | Sequence[str] = field(default_factory=dict)  #: expressions by coordinate, or names
-    rates: Mapping[str, str] = field(default_factory=dict)  #: expressions of the rates of the states
-    states: Mapping[str, float] = field(default_factory=dict)  #: initial values of the states
-    parameters: Mapping[str, float] = field(default_factory=dict)  #: constants in expressions
-    #: functions of one variable in expressions
+    coordinates: Mapping[str, Coordinate]
+    forces: Mapping[str, str] | Sequence[str] = field(default_factory=dict)
+    rates: Mapping[str, str] = field(default_factory=dict)
+    states: Mapping[str, float] = field(default_factory=dict)
+    parameters: Mapping[str, float] = field(default_factory=dict)
     functions: Mapping[str, TimeFunction] = field(default_factory=dict, metadata=NOT_OF_TIME)
-    function: Callable[..., None] | None = None  #: instead of expressions
-    knots: Sequence[float] = ()  #: times at which the function jumps; steps of a run end there [s]
-    #: expressions at whose zeros forces and rates jump. In other expressions, the name of a switch stands for its sign,
-    #: 1 (also at zero) or -1. The sign is constant within a step, and steps of a run end at the zeros
+    function: Callable[..., None] | None = None
+    knots: Sequence[float] = ()
     switches: Mapping[str, str] = field(default_factory=dict)
-    length: float | None = None  #: length scale on which the function changes [m]; None: the size of the smaller body
+    length: float | None = None
 
     def __post_init__(self) -> None:
         where = f"force {self.name!r}"

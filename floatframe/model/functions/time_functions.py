@@ -38,10 +38,18 @@ NOT_OF_TIME = {"of_time": False}
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class TimeFunction:
-    """A piecewise function; the first piece also holds before its start, and the last one has no end."""
+    """A piecewise function; the first piece also holds before its start, and the last one has no end.
 
-    begins: Array  #: start times of the pieces, increasing, (n,) [s]
-    pieces: Array  #: coefficients, (n, 9): Σ_k c_k (t - t_k)^k + amplitude sin(omega (t - t_k) + phase)
+    Parameters
+    ----------
+    begins
+        Start times of the pieces, increasing, (n,) [s].
+    pieces
+        Coefficients, (n, 9): Σ_k c_k (t - t_k)^k + amplitude sin(omega (t - t_k) + phase).
+    """
+
+    begins: Array
+    pieces: Array
 
     def __post_init__(self) -> None:
         begins, pieces = np.array(self.begins, dtype=float), np.array(self.pieces, dtype=float)

@@ -22,11 +22,20 @@ class Limits:
     At a stop an impulse changes the rate v of the sum to -restitution v, with all joints satisfied (M du = Gᵀ i,
     including the modes of flexible bodies). A bounce with a flight shorter than a step ends at the stop, which then
     holds the sum until it would have to pull.
+
+    Parameters
+    ----------
+    lower
+        Lower bound in the unit of the sum; None: no lower stop.
+    upper
+        Upper bound in the unit of the sum; None: no upper stop.
+    restitution
+        Coefficient of restitution, 0 (no bounce) to 1 (no loss of energy).
     """
 
-    lower: float | None = None  #: lower bound in the unit of the sum; None: no lower stop
+    lower: float | None = None
     upper: float | None = None
-    restitution: float = 0.0  #: 0 (no bounce) to 1 (no loss of energy)
+    restitution: float = 0.0
 
     def __post_init__(self) -> None:
         if self.lower is None and self.upper is None:
@@ -55,14 +64,26 @@ class CoordinateCoupler:
     If it is not engaged, it has no force until an event engages it: a latch (one term), a clutch or a brake (two
     terms). It then holds the current value of the sum, unless `constant` is given. An impulse removes the remaining
     rate of the sum, and the energy balance records the loss. With `limits` it only acts while the sum is at a limit.
+
+    Parameters
+    ----------
+    name
+        Name of the coupler, unique in the system.
+    terms
+        Coordinates and their coefficients a_k.
+    constant
+        c as a number or a function of time; None: as assembled, or the value when engaged.
+    engaged
+        False: no force until an event engages it.
+    limits
+        Stops of the sum; the coupler is then not engaged.
     """
 
     name: str
-    terms: Sequence[tuple[Coordinate, float]]  #: coordinates and their coefficients a_k
-    #: c as a number or a function of time; None: as assembled, or the value when engaged
+    terms: Sequence[tuple[Coordinate, float]]
     constant: float | TimeFunction | None = None
-    engaged: bool = True  #: False: no force until an event engages it
-    limits: Limits | None = None  #: stops of the sum; the coupler is then not engaged
+    engaged: bool = True
+    limits: Limits | None = None
 
     def __post_init__(self) -> None:
         where = f"coupler {self.name!r}"

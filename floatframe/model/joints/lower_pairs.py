@@ -51,14 +51,28 @@ class RevoluteJoint:
     The axis is given in the axes of marker A (the ground axes, if A is on the ground with the default triad). On B it
     is the same line as assembled, unless `axis_b` gives it in the axes of marker B. Coordinate `angle`: of B about the
     axis, zero as assembled.
+
+    Parameters
+    ----------
+    name
+        Name of the joint, unique in the system.
+    marker_a
+        Marker A; a body, or its name, is attached where the other marker is.
+    marker_b
+        Marker B; a body, or its name, is attached where the other marker is.
+    axis
+        Direction of the axis, in the axes of marker A, (3,).
+    axis_b
+        The same direction in the axes of marker B, (3,); None: as assembled.
+    motions
+        Prescribed motions by coordinate; a number fixes the coordinate.
     """
 
     name: str
     marker_a: Place
     marker_b: Place
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
-    axis_b: Array | None = None  #: in the axes of marker B, (3,); None: as assembled
-    #: prescribed motions by coordinate; a number fixes the coordinate
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    axis_b: Array | None = None
     motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     size = 6  #: components of the unknown wrench
@@ -87,13 +101,25 @@ class PrismaticJoint:
 
     The point of B stays on the line through the point of A. The fixed orientation is that of the assembled bodies.
     Coordinate `distance`: from the point of A to the point of B, along the axis.
+
+    Parameters
+    ----------
+    name
+        Name of the joint, unique in the system.
+    marker_a
+        Marker A; a body, or its name, is attached where the other marker is.
+    marker_b
+        Marker B; a body, or its name, is attached where the other marker is.
+    axis
+        Direction of the axis, in the axes of marker A, (3,).
+    motions
+        Prescribed motions by coordinate; a number fixes the coordinate.
     """
 
     name: str
     marker_a: Place
     marker_b: Place
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
-    #: prescribed motions by coordinate; a number fixes the coordinate
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     size = 9  #: components of the unknown wrench
@@ -128,15 +154,31 @@ class ScrewJoint:
 
     The point of B stays on the line through the point of A. Coordinates: `angle` of B about the axis, zero as
     assembled; `distance` = lead angle/(2 pi) between the points along the axis. The points must coincide as assembled.
+
+    Parameters
+    ----------
+    name
+        Name of the joint, unique in the system.
+    marker_a
+        Marker A; a body, or its name, is attached where the other marker is.
+    marker_b
+        Marker B; a body, or its name, is attached where the other marker is.
+    axis
+        Direction of the axis, in the axes of marker A, (3,).
+    axis_b
+        The same direction in the axes of marker B, (3,); None: as assembled.
+    lead
+        Distance along the axis per turn; positive for a right-handed screw [m].
+    motions
+        Prescribed motions by coordinate; a number fixes the coordinate.
     """
 
     name: str
     marker_a: Place
     marker_b: Place
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
-    axis_b: Array | None = None  #: in the axes of marker B, (3,); None: as assembled
-    lead: float = METRE  #: distance along the axis per turn; positive for a right-handed screw [m]
-    #: prescribed motions by coordinate; a number fixes the coordinate
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    axis_b: Array | None = None
+    lead: float = METRE
     motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     size = 9  #: components of the unknown wrench
@@ -186,14 +228,28 @@ class CylindricalJoint:
 
     The point of B stays on the line through the point of A. Coordinates: `distance` between the points along the axis;
     `angle` of B about it, zero as assembled.
+
+    Parameters
+    ----------
+    name
+        Name of the joint, unique in the system.
+    marker_a
+        Marker A; a body, or its name, is attached where the other marker is.
+    marker_b
+        Marker B; a body, or its name, is attached where the other marker is.
+    axis
+        Direction of the axis, in the axes of marker A, (3,).
+    axis_b
+        The same direction in the axes of marker B, (3,); None: as assembled.
+    motions
+        Prescribed motions by coordinate; a number fixes the coordinate.
     """
 
     name: str
     marker_a: Place
     marker_b: Place
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
-    axis_b: Array | None = None  #: in the axes of marker B, (3,); None: as assembled
-    #: prescribed motions by coordinate; a number fixes the coordinate
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    axis_b: Array | None = None
     motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     size = 9  #: components of the unknown wrench
@@ -223,7 +279,17 @@ class CylindricalJoint:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class SphericalJoint:
-    """Holds the point of marker B at the point of marker A; three constraints."""
+    """Holds the point of marker B at the point of marker A; three constraints.
+
+    Parameters
+    ----------
+    name
+        Name of the joint, unique in the system.
+    marker_a
+        Marker A; a body, or its name, is attached where the other marker is.
+    marker_b
+        Marker B; a body, or its name, is attached where the other marker is.
+    """
 
     name: str
     marker_a: Place
@@ -248,14 +314,28 @@ class PlanarJoint:
 
     Coordinates: `first` and `second`, the position of the point of B in the plane along the two directions of
     `normals_of(axis)`; `angle` of B about the normal, zero as assembled.
+
+    Parameters
+    ----------
+    name
+        Name of the joint, unique in the system.
+    marker_a
+        Marker A; a body, or its name, is attached where the other marker is.
+    marker_b
+        Marker B; a body, or its name, is attached where the other marker is.
+    axis
+        Normal, in the axes of marker A.
+    axis_b
+        The same direction in the axes of marker B, (3,); None: as assembled.
+    motions
+        Prescribed motions by coordinate; a number fixes the coordinate.
     """
 
     name: str
     marker_a: Place
     marker_b: Place
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: normal, in the axes of marker A
-    axis_b: Array | None = None  #: in the axes of marker B, (3,); None: as assembled
-    #: prescribed motions by coordinate; a number fixes the coordinate
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    axis_b: Array | None = None
     motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     size = 9  #: components of the unknown wrench

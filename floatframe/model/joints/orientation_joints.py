@@ -40,12 +40,23 @@ class FixedJoint:
     """Fixes marker B to marker A; six constraints.
 
     The fixed orientation is that of the assembled bodies, unless `rotation` is given.
+
+    Parameters
+    ----------
+    name
+        Name of the joint, unique in the system.
+    marker_a
+        Marker A; a body, or its name, is attached where the other marker is.
+    marker_b
+        Marker B; a body, or its name, is attached where the other marker is.
+    rotation
+        Fixed rotation R_AB from marker axes B to A, (3, 3); None: as assembled.
     """
 
     name: str
     marker_a: Place
     marker_b: Place
-    rotation: Array | None = None  #: fixed rotation R_AB from marker axes B to A, (3, 3); None: as assembled
+    rotation: Array | None = None
 
     size = 6  #: components of the unknown wrench: force, moment
     moment_b = MOMENT  #: index at which the moment on B starts in the wrench
@@ -70,12 +81,23 @@ class ConstantOrientation:
     """Fixes the orientation of marker B relative to marker A; three constraints.
 
     The fixed orientation is that of the assembled bodies, unless `rotation` is given.
+
+    Parameters
+    ----------
+    name
+        Name of the joint, unique in the system.
+    marker_a
+        Marker A; a body, or its name, is attached where the other marker is.
+    marker_b
+        Marker B; a body, or its name, is attached where the other marker is.
+    rotation
+        Fixed rotation R_AB from marker axes B to A, (3, 3); None: as assembled.
     """
 
     name: str
     marker_a: Place
     marker_b: Place
-    rotation: Array | None = None  #: fixed rotation R_AB from marker axes B to A, (3, 3); None: as assembled
+    rotation: Array | None = None
 
     size = 6  #: components of the unknown wrench
     moment_b = MOMENT  #: index at which the moment on B starts in the wrench
@@ -101,14 +123,28 @@ class UniversalJoint:
 
     Coordinates, zero as assembled: `angle` of the cross about the axis of A; `angle_b` of B relative to the cross about
     the axis of B.
+
+    Parameters
+    ----------
+    name
+        Name of the joint, unique in the system.
+    marker_a
+        Marker A; a body, or its name, is attached where the other marker is.
+    marker_b
+        Marker B; a body, or its name, is attached where the other marker is.
+    axis
+        Direction of the axis, in the axes of marker A, (3,).
+    axis_b
+        Direction of the axis on B, in the axes of marker B, (3,).
+    motions
+        Prescribed motions by coordinate; a number fixes the coordinate.
     """
 
     name: str
     marker_a: Place
     marker_b: Place
-    axis: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))  #: in the axes of marker A, (3,)
-    axis_b: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: in the axes of marker B, (3,)
-    #: prescribed motions by coordinate; a number fixes the coordinate
+    axis: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
+    axis_b: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))
     motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     size = 6  #: components of the unknown wrench
@@ -149,13 +185,25 @@ class ConstantVelocityJoint:
     B only rotates relative to A about axes normal to the bisector of both shafts. The angular velocities of the shafts
     about their own axes are therefore equal at every instant. The two deflections of the shafts are free. In the
     assembled position the shafts must be at less than 135 degrees from a straight line.
+
+    Parameters
+    ----------
+    name
+        Name of the joint, unique in the system.
+    marker_a
+        Marker A; a body, or its name, is attached where the other marker is.
+    marker_b
+        Marker B; a body, or its name, is attached where the other marker is.
+    axis
+        Shaft of A, in the axes of marker A, (3,).
+    axis_b
+        Shaft of B, pointing away from A, in the axes of marker B, (3,); None: collinear as assembled.
     """
 
     name: str
     marker_a: Place
     marker_b: Place
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: shaft of A, in the axes of marker A, (3,)
-    #: shaft of B, pointing away from A, in the axes of marker B, (3,); None: collinear as assembled
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     axis_b: Array | None = None
 
     size = 6  #: components of the unknown wrench: force and moment

@@ -29,13 +29,25 @@ class PointOnLine:
     """Keeps the point of marker B on a line through the point of marker A; two constraints.
 
     Coordinate `distance`: from the point of A to the point of B, along the line.
+
+    Parameters
+    ----------
+    name
+        Name of the joint, unique in the system.
+    marker_a
+        Marker A; a body, or its name, is attached where the other marker is.
+    marker_b
+        Marker B; a body, or its name, is attached where the other marker is.
+    axis
+        Direction of the axis, in the axes of marker A, (3,).
+    motions
+        Prescribed motions by coordinate; a number fixes the coordinate.
     """
 
     name: str
     marker_a: Place
     marker_b: Place
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
-    #: prescribed motions by coordinate; a number fixes the coordinate
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     size = 6  #: components of the unknown wrench
@@ -62,13 +74,25 @@ class PointOnPlane:
 
     Coordinates: `first` and `second`, the position of the point of B in the plane along the two directions of
     `normals_of(axis)`.
+
+    Parameters
+    ----------
+    name
+        Name of the joint, unique in the system.
+    marker_a
+        Marker A; a body, or its name, is attached where the other marker is.
+    marker_b
+        Marker B; a body, or its name, is attached where the other marker is.
+    axis
+        Normal, in the axes of marker A.
+    motions
+        Prescribed motions by coordinate; a number fixes the coordinate.
     """
 
     name: str
     marker_a: Place
     marker_b: Place
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: normal, in the axes of marker A
-    #: prescribed motions by coordinate; a number fixes the coordinate
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     size = 6  #: components of the unknown wrench
@@ -95,13 +119,25 @@ class DistanceJoint:
     """Keeps the points of two markers at a distance, like a massless rod; one constraint.
 
     Coordinate `distance`.
+
+    Parameters
+    ----------
+    name
+        Name of the joint, unique in the system.
+    marker_a
+        Marker A; a body, or its name, is attached where the other marker is.
+    marker_b
+        Marker B; a body, or its name, is attached where the other marker is.
+    distance
+        [m]; None: as assembled.
+    motions
+        Prescribed motions by coordinate; a number fixes the coordinate.
     """
 
     name: str
     marker_a: Place
     marker_b: Place
-    distance: float | None = None  #: [m]; None: as assembled
-    #: prescribed motions by coordinate; a number fixes the coordinate
+    distance: float | None = None
     motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     size = 4  #: components of the unknown wrench

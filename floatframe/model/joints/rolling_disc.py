@@ -29,14 +29,28 @@ class RollingDisc:
     It has one position constraint, the contact, and two velocity constraints: the rim does not slide at the contact. It
     does not lift off, so check the sign of the reaction. Constrained velocities do not drift, but the path that results
     from them is only found by the integrator.
+
+    Parameters
+    ----------
+    name
+        Name of the joint, unique in the system.
+    marker_a
+        a Marker: a point of the plane.
+    marker_b
+        a Marker: the centre of the disc.
+    radius
+        Radius of the disc [m].
+    axis
+        Normal of the plane, axes of marker A.
+    axis_b
+        Axis of the disc, in the axes of marker B.
     """
 
     name: str
-    marker_a: Place  #: a Marker: a point of the plane
-    marker_b: Place  #: a Marker: the centre of the disc
-    radius: float = METRE  #: of the disc [m]
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: normal of the plane, axes of marker A
-    #: axis of the disc, in the axes of marker B
+    marker_a: Place
+    marker_b: Place
+    radius: float = METRE
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     axis_b: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))
 
     size = 9  #: components of the unknown wrench

@@ -34,16 +34,31 @@ class SlidingJoint:
     joint on the deformed line. There is no friction: the reaction does no work as B slides.
 
     Coordinate `distance`: position of B along the line from marker A, measured on the undeformed line.
+
+    Parameters
+    ----------
+    name
+        Name of the joint, unique in the system.
+    marker_a
+        Marker at the interface of a flexible body where the line begins.
+    marker_b
+        Marker B; a body, or its name, is attached where the other marker is.
+    line
+        Names of the other interfaces of that body along the line.
+    is_aligned
+        True: the orientation of marker B follows the line.
+    normal
+        Direction normal to the line in the axes of its body, (3,); None: chosen automatically.
+    motions
+        Prescribed motions by coordinate; a number fixes the coordinate.
     """
 
     name: str
-    marker_a: Marker  #: at the interface of a flexible body where the line begins
+    marker_a: Marker
     marker_b: Place
-    line: Sequence[str] = ()  #: names of the other interfaces of that body along the line
-    is_aligned: bool = False  #: True: the orientation of marker B follows the line
-    #: direction normal to the line in the axes of its body, (3,); None: chosen automatically
+    line: Sequence[str] = ()
+    is_aligned: bool = False
     normal: Array | None = None
-    #: prescribed motions by coordinate; a number fixes the coordinate
     motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     coordinates = ("distance",)

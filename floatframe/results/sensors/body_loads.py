@@ -148,12 +148,23 @@ class InterfaceForceSensor:
     """The total force and moment on a flexible body at an interface, from joints, springs and point forces.
 
     The moment is about the point of the interface. Inputs of a linearised system that act there are included.
+
+    Parameters
+    ----------
+    name
+        Name of the sensor, unique in the system.
+    body
+        Name of the flexible body.
+    interface
+        Name of the interface of the body.
+    axes
+        "ground", or "body" for those of the body frame.
     """
 
     name: str
     body: str
     interface: str
-    axes: str = "ground"  #: "ground", or "body" for those of the body frame
+    axes: str = "ground"
 
     def __post_init__(self) -> None:
         if self.axes not in INTERFACE_AXES:
@@ -210,10 +221,18 @@ class InterfaceForceSensor:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class SpringSensor:
-    """A spring-damper along its line: length, its rate, and the tension, negative in compression."""
+    """A spring-damper along its line: length, its rate, and the tension, negative in compression.
+
+    Parameters
+    ----------
+    name
+        Name of the sensor, unique in the system.
+    of
+        Name of the spring-damper.
+    """
 
     name: str
-    of: str  #: name of the spring-damper
+    of: str
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return length, rate and tension over time."""
@@ -261,12 +280,23 @@ class RecoverySensor:
     y = D_0 z + D_1 z' + D_2 z'' + L p, see `cms.body.recovery_table`. z' and z'' are velocities and
     accelerations of the body frame in its axes and the rates of q. p contains gravity, spin, the loads on interfaces
     and load cases. Positions are relative to the moving body frame, so z begins with zeros.
+
+    Parameters
+    ----------
+    name
+        Name of the sensor, unique in the system.
+    body
+        Name of the flexible body.
+    table
+        Name of the recovery table in the modal file.
+    rows
+        Labels of rows or their beginnings; none: all rows.
     """
 
     name: str
     body: str
-    table: str  #: name of the recovery table in the modal file
-    rows: Sequence[str] = ()  #: labels of rows or their beginnings; none: all rows
+    table: str
+    rows: Sequence[str] = ()
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return the rows over time, by label."""

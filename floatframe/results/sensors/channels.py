@@ -40,14 +40,29 @@ class Channel:
 
     As an input, it is the force [N], or moment [N m], that does work on this motion. With `relative_to`, the motion is
     relative to that marker, on which the opposite force acts.
+
+    Parameters
+    ----------
+    name
+        Name of the channel.
+    marker
+        Marker that is observed.
+    direction
+        Ground axes, (3,).
+    quantity
+        "translation" or "rotation".
+    relative_to
+        Marker relative to which it is observed; None: the ground.
+    rate
+        Derivative of an output: 0 displacement, 1 velocity, 2 acceleration, relative to the rotating system.
     """
 
     name: str
     marker: Marker
-    direction: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))  #: ground axes, (3,)
-    quantity: str = "translation"  #: "translation" or "rotation"
+    direction: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
+    quantity: str = "translation"
     relative_to: Marker | None = None
-    rate: int = 0  #: for outputs: 0 displacement, 1 velocity, 2 acceleration, relative to the rotating system
+    rate: int = 0
 
     def __post_init__(self) -> None:
         where = f"channel {self.name!r}"
@@ -110,12 +125,24 @@ class Channel:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class CoordinateChannel:
-    """A joint coordinate; as an input, the force or torque along it."""
+    """A joint coordinate; as an input, the force or torque along it.
+
+    Parameters
+    ----------
+    name
+        Name of the channel.
+    joint
+        Name of the joint.
+    coordinate
+        Name of the coordinate of the joint.
+    rate
+        Derivative of an output: 0 value, 1 first rate, 2 second rate.
+    """
 
     name: str
     joint: str
     coordinate: str
-    rate: int = 0  #: for outputs: 0 value, 1 first rate, 2 second rate
+    rate: int = 0
 
     def __post_init__(self) -> None:
         require_rate(f"channel {self.name!r}", self.rate)
@@ -155,12 +182,24 @@ class CoordinateChannel:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class StressChannel:
-    """A stress component at a node of a flexible body, in axes of its frame; an output only."""
+    """A stress component at a node of a flexible body, in axes of its frame; an output only.
+
+    Parameters
+    ----------
+    name
+        Name of the channel.
+    body
+        Name of the flexible body.
+    component
+        Component of the stress, "xx", "yy", "zz", "yz", "xz" or "xy".
+    position
+        Mesh axes; the nearest kept node is used, (3,) [m].
+    """
 
     name: str
     body: str
-    component: str  #: xx, yy, zz, yz, xz or xy
-    position: Array  #: mesh axes; the nearest kept node is used, (3,) [m]
+    component: str
+    position: Array
 
     def __post_init__(self) -> None:
         where = f"channel {self.name!r}"

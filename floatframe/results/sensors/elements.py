@@ -68,10 +68,18 @@ def output_rows(placed: PlacedLaw, small: SmallMotions) -> Rows:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class CouplerSensor:
-    """A coupler: value, rate and force of each of its terms, numbered from 1."""
+    """A coupler: value, rate and force of each of its terms, numbered from 1.
+
+    Parameters
+    ----------
+    name
+        Name of the sensor, unique in the system.
+    of
+        Name of the coupler.
+    """
 
     name: str
-    of: str  #: name of the coupler
+    of: str
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return the columns "value 1", "rate 1", "force 1", "value 2", ..."""
@@ -108,10 +116,18 @@ class CouplerSensor:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ControlSensor:
-    """A user force: its coordinates, their rates, the forces along them, and its states, all by name."""
+    """A user force: its coordinates, their rates, the forces along them, and its states, all by name.
+
+    Parameters
+    ----------
+    name
+        Name of the sensor, unique in the system.
+    of
+        Name of the user force.
+    """
 
     name: str
-    of: str  #: name of the user force
+    of: str
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return the columns "phi", "phi_dot", "phi force", ..., and states by name (without unit)."""
@@ -174,11 +190,20 @@ class ElementSensor:
     """Outputs, states and multipliers of a public element, by name, or one of them.
 
     If an output and a state have the same name, the state is measured.
+
+    Parameters
+    ----------
+    name
+        Name of the sensor, unique in the system.
+    of
+        Name of the element.
+    output
+        Name of an output, state or multiplier; default: all.
     """
 
     name: str
-    of: str  #: name of the element
-    output: str | None = None  #: name of an output, state or multiplier; default: all
+    of: str
+    output: str | None = None
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return a column for each output, state and multiplier, or the requested one."""
@@ -242,10 +267,18 @@ NAMES = (*DEFORMATIONS, *(f"{name} rate" for name in DEFORMATIONS))
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class BushingSensor:
-    """Deformations x, y, z, rx, ry, rz of a bushing and their rates, as used by its stiffness and damping."""
+    """Deformations x, y, z, rx, ry, rz of a bushing and their rates, as used by its stiffness and damping.
+
+    Parameters
+    ----------
+    name
+        Name of the sensor, unique in the system.
+    of
+        Name of the bushing.
+    """
 
     name: str
-    of: str  #: name of the bushing
+    of: str
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return deformations and rates over time."""

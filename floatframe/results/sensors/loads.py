@@ -35,11 +35,21 @@ ENERGIES = (*Energies.__dataclass_fields__, "total", "balance")
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ReactionSensor:
-    """Force and moment that a joint or spring-damper exerts on its marker A, in ground axes or its own."""
+    """Force and moment that a joint or spring-damper exerts on its marker A, in ground axes or its own.
+
+    Parameters
+    ----------
+    name
+        Name of the sensor, unique in the system.
+    of
+        Name of a joint or spring-damper.
+    axes
+        "ground" or "marker".
+    """
 
     name: str
-    of: str  #: name of a joint or spring-damper
-    axes: str = "ground"  #: "ground" or "marker"
+    of: str
+    axes: str = "ground"
 
     def __post_init__(self) -> None:
         if self.axes not in AXES:
@@ -102,7 +112,17 @@ class ReactionSensor:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class CoordinateSensor:
-    """A coordinate of a joint: value, rate, and the force along it."""
+    """A coordinate of a joint: value, rate, and the force along it.
+
+    Parameters
+    ----------
+    name
+        Name of the sensor, unique in the system.
+    joint
+        Name of the joint.
+    coordinate
+        Name of the coordinate of the joint.
+    """
 
     name: str
     joint: str
@@ -134,7 +154,13 @@ class CoordinateSensor:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class EnergySensor:
-    """Energies of the whole system: kinetic, strain, gravity, springs, work, dissipated, total and balance."""
+    """Energies of the whole system: kinetic, strain, gravity, springs, work, dissipated, total and balance.
+
+    Parameters
+    ----------
+    name
+        Name of the sensor, unique in the system.
+    """
 
     name: str
 
@@ -155,7 +181,13 @@ class EnergySensor:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class MomentumSensor:
-    """Linear momentum, and angular momentum about the ground origin, in ground axes."""
+    """Linear momentum, and angular momentum about the ground origin, in ground axes.
+
+    Parameters
+    ----------
+    name
+        Name of the sensor, unique in the system.
+    """
 
     name: str
 
@@ -188,11 +220,21 @@ class MomentumSensor:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ModeSensor:
-    """A modal coordinate of a flexible body, and its rate."""
+    """A modal coordinate of a flexible body, and its rate.
+
+    Parameters
+    ----------
+    name
+        Name of the sensor, unique in the system.
+    body
+        Name of the flexible body.
+    mode
+        Number of the mode, from 1.
+    """
 
     name: str
     body: str
-    mode: int  #: number of the mode, from 1
+    mode: int
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return the coordinate and its rate over time."""

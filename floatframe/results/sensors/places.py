@@ -163,11 +163,22 @@ class PlaceSensor:
     """Position, velocity, acceleration, rotation vector or angular velocity of a marker.
 
     In ground axes; with `relative_to`, relative to that marker and in its axes, with its own motion subtracted.
+
+    Parameters
+    ----------
+    name
+        Name of the sensor, unique in the system.
+    marker
+        Marker that is observed.
+    quantity
+        One of PLACE_QUANTITIES.
+    relative_to
+        Marker relative to which it is observed; None: the ground.
     """
 
     name: str
     marker: Marker
-    quantity: str = "position"  #: one of PLACE_QUANTITIES
+    quantity: str = "position"
     relative_to: Marker | None = None
 
     def __post_init__(self) -> None:
@@ -292,12 +303,23 @@ class AngleSensor:
 
     A run counts the turns for the sensors of its system in every step. A sensor defined later follows the rates at the
     outputs, and raises an error if these are too far apart.
+
+    Parameters
+    ----------
+    name
+        Name of the sensor, unique in the system.
+    marker_a
+        Marker A.
+    marker_b
+        Marker B.
+    axis
+        Direction of the axis, in the axes of marker A, (3,).
     """
 
     name: str
     marker_a: Marker
     marker_b: Marker
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", unit_vector(f"sensor {self.name!r}: axis", self.axis))
@@ -340,10 +362,18 @@ class AngleSensor:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class DisplacementSensor:
-    """Elastic displacement of an interface or node of a flexible body, in axes of its frame B, from all modes."""
+    """Elastic displacement of an interface or node of a flexible body, in axes of its frame B, from all modes.
+
+    Parameters
+    ----------
+    name
+        Name of the sensor, unique in the system.
+    marker
+        An interface, or a kept node by number or position.
+    """
 
     name: str
-    marker: Marker  #: an interface, or a kept node by number or position
+    marker: Marker
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return x, y, z and size over time."""

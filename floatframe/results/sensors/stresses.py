@@ -114,16 +114,35 @@ class StressSensor:
 
     If several points are meant (an element, a set, the skin around a node of a beam or shell), the one with the largest
     von Mises stress during the motion is measured.
+
+    Parameters
+    ----------
+    name
+        Name of the sensor, unique in the system.
+    body
+        Name of the flexible body.
+    position
+        Position in mesh axes, where a kept node must be, (3,) [m].
+    point
+        Alternatively, the name of a stress point of the file.
+    node
+        Alternatively, the user's number of a node.
+    element
+        Alternatively, the number of an element on the surface.
+    set
+        Alternatively, the name of a set.
+    tolerance
+        Largest distance of the node from the position, relative to the size of the body.
     """
 
     name: str
     body: str
-    position: Array | None = None  #: position in mesh axes, where a kept node must be, (3,) [m]
-    point: str | None = None  #: alternatively, the name of a stress point of the file
-    node: int | str | None = None  #: alternatively, the user's number of a node
-    element: int | str | None = None  #: alternatively, the number of an element on the surface
-    set: str | None = None  #: alternatively, the name of a set
-    tolerance: float = TOLERANCE  #: largest distance of the node from the position, relative to the size of the body
+    position: Array | None = None
+    point: str | None = None
+    node: int | str | None = None
+    element: int | str | None = None
+    set: str | None = None
+    tolerance: float = TOLERANCE
 
     def __post_init__(self) -> None:
         with_position(self)
@@ -169,13 +188,27 @@ class StressSensor:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class VonMisesSensor:
-    """The largest von Mises stress of a body, or of a part of it, over its kept nodes, and the node of this stress."""
+    """The largest von Mises stress of a body, or of a part of it, over its kept nodes, and the node of this stress.
+
+    Parameters
+    ----------
+    name
+        Name of the sensor, unique in the system.
+    body
+        Name of the flexible body.
+    node
+        Restricts it to this node, by the user's number.
+    element
+        Restricts it to this element on the surface.
+    set
+        Restricts it to the nodes of this set.
+    """
 
     name: str
     body: str
-    node: int | str | None = None  #: restricts it to this node, by the user's number
-    element: int | str | None = None  #: restricts it to this element on the surface
-    set: str | None = None  #: restricts it to the nodes of this set
+    node: int | str | None = None
+    element: int | str | None = None
+    set: str | None = None
 
     def __post_init__(self) -> None:
         address_of(self)
@@ -234,17 +267,38 @@ class StrainGauge:
     """Strain along a direction at a node, computed from its stress by Hooke's law of an isotropic material.
 
     epsilon = ((1 + nu) d·sigma d - nu tr(sigma)) / E
+
+    Parameters
+    ----------
+    name
+        Name of the sensor, unique in the system.
+    body
+        Name of the flexible body.
+    direction
+        Mesh axes, (3,).
+    young
+        Young's modulus [Pa].
+    poisson
+        Poisson's ratio of the material [-].
+    position
+        Position in mesh axes, where a kept node must be, (3,) [m].
+    point
+        Alternatively, the name of a stress point of the file.
+    node
+        Alternatively, the user's number of a node.
+    tolerance
+        Largest distance of the node from the position, relative to the size of the body.
     """
 
     name: str
     body: str
-    direction: Array  #: mesh axes, (3,)
-    young: float  #: [Pa]
+    direction: Array
+    young: float
     poisson: float
-    position: Array | None = None  #: position in mesh axes, where a kept node must be, (3,) [m]
-    point: str | None = None  #: alternatively, the name of a stress point of the file
-    node: int | str | None = None  #: alternatively, the user's number of a node
-    tolerance: float = TOLERANCE  #: largest distance of the node from the position, relative to the size of the body
+    position: Array | None = None
+    point: str | None = None
+    node: int | str | None = None
+    tolerance: float = TOLERANCE
 
     def __post_init__(self) -> None:
         where = f"sensor {self.name!r}"
@@ -284,14 +338,26 @@ class ElongationSensor:
     local rotation by theta moves b by |d| theta across the line, and back along it by |d| theta²/2. First-order
     displacements lack the latter part, quadratic modes contain it; the distance of the displaced nodes would count it
     as strain.
+
+    Parameters
+    ----------
+    name
+        Name of the sensor, unique in the system.
+    body
+        Name of the flexible body.
+    position_a
+        Position in mesh axes, (3,) [m], where a kept node must be, or an address such as a node number.
+    position_b
+        Second of the two places, as `position_a`.
+    tolerance
+        Largest distance of nodes from positions, relative to the size of the body.
     """
 
     name: str
     body: str
-    #: position in mesh axes, (3,) [m], where a kept node must be, or an address such as a node number
     position_a: Array | Address
     position_b: Array | Address
-    tolerance: float = TOLERANCE  #: largest distance of nodes from positions, relative to the size of the body
+    tolerance: float = TOLERANCE
 
     def __post_init__(self) -> None:
         for key in ("position_a", "position_b"):

@@ -22,16 +22,36 @@ HERMITIAN = 1e-8  #: largest defect of a cross spectrum, and its most negative e
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ModalSpectra:
-    """Stationary Gaussian motion of the modal coordinates, as one-sided cross spectra, with its duration."""
+    """Stationary Gaussian motion of the modal coordinates, as one-sided cross spectra, with its duration.
+
+    Parameters
+    ----------
+    name
+        Name of the load.
+    frequencies
+        Ascending frequencies, (n_f,) [Hz].
+    spectra
+        One-sided, G_kl(f) = G_lk(f)*, (n_f, n_q, n_q) [unit of q² / Hz].
+    duration
+        Duration of one pass [s].
+    mean
+        Static modal coordinates, (n_q,); None: zero.
+    repeats
+        How often the load is repeated.
+    scale
+        Factor on the loads; spectra are multiplied by its square.
+    weights
+        Weights of integrals over the frequencies, (n_f,) [Hz]; None: trapezoidal rule.
+    """
 
     name: str
-    frequencies: Array  #: ascending, (n_f,) [Hz]
-    spectra: NDArray[np.complex128]  #: one-sided, G_kl(f) = G_lk(f)*, (n_f, n_q, n_q) [unit of q² / Hz]
-    duration: float  #: duration of one pass [s]
-    mean: Array | None = None  #: static modal coordinates, (n_q,); None: zero
+    frequencies: Array
+    spectra: NDArray[np.complex128]
+    duration: float
+    mean: Array | None = None
     repeats: float = 1.0
-    scale: float = 1.0  #: factor on the loads; spectra are multiplied by its square
-    weights: Array | None = None  #: weights of integrals over the frequencies, (n_f,) [Hz]; None: trapezoidal rule
+    scale: float = 1.0
+    weights: Array | None = None
 
     def __post_init__(self) -> None:
         where = f"spectrum {self.name!r}"

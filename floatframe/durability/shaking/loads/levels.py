@@ -38,17 +38,30 @@ FEWEST = 2  #: smallest number of rows
 class Level:
     """A level at frequencies [Hz]: amplitudes of an acceleration or displacement, or a power spectral density.
 
+    Parameters
+    ----------
+    frequencies
+        Ascending frequencies, (n,) [Hz].
+    values
+        Values in `unit`, (n,).
+    unit
+        Unit of the values, such as "g", "m/s2" or "g2/Hz".
+    where
+        Location of the level, for messages.
+    rows
+        Location of each row, for messages: "line 7"; (): the row number.
+
     Raises
     ------
     ModelError
         With the row, if frequencies do not rise above zero, or a level is not a number above zero.
     """
 
-    frequencies: Array  #: ascending, (n,) [Hz]
-    values: Array  #: (n,), in `unit`
+    frequencies: Array
+    values: Array
     unit: str = "g"
-    where: str = field(default="shake: level", compare=False)  #: location of the level, for messages
-    rows: Sequence[str] = ()  #: location of each row, for messages: "line 7"; (): the row number
+    where: str = field(default="shake: level", compare=False)
+    rows: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         f, values = np.asarray(self.frequencies, dtype=float), np.asarray(self.values, dtype=float)

@@ -39,14 +39,30 @@ JOINED = 0.01  #: smallest reported depth of a notch [dB]
 
 @dataclass(frozen=True)
 class ResponseLimit:
-    """An output and a level that it must not exceed."""
+    """An output and a level that it must not exceed.
 
-    output: str  #: name of an output: "mirror acceleration x", "base force z", "root stress von Mises"
-    level: float | None = None  #: constant level over frequency, in the unit of the table
-    table: Level | None = None  #: level over frequency; the unit "output" is that of `level`
-    rms: float | None = None  #: rms over the whole band, only for random tests
+    Parameters
+    ----------
+    output
+        Name of an output: "mirror acceleration x", "base force z", "root stress von Mises".
+    level
+        Constant level over frequency, in the unit of the table.
+    table
+        Level over frequency; the unit "output" is that of `level`.
+    rms
+        Rms over the whole band, only for random tests.
+    name
+        Name of the limit, for the report.
+    factor
+        Factor on the response before the comparison.
+    """
+
+    output: str
+    level: float | None = None
+    table: Level | None = None
+    rms: float | None = None
     name: str = ""
-    factor: float = 1.0  #: factor on the response before the comparison
+    factor: float = 1.0
 
     def __post_init__(self) -> None:
         given = [key for key in ("level", "table", "rms") if getattr(self, key) is not None]
@@ -69,13 +85,29 @@ class ResponseLimit:
 
 @dataclass(frozen=True)
 class ForceLimit:
-    """The semi-empirical limit of an interface force, in the driven direction or another one."""
+    """The semi-empirical limit of an interface force, in the driven direction or another one.
 
-    output: str  #: "base force z"
-    C: float  #: C of the mounting structure, about sqrt(2) [-]
-    frequency: float | None = None  #: f_0 [Hz]; None: the mode with the largest effective mass in the direction
-    exponent: float = 2.0  #: n for densities
-    mass: float | None = None  #: M_0 in units of the model; None: that of the structure
+    Parameters
+    ----------
+    output
+        "base force z".
+    C
+        C of the mounting structure, about sqrt(2) [-].
+    frequency
+        f_0 [Hz]; None: the mode with the largest effective mass in the direction.
+    exponent
+        n for densities.
+    mass
+        M_0 in units of the model; None: that of the structure.
+    name
+        Name of the limit, for the report.
+    """
+
+    output: str
+    C: float
+    frequency: float | None = None
+    exponent: float = 2.0
+    mass: float | None = None
     name: str = ""
 
     def __post_init__(self) -> None:

@@ -35,12 +35,24 @@ CHUNK_SIZE = 4_000_000  #: largest number of stress values in memory
 
 @dataclass(frozen=True)
 class CrossSpectrum:
-    """Coherence and phase between two inputs, the same at all frequencies."""
+    """Coherence and phase between two inputs, the same at all frequencies.
+
+    Parameters
+    ----------
+    a
+        Name of the first input.
+    b
+        Name of the second input.
+    coherence
+        Coherence gamma², 0 to 1.
+    phase
+        Phase of S_ab, positive where a leads b [degrees].
+    """
 
     a: str
     b: str
-    coherence: float  #: gamma², 0 to 1
-    phase: float = 0.0  #: phase of S_ab, positive where a leads b [degrees]
+    coherence: float
+    phase: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +60,21 @@ class RandomTest:
     """A stationary Gaussian excitation.
 
     `level` excites one direction after the other, each a run; `levels` excite several inputs at once, a single run.
+
+    Parameters
+    ----------
+    name
+        Name of the test.
+    level
+        Power spectral density of the excitation of one direction after the other.
+    directions
+        Directions that `level` excites, one after the other.
+    levels
+        Power spectral density of each input by name; all act at once.
+    cross
+        Coherence and phase between inputs of `levels`; inputs that are not named are independent.
+    duration
+        Duration for the expected largest value [s].
     """
 
     name: str
@@ -55,7 +82,7 @@ class RandomTest:
     directions: Sequence[str] = ("x", "y", "z")
     levels: Mapping[str, Level] | None = None
     cross: Sequence[CrossSpectrum] = ()
-    duration: float | None = None  #: duration for the expected largest value [s]
+    duration: float | None = None
 
     def __post_init__(self) -> None:
         where = f"shake: random {self.name!r}"

@@ -30,12 +30,26 @@ LOST = 0.01  #: of the largest value of a history; a note reports a larger chang
 
 @dataclass(frozen=True)
 class SpectrumRequest:
-    """A request for shock response spectra of accelerations."""
+    """A request for shock response spectra of accelerations.
+
+    Parameters
+    ----------
+    Q
+        Quality factors, each above 0.5.
+    kind
+        Kind of the spectrum.
+    first
+        [Hz]; None: a tenth of the lowest mode, or 10 Hz if that is less.
+    last
+        [Hz]; None: twice the highest mode, 10000 Hz at most.
+    per_octave
+        Number of frequencies in an octave.
+    """
 
     Q: Sequence[float] = (10.0,)
     kind: str = "acceleration"
-    first: float | None = None  #: [Hz]; None: a tenth of the lowest mode, or 10 Hz if that is less
-    last: float | None = None  #: [Hz]; None: twice the highest mode, 10000 Hz at most
+    first: float | None = None
+    last: float | None = None
     per_octave: int = 12
 
     def __post_init__(self) -> None:
@@ -54,20 +68,41 @@ class TimeTest:
     """Histories of inputs, linear between their samples.
 
     `history` excites one direction after the other, each a run; `inputs` are given all at once, a single run.
+
+    Parameters
+    ----------
+    name
+        Name of the test.
+    time
+        Rising times, (n_t,) [s].
+    history
+        Acceleration in SI, (n_t,) [m/s², rad/s²].
+    directions
+        Directions that `history` excites, one after the other.
+    inputs
+        Inputs by name, in SI [m/s², rad/s², N, N m], (n_t,) each.
+    after
+        How long to go on after the end [s]; None: 10 cycles of the lowest mode, of a transient not at all.
+    spectra
+        The requested shock response spectra.
+    kind
+        "shock" or "transient", for the report.
+    words
+        Description of the history.
+    synthesis
+        Synthesis, if the history was made for a spectrum.
     """
 
     name: str
-    time: Array  #: rising, (n_t,) [s]
-    history: Array | None = None  #: acceleration in SI, (n_t,) [m/s², rad/s²]
+    time: Array
+    history: Array | None = None
     directions: Sequence[str] = ("x", "y", "z")
-    inputs: Mapping[str, Array] | None = None  #: by name, in SI [m/s², rad/s², N, N m], (n_t,) each
-    after: float | None = (
-        None  #: how long to go on after the end [s]; None: 10 cycles of the lowest mode, of a transient not at all
-    )
+    inputs: Mapping[str, Array] | None = None
+    after: float | None = None
     spectra: SpectrumRequest = field(default_factory=SpectrumRequest)
-    kind: str = "transient"  #: "shock" or "transient", for the report
-    words: str = ""  #: description of the history
-    synthesis: Synthesis | None = None  #: synthesis, if the history was made for a spectrum
+    kind: str = "transient"
+    words: str = ""
+    synthesis: Synthesis | None = None
 
     def __post_init__(self) -> None:
         where = f"shake: {self.kind} {self.name!r}"

@@ -36,13 +36,27 @@ MOST_STEPS = 2_000_000
 
 @dataclass(frozen=True, eq=False)
 class SineTest:
-    """A sine sweep in several base directions, one after the other."""
+    """A sine sweep in several base directions, one after the other.
+
+    Parameters
+    ----------
+    name
+        Name of the test.
+    level
+        Amplitude, 0 to peak.
+    directions
+        Directions, one run for each; "base:x" if there are several bases.
+    rate
+        Octaves per minute; None: so slow that the response is steady.
+    downward
+        Sweep from the last frequency to the first.
+    """
 
     name: str
-    level: Level  #: amplitude, 0 to peak
-    directions: Sequence[str] = ("x", "y", "z")  #: directions, one run for each; "base:x" if there are several bases
-    rate: float | None = None  #: octaves per minute; None: so slow that the response is steady
-    downward: bool = False  #: sweep from the last frequency to the first
+    level: Level
+    directions: Sequence[str] = ("x", "y", "z")
+    rate: float | None = None
+    downward: bool = False
 
     def __post_init__(self) -> None:
         where = f"shake: sine {self.name!r}"

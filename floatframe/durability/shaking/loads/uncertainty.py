@@ -21,11 +21,20 @@ SAME = 1e-9  #: relative distance of frequencies that differ by rounding alone
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """Factor on responses and relative uncertainty of frequencies, constant or by frequency band."""
+    """Factor on responses and relative uncertainty of frequencies, constant or by frequency band.
 
-    factor: float = 1.0  #: dynamic or model uncertainty factor, 1 or more
-    frequency: float = 0.0  #: relative uncertainty of frequencies, 0.05 for 5 %
-    #: rows (from [Hz], to [Hz], factor, frequency), which replace the values above
+    Parameters
+    ----------
+    factor
+        Dynamic or model uncertainty factor, 1 or more.
+    frequency
+        Relative uncertainty of frequencies, 0.05 for 5 %.
+    bands
+        Rows (from [Hz], to [Hz], factor, frequency), which replace the values above.
+    """
+
+    factor: float = 1.0
+    frequency: float = 0.0
     bands: Sequence[Sequence[float]] = ()
 
     def __post_init__(self) -> None:

@@ -17,18 +17,33 @@ __all__ = ["Damping"]
 class Damping:
     """Damping ratios zeta = 1/(2 Q); later entries override earlier ones: `ratio`, `table`, `bands`, `modes`.
 
+    Parameters
+    ----------
+    ratio
+        Ratio of all modes.
+    Q
+        Amplification of all modes.
+    table
+        Rows (frequency [Hz], ratio), linear in log f, constant beyond the ends.
+    bands
+        Rows (from [Hz], to [Hz], ratio), from <= f < to.
+    modes
+        Ratios of single modes by number, from 1.
+    own
+        Whether the damping of the body or of the dampers of the system is used.
+
     Raises
     ------
     ModelError
         If nothing or a contradiction is given, or a ratio is not between 0 and 1.
     """
 
-    ratio: float | None = None  #: ratio of all modes
-    Q: float | None = None  #: amplification of all modes
-    table: Sequence[Sequence[float]] = ()  #: rows (frequency [Hz], ratio), linear in log f, constant beyond the ends
-    bands: Sequence[Sequence[float]] = ()  #: rows (from [Hz], to [Hz], ratio), from <= f < to
-    modes: Mapping[int, float] = field(default_factory=dict)  #: ratios of single modes by number, from 1
-    own: bool = False  #: whether the damping of the body or of the dampers of the system is used
+    ratio: float | None = None
+    Q: float | None = None
+    table: Sequence[Sequence[float]] = ()
+    bands: Sequence[Sequence[float]] = ()
+    modes: Mapping[int, float] = field(default_factory=dict)
+    own: bool = False
 
     def __post_init__(self) -> None:
         if self.ratio is not None and self.Q is not None:

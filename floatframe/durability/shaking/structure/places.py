@@ -29,20 +29,47 @@ class Observed:
 
     An element or a set is each of its kept nodes. The displacement is relative to the (first) base; the stress has its
     components in mesh axes.
+
+    Parameters
+    ----------
+    name
+        Name of the output.
+    interface
+        Name of an interface.
+    node
+        The user's number; "INSTANCE.number" where instances have the same numbers.
+    element
+        Number of an element, in the same notation.
+    set
+        Name of a set of nodes or elements.
+    position
+        Mesh coordinates of a kept node, (3,) [m].
+    point
+        Stress point of the file, by name.
+    quantities
+        Quantities, of `QUANTITIES`; (): acceleration, or stress at a stress point.
+    tolerance
+        Largest distance of a kept node from the position, relative to the size of the body.
+    body
+        Name of the body of a system; "position" is then also one on a rigid body.
+    sensor
+        Name of a sensor of a system, instead of a place.
+    recovery
+        Name of a recovery table of a body, for all of its rows.
     """
 
     name: str
     interface: str | None = None
-    node: int | str | None = None  #: the user's number; "INSTANCE.number" where instances have the same numbers
-    element: int | str | None = None  #: number of an element, in the same notation
+    node: int | str | None = None
+    element: int | str | None = None
     set: str | None = None
-    position: Array | Sequence[float] | None = None  #: mesh coordinates of a kept node, (3,) [m]
-    point: str | None = None  #: stress point of the file, by name
-    quantities: tuple[str, ...] = ()  #: quantities, of `QUANTITIES`; (): acceleration, or stress at a stress point
-    tolerance: float = TOLERANCE  #: largest distance of a kept node from the position, relative to the size of the body
-    body: str | None = None  #: of a system: on which body; "position" is then also one on a rigid body
-    sensor: str | None = None  #: of a system: a sensor of it, by name, in place of a place
-    recovery: str | None = None  #: of a body: a recovery table of it, by name: all of its rows
+    position: Array | Sequence[float] | None = None
+    point: str | None = None
+    quantities: tuple[str, ...] = ()
+    tolerance: float = TOLERANCE
+    body: str | None = None
+    sensor: str | None = None
+    recovery: str | None = None
 
     def __post_init__(self) -> None:
         where = f"shake: output {self.name!r}"
