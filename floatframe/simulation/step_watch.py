@@ -10,10 +10,12 @@ It works for second-order methods, with fixed steps and with an error tolerance:
     run by 3/4 of the error. Only its estimate is reported. From the start of a run it has little numerical damping
     (`LIGHT`): a run may damp vibrations that its steps do not resolve, and equal damping would hide what they do to the
     motion.
-    The estimate holds for errors of second order. The companion with double steps goes on beside one with half steps
-    of the same damping. Where the difference from the run falls to more than a quarter from double to half steps
+    The estimate holds for errors of second order. The companion with double steps goes on beside one with half steps.
+    Where the difference from the run falls to more than a quarter from double to half steps of the same damping
     (vibrations of much energy that no step resolves), the estimate follows this ratio, up to `MOST_RATIO`. Where double
-    steps fail, the ratio is taken as `UNKNOWN_RATIO`.
+    steps fail, the ratio is taken as `UNKNOWN_RATIO`. If the error exceeds `SCREEN` of the limit, but not the limit,
+    and the ratio is outside `ORDINARY`, quarter steps from the same memory decide, with half steps beside them: half
+    steps may agree with the run by chance.
 (3) The companion covers `COMPANION_STEPS` steps. It crosses jumps of forces and has its own events. In a run of more
     than `LONG_RUN` steps it starts after the first steps, from their memory. There it ends as soon as the error,
     extrapolated in proportion to the end of the run, is far below the limit.
@@ -28,8 +30,8 @@ It works for second-order methods, with fixed steps and with an error tolerance:
 
 (7) A run that continues another one in time (`State.watched`) is a piece of one motion, and its errors are relative to
     the motion since that began. If a companion reached the end of the other run, the error of the last state is passed
-    on, and companions begin with it: they lie from the run as far as if they had run since the beginning. Other errors
-    of earlier pieces are added.
+    on, and companions begin with it: they lie from the run as far as if they had run since the beginning, and with the
+    shortest steps that have been needed since. Other errors of earlier pieces are added.
 
 A companion restarts where a run can be resumed; its error up to there is added. These sums, and that over windows, do
 not know how the motion changes earlier errors: it may forget them (damping) or magnify them (chaos).
@@ -88,14 +90,16 @@ LIGHT = 0.9  #: rho_inf at least of companions with half steps from the start of
 FULL_TURN = 3.0  #: rotation above which errors are relative to a whole turn [rad]
 SCREEN = 0.25  #: share of the limit above which half steps decide: double steps may be outside the asymptotic range
 AIM = 0.2  #: share of the limit that the recommended step would reach
-DOUBLES, HALVES = 2.0, 0.5  #: step size of a companion over that of the run
-ERROR_SHARE = {DOUBLES: -1 / 3, HALVES: 4 / 3}  #: error of the run over the difference: 1/(1 - 2²), 1/(1 - 1/2²)
+DOUBLES, HALVES, QUARTERS = 2.0, 0.5, 0.25  #: step size of a companion over that of the run
+ERROR_SHARE = {ratio: 1 / (1 - ratio**2) for ratio in (DOUBLES, HALVES, QUARTERS)}  #: error over the difference
+ORDINARY = (1 / 6, 3 / 8)  #: ratios of the differences by half and by double steps of about second order (1/4)
 MOST_RATIO = 2 / 3  #: largest ratio of the differences by half and by double steps from which an error is estimated
 UNKNOWN_RATIO = 1 / 2  #: the ratio where double steps fail, that of errors of first order
 
 
 #: of a record
-COUNTS = ("next_window", "window_distance", "n_watched", "n_companion_steps", "companions_done", "n_before", "is_piece")
+COUNTS = ("next_window", "window_distance", "n_watched", "n_companion_steps", "companions_done", "n_before", "is_piece",
+          "ratio")  # fmt: skip
 
 
 @dataclass
@@ -133,7 +137,7 @@ class Companion:
         none = np.zeros((len(memory.r), 2, 3))
         method, begin, share = integrator_of(integrator, ratio), memory, ERROR_SHARE[ratio]
         if is_light:
-            method, share = lighter(method, share)
+            method, share = lighter(method, ratio)
         if h and memory.h and isinstance(method, GeneralizedAlpha | RelativeGeneralizedAlpha) and method.h_min is None:
             method, begin = replace(method, h_min=h), memory.changed(h_next=ratio * h)  # without a new start
         own = None if events is None else events.copied()
@@ -208,8 +212,9 @@ class StepWatch:
     n_companion_steps: int = 0  #: number of steps that companions have covered
     companions_done: bool = False  #: whether only windows follow
     companion: Companion | None = None
-    coarse: Companion | None = None  #: with double steps, beside a companion with half steps
-    coarse_fails: bool = False  #: whether double steps cannot follow the motion
+    coarse: Companion | None = None  #: with twice as long steps, or four times, beside a companion with short ones
+    coarse_fails: bool = False  #: whether these cannot follow the motion
+    ratio: float = DOUBLES  #: step size that companions begin with, over that of the run
     next_window: int = 0  #: step at which the next window starts
     window_distance: int = 0  #: number of steps between the last window and the next
     n_watched: int = 0  #: number of steps with summed errors
@@ -241,7 +246,8 @@ class StepWatch:
         first, error, total = self.initial_state, np.zeros(0), self.total
         if self.at_end is not None:
             error, total = self.at_end
-        arrays = {"errors": total, "size": self.size, "r": first.r, "p": first.p, "error": error}
+        arrays = {"errors": total, "size": self.size, "r": first.r, "p": first.p, "error": error,
+                  "ratio": np.array([self.ratio])}  # fmt: skip
         return {name: [float(x) for x in array.ravel()] for name, array in arrays.items()}
 
     def continue_from(self, watched: Mapping[str, Any]) -> None:
@@ -254,6 +260,7 @@ class StepWatch:
                   "p": self.initial_state.p.shape}  # fmt: skip
         self.total, self.size, r, p = (np.reshape(watched[name], shape) for name, shape in shapes.items())
         self.initial_state = replace(self.initial_state, r=r, p=p)
+        (self.ratio,) = watched.get("ratio", [DOUBLES])
         if len(watched.get("error", ())):
             self.error = np.array(watched["error"], dtype=float)
             if self.is_long:  # its companion begins later
@@ -312,7 +319,7 @@ class StepWatch:
 
     def is_comparable(self, n_done: int) -> bool:
         """Whether a step of the companion ends with step n_done of the run."""
-        return self.companion is None or self.companion.ratio == HALVES or (n_done - self.companion.start) % 2 == 0
+        return self.companion is None or self.companion.ratio < 1.0 or (n_done - self.companion.start) % 2 == 0
 
     def take(
         self, system: System, begin: Memory, end: Memory, *, t0: float, h: float, first: int, n_steps: int,
@@ -360,34 +367,25 @@ class StepWatch:
                 self.integrator, begin, self.work_arrays(system), first, DOUBLES, h if is_fixed else 0.0, events
             ))  # fmt: skip
             self.coarse_fails = False
+            while self.companion.ratio > self.ratio:
+                self.refined(system, t0, self.companion)
         other = self.companion
         if self.is_comparable(last):
             self.update_size(begin.state, end.state, h * (last - first))
             self.turn = np.maximum(self.turn, turns_in_a_step(system, end.state, h))
-            is_good = False
-            if other.ratio == HALVES or not self.turns_far(system):
-                is_good = other.follow(system, end, last, t0, h, self.jumps)
-            if self.coarse is not None and (last - other.start) % 2 == 0:
-                if not self.coarse.follow(system, end, last, t0, h, self.jumps):
-                    self.coarse, self.coarse_fails = None, True
-            is_small = is_good and self.relative_errors(system, other.peak).max() < SCREEN * self.limit
-            if other.ratio == DOUBLES and not is_small:
-                coarse, self.coarse_fails = (other, False) if is_good else (None, True)
-                other = self.companion = self.with_half_steps(system, t0, other)
-                if coarse is not None and not other.is_light:
-                    self.coarse, self.kept_work = coarse, None  # each has its own working arrays
-                    other = self.companion = self.with_half_steps(system, t0, coarse)
-                is_good = other.follow(system, end, last, t0, h, self.jumps)
-            if not is_good and other.is_light:  # less damping may be what fails
-                damped = self.with_half_steps(system, t0, other, is_light=False)
-                is_good = damped.follow(system, end, last, t0, h, self.jumps)
-                other = self.companion = damped if is_good else other
-            if not is_good:  # what it has found so far counts
+            if not self.follow(system, other, end, last, t0, h):  # what it has found so far counts
                 self.close_companion(h)
                 self.companions_done, self.next_window = True, last
                 return self.new_note(system, t0 + last * h, h) if self.is_judged(last) else None
+            other = self.companion
         is_due = self.is_judged(last) and last >= min(self.n_total, COMPANION_STEPS) // 2
         note = self.new_note(system, t0 + last * h, h) if is_due else None
+        if is_due and self.note is None and self.is_doubtful(system, other):
+            quarters = self.refined(system, t0, other)
+            if quarters.follow(system, end, last, t0, h, self.jumps):
+                other, note = quarters, self.new_note(system, t0 + last * h, h)
+            else:
+                self.companion, self.coarse, self.coarse_fails = other, None, True
         is_over = self.n_companion_steps + last - other.start >= COMPANION_STEPS or self.note is not None
         if self.is_long and last >= LEAST_COMPANION_STEPS:  # errors of phase grow in proportion to time
             expected = float(self.relative_errors(system, other.peak).max()) * self.n_total / last
@@ -405,13 +403,54 @@ class StepWatch:
         is_flexible = np.diff(compiled_system(system).model.bodies.q0) > 0
         return bool((self.turn[is_flexible] > FAR_TURN).any())
 
-    def with_half_steps(self, system: System, t0: float, other: Companion, *, is_light: bool = True) -> Companion:
-        """Return a companion with half steps that starts where another one started.
+    def follow(self, system: System, other: Companion, end: Memory, last: int, t0: float, h: float) -> bool:
+        """Advance the companions to run step `last`, replace those that fail; return whether the steps converged."""
+        is_far = self.turns_far(system)
+        is_good = not (is_far and other.ratio == DOUBLES) and other.follow(system, end, last, t0, h, self.jumps)
+        if self.coarse is not None and (last - other.start) % 2 == 0:
+            is_fit = not (is_far and self.coarse.ratio == DOUBLES)
+            if not (is_fit and self.coarse.follow(system, end, last, t0, h, self.jumps)):
+                self.coarse, self.coarse_fails = None, True
+        is_small = is_good and self.relative_errors(system, other.peak).max() < SCREEN * self.limit
+        if other.ratio == DOUBLES and not is_small:
+            doubles_fail, other = not is_good, self.refined(system, t0, other)
+            if doubles_fail:
+                self.coarse, self.coarse_fails = None, True
+            is_good = other.follow(system, end, last, t0, h, self.jumps)
+        if not is_good and other.is_light:  # less damping may be what fails
+            damped = self.with_steps(other.ratio, system, t0, other, is_light=False)
+            is_good = damped.follow(system, end, last, t0, h, self.jumps)
+            self.companion = damped if is_good else other
+        return is_good
+
+    def refined(self, system: System, t0: float, coarse: Companion) -> Companion:
+        """Replace a companion by one with shorter steps from the same start; the other one goes on beside it."""
+        self.coarse, self.kept_work = coarse, None  # each has its own working arrays
+        self.ratio = HALVES if coarse.ratio == DOUBLES else QUARTERS
+        is_light = coarse.ratio == DOUBLES or coarse.is_light
+        self.companion = self.with_steps(self.ratio, system, t0, coarse, is_light=is_light)
+        return self.companion
+
+    def is_doubtful(self, system: System, halves: Companion) -> bool:
+        """Return whether the error by half steps counts beside the limit, and is not of second order."""
+        if halves.ratio != HALVES:
+            return False
+        found = halves.peak * by_observed_order(halves, self.coarse, self.coarse_fails)
+        counts = self.relative_errors(system, found) > SCREEN * self.limit
+        if self.coarse is None:
+            return self.coarse_fails and bool(counts.any())
+        ratio = ratio_of_differences(halves, self.coarse)
+        return bool((counts & ((ratio < ORDINARY[0]) | (ratio > ORDINARY[1]))).any())
+
+    def with_steps(
+        self, ratio: float, system: System, t0: float, other: Companion, *, is_light: bool = True
+    ) -> Companion:
+        """Return a companion with steps of so much of those of the run, that starts where another one started.
 
         is_light: with little numerical damping at the start of a run; a memory of the run has that of its method.
         """
         return self.moved_companion(system, t0, Companion.begun(
-            self.integrator, other.begin, self.work_arrays(system), other.start, HALVES, events=other.events_at_begin,
+            self.integrator, other.begin, self.work_arrays(system), other.start, ratio, events=other.events_at_begin,
             is_light=is_light and other.begin.h == 0.0,
         ))  # fmt: skip
 
@@ -494,7 +533,7 @@ class StepWatch:
                 return note
         other = self.companion
         if other is not None and other.at < n_done < FIRST_VERDICT:  # a run of few steps ends within a double step
-            halves = self.with_half_steps(system, t0, other, is_light=False)
+            halves = self.with_steps(HALVES, system, t0, other, is_light=False)
             if halves.follow(system, end, n_done, t0, h, self.jumps):
                 self.update_size(halves.begin.state, end.state, h * (n_done - halves.start))
                 self.companion = other = halves
@@ -589,34 +628,43 @@ def integrator_of(integrator: Integrator, ratio: float) -> Integrator:
     return replace(integrator, error_tolerance=tolerance * ratio**3)  # type: ignore[type-var]
 
 
-def lighter(integrator: Integrator, share: float) -> tuple[Integrator, float]:
-    """Return the method with the numerical damping of `LIGHT` where that is less, and the share of half steps.
+def lighter(integrator: Integrator, ratio: float) -> tuple[Integrator, float]:
+    """Return the method with the numerical damping of `LIGHT` where that is less, and its share in the error.
 
     The phase error of generalized-alpha in a period is c(rho_inf) (omega h)², c as below.
     """
     if not isinstance(integrator, GeneralizedAlpha | RelativeGeneralizedAlpha):
-        return integrator, share
+        return integrator, ERROR_SHARE[ratio]
     is_other = integrator.parameters is not None or integrator.error_tolerance is not None
     if is_other or integrator.rho_inf >= LIGHT:
-        return integrator, share
+        return integrator, ERROR_SHARE[ratio]
     own, light = (1 / 12 + 3 / 8 * ((1 - rho) / (1 + rho)) ** 2 for rho in (integrator.rho_inf, LIGHT))
-    return replace(integrator, rho_inf=LIGHT), own / (own - light / 4)
+    return replace(integrator, rho_inf=LIGHT), own / (own - light * ratio**2)
+
+
+def ratio_of_differences(other: Companion, coarse: Companion) -> Array:
+    """Return how much more steps are changed by going on to shorter ones than by going to the coarse ones, (n_b, 2)."""
+    fine, before = other.peak / abs(other.share), coarse.peak / abs(coarse.share)
+    more = fine - before if coarse.ratio < 1.0 else fine
+    return np.asarray(np.maximum(more, 0.0) / np.where(before > 0.0, before, np.inf))
 
 
 def by_observed_order(other: Companion, coarse: Companion | None, coarse_fails: bool) -> Array:
     """Return by how much the errors that a companion finds are larger where they are not of second order, (n_b, 2).
 
-    Differences by double and half steps from the run that fall by a ratio x leave an error of 1/(1 - x) times the last.
+    Changes of a run to shorter and shorter steps that fall by a ratio x go on by x/(1 - x) times the last.
     Where double steps fail, the order is unknown, and the first is assumed.
     """
-    if (coarse is None and not coarse_fails) or other.ratio != HALVES or other.is_light:
-        return np.ones(other.peak.shape)
+    none = np.ones(other.peak.shape)
+    if other.ratio == DOUBLES or (other.ratio == HALVES and other.is_light):
+        return none
     if coarse is None:
-        ratio = np.full(other.peak.shape, UNKNOWN_RATIO)
-    else:
-        by_halves, by_doubles = other.peak / other.share, coarse.peak / abs(coarse.share)
-        ratio = np.clip(by_halves / np.where(by_doubles > 0.0, by_doubles, np.inf), 0.25, MOST_RATIO)
-    return np.asarray(1 / (1 - ratio) / ERROR_SHARE[HALVES])
+        return none * (1 / (1 - UNKNOWN_RATIO) / ERROR_SHARE[HALVES] if coarse_fails and other.ratio == HALVES else 1.0)
+    fine = other.peak / other.share
+    last = fine - coarse.peak / coarse.share if coarse.ratio < 1.0 else fine
+    ratio = np.clip(ratio_of_differences(other, coarse), 0.25, MOST_RATIO)
+    found = fine + np.maximum(last, 0.0) * ratio / (1 - ratio)
+    return np.asarray(found / np.where(other.peak > 0.0, other.peak, np.inf))
 
 
 def lengths(vectors: Array) -> Array:
