@@ -44,6 +44,18 @@ def test_a_well_conditioned_matrix_with_multipliers_is_not_called_singular(seed)
         assert_allclose(factor.solve(K_ii @ x), x, rtol=0, atol=1e-8 * np.abs(x).max())
 
 
+def test_coordinates_in_columns_that_nearly_repeat_each_other_are_compared():
+    """Rounding of 2000 times the mode hides V A = Phi; the work of the columns shows a wrong sign all the same."""
+    sound = sound_body(281074)
+    columns = sound.reduced.columns
+    wrong = np.array(columns.A)
+    wrong[:, 17] *= -1
+    with FullReference(sound.body, band=1.5 * sound.reduced.free_frequencies[0] / sound.body.units.time) as reference:
+        for A, verdict in ((columns.A, "pass"), (wrong, "fail")):
+            body = replace(sound.reduced, columns=replace(columns, A=A))
+            assert judged(sound, body, reference)["sources"].verdict == verdict
+
+
 @pytest.mark.parametrize("seed", [120160, 120251])
 def test_approximated_moments_are_compared_after_a_change_of_frame(seed):
     sound = sound_body(seed)

@@ -392,7 +392,8 @@ def compare_load_cases(case: Case) -> Iterator[Compared]:
 def compare_sources(case: Case) -> Iterator[Compared]:
     """Labels and shares by the columns of the file; the columns by the mode set, up to a scale for each column.
 
-    The forces of the modes on the columns V are F = VᵀK Phi; the coordinates A satisfy V A = Phi up to rigid motion.
+    The forces of the modes on the columns V are F = VᵀK Phi; the coordinates A satisfy V A = Phi up to rigid motion,
+    which rounding hides where columns nearly repeat each other, and AᵀF = PhiᵀK Phi, which it hides much less.
     """
     file = case.reduced
     if file.columns is None:
@@ -420,8 +421,12 @@ def compare_sources(case: Case) -> Iterator[Compared]:
     E = u - case.Phi @ Z
     rounding = SUSPECT_ENERGY * rounding_of_energy(case.body, np.abs(V) @ np.abs(back))
     error = np.sqrt(np.maximum(np.einsum("nk,nk->k", E, case.body.K @ E) - rounding, 0.0))
-    energy = np.sqrt(np.maximum(np.einsum("nk,nk->k", case.Phi @ Z, K_Phi), 0.0))
+    work = (case.Phi @ Z).T @ K_Phi
+    energy = np.sqrt(np.maximum(np.diag(work), 0.0))
     yield apart("columns.A", error, np.zeros_like(error), energy, axes=case.axes_words)
+    rounding = SUSPECT_ENERGY * np.finfo(float).eps * (np.abs(A).T @ np.abs(F))
+    error = np.maximum(np.abs(A.T @ F - work) - rounding, 0.0)
+    yield apart("columns.A", error, np.zeros_like(error), np.outer(energy, energy), axes=f"{case.axes_words} -")
 
 
 def compare_stress(case: Case) -> Iterator[Compared]:
