@@ -46,6 +46,44 @@ def full(matrix):
     return matrix.toarray() if sp.issparse(matrix) else matrix
 
 
+def spoilt_record(words, at, fault):
+    """Return the words of a file with a fault in the record at a place: length, column, 0, words, strings, length."""
+    end = at + 1 + words[at] // 4
+    if fault == "it is truncated":
+        return words[: end - 1]
+    words = words.copy()
+    second = at + 4 + 1 + words[at + 4]  # its second string: length + 1, row, numbers
+    where, value = {
+        "is not the one at its beginning": (end, words[end] + 4),
+        "not larger than the one before": (at + 1, words[at + 1] - 1),
+        "do not add up": (at + 3, words[at + 3] + 1),
+        "outside the rows": (second + 1, 7),
+        "not in the order of the rows": (second + 1, 1),
+    }[fault]
+    words[where] = value
+    return words
+
+
+@pytest.mark.parametrize(
+    "fault",
+    ["it is truncated", "is not the one at its beginning", "not larger than the one before", "do not add up",
+     "outside the rows", "not in the order of the rows"],
+)  # fmt: skip
+def test_a_fault_of_a_record_names_its_column_and_byte(tmp_path, fault):
+    A = np.zeros((6, 5))
+    A[[1, 4]] = np.arange(1.0, 11.0).reshape(2, 5)  # two strings in each column
+    path = tmp_path / "a.op4"
+    write_op4(path, {"A": sp.csc_array(A)})
+    words = np.fromfile(path, np.int32)
+    at = 0
+    for _ in range(3):  # the header and two columns
+        at += 2 + words[at] // 4
+    assert words[at + 1] == 3
+    spoilt_record(words, at, fault).tofile(path)
+    with pytest.raises(MatrixError, match=rf"column 3 of 5, at byte {4 * at} of \d+: .*{fault}"):
+        read_op4(path)
+
+
 @pytest.mark.parametrize("name", FILES)
 def test_matrices_of_nastran_are_those_that_pyyeti_reads(name):
     ours = {matrix.name: matrix for matrix in read_op4(DATA / name)}
