@@ -102,6 +102,32 @@ def test_pressures_along_a_pipe_begin_on_the_line_between_those_of_its_ends():
     assert_allclose(found, [supply + (9e6 - supply) / 3, supply + (9e6 - supply) * 2 / 3, 1e-4], rtol=1e-14)
 
 
+@pytest.mark.parametrize("segments", [1, 4])
+@pytest.mark.parametrize("wall", [None, 5e9])
+def test_oil_of_a_pipe_lies_half_a_segment_at_each_end_of_its_segments(segments, wall):
+    """At ambient pressure p' (V/K + V_pipe/E_wall) flows in, with V_pipe = A L / n inside and half of it at ends."""
+    p, K, A, L = 101325.0, 1.4e9, 1e-4, 3.0
+    parts = [
+        Pipe("pipe", "one", "two", L, A, segments=segments, wall_modulus=wall),
+        Pump("still", "one", "tank", GROUND, SHAFT, 3e-6), Resistance("last", "two", "tank", 1e-11),
+        Tank("outside", "tank"),
+    ]  # fmt: skip
+    nodes, x = {"one": Node(2e-5, p), "two": Node(5e-5, p)}, np.array(motion()[2:])
+    x[:, 12:] = 0.0
+    law = Circuit("c", Fluid(870.0, K, p), parts, nodes).law(placed(x))
+    flows = 1e-4 * np.array([3.0, -1.0, 2.0, 0.5])[:segments]
+    names = ["flow pipe"] if segments == 1 else [f"flow pipe {k + 1}" for k in range(segments)]
+    z = np.array([dict(zip(names, flows, strict=True)).get(name, p) for name in law.states])
+    _, rates, _ = evaluate(law, 0.0, x, z)
+    found = {name: rate for name, rate in zip(law.states, rates, strict=True) if name.startswith("pressure")}
+    part = A * L / segments
+    own = np.r_[2e-5, np.zeros(segments - 1), 5e-5]
+    oil = np.r_[part / 2, np.full(segments - 1, part), part / 2]
+    expected = -np.diff(np.r_[0.0, flows, 0.0]) / ((own + oil) / K + (0.0 if wall is None else oil / wall))
+    order = ["pressure one", *(f"pressure pipe {k}" for k in range(1, segments)), "pressure two"]
+    assert_allclose([found[name] for name in order], expected, rtol=1e-4)
+
+
 @pytest.mark.parametrize("segments", [1, 2])
 def test_a_pipe_of_one_segment_has_the_name_of_the_pipe_and_segments_have_numbers(segments):
     pipe = Pipe("line", "supply", "end", 3.0, 1e-4, segments=segments, flow=2e-4)
