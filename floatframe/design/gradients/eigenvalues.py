@@ -21,6 +21,8 @@ from floatframe.design.gradients.outputs import moved
 from floatframe.design.gradients.parameters import Family, Neighbour, Parameter
 from floatframe.design.gradients.tangents import Point, PointTangents, parameter_residuals, tangents_at
 from floatframe.engine.compiling.file_frames import motion_of_engine
+from floatframe.engine.compiling.system import CompiledSystem
+from floatframe.engine.initial_conditions.newton_equations import balanced_scales
 from floatframe.engine.open_equations.configuration import Configurations
 from floatframe.engine.open_equations.rows import structure_of
 from floatframe.errors import ModelError
@@ -47,36 +49,62 @@ __all__ = [
 SINGULAR_EQUILIBRIUM = 1e-12  #: smallest singular value of the scaled matrix, below which the equilibrium is not unique
 
 
-def equilibrium_matrix(at: PointTangents, name: str) -> Array:
-    """Return the matrix, (n_u + n_w, n_u + n_w).
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """The matrix [K, -Jᵀ; G, V] with rows and columns of one size: neither units nor the size of the system decide."""
+
+    scaled: Array  #: of_rows[:, None] * matrix * of_columns
+    of_columns: Array
+    of_rows: Array
+
+    def solve(self, right: Array) -> Array:
+        """Return the solutions of matrix @ x = right, of columns."""
+        return np.asarray(self.of_columns[:, None] * la.solve(self.scaled, self.of_rows[:, None] * right))
+
+    def solve_transposed(self, right: Array) -> Array:
+        """Return the solutions of matrix.T @ x = right, of columns."""
+        return np.asarray(self.of_rows[:, None] * la.solve(self.scaled.T, self.of_columns[:, None] * right))
+
+
+def balance_of(K: Array, J: Array, G: Array, V: Array, displacements: Array) -> Balance:
+    """Return the balance of these matrices; displacements, (n_u,): typical ones, by which K is scaled to one."""
+    work = np.abs(K * displacements[:, None] * displacements).max(initial=0.0)
+    diagonal = (work if work > 0 else 1.0) / displacements**2
+    of_columns, of_rows = balanced_scales(diagonal, np.abs(J), np.abs(G), np.abs(V))
+    return Balance(of_rows[:, None] * np.block([[K, -J.T], [G, V]]) * of_columns, of_columns, of_rows)
+
+
+def typical_displacements(compiled: CompiledSystem) -> Array:
+    """Return displacements, (n_u,), that move a system by about its length: the length, a radian, and so of modes."""
+    return np.asarray(compiled.length / compiled.motion_lengths)
+
+
+def equilibrium_matrix(at: PointTangents, compiled: CompiledSystem, name: str) -> Balance:
+    """Return the matrix of the balance of forces and constraints.
 
     Raises
     ------
     ModelError
         If something moves at no cost, so that the equilibrium is one of many.
     """
-    matrix = np.block([[at.K, -at.J.T], [at.G_x, at.V]])
-    scaled = matrix.copy()
-    for _ in range(5):  # scale rows and columns to one size, so that units do not matter
-        scaled /= np.sqrt(np.maximum(np.abs(scaled).max(axis=1, keepdims=True), np.finfo(float).tiny))
-        scaled /= np.sqrt(np.maximum(np.abs(scaled).max(axis=0, keepdims=True), np.finfo(float).tiny))
-    values = la.svdvals(scaled)
+    balance = balance_of(at.K, at.J, at.G_x, at.V, typical_displacements(compiled))
+    values = la.svdvals(balance.scaled)
     if values[-1] <= SINGULAR_EQUILIBRIUM * values[0]:
         raise ModelError(
             f"sensitivities: system {name!r}: its equilibrium is not unique (a motion meets no resistance) and has "
             "no derivative; hold it by a spring or a joint"
         )
-    return np.asarray(matrix)
+    return balance
 
 
-def equilibrium_columns(matrix: Array, by_p: Array) -> Array:
+def equilibrium_columns(balance: Balance, by_p: Array) -> Array:
     """Return d(x, w)/dp, (n_u + n_w, n_p)."""
-    return np.asarray(la.solve(matrix, -by_p))
+    return balance.solve(-by_p)
 
 
-def equilibrium_adjoint(matrix: Array, slopes: Array, by_p: Array) -> Array:
+def equilibrium_adjoint(balance: Balance, slopes: Array, by_p: Array) -> Array:
     """Return the gradient of outputs with derivatives `slopes` by (x, w), (n_out, n_u + n_w): (n_out, n_p)."""
-    return np.asarray(-la.solve(matrix.T, slopes.T).T @ by_p)
+    return np.asarray(-balance.solve_transposed(slopes.T).T @ by_p)
 
 
 # steady rotations -----------------------------------------------------------------------------------------------------
@@ -152,28 +180,23 @@ def steady_rotation_of(family: Family, own: Neighbour, omega: Array, center: Arr
         U[j + 3 : j + 6, j + 3 : j + 6] = tilde(R.T @ omega)  # d(Rᵀ omega) = (Rᵀ omega) × dtheta
         turned[j : j + 3] = np.cross(omega, state.r[i] - center)
         turned[j + 3 : j + 6] = R.T @ omega
-    matrix = np.block([[at.K + at.C @ U + at.M @ A, -at.J.T], [at.G_x + at.G_v @ U, at.V]])
-    inverse, turn = without_turn(matrix, turned / np.linalg.norm(omega), family.system.name)
+    K, G = at.K + at.C @ U + at.M @ A, at.G_x + at.G_v @ U
+    matrix = np.block([[K, -at.J.T], [G, at.V]])
+    balance = balance_of(K, at.J, G, at.V, typical_displacements(own.compiled))
+    inverse, turn = without_turn(balance, turned / np.linalg.norm(omega), family.system.name)
     by_p = parameter_residuals(family.parameters, [point])[0]
     return SteadyRotation(point, group, matrix, inverse, by_p, np.vstack([U, A]), turn)
 
 
-def without_turn(matrix: Array, turned: Array, name: str) -> tuple[Array, Array]:
+def without_turn(balance: Balance, turned: Array, name: str) -> tuple[Array, Array]:
     """Return the pseudo-inverse of a matrix that excludes a rotation about the axis, and the change of (x, w) by it."""
-    rows, columns = np.ones(len(matrix)), np.ones(len(matrix))
-    scaled = matrix.copy()
-    tiny = np.finfo(float).tiny
-    for _ in range(5):  # rows and columns of one size, so that units do not decide
-        r = 1 / np.sqrt(np.maximum(np.abs(scaled).max(axis=1), tiny))
-        scaled, rows = r[:, None] * scaled, rows * r
-        c = 1 / np.sqrt(np.maximum(np.abs(scaled).max(axis=0), tiny))
-        scaled, columns = scaled * c, columns * c
-    left, sizes, right = la.svd(scaled)
+    rows, columns = balance.of_rows, balance.of_columns
+    left, sizes, right = la.svd(balance.scaled)
     n_free = int((sizes <= SINGULAR * sizes[0]).sum())
     keep = slice(None, len(sizes) - n_free)
     inverse = columns[:, None] * (right[keep].T @ (left[:, keep].T / sizes[keep, None])) * rows
     if n_free == 0:
-        return inverse, np.zeros(len(matrix))
+        return inverse, np.zeros(len(rows))
     turn = columns * right[-1]
     own = turn[: len(turned)]
     factor = float(turned @ own) / float(own @ own) if own.any() else 0.0
@@ -244,28 +267,27 @@ def branch_of(eigenvalues: Array, k: int) -> Branch:
     return Branch(value, len(same), int(np.flatnonzero(same == k)[0]))
 
 
-def null_vectors(P: Array, n_times: int) -> tuple[Array, Array]:
-    """Return left and right null vectors of P, (n, n_times) each, from scaled rows and columns."""
-    rows, columns = np.ones(len(P)), np.ones(len(P))
-    scaled = P.copy()
-    for _ in range(5):
-        r = 1 / np.sqrt(np.abs(scaled).max(axis=1))
-        scaled, rows = r[:, None] * scaled, rows * r
-        c = 1 / np.sqrt(np.abs(scaled).max(axis=0))
-        scaled, columns = scaled * c, columns * c
-    left, _, right = la.svd(scaled)
-    return rows[:, None] * left[:, -n_times:], columns[:, None] * right[-n_times:].conj().T
+def null_vectors(at: PointTangents, value: complex, displacements: Array, n_times: int) -> tuple[Array, Array]:
+    """Return left and right null vectors of P(lambda), (n, n_times) each, from scaled rows and columns."""
+    bodies = value**2 * at.M + value * at.C + at.K
+    P = balance_of(bodies, at.J, value * at.G_v + at.G_x, at.V, displacements)
+    left, _, right = la.svd(P.scaled)
+    return P.of_rows[:, None] * left[:, -n_times:], P.of_columns[:, None] * right[-n_times:].conj().T
 
 
-def eigenvalue_derivatives(at: PointTangents, rates: list[PointTangents], branch: Branch) -> Array:
+def eigenvalue_derivatives(
+    at: PointTangents, rates: list[PointTangents], branch: Branch, displacements: Array
+) -> Array:
     """Return dlambda/dp of a mode by each parameter, (n_p,) complex, with branches in ascending order.
+
+    displacements: `typical_displacements`.
 
     Raises
     ------
     ModelError
         If the eigenvalue is defective (as many modes run into one), and has no derivative.
     """
-    psi, phi = null_vectors(pencil(at, branch.value), branch.n_times)
+    psi, phi = null_vectors(at, branch.value, displacements, branch.n_times)
     slope = psi.conj().T @ pencil_slope(at, branch.value) @ phi
     size = np.abs(psi.conj().T) @ np.abs(pencil_slope(at, branch.value)) @ np.abs(phi)
     if la.svdvals(slope)[-1] <= DEFECTIVE * size.max():

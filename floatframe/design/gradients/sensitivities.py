@@ -18,6 +18,7 @@ from floatframe.design.gradients.differences import CENTRAL
 from floatframe.design.gradients.discrete_motion import adjoint_gradient, computed_motion, direct_columns, start_columns
 from floatframe.design.gradients.eigenvalues import (
     DEPENDS,
+    Balance,
     SteadyRotation,
     branch_of,
     eigenvalue_derivatives,
@@ -26,6 +27,7 @@ from floatframe.design.gradients.eigenvalues import (
     equilibrium_matrix,
     pencil_rates,
     steady_rotation_of,
+    typical_displacements,
 )
 from floatframe.design.gradients.outputs import (
     Column,
@@ -42,6 +44,7 @@ from floatframe.design.gradients.tangents import Point, parameter_residuals, tan
 from floatframe.design.studies.study import OF_MODES
 from floatframe.engine.compiling.file_frames import motion_of_engine
 from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.initial_conditions.newton_equations import linearized, set_iterate
 from floatframe.engine.open_equations.configuration import Configurations
 from floatframe.engine.open_equations.rows import structure_of
 from floatframe.errors import ModelError
@@ -391,16 +394,24 @@ def slopes_at(own: Neighbour, group: Configurations, columns: tuple[Column, ...]
 
 
 def scales_at(own: Neighbour, group: Configurations, point: Point) -> Array:
-    """Return typical magnitudes of (x, u, u_dot, w) at a point, (3 n_u + n_w,); a thousandth is a small change."""
-    n, n_w = group.n_v, len(point.w)
-    scale = np.ones(3 * n + n_w)
+    """Return typical magnitudes of (x, u, u_dot, w) at a point, (3 n_u + n_w,); a thousandth is a small change.
+
+    (1) x: the length of the system, a radian, the size of modes. (2) u, u_dot: x times a rate, and its square, that the
+    fastest motion has. (3) w: wrenches that do as much work on x as the largest one; states as they are.
+    """
+    x = np.ones(group.n_v)
     for _, j, n_q in group.parts():
-        scale[j : j + 3] = own.compiled.length
-        scale[j + 6 : j + 6 + n_q] = modal_size(own, point)
-    scale[n : 2 * n] = max(np.abs(point.state.u).max(initial=0.0), 1.0)
-    scale[2 * n : 3 * n] = max(np.abs(point.u_dot).max(initial=0.0), 1.0)
-    scale[3 * n :] = max(np.abs(point.w).max(initial=0.0), 1.0)
-    return scale
+        x[j : j + 3] = own.compiled.length
+        x[j + 6 : j + 6 + n_q] = modal_size(own, point)
+    rate, bend = np.abs(point.state.u / x).max(initial=0.0), np.abs(point.u_dot / x).max(initial=0.0)
+    rate = rate or np.sqrt(bend) or 1.0
+    set_iterate(own.work, point.state, point.u_dot, point.w)
+    own.work.state.time[...] = point.t
+    lever = abs(linearized(own.compiled.model, own.work, 1.0, 0.0, 0.0).J) @ x
+    largest = np.abs(point.w * lever).max(initial=0.0)
+    acts = lever > 0
+    w = np.where(acts, (largest or 1.0) / np.where(acts, lever, 1.0), np.where(point.w != 0, np.abs(point.w), 1.0))
+    return np.concatenate([x, rate * x, max(rate**2, bend) * x, w])
 
 
 def modal_size(own: Neighbour, point: Point) -> float:
@@ -449,13 +460,13 @@ def of_rotation(
     return made(family, wanted, values[0], gradient, units)
 
 
-def balanced(family: Family, own: Neighbour) -> tuple[Point, Configurations, Array, Array]:
+def balanced(family: Family, own: Neighbour) -> tuple[Point, Configurations, Balance, Array]:
     """Return the equilibrium at rest, its matrix, and the derivatives of the equations by the parameters."""
     rest = static_equilibrium(family.system, tolerance=1e-12)
     state, u_dot = motion_of_engine(own.compiled, rest.state, rest.u_dot)
     point, model = Point(0.0, state, u_dot, rest.w), own.compiled.model
     at = tangents_at(structure_of(model), model, own.work, point)
-    matrix = equilibrium_matrix(at, family.system.name)
+    matrix = equilibrium_matrix(at, own.compiled, family.system.name)
     return point, Configurations(np.array(model.bodies.n_q)), matrix, parameter_residuals(family.parameters, [point])[0]
 
 
@@ -481,7 +492,8 @@ def of_modes(family: Family, own: Neighbour, wanted: tuple[OutputRequest, ...]) 
                 "sensitivities: mode %d is one of %d with the same eigenvalue: derivatives are those of one branch, "
                 "for each parameter alone, and do not add up", k, branch.n_times,
             )  # fmt: skip
-        value, slope = of_eigenvalue(part, branch.value, eigenvalue_derivatives(at, rates, branch), per_second)
+        slopes = eigenvalue_derivatives(at, rates, branch, typical_displacements(own.compiled))
+        value, slope = of_eigenvalue(part, branch.value, slopes, per_second)
         values.append(value)
         gradient.append(slope)
         units.append(OF_MODES[part])

@@ -1,0 +1,91 @@
+"""Derivatives by parameters in other units, and of arms of a micrometre and of 1000 km, are those in SI of a metre."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+
+from floatframe import (
+    GROUND,
+    EnergySensor,
+    Gravity,
+    JointForce,
+    Marker,
+    PlaceSensor,
+    PrismaticJoint,
+    ReactionSensor,
+    RevoluteJoint,
+    RigidBody,
+    SpringDamper,
+    System,
+    sensitivities,
+)
+from tests.floatframe.other_units import SI, SIZES, in_units, other_units
+
+R = Rotation.from_rotvec([0.7, -0.4, 1.1]).as_matrix()
+PLACE = np.array([30.0, -20.0, 15.0])
+UNITS = ["mm-t-s", "mm-kg-ms", "in-slinch-s", *SIZES]
+OUTPUTS = {"hinge.angle value": "rad", "slide.distance rate": "m/s", "load force size": "N", "load moment size": "N m",
+           "energy kinetic": "J", "hand size": "m/s^2"}  # fmt: skip
+PARAMETERS = {"bodies.arm.mass": "kg", "forces.rub.damping": "N m s", "forces.spring.stiffness": "N/m",
+              "joints.slide.marker_a.position.0": "m"}  # fmt: skip
+MODES = {"frequency 1": "Hz", "frequency 2": "Hz", "damping 2": "1"}
+
+
+@cache
+def arm():
+    """An arm on a hinge with spring and damper, a block on a sprung slide in it, and a stay."""
+    places = np.array([0.5, -0.2, 0.4]), np.array([1.1, -0.1, 0.5])
+    bodies = [
+        RigidBody("arm", 2.0, np.diag([0.1, 0.12, 0.14]), (0.3, 0.05, 0.02), position=places[0]),
+        RigidBody("block", 0.7, np.diag([0.02, 0.03, 0.04]), (0.01, 0.02, 0.03), position=places[1]),
+    ]
+    joints = [
+        RevoluteJoint("hinge", Marker(GROUND, position=places[0]), Marker("arm"), axis=(0.6, 0.8, 0)),
+        PrismaticJoint("slide", Marker("arm", position=places[1] - places[0]), Marker("block"), axis=(0.8, 0, 0.6)),
+    ]
+    forces = [
+        Gravity((0.5, -1.0, -9.81)),
+        JointForce("rub", "hinge", "angle", stiffness=60.0, free=0.1, damping=0.3, preload=0.2),
+        JointForce("spring", "slide", "distance", stiffness=200.0, damping=3.0),
+        SpringDamper("stay", Marker(GROUND, position=(0.2, 0.1, 1.5)), Marker("arm", position=(0.6, 0, 0)), 90, 2, 0.9),
+    ]
+    return System(bodies, joints, forces)
+
+
+SENSORS = [
+    ReactionSensor("load", "hinge"),
+    EnergySensor("energy"),
+    PlaceSensor("hand", Marker("block"), "acceleration"),
+]
+
+
+@cache
+def derivatives(units, analysis, method="direct"):
+    """Return values and gradient of outputs, in SI of a metre."""
+    other = other_units(units)
+    system = replace(arm() if other.units == SI else in_units(arm(), other.units, R, PLACE), sensors=SENSORS)
+    outputs = MODES if analysis == "eig" else OUTPUTS
+    run = {"t_end": 0.02 * other.factor("s"), "h": 2.5e-3 * other.factor("s")} if analysis == "run" else {}
+    found = sensitivities(system, list(outputs), list(PARAMETERS), analysis=analysis, method=method, **run)
+    per_second = 1 / other.factor("s") if analysis == "eig" and units in SIZES else None  # else told in Hz
+    of = np.array([other.factor(unit) if per_second is None else (per_second if unit == "Hz" else 1.0)
+                   for unit in outputs.values()])  # fmt: skip
+    if analysis == "eig" and per_second is None:
+        of = np.ones(len(outputs))
+    by = np.array([other.factor(unit) for unit in PARAMETERS.values()])
+    return found.values / of, found.gradient * by / of[:, None]
+
+
+@pytest.mark.parametrize("units", UNITS)
+@pytest.mark.parametrize(("analysis", "method"), [("run", "direct"), ("run", "adjoint"), ("static", "direct"),
+                                                  ("static", "adjoint"), ("eig", "direct")])  # fmt: skip
+def test_derivatives_are_alike_in_other_units_and_sizes(analysis, method, units):
+    (values, gradient), (found, other) = derivatives(SI.name, analysis), derivatives(units, analysis, method)
+    assert_allclose(found, values, rtol=1e-6, atol=1e-9)
+    size = np.abs(gradient).max(axis=1, keepdims=True)
+    assert (size > 1e-6).sum() >= 3
+    assert_allclose(other, gradient, rtol=1e-4, atol=1e-9 + 1e-6 * size.max())
