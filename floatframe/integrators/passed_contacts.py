@@ -46,7 +46,8 @@ def stretches_of_passed_contact(
     t = np.linspace(t_0, t_1, PARTS + 1)
     values = np.array([gaps(at, way(at)) for at in t])
     found = []
-    for g in np.flatnonzero((values[0] >= 0.0) & (values[-1] >= 0.0)):
+    is_near = values.min(axis=0) <= np.ptp(values, axis=0)  # others change too little to close between the values
+    for g in np.flatnonzero((values[0] >= 0.0) & (values[-1] >= 0.0) & is_near):
 
         def gap(at: float, g: int = int(g)) -> float:
             return float(gaps(at, way(at))[g])

@@ -70,7 +70,7 @@ from floatframe.results.sensors import (
     VonMisesSensor,
 )
 
-__all__ = ["FIELDS", "SI", "SIZES", "Other", "dimensions", "in_units", "other_units"]
+__all__ = ["FIELDS", "ODD", "SI", "SIZES", "Other", "dimensions", "in_units", "other_units"]
 
 SI = unit_system("m-kg-s")
 #: systems of other size in SI, of the same density under the same gravity: their numbers are those of such units
@@ -78,6 +78,8 @@ SIZES = {
     "micrometres": replace(SI, name="of micrometres", length=1e6, mass=1e18, time=1e3),
     "1000 km": replace(SI, name="of 1000 km", length=1e-6, mass=1e-18, time=1e-3),
 }
+#: no product of powers of its factors is 1, as that of mm/s is in mm and ms: a wrong exponent of any unit shows
+ODD = Units("odd", 1.3e-3, 7e2, 1.1e-2, "o", "d", "y", "F", "P")
 BASE = {
     "1": (0, 0, 0), "rad": (0, 0, 0), "A": (0, 0, 0), "kg": (1, 0, 0), "m": (0, 1, 0), "s": (0, 0, 1),
     "Hz": (0, 0, -1), "N": (1, 1, -2), "J": (1, 2, -2), "W": (1, 2, -3), "V": (1, 2, -3), "Pa": (1, -1, -2),
@@ -340,8 +342,8 @@ class Other:
 
 
 def other_units(name):
-    """Return other units, or other sizes, by name."""
-    return Other(SIZES.get(name) or unit_system(name))
+    """Return other units, odd ones or other sizes, by name."""
+    return Other((SIZES | {"odd": ODD}).get(name) or unit_system(name))
 
 
 def in_units(system, units, turn=None, place=None):

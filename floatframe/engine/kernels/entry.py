@@ -141,6 +141,7 @@ class CompiledEntry:
     def __init__(self, make: Callable[[int], Any], module: str, n_records: int) -> None:
         self.compiled = make(source_digest(module, "lean" if is_lean else "plain"))
         self.signature = (types.Array(types.int64, 1, "C"),) * (n_records + 3)
+        self.is_ready = False
 
     def prepare(self) -> bool:
         """Load the kernels from the cache, or compile them; return whether they were compiled in this call.
@@ -149,11 +150,12 @@ class CompiledEntry:
         """
         before = sum(self.compiled.stats.cache_misses.values())
         self.compiled.compile(self.signature)
+        self.is_ready = True
         return sum(self.compiled.stats.cache_misses.values()) > before
 
     def __call__(self, *records: Any, memory: Any = NO_MEMORY, rows: Any = NO_ROWS, **order: float) -> Outcome:
         """Carry out a request; unnamed fields of the order are zero, and all arrays live until it returns."""
-        if not self.compiled.signatures:
+        if not self.is_ready:
             began = time.perf_counter()
             if self.prepare():
                 level = logging.INFO if is_lean else logging.WARNING  # plain numba is unusual: the user should see it

@@ -48,7 +48,7 @@ def assert_moves_alike(name, units):
     assert np.abs(found.energies.kinetic / other.factor("J") - kinetic).max() < CLOSE * kinetic.max()
 
 
-@pytest.mark.parametrize("units", ["mm-t-s", "mm-kg-ms", "in-slinch-s", *SIZES])
+@pytest.mark.parametrize("units", ["odd", *SIZES])
 @pytest.mark.parametrize("name", OF_PARTS)
 def test_a_part_moves_alike_in_other_units_and_elsewhere(name, units):
     assert_moves_alike(name, units)
@@ -56,5 +56,5 @@ def test_a_part_moves_alike_in_other_units_and_elsewhere(name, units):
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", OF_ELEMENTS)
-def test_an_element_moves_alike_in_milliseconds_and_elsewhere(name):
-    assert_moves_alike(name, "mm-kg-ms")
+def test_an_element_moves_alike_in_other_units_and_elsewhere(name):
+    assert_moves_alike(name, "odd")

@@ -63,7 +63,7 @@ from tests.bodies import beam, with_interfaces
 from tests.floatframe.other_units import Other, in_units
 
 H, STEPS = 1e-3, 6
-UNITS = ["mm-t-s", "mm-kg-ms", "in-slinch-s"]
+UNITS = ["mm-kg-ms", "in-slinch-s"]
 K = np.diag([3e4, 2e4, 4e4, 300.0, 200.0, 250.0]) + 50.0
 NUMBER = "index in the model, from 0"
 #: the words of sensors and of the table of units

@@ -120,12 +120,10 @@ def table_of_numbers(declaration, values: Mapping[str, float]) -> tuple[IntArray
     """Return the table of a record of numbers (zero if not given) and the numbers, which the caller keeps alive."""
     reals = np.zeros(len(declaration))
     integers = reals.view(np.int64)
-    left = len(values)
-    for k, (name, declared) in enumerate(zip(declaration._fields, declaration, strict=True)):
-        if name in values:
-            (integers if declared.dtype is np.int64 else reals)[k] = values[name]
-            left -= 1
-    if left:
-        unknown = ", ".join(name for name in values if name not in declaration._fields)
-        raise TypeError(f"{type(declaration).__name__} has no numbers {unknown}")
-    return reals.__array_interface__["data"][0] + reals.itemsize * np.arange(len(declaration)), reals
+    for name, value in values.items():
+        declared = getattr(declaration, name, None)
+        if declared is None:
+            unknown = ", ".join(name for name in values if name not in declaration._fields)
+            raise TypeError(f"{type(declaration).__name__} has no numbers {unknown}")
+        (integers if declared.dtype is np.int64 else reals)[declaration._fields.index(name)] = value
+    return reals.ctypes.data + reals.itemsize * np.arange(len(declaration)), reals
