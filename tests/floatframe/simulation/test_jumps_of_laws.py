@@ -45,7 +45,7 @@ METHODS = {
     "default": (GeneralizedAlpha(0.8), None),
     "controlled": (GeneralizedAlpha(0.8, error_tolerance=1e-8), None),
     "conserving": (EnergyMomentum(), None),
-    "ida": (Ida(rtol=1e-10, atol=1e-12), None),
+    "ida": (Ida(rtol=1e-7, atol=1e-9), None),
     "relative": (GeneralizedAlpha(0.8), "relative"),
     "ode": (RelativeOde("BDF"), "relative"),
 }
@@ -201,7 +201,7 @@ def test_a_motor_runs_up_from_when_its_supply_jumps(method, formulation):
     assert_allclose(motion.body("rotor").omega_B[-1, 2], exact, rtol=2e-3)
 
 
-@pytest.mark.parametrize("method", [GeneralizedAlpha(0.8), GeneralizedAlpha(0.5), EnergyMomentum()], ids=str)
+@pytest.mark.parametrize("method", [GeneralizedAlpha(0.8), EnergyMomentum()], ids=str)
 def test_a_current_that_settles_in_less_than_a_step_keeps_its_impulse(method):
     """It settles in 0.1 ms; a pulse of 3 ms in one step of 20 ms, and beside the ends of steps of 10 ms."""
     hinge = RevoluteJoint("hinge", Marker(GROUND, position=(1, 2, 3)), Marker("rotor"))
