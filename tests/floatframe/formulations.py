@@ -54,7 +54,7 @@ EXCEPTIONS: dict[str, str] = {
         "a hinge of the tree follows any turn in a step, so nothing is refused",
     "model/joints/test_sliding.py::test_on_a_rigid_line_it_is_the_point_on_a_line_and_the_prismatic_joint[True]":
         KINDS + "agree to 1e-8 there, to 6e-6 here",
-    "simulation/test_restart.py::test_killed_run_is_readable_and_can_be_resumed[2]": BESIDE,
+    "simulation/test_restart.py::test_killed_run_is_readable_and_can_be_resumed[2-0.6]": BESIDE,
     "simulation/test_stops.py::test_a_latch_between_free_flexible_bodies_keeps_momentum_and_loses_what_carnot_says":
         "linear momentum is kept to 1e-8 there, to 1.3e-7 here",
     "simulation/test_validity.py::test_an_equilibrium_tells_a_load_near_buckling_and_the_far_bend_above_it":
