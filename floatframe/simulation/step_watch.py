@@ -25,8 +25,8 @@ It works for second-order methods, with fixed steps and with an error tolerance:
     the largest rotation; where that is below `SMALL_TURN`, to the displacement over the length of the system. Windows
     also count the errors of speeds, relative to twice the largest speed (a vibration moves by two amplitudes). Errors a
     of place and b of speed combine to sqrt(a² + b²), since they turn into one another.
-(6) The first step is compared alone, with two half steps of the same damping. A stiff spring with a damper settles
-    before the comparisons of (1), while the first step may be wrong by the whole sag.
+(6) The first step is compared alone, with two half steps of the same damping, where accelerations change much in it.
+    A stiff spring with a damper settles before the comparisons of (1), while this step may be wrong by the whole sag.
 
 (7) A run that continues another one in time (`State.watched`) is a piece of one motion, and its errors are relative to
     the motion since that began. If a companion reached the end of the other run, the error of the last state is passed
@@ -332,7 +332,7 @@ class StepWatch:
         """
         last = first + n_steps
         if self.has_companion:
-            if last == 1:
+            if last == 1 and self.may_err_at_once(system, begin, end, h):
                 halves = Companion.begun(self.integrator, begin, self.work_arrays(system), 0, HALVES, events=events)
                 if halves.follow(system, end, last, t0, h, self.jumps):
                     self.first_error = halves.peak
@@ -349,6 +349,16 @@ class StepWatch:
             self.open_window = [(first, begin), (last, end)]
             return None
         return self.close_window(system, end, last, t0, h)
+
+    def may_err_at_once(self, system: System, begin: Memory, end: Memory, h: float) -> bool:
+        """Return whether the first step alone may have an error that counts, from the change of accelerations in it.
+
+        Where they change by c, places are in doubt by up to h² c/2. What a step does not resolve changes them fully.
+        """
+        u0 = compiled_system(system).model.bodies.u0[:-1, None] + np.arange(6)
+        change = lengths((end.u_dot - begin.u_dot)[u0].reshape(-1, 2, 3)).max(axis=0)
+        way = lengths(difference(end.state, begin.state)).max(axis=0)
+        return bool((h**2 / 2 * change > SCREEN * self.limit * way).any())
 
     def skip(self, h: float) -> None:
         """Close the companion and the window before a step that fails or in which an event ends the run."""

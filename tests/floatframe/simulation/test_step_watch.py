@@ -609,6 +609,23 @@ def test_a_first_step_that_is_wrong_counts_where_the_motion_settles_after_it(wei
     assert ("steps" in kinds(motion)) == (not beside)
 
 
+@pytest.mark.parametrize(("stiffness", "is_repeated"), [(1.0, False), (1e8, True)])
+def test_a_first_step_is_repeated_only_where_accelerations_change_in_it(stiffness, is_repeated, monkeypatch):
+    """A falling mass on a soft spring, or on one that a step does not resolve: 10 rad in a step."""
+    body = RigidBody("mass", 1.0, np.eye(3), position=PLACE)
+    rail = PrismaticJoint("rail", Marker("ground", position=PLACE), Marker("mass", position=(0, 0, 0)), axis=(1, 0, 0))
+    spring = JointForce("spring", "rail", "distance", stiffness=stiffness, damping=stiffness / 1e4)
+    seen, follow = [], Companion.follow
+
+    def counted(companion, system, end, last, *others):
+        seen.append((companion.ratio, last))
+        return follow(companion, system, end, last, *others)
+
+    monkeypatch.setattr(Companion, "follow", counted)
+    integrate(System([body], [rail], [spring, Gravity((9.81, 0, 0))]), GeneralizedAlpha(0.8), 0.1, 1e-3)
+    assert ((0.5, 1) in seen) == is_repeated
+
+
 @pytest.mark.parametrize("damping", [0.01, 0.05])
 def test_vibrations_that_steps_and_their_companion_damp_count_in_the_error(damping):
     """SciPy: a mass that turns about a point on a stiff spring, three periods of the spring in a step.
