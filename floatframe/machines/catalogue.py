@@ -4,15 +4,18 @@ A machine is a folder `files` in a room of this package, with jobs of its flexib
 with the commands in order. `MACHINES` has an entry for each.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+from fe_models.foundation.parametric_file import read_parametric
 from fe_models.foundation.paths import replace_files
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 
-__all__ = ["MACHINES", "Machine", "copy_machine", "machine_files"]
+__all__ = ["MACHINES", "Machine", "copy_machine", "machine_files", "parameters_of"]
 
 
 @dataclass(frozen=True)
@@ -98,3 +101,21 @@ def copy_machine(name: str, folder: str | Path) -> Sequence[Path]:
         target.parent.mkdir(parents=True, exist_ok=True)
     replace_files({target: source.read_bytes() for source, target in zip(sources, targets, strict=True)})
     return targets
+
+
+def parameters_of(path: str | Path, changes: Mapping[str, Any] | None = None) -> SimpleNamespace:
+    """Return the values of the parameters of a file as attributes, for formulas beside its motion.
+
+    Parameters
+    ----------
+    path
+        A system or job file.
+    changes
+        Values that replace those in the file, as in `read_system`.
+
+    Raises
+    ------
+    ModelError
+        If the file is not valid.
+    """
+    return SimpleNamespace(**read_parametric(Path(path), ModelError, changes).parameters)

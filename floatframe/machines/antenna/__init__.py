@@ -1,7 +1,7 @@
 """A deployable antenna with petals hinged to a spacecraft, pushed outward by struts from one slider on a mast."""
 
 from floatframe.machines.antenna.closed_forms import AntennaGeometry, mechanism
-from floatframe.machines.antenna.description import FINE, Antenna, HingePlay
-from floatframe.machines.antenna.systems import antenna_files, fine_files, pointing
+from floatframe.machines.antenna.mesh import petal_mesh
+from floatframe.machines.antenna.pointing import Pointing, pointing
 
-__all__ = ["FINE", "Antenna", "AntennaGeometry", "HingePlay", "antenna_files", "fine_files", "mechanism", "pointing"]
+__all__ = ["AntennaGeometry", "Pointing", "mechanism", "petal_mesh", "pointing"]

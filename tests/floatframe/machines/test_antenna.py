@@ -1,6 +1,6 @@
 """The deployable antenna against pins and virtual work; its latching against momentum; its files as shipped."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -8,36 +8,28 @@ from numpy.testing import assert_allclose
 
 import cms
 import floatframe as ff
-from floatframe.machines import machine_files
-from floatframe.machines.antenna import FINE, Antenna, HingePlay, antenna_files, fine_files, mechanism, pointing
-from floatframe.machines.antenna.systems import latching_text
+from floatframe.machines import copy_machine, machine_files, parameters_of
+from floatframe.machines.antenna import AntennaGeometry, mechanism, petal_mesh, pointing
 
 G = 9.81
-SLOW = Antenna(n_petals=3, duration=1e5)
+GEOMETRY = AntennaGeometry()
+SLOW = {"n_petals": 3, "duration": 1e5}
 
 
 @pytest.fixture(scope="module")
 def parts(tmp_path_factory):
-    """Return a folder with the reduced petal and strut, the masses in them, and a way to write systems there."""
+    """Return a folder with the files, and the masses in the reduced petal and strut."""
     folder = tmp_path_factory.mktemp("antenna")
-    for name, text in antenna_files(SLOW).items():
-        (folder / name).write_text(text)
+    copy_machine("antenna", folder)
     petal, strut = (cms.reduce_job(folder / f"{name}.toml") for name in ("petal", "strut"))
-    cms.write(petal, folder / "petal.h5")
-    cms.write(strut, folder / "strut.h5")
+    for place in (folder, folder / "fine"):
+        cms.write(petal, place / "petal.h5")
+        cms.write(strut, place / "strut.h5")
     return folder, petal.moments, strut.moments
 
 
-def written(parts, antenna):
-    folder, petal, _ = parts
-    moment = petal.gram[0, 0] * petal.center_of_mass[0]
-    for name, text in antenna_files(antenna, petal_moment=moment).items():
-        (folder / name).write_text(text)
-    return folder
-
-
 def test_closed_form_follows_from_its_geometry():
-    theta, geometry = np.linspace(0.05, 1.3, 7), SLOW.geometry
+    theta, geometry = np.linspace(0.05, 1.3, 7), GEOMETRY
     found, step = mechanism(geometry, theta, n_petals=3), 1e-6
     foot = np.array([np.full(7, geometry.slider_radius), found.slider])
     elbow = np.array([geometry.hinge_radius + geometry.elbow * np.sin(theta), geometry.elbow * np.cos(theta)])
@@ -46,23 +38,34 @@ def test_closed_form_follows_from_its_geometry():
     assert_allclose(found.rate, (ahead - behind) / (2 * step), rtol=1e-7)
 
 
+def test_the_files_and_the_closed_form_have_the_same_lengths():
+    shipped = parameters_of(next(path for path in machine_files("antenna") if path.name == "space.toml"))
+    assert {each.name: getattr(shipped, each.name) for each in fields(GEOMETRY)} == vars(GEOMETRY)
+
+
+def test_the_wires_of_the_rig_balance_the_weight_of_a_petal(parts):
+    folder, petal, _ = parts
+    wire = G * petal.gram[0, 0] * petal.center_of_mass[0] / GEOMETRY.elbow
+    assert_allclose(parameters_of(folder / "rig.toml").wire, wire, rtol=1e-12)
+
+
 @pytest.mark.parametrize("name", ["space", "rig", "bare"])
 def test_drive_and_strut_forces_are_those_of_virtual_work(parts, name):
     """Rigid parts moved so slowly that nothing has inertia: weights, harness, friction, wires; 1e-6."""
-    folder = written(parts, SLOW)
-    (_, petal, strut), antenna = parts, SLOW
-    system, _ = ff.read_system(folder / f"{name}.toml")
+    folder, petal, strut = parts
+    system, _ = ff.read_system(folder / f"{name}.toml", SLOW)
+    antenna = parameters_of(folder / f"{name}.toml", SLOW)
     motion = ff.kinematics(system, np.linspace(0.1, 0.9, 5) * antenna.duration)
     drive, hinge = (ff.joint_coordinate(system, motion, *of) for of in (("mast", "distance"), ("hinge_1", "angle")))
     theta, x = antenna.stowed + hinge.value, petal.center_of_mass
     mass, half = petal.gram[0, 0], strut.gram[0, 0] / 2
-    g, wire = (0.0 if name == "space" else G), (G * mass * x[0] / antenna.geometry.elbow if name == "rig" else 0.0)
+    g, wire = (0.0 if name == "space" else G), (G * mass * x[0] / GEOMETRY.elbow if name == "rig" else 0.0)
     moment = mass * g * (x[0] * np.sin(theta) - x[2] * np.cos(theta))
-    moment += (half * g - wire) * antenna.geometry.elbow * np.sin(theta)
-    moment -= antenna.hinge_stiffness * hinge.value + antenna.hinge_damping * hinge.rate
-    moment -= antenna.hinge_friction * np.tanh(hinge.rate / antenna.friction_speed)
+    moment += (half * g - wire) * GEOMETRY.elbow * np.sin(theta)
+    moment -= antenna.harness_stiffness * hinge.value + antenna.harness_damping * hinge.rate
+    moment -= antenna.harness_friction * np.tanh(hinge.rate / antenna.friction_speed)
     weight = -(antenna.slider_mass + 3 * half) * g
-    found = mechanism(antenna.geometry, theta, n_petals=3, petal_moment=moment, slider_force=weight)
+    found = mechanism(GEOMETRY, theta, n_petals=3, petal_moment=moment, slider_force=weight)
     assert_allclose(found.slider, drive.value, rtol=0, atol=1e-9)
     assert_allclose(drive.force, found.drive, rtol=0, atol=1e-6 * np.abs(found.drive).max())
     # along strut 3, which stands over the x axis: its ends carry half of its weight less and more than its middle
@@ -72,11 +75,9 @@ def test_drive_and_strut_forces_are_those_of_virtual_work(parts, name):
 
 
 def test_quasi_static_shapes_change_forces_by_little_and_the_wires_take_the_weight(parts):
-    antenna = replace(SLOW, duration=1e4)
-    folder = written(parts, antenna)
-    force = {}
+    folder, force = parts[0], {}
     for name in ("space", "rig", "bare"):
-        system, _ = ff.read_system(folder / f"{name}.toml")
+        system, _ = ff.read_system(folder / f"{name}.toml", {"n_petals": 3, "duration": 1e4})
         motion = ff.kinematics(system, [0.5e4, 0.7e4], elasticity=ff.quasi_static_bodies)
         force[name] = ff.joint_coordinate(system, motion, "mast", "distance").force
     gravity = {name: np.abs(force[name] - force["space"]) for name in ("rig", "bare")}
@@ -84,24 +85,24 @@ def test_quasi_static_shapes_change_forces_by_little_and_the_wires_take_the_weig
 
 
 def test_latching_keeps_momentum_and_moves_the_spacecraft_as_the_centre_of_mass_says(parts):
-    antenna = Antenna(n_petals=3, stowed=Antenna().deployed - 0.02)
-    folder = written(parts, antenna)
-    system, _ = ff.read_system(folder / "latching.toml")
+    folder, petal, strut = parts
+    changes = {"n_petals": 3, "stowed": np.deg2rad(75) - 0.02}
+    system, _ = ff.read_system(folder / "latching.toml", changes)
+    antenna = parameters_of(folder / "latching.toml", changes)
     motion = ff.integrate(system, ff.GeneralizedAlpha(), 6.0, 4e-3, output_every=5)
     (event,) = motion.head.summary["events"]
     after = motion.t > event["t"]
     distance = ff.joint_coordinate(system, motion, "mast", "distance").value
-    assert_allclose(distance[after], antenna.travel[1], atol=1e-8)
+    assert_allclose(distance[after], antenna.height[2], atol=1e-8)
     assert abs(event["impulse"]["latch"]) > 1e-3
     scale = np.abs(event["impulse"]["latch"])
     assert_allclose(motion.linear_momentum, 0.0, atol=1e-6 * scale)
     assert_allclose(motion.angular_momentum, 0.0, atol=1e-5 * scale)
-    (_, petal, strut), n = parts, 3
-    heights = []
+    heights, n = [], 3
     for theta in (antenna.stowed, antenna.deployed):
-        slider, x = mechanism(antenna.geometry, theta, n_petals=n).slider[0], petal.center_of_mass
+        slider, x = mechanism(GEOMETRY, theta, n_petals=n).slider[0], petal.center_of_mass
         z = n * petal.gram[0, 0] * (x[0] * np.cos(theta) + x[2] * np.sin(theta)) + antenna.slider_mass * slider
-        heights.append(z + n * strut.gram[0, 0] / 2 * (slider + antenna.geometry.elbow * np.cos(theta)))
+        heights.append(z + n * strut.gram[0, 0] / 2 * (slider + GEOMETRY.elbow * np.cos(theta)))
     total = antenna.bus_mass + antenna.slider_mass + n * (petal.gram[0, 0] + strut.gram[0, 0])
     moved = -(heights[1] - heights[0]) / total
     bus = motion.body("bus").r[:, 2]
@@ -110,28 +111,22 @@ def test_latching_keeps_momentum_and_moves_the_spacecraft_as_the_centre_of_mass_
 
 def test_play_lets_petals_point_elsewhere_within_what_their_pins_leave(parts):
     """Pins 0.1 mm loose over 80 mm on a bus that turns under them: lateral angles up to 2 c/L, and what they bend."""
-    folder, spread = parts[0], {}
-    for name, play in (("ideal", None), ("play", HingePlay(friction=0.0))):
-        antenna = replace(FINE, n_petals=3, petal_width=0.3, n_along=20, begin=FINE.deployed - 0.005, play=play)
-        (folder / f"{name}.toml").write_text(latching_text(antenna))
-        system, _ = ff.read_system(folder / f"{name}.toml")
-        start = pointing(system, ff.integrate(system, ff.GeneralizedAlpha(), 1e-3, 1e-3), antenna)
-        assert_allclose(start.theta[0], antenna.begin, rtol=0, atol=1e-12)
+    folder, spread = parts[0] / "fine", {}
+    changes = {"n_petals": 3, "start": np.deg2rad(75) - 0.005}
+    for name, more in (("latching", {}), ("play", {"pin_friction": 0.0})):
+        system, _ = ff.read_system(folder / f"{name}.toml", changes | more)
+        start = pointing(system, ff.integrate(system, ff.GeneralizedAlpha(), 1e-3, 1e-3))
+        assert_allclose(start.theta[0], changes["start"], rtol=0, atol=1e-12)
         assert_allclose(start.lateral[0], 0.0, rtol=0, atol=1e-12)
         bodies = [replace(system.bodies[0], omega_B=(0.0, 0.0, 0.002)), *system.bodies[1:]]
         turning = replace(system, bodies=bodies, events=())
         motion = ff.integrate(turning, ff.GeneralizedAlpha(), 0.6, 1e-3, output_every=10)
-        spread[name] = np.abs(pointing(system, motion, antenna).lateral).max()
-    assert spread["play"] > 5 * spread["ideal"]
-    assert spread["play"] < 2 * HingePlay().radial / HingePlay().length + 2 * spread["ideal"]
+        spread[name] = np.abs(pointing(system, motion).lateral).max()
+    play = parameters_of(folder / "play.toml")
+    assert spread["play"] > 5 * spread["latching"]
+    assert spread["play"] < 2 * play.radial_play / play.bearing_length + 2 * spread["latching"]
 
 
-def test_shipped_files_are_those_of_the_description(parts):
-    _, petal, _ = parts
-    moment = petal.gram[0, 0] * petal.center_of_mass[0]
-    made = antenna_files(Antenna(), petal_moment=moment)
-    made |= {f"fine/{name}": text for name, text in fine_files().items()}
-    paths = machine_files("antenna")
-    (folder,) = (path.parent for path in paths if path.name == "README.md")
-    shipped = {path.relative_to(folder).as_posix(): path.read_text() for path in paths if path.name != "README.md"}
-    assert shipped == made
+def test_the_shipped_meshes_are_those_of_their_function():
+    meshes = {path.parent.name: path.read_text() for path in machine_files("antenna") if path.name == "petal.inp"}
+    assert meshes == {"files": petal_mesh(), "fine": petal_mesh(width=0.15, n_along=40)}
