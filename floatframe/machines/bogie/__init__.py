@@ -1,7 +1,6 @@
 """A four-axle passenger vehicle on bogies: stability over speed, limit cycles, independent wheels, curves."""
 
 from floatframe.machines.bogie.curves_and_comfort import circle, in_circle, weighted_rms
-from floatframe.machines.bogie.frame import frame_files
 from floatframe.machines.bogie.running import (
     Hunting,
     SpeedSweep,
@@ -12,18 +11,15 @@ from floatframe.machines.bogie.running import (
     steady_running,
 )
 from floatframe.machines.bogie.vehicle import RailVehicle, flexible_frames, vehicle
-from floatframe.machines.bogie.write_files import bogie_files
 
 __all__ = [
     "Hunting",
     "RailVehicle",
     "SpeedSweep",
-    "bogie_files",
     "circle",
     "critical_speed",
     "falling_speed",
     "flexible_frames",
-    "frame_files",
     "hunting",
     "in_circle",
     "steady_motion_of",

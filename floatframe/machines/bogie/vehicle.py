@@ -102,7 +102,7 @@ def vehicle(
 
 
 def flexible_frames(data: RailVehicle, frame: ReducedBody, speed: float) -> list[FlexibleBody]:
-    """Return the two frames of a vehicle from one reduced body, made from `frame_files`."""
+    """Return the two frames of a vehicle from one reduced body, reduced from the file `frame.toml` of this machine."""
     return [
         FlexibleBody(
             f"frame_{name}",

@@ -13,14 +13,29 @@ is 3/2 p Im c_0. A supply with the orders -5 and 7 gives n = 6 and 12, an unbala
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from floatframe.machines.motor_bogie.description import Motor
-
 __all__ = [
+    "Motor",
     "ripple_of_leakage", "speed_of_torque", "steady_fluxes", "supply_voltage", "torque_lines", "torque_over_speed",
 ]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Motor:
+    """Two-axis model of a three-phase machine of about 380 kW, referred to the stator."""
+
+    stator_resistance: float = 0.08  #: [ohm]
+    rotor_resistance: float = 0.07  #: [ohm]
+    stator_leakage: float = 1.2e-3  #: [H]
+    rotor_leakage: float = 1.2e-3  #: [H]
+    magnetizing: float = 22e-3  #: [H]
+    pole_pairs: int = 2
+    rated_voltage: float = 1100.0  #: phase peak [V]
+    rated_frequency: float = 60.0  #: [Hz]
+    boost: float = 25.0  #: phase peak at standstill [V]
 
 
 def supply_voltage(motor: Motor, f: float) -> float:

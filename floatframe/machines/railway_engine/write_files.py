@@ -1,14 +1,15 @@
 """The files of the railway engine with another track or another mesh than the shipped ones."""
 
-import re
-import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import tomlkit
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.parametric_file import read_parametric
 from fe_models.foundation.paths import replace_files
 from fe_models.foundation.words import nearest, quoted
 from fe_models.parts.engine_body import EngineBody, engine_body_mesh, mesh_deck
@@ -195,7 +196,6 @@ def path_table(paths: WheelPaths) -> str:
 
 CASES: dict[str, type[Defect] | type[SCurve]] = {"defect": Defect, "s_curve": SCurve}
 SAMPLE = {"defect": 2e-3, "s_curve": 2e-2}  #: sampling interval of the paths [s]
-MARGIN, STEP = 12.0, 2.0  #: of the drawn track: length beyond the vehicle, distance between its points [m]
 SIZE = 0.75  #: largest edge of a cell of the shipped mesh [m]
 
 
@@ -207,7 +207,7 @@ def write_railway_engine(
     part: EngineBody | None = None,
     size: float = SIZE,
 ) -> Path:
-    """Write carbody.inp, carbody.toml, CASE.toml and CASE.csv; existing files with these names are replaced.
+    """Write carbody.inp, carbody.toml, engine.toml, CASE.toml and CASE.csv; existing files with these names are replaced.
 
     Continue with `cms reduce carbody.toml -o carbody.h5` and `floatframe run CASE.toml` (docs/railway_engine.md).
 
@@ -244,31 +244,27 @@ def write_railway_engine(
 def railway_engine_files(
     case: str, *, track: Defect | SCurve | None = None, part: EngineBody | None = None, size: float = SIZE
 ) -> dict[str, str]:
-    """Return the text of the four files, by name; parameters and errors as for `write_railway_engine`."""
+    """Return the text of the five files, by name; parameters and errors as for `write_railway_engine`."""
     if case not in CASES:
         raise ModelError(f"railway engine: unknown case {quoted(case)}{nearest(case, CASES)}")
     track = CASES[case]() if track is None else track
     if not isinstance(track, CASES[case]):
         raise ModelError(f"railway engine: case {case!r}: expected a {CASES[case].__name__}, got {track!r}")
     shipped = Path(__file__).parent / "files"
-    text = (shipped / f"{case}.toml").read_text("utf-8")
-    bodies = tomllib.loads(text)["bodies"]
+    bodies = read_parametric(shipped / f"{case}.toml", ModelError)["bodies"]
     wheelsets = [bodies[name]["position"][0] for name in sorted(bodies) if name.startswith("wheelset_")]
     paths = track.paths(np.array(wheelsets), SAMPLE[case])
-    text = re.sub(r"^velocity = .*$", f"velocity = [{track.speed:g}, 0, 0]", text, flags=re.MULTILINE)
-    text = re.sub(r"^t_end = .*$", f"t_end = {paths.t[-1]:g}", text, flags=re.MULTILINE)
-    text = re.sub(r"^points = .*$", f"points = {points_of(track, paths)}", text, flags=re.MULTILINE)
+    document = tomlkit.parse((shipped / f"{case}.toml").read_text("utf-8"))
+    values: dict[str, Any] = {"speed": track.speed, "duration": round(float(paths.t[-1]), 6)}
+    if isinstance(track, SCurve):
+        values["curve"] = {"begin": max(wheelsets) + track.begin, "length": track.length, "shift": track.shift}
+    parameters: Any = document["parameters"]
+    for name, value in values.items():
+        if parameters[name] != value:
+            parameters[name] = value
     return {
         "carbody.inp": mesh_deck(engine_body_mesh(part, size=size)),
-        "carbody.toml": (shipped / "carbody.toml").read_text("utf-8"),
-        f"{case}.toml": text,
+        **{name: (shipped / name).read_text("utf-8") for name in ("carbody.toml", "engine.toml")},
+        f"{case}.toml": tomlkit.dumps(document),
         f"{case}.csv": path_table(paths),
     }
-
-
-def points_of(track: Defect | SCurve, paths: WheelPaths) -> str:
-    """Return the middle line of the drawn track, from behind the vehicle's start to beyond its end."""
-    along = paths.places[..., 0]
-    x = np.arange(np.floor(along.min()) - MARGIN, np.ceil(along.max()) + MARGIN + STEP, STEP)
-    y = track.y(x) if isinstance(track, SCurve) else np.zeros(len(x))
-    return "[" + ", ".join(f"[{a:g}, {b:.3f}, 0]" for a, b in zip(x, y, strict=True)) + "]"

@@ -25,8 +25,9 @@ from floatframe import (
     read_system,
 )
 from floatframe.components.drives import InductionMotor
-from floatframe.machines import machine_files
-from floatframe.machines.motor_bogie import SIX_STEPS, Motor, MotorBogie, motor_bogie_file, motor_bogie_files
+from floatframe.components.rails import Wheelset, height_on_rails
+from floatframe.machines import copy_machine, parameters_of
+from floatframe.machines.motor_bogie import SIX_STEPS, Motor, MotorBogie
 from floatframe.machines.motor_bogie.closed_forms import (
     ripple_of_leakage,
     speed_of_torque,
@@ -198,25 +199,23 @@ def test_a_drive_line_started_by_an_inverter_moves_as_an_independent_model():
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """The machine with a stiffer start: at once at 2 m/s, its frame reduced."""
+    """The machine, its frame reduced."""
     folder = tmp_path_factory.mktemp("motor_bogie")
-    for path in machine_files("motor-bogie"):
-        (folder / path.name).write_bytes(path.read_bytes())
+    copy_machine("motor-bogie", folder)
     cms.write(cms.reduce_job(folder / "frame.toml"), folder / "frame.h5")
     return folder
 
 
 def test_the_mounts_carry_the_ripple_that_closed_form_and_frequency_response_say(folder):
     """At 2 m/s 6 f is 41.5 Hz, among modes of motors and frame; the motor answers the swing of its rotor."""
-    data = MotorBogie(speed=2.0, h=5e-4, t_end=0.35)
-    (folder / "even.toml").write_text(motor_bogie_file(data, "runs evenly"))
-    system, _ = read_system(folder / "even.toml")
+    data, t_end = MotorBogie(speed=2.0), 0.35
+    system, _ = read_system(folder / "six_steps.toml", data.even_running())
     f = data.running_frequency
     linear = at_rest(system)
     expected = predicted_lines(data, linear, [f], 0.0, multiples=(6,))
-    motion = integrate(system, GeneralizedAlpha(0.9, 1e-7), data.t_end, data.h)
+    motion = integrate(system, GeneralizedAlpha(0.9, 1e-7), t_end, 5e-4)
     t = np.asarray(motion.t)
-    late = t > data.t_end - 10 / (6 * f)
+    late = t > t_end - 10 / (6 * f)
     w = np.hanning(late.sum())
 
     def line(values):
@@ -233,9 +232,24 @@ def test_the_mounts_carry_the_ripple_that_closed_form_and_frequency_response_say
     assert any(mode.flexible > 0.9 for mode in modes)  # of the frame
 
 
-def test_the_shipped_files_are_those_of_the_description():
-    written = motor_bogie_files(MotorBogie())
-    shipped = {path.name: path.read_text() for path in machine_files("motor-bogie") if path.name != "README.md"}
-    assert shipped == written
-    other = motor_bogie_files(replace(MotorBogie(), ratio=4.0))
-    assert other["sine.toml"] != written["sine.toml"]
+def test_the_files_have_the_motors_of_the_closed_forms(folder):
+    data, given = MotorBogie(), parameters_of(folder / "six_steps.toml")
+    system, _ = read_system(folder / "six_steps.toml")
+    for motor in (each for each in system.elements if isinstance(each, InductionMotor)):
+        assert {name: getattr(motor, name) for name in asdict(MOTOR)} == asdict(MOTOR)
+        assert_allclose(motor.harmonics, SIX_STEPS, rtol=1e-15)
+    assert given.ratio == data.ratio
+    assert_allclose(given.rolling_radius, data.rolling_radius, rtol=1e-12)
+    geared, _ = read_system(folder / "six_steps.toml", {"ratio": 4})
+    assert [coupler.terms[1][1] for coupler in geared.couplers] == [4.0, 4.0]
+
+
+def test_the_axles_stand_on_the_loaded_rails_and_mounts_carry_the_motors(folder):
+    given, g = parameters_of(folder / "six_steps.toml"), 9.81
+    system, _ = read_system(folder / "six_steps.toml")
+    wheels = next(each for each in system.elements if isinstance(each, Wheelset))
+    axles = 2 * (1563 + 250)
+    load = (g * (given.body_mass + given.frame_mass + axles) + 2 * given.motor_weight) / 4
+    assert_allclose(given.axle_height, height_on_rails(wheels, load), rtol=0, atol=1e-10)
+    mounts = [force for force in system.forces if force.name.startswith("leading_mount")]
+    assert_allclose(sum(mount.preload for mount in mounts)[[0, 2]], [0, -given.motor_weight], rtol=0, atol=1e-9)
