@@ -22,12 +22,13 @@ import numpy as np
 
 import floatframe as ff
 from benchmarks.recursive import compiled, moving, shortest
+from cms.jobs.decks.job_text import toml_text
+from fe_models.foundation.parametric_file import read_parametric
 from floatframe.design.generation.generate import GeneratedCode
 from floatframe.engine.tree.recursion.entry import FORWARD, INVERSE, MASS, TANGENTS
 from floatframe.engine.tree.topology import tree_of
 from floatframe.files.system_file.read_system import read_system
-from floatframe.machines.road_car import RoadCar
-from floatframe.machines.road_car.systems import base, written
+from floatframe.machines import machine_files
 from tests.floatframe.design.generation.flexible_systems import (
     bent_motion,
     dense_body,
@@ -77,7 +78,8 @@ RX_90 = {"angles": (0, 90, 0, -90, 90, -90), "along_x": (0, 0, 0.45, 0, 0, 0), "
 
 def road_car() -> ff.System:
     """Return the rigid tree of the road car: 20 bodies, 31 rates."""
-    tables = base(RoadCar(), "bars", is_rigid=True, has_wheels=True)
+    shipped = next(path for path in machine_files("road-car") if path.name == "lane_change_bars.toml")
+    tables = dict(read_parametric(shipped, ff.ModelError))
     J = np.diag([450.0, 1500.0, 1650.0]).tolist()
     tables["bodies"]["chassis"] = {"mass": 1100.0, "inertia": J, "center_of_mass": [0, 0, 0.5]}
     joints = {name: each for name, each in tables["joints"].items() if each["type"] != "distance"}
@@ -86,7 +88,7 @@ def road_car() -> ff.System:
         joints[f"mount_{axle}"] = {"type": "fixed"} | ends
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "car.toml"
-        path.write_text(written("road car", {"bodies": tables["bodies"], "joints": joints}, {"t_end": 1.0, "h": 1e-3}))
+        path.write_text(toml_text({"system": tables["system"], "bodies": tables["bodies"], "joints": joints}))
         system = read_system(path)[0]
     cut = tree_of(system).cut
     return replace(system, joints=[each for each in system.joints if each.name not in cut])

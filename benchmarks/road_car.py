@@ -10,28 +10,23 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
+import tomlkit
 
 import cms
 import floatframe as ff
 from floatframe.components.wheels import read_tyre_file, shipped_tyre
-from floatframe.machines.road_car import CarOnPosts, Linkage, RoadCar, body_files
+from floatframe.machines import copy_machine
+from floatframe.machines.road_car import CarOnPosts, Linkage, RoadCar
 from floatframe.machines.road_car.closed_forms import MODES, roll_control_stiffness
 from floatframe.machines.road_car.description import CORNERS
 from floatframe.machines.road_car.figures import CarMotion, body_twist_stiffness, car_mass, driven, steady_turn
-from floatframe.machines.road_car.systems import (
-    SUPPORTS,
-    car_file,
-    lane_change,
-    rig_file,
-    sine_steer,
-    steady_circle,
-    twisted_road,
-)
 from tests.floatframe.components.wheels.magic_formula_oracle import version_61
 
 CAR = RoadCar()
+SUPPORTS = ("hydraulic", "bars", "none")
 TYRE = read_tyre_file(shipped_tyre("passenger_car_61"))
 DEGREES = 180 / np.pi
 
@@ -43,10 +38,20 @@ def tyre(load: float, alpha: float, gamma: float, is_left: bool) -> tuple[float,
     return side * found[1], side * found[2], -found[3], side * found[4]
 
 
-def run(folder: Path, text: str) -> tuple[ff.System, CarMotion, float]:
+def read(folder: Path, name: str, support: str, changes: dict[str, Any], *overlays: str) -> tuple[ff.System, Any]:
+    """Return a system file of the car with one of SUPPORTS; "none" has bars without stiffness."""
+    bases = [name, *(["bars.toml"] if support != "hydraulic" else []), *overlays]
+    if support != "hydraulic" and name != "rig.toml":
+        bases.append("no_pressures.toml")
+    (folder / "no_pressures.toml").write_text('sensors."pressure {side}" = {}')
+    (folder / "car_as_asked.toml").write_text(tomlkit.dumps({"extends": bases}))
+    bars = {"bars": {"front": 0.0, "rear": 0.0}} if support == "none" else {}
+    return ff.read_system(folder / "car_as_asked.toml", changes | bars)
+
+
+def run(folder: Path, name: str, support: str, changes: dict[str, Any]) -> tuple[ff.System, CarMotion, float]:
     """Return a system, what its motion shows, and the processor time of a second."""
-    (folder / "car.toml").write_text(text)
-    system, options = ff.read_system(folder / "car.toml")
+    system, options = read(folder, name, support, changes)
     assert options is not None
     begin = time.process_time()
     motion = ff.integrate(system, options.integrator, options.t_end, options.h, output_every=options.output_every)
@@ -71,11 +76,12 @@ def posts(folder: Path) -> None:
             for mode, way in MODES.items():
                 forces = []
                 for height in (small, -small, 0.03):
-                    values = {
-                        c: {"type": "constant", "value": float(height * w)} for c, w in zip(CORNERS, way, strict=True)
+                    values: dict[str, Any] = {
+                        f"couplers.post_{c}.constant": {"type": "constant", "value": float(height * w)}
+                        for c, w in zip(CORNERS, way, strict=True)
                     }
-                    (folder / "rig.toml").write_text(rig_file(car, "rig", support=support, heights=values))
-                    system, _ = ff.read_system(folder / "rig.toml")
+                    overlays = ["fixed_subframes.toml"] if car.mount_stiffness is None else []
+                    system, _ = read(folder, "rig.toml", support, values, *overlays)
                     rest = ff.snapshot(system, ff.static_equilibrium(system))
                     forces.append(np.array([ff.coupler_motion(system, rest, f"post_{c}").force[0, 0] for c in CORNERS]))
                     expected = CarOnPosts(car, support).forces(height * way)
@@ -108,8 +114,7 @@ def circle(folder: Path) -> None:
     for support in ("hydraulic", "bars"):
         rows = []
         for rack in (0.001, 0.002, 0.003, 0.004, 0.005, 0.006):
-            text = car_file(CAR, steady_circle(CAR, rack=rack), "circle", support=support, is_rigid=True)
-            system, turn, _ = run(folder, text)
+            system, turn, _ = run(folder, "circle.toml", support, {"rack": rack})
             speed = float(turn.speed[-1])
             expected = steady_turn(CAR, car_mass(CAR, system), tyre, speed, rack, support)
             steer = np.mean([Linkage(CAR.front, side, -rack).lifted(0.0).steer for side in (1, -1)])
@@ -147,7 +152,7 @@ def peaks(words: str, seen: CarMotion, cost: float) -> None:
     print(f"{words}: {', '.join(told)}; {cost:.2f} s a second", flush=True)
 
 
-def manoeuvre(folder: Path, name: str, make: Callable[[RoadCar], dict]) -> None:
+def manoeuvre(folder: Path, name: str, file: str) -> None:
     """Print a manoeuvre with flexible and rigid body, hydraulics, bars and neither."""
     for support, is_rigid in (
         ("hydraulic", False),
@@ -156,9 +161,18 @@ def manoeuvre(folder: Path, name: str, make: Callable[[RoadCar], dict]) -> None:
         ("bars", True),
         ("none", True),
     ):
-        text = car_file(CAR, make(CAR), name, support=support, is_rigid=is_rigid)
-        _, seen, cost = run(folder, text)
+        _, seen, cost = run(folder, file, support, {"is_rigid": is_rigid})
         peaks(f"{name} {support} {'rigid' if is_rigid else 'flexible'}", seen, cost)
+
+
+def twisted_road(wave: float, height: float = 0.03) -> list[float]:
+    """Return the left side of a road with sine waves of a length [m], opposite on the right, as in twist.toml.
+
+    A wave as long as twice the wheelbase twists the car, one as long as the wheelbase rolls it.
+    """
+    x = np.arange(-4.0, 40.0, 0.2) - 3.0
+    rise = np.clip(x / wave, 0.0, 1.0)
+    return [float(z) for z in height * rise**2 * (3 - 2 * rise) * np.sin(2 * np.pi * x / wave)]
 
 
 def twist(folder: Path) -> None:
@@ -171,8 +185,8 @@ def twist(folder: Path) -> None:
             ("hydraulic", True),
             ("bars", True),
         ):
-            text = car_file(CAR, twisted_road(CAR, wave=length), words, support=support, is_rigid=is_rigid)
-            _, seen, _ = run(folder, text)
+            changes = {"heights": twisted_road(length), "is_rigid": is_rigid}
+            _, seen, _ = run(folder, "twist.toml", support, changes)
             late = seen.t > 3.0
             told = [
                 f"loads vary by {np.ptp(seen.loads[late], axis=0).mean() / 2:.0f} N each way",
@@ -191,14 +205,13 @@ def main(wanted: list[str]) -> None:
         "posts": posts,
         "wheels": wheels,
         "circle": circle,
-        "sine": lambda folder: manoeuvre(folder, "sine", sine_steer),
-        "lanes": lambda folder: manoeuvre(folder, "lanes", lane_change),
+        "sine": lambda folder: manoeuvre(folder, "sine", "sine_steer.toml"),
+        "lanes": lambda folder: manoeuvre(folder, "lanes", "lane_change.toml"),
         "twist": twist,
     }
     with TemporaryDirectory() as name:
         folder = Path(name)
-        for file, text in body_files(CAR).items():
-            (folder / file).write_text(text)
+        copy_machine("road-car", folder)
         cms.write(cms.reduce_job(folder / "body.toml"), folder / "body.h5")
         for part in wanted or parts:
             parts[part](folder)

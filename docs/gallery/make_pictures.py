@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import imageio.v3 as iio
 import numpy as np
@@ -23,6 +24,7 @@ import cms
 import fe_models as fm
 import floatframe as ff
 from cms.assessment.rendering import Lines, Surface, render_animation
+from fe_models.foundation.parametric_file import read_parametric
 from floatframe.components import mechanisms
 from floatframe.files.system_file.read_system import read_system
 from floatframe.model.functions.time_functions import cycloidal_spin_up
@@ -221,15 +223,13 @@ def railway_engine() -> None:
 
 def kart() -> None:
     """The kart with its flexible frame in a turn at 4 m/s, five times slower; deformation is drawn 20 times larger."""
-    from floatframe.machines.kart import Kart, chassis_files, kart_files
+    from floatframe.machines import copy_machine
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        slow = Kart(speed=4.0, steer_at=0.15, duration=0.6)
-        for file, text in {**chassis_files(slow), **kart_files(slow)}.items():
-            (folder / file).write_text(text)
+        copy_machine("kart", folder)
         cms.write(cms.reduce_job(folder / "chassis.toml"), folder / "chassis.h5")
-        system, run = read_system(folder / "kart.toml")
+        system, run = read_system(folder / "kart.toml", {"speed": 4.0, "steer_at": 0.15, "duration": 0.6})
         system = replace(system, scene=())
         motion = ff.integrate(system, run.integrator, t_end=run.t_end, h=run.h, output_every=10)
         film = folder / "film.gif"
@@ -246,21 +246,19 @@ def road_car() -> None:
     from floatframe.machines import copy_machine
     from floatframe.machines.road_car import RoadCar
     from floatframe.machines.road_car.description import CORNERS
-    from floatframe.machines.road_car.systems import post_motion, rig_file
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         copy_machine("road-car", folder)
         cms.write(cms.reduce_job(folder / "body.toml"), folder / "body.h5")
-        text = rig_file(RoadCar(), "rig", heights=post_motion(0.035)).replace("is_rigid = true", "is_rigid = false")
+        content = read_parametric(folder / "rig.toml", ff.ModelError)
+        changes: dict[str, Any] = {"height": 0.035, "is_rigid": False}
         for corner, (axle, side) in CORNERS.items():  # drawn wheels, without tyres
             place = RoadCar().axle(axle).point("centre", side).tolist()
-            wheel = f'{{type = "wheel", radius = 0.32, width = 0.205, position = {place}}}, '
-            at = text.index(f"[bodies.upright_{corner}]")
-            begin = text.index("shapes = [", at) + len("shapes = [")
-            text = text[:begin] + wheel + text[begin:]
-        (folder / "rig.toml").write_text(text)
-        system, run = read_system(folder / "rig.toml")
+            wheel = {"type": "wheel", "radius": 0.32, "width": 0.205, "position": place}
+            shapes = content["bodies"][f"upright_{corner}"]["shapes"]
+            changes[f"bodies.upright_{corner}.shapes"] = [wheel, *shapes]
+        system, run = read_system(folder / "rig.toml", changes)
         motion = ff.integrate(system, run.integrator, run.t_end, h=run.h, output_every=5)
         film = folder / "film.gif"
         animate(motion, drawn(system), film, speed=0.5, fps=10, magnification=50.0, system=system)

@@ -16,7 +16,7 @@ import logging
 import math
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
@@ -38,11 +38,32 @@ __all__ = ["extended_files", "json_schema", "read_parametric"]
 
 log = logging.getLogger(__name__)
 
+
+def mirrored(value: Any, side: float) -> Any:
+    """Return a point, [x, y, z], with y times `side` (1: left, -1: right); of lists and tables, all points in them."""
+    if isinstance(value, dict):
+        return {key: mirrored(inner, side) for key, inner in value.items()}
+    if not isinstance(value, list | tuple):
+        raise ValueError("mirrored expects points, [x, y, z], or lists or tables of points")
+    if len(value) == 3 and all(isinstance(inner, int | float) for inner in value):
+        return [value[0], side * value[1], value[2]]
+    return [mirrored(inner, side) for inner in value]
+
+
+def weighted(points: Sequence[Sequence[float]], weights: Sequence[float]) -> list[float]:
+    """Return the sum of points, each times its weight: [1, -1] for a difference, [0.5, 0.5] for the middle."""
+    return [
+        sum(weight * value for weight, value in zip(weights, values, strict=True))
+        for values in zip(*points, strict=True)
+    ]
+
+
 MOST_COPIES = 20_000  #: largest number of tables that `repeat` may create in one file
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     **{name: getattr(math, name) for name in ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sqrt", "exp",
                                                "log", "radians", "degrees", "hypot", "floor", "ceil")},
     "abs": abs, "min": min, "max": max, "round": round, "int": int, "str": str, "len": len, "sum": sum,
+    "mirrored": mirrored, "weighted": weighted,
     "range": lambda *limits: list(range(*(min(limit, MOST_COPIES) for limit in limits))),
 }  # fmt: skip
 CONSTANTS = {"pi": math.pi}

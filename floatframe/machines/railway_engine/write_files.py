@@ -207,7 +207,7 @@ def write_railway_engine(
     part: EngineBody | None = None,
     size: float = SIZE,
 ) -> Path:
-    """Write carbody.inp, carbody.toml, engine.toml, CASE.toml and CASE.csv; existing files with these names are replaced.
+    """Write carbody.inp, carbody.toml, engine.toml, CASE.toml and CASE.csv; existing files are replaced.
 
     Continue with `cms reduce carbody.toml -o carbody.h5` and `floatframe run CASE.toml` (docs/railway_engine.md).
 

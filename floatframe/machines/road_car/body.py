@@ -1,4 +1,4 @@
-"""The body in white as a mesh and its job: panels on a frame of thin-walled beams, with carried parts as masses."""
+"""The mesh of the body in white: panels on a frame of thin-walled beams, with nodes for the parts it carries."""
 
 import itertools
 from collections.abc import Iterator, Sequence
@@ -7,7 +7,7 @@ import numpy as np
 
 from floatframe.machines.road_car.description import RoadCar
 
-__all__ = ["body_files", "interface_nodes"]
+__all__ = ["body_mesh", "interface_nodes"]
 
 Node = tuple[float, float, float]
 
@@ -20,31 +20,24 @@ X_ROOF = (-0.95, -0.75, -0.55, -0.35, -0.10, 0.15)
 Y_ROOF = (-0.58, -0.435, -0.29, -0.145, 0.0, 0.145, 0.29, 0.435, 0.58)
 FLOOR, ROOF = 0.24, 1.40
 
-#: closed sections: width, height, wall [m]
-SECTIONS = {
-    "sill": (0.11, 0.14, 0.0018), "rail": (0.08, 0.12, 0.0022), "pillar": (0.08, 0.08, 0.0016),
-    "header": (0.06, 0.05, 0.0012), "brace": (0.06, 0.07, 0.0018), "cross": (0.08, 0.10, 0.0015),
-    "tunnel": (0.18, 0.14, 0.0012), "bead": (0.05, 0.04, 0.0010),
-}  # fmt: skip
-#: panels: thickness [m], and mass per area of the parts fixed to them [kg/m²]
-PANELS = {"floor": (0.0010, 18.0), "firewall": (0.0012, 12.0), "bulkhead": (0.0010, 8.0), "roof": (0.0008, 6.0)}
-#: carried parts: node, mass [kg], moment of inertia about each axis [kg m²], position relative to the node [m]
-CARRIED: dict[str, tuple[Node, float, float, Node]] = {
-    "engine_left": ((1.25, 0.45, 0.42), 112.0, 3.0, (0.0, -0.25, 0.05)),
-    "engine_right": ((1.25, -0.45, 0.42), 112.0, 3.0, (0.0, 0.25, 0.05)),
-    "front_left": ((1.95, 0.45, 0.42), 24.0, 1.5, (0.0, -0.10, 0.10)),
-    "front_right": ((1.95, -0.45, 0.42), 24.0, 1.5, (0.0, 0.10, 0.10)),
-    "seat_left": ((-0.05, 0.35, FLOOR), 100.0, 4.0, (-0.05, 0.0, 0.35)),
-    "seat_right": ((-0.05, -0.35, FLOOR), 100.0, 4.0, (-0.05, 0.0, 0.35)),
-    "bench_left": ((-0.75, 0.35, FLOOR), 55.0, 3.0, (-0.05, 0.0, 0.35)),
-    "bench_right": ((-0.75, -0.35, FLOOR), 55.0, 3.0, (-0.05, 0.0, 0.35)),
-    "door_left": ((-0.05, 0.70, FLOOR), 38.0, 4.0, (0.0, 0.08, 0.45)),
-    "door_right": ((-0.05, -0.70, FLOOR), 38.0, 4.0, (0.0, -0.08, 0.45)),
-    "dash_left": ((0.75, 0.35, 0.85), 22.0, 0.5, (-0.15, 0.0, -0.10)),
-    "dash_right": ((0.75, -0.35, 0.85), 22.0, 0.5, (-0.15, 0.0, -0.10)),
-    "tank": ((-0.95, 0.0, FLOOR), 55.0, 1.0, (0.0, 0.0, 0.10)),
-    "boot_left": ((-1.95, 0.50, 0.42), 34.0, 2.5, (0.10, -0.15, 0.15)),
-    "boot_right": ((-1.95, -0.50, 0.42), 34.0, 2.5, (0.10, 0.15, 0.15)),
+PANELS = ("floor", "firewall", "bulkhead", "roof")  #: groups of shells; all others are beams
+#: nodes of the carried parts
+CARRIED: dict[str, Node] = {
+    "engine_left": (1.25, 0.45, 0.42),
+    "engine_right": (1.25, -0.45, 0.42),
+    "front_left": (1.95, 0.45, 0.42),
+    "front_right": (1.95, -0.45, 0.42),
+    "seat_left": (-0.05, 0.35, FLOOR),
+    "seat_right": (-0.05, -0.35, FLOOR),
+    "bench_left": (-0.75, 0.35, FLOOR),
+    "bench_right": (-0.75, -0.35, FLOOR),
+    "door_left": (-0.05, 0.70, FLOOR),
+    "door_right": (-0.05, -0.70, FLOOR),
+    "dash_left": (0.75, 0.35, 0.85),
+    "dash_right": (0.75, -0.35, 0.85),
+    "tank": (-0.95, 0.0, FLOOR),
+    "boot_left": (-1.95, 0.50, 0.42),
+    "boot_right": (-1.95, -0.50, 0.42),
 }
 
 
@@ -125,8 +118,8 @@ def beams(car: RoadCar) -> Iterator[tuple[str, list[Node]]]:
         yield "cross", cut([(x, -y, z), (x, y, z)], 0.25)
 
 
-def body_files(car: RoadCar, *, n_modes: int = 12) -> dict[str, str]:
-    """Return mesh and job of the body, by file name, with a number of vibration modes besides the static modes."""
+def body_mesh(car: RoadCar) -> str:
+    """Return the mesh of the body (Abaqus), for the job `body.toml`."""
     number: dict[Node, int] = {}
 
     def node(place: Sequence[float]) -> int:
@@ -141,7 +134,7 @@ def body_files(car: RoadCar, *, n_modes: int = 12) -> dict[str, str]:
     for section, line in beams(car):
         cells.setdefault(section, []).extend((node(a), node(b)) for a, b in itertools.pairwise(line))
     sets = {name: node(place) for name, place in interface_nodes(car).items()}
-    sets |= {f"of_{name}": node(place) for name, (place, *_) in CARRIED.items()}
+    sets |= {f"of_{name}": node(place) for name, place in CARRIED.items()}
     lines = ["*HEADING", "body of the road car; x ahead, y left, z up from the ground [m]", "*NODE"]
     lines += [f"{k}, {x:.9g}, {y:.9g}, {z:.9g}" for (x, y, z), k in number.items()]
     count = itertools.count(1)
@@ -150,33 +143,4 @@ def body_files(car: RoadCar, *, n_modes: int = 12) -> dict[str, str]:
         lines += [", ".join(map(str, (next(count), *row))) for row in of_group]
     for name, k in sets.items():
         lines += [f"*NSET, NSET={name}", str(k)]
-    return {"body.inp": "\n".join(lines) + "\n", "body.toml": job(car, n_modes)}
-
-
-def job(car: RoadCar, n_modes: int) -> str:
-    """Return the job file of the body."""
-    text = [
-        "# The body of the road car: panels on beams, what it carries as masses, thirteen interfaces.\n"
-        '# cms reduce body.toml\n[body]\nname = "body"\nmesh = "body.inp"\nunits = "m-kg-s"\n',
-        "[materials.steel]\nyoung = 210e9\npoisson = 0.3\ndensity = 7850.0\n",
-    ]
-    for name, (thickness, added) in PANELS.items():
-        text.append(f'[shells.{name}]\ncells = "{name}"\nthickness = {thickness:g}\nadded_mass = {added:g}\n')
-    for name, (width, height, wall) in SECTIONS.items():
-        text.append(
-            f'[sections.{name}]\nlines = "{name}"\nshape = "box"\nwidth = {width:g}\nheight = {height:g}\n'
-            f"web = {wall:g}\nflange = {wall:g}\n"
-        )
-    for name, (_, mass, inertia, offset) in CARRIED.items():
-        x, y, z = offset
-        text.append(
-            f'[masses.{name}]\nnode = "of_{name}"\nmass = {mass:g}\ninertia = {inertia:g}\n'
-            f"offset = [{x:g}, {y:g}, {z:g}]\n"
-        )
-    for name in interface_nodes(car):
-        text.append(f'[interfaces.{name}]\nkind = "rigid"\nnodes = "{name}"\n')
-    text.append(
-        f'[reduction]\nset = "craig-bampton"\nn_modes = {n_modes}\ngeometric_stiffness = false\nstress = false\n'
-    )
-    text.append("[damping]\nratio = 0.02\n")
-    return "\n".join(text)
+    return "\n".join(lines) + "\n"

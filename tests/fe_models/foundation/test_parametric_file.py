@@ -46,6 +46,26 @@ def test_expressions_have_the_values_of_python(read):
     assert body["label"] == "rod of 300 mm, {kept}"
 
 
+def test_points_of_one_side_are_mirrored_to_the_other(read):
+    text = """
+    parameters.left = {pin = [1, 2, 3], ends = [[4, 5, 6], [7, -8, 9]]}
+    [bodies.rod]
+    pin = "{mirrored(left, -1).pin}"
+    ends = "{mirrored(left, -1)['ends']}"
+    same = "{mirrored(left.pin, 1)}"
+    """
+    rod = read(text)["bodies"]["rod"]
+    assert rod == {"pin": [1, -2, 3], "ends": [[4, -5, 6], [7, 8, 9]], "same": [1, 2, 3]}
+
+
+@pytest.mark.parametrize(
+    "call", ["mirrored('left', 1)", "weighted([[1, 2], [3, 4, 5]], [1, 1])", "weighted([[1]], [])"]
+)
+def test_points_that_do_not_fit_are_refused(read, call):
+    with pytest.raises(CmsError, match="cannot be evaluated"):
+        read(f'[parameters]\np = "{call}"\n[a]\nx = "{{p}}"')
+
+
 def test_a_file_without_parameters_keeps_its_braces(read):
     assert read('name = "{x}"')["name"] == "{x}"
 
@@ -53,8 +73,11 @@ def test_a_file_without_parameters_keeps_its_braces(read):
 @pytest.mark.parametrize("name", sorted(FUNCTIONS))
 def test_every_function_can_be_called(read, name):
     argument = {"atan2": "0.3, 0.4", "hypot": "0.3, 0.4", "min": "0.3, 0.4", "max": "0.3, 0.4",
-                "len": "[1, 2]", "sum": "[1, 2]", "range": "1, 3"}.get(name, "0.5")  # fmt: skip
-    expected = {"range": [1, 2], "len": 2, "sum": 3}.get(name, FUNCTIONS[name](*eval(f"({argument},)")))
+                "len": "[1, 2]", "sum": "[1, 2]", "range": "1, 3",
+                "mirrored": "[1, 2, 3], -1", "weighted": "[[1, 2], [4, 5]], [-1, 2]"}.get(name, "0.5")  # fmt: skip
+    expected = {"range": [1, 2], "len": 2, "sum": 3, "mirrored": [1, -2, 3], "weighted": [7, 8, 9]}.get(
+        name, FUNCTIONS[name](*eval(f"({argument},)"))
+    )
     assert read(f'[parameters]\np = "{name}({argument})"\n[a]\nx = "{{p}}"')["a"]["x"] == expected
 
 

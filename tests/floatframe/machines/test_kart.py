@@ -1,6 +1,6 @@
 """The kart: its chassis against its finite elements, its loads against levers, its turn rigid and flexible."""
 
-from dataclasses import replace
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -11,8 +11,8 @@ import cms
 import floatframe as ff
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
-from floatframe.machines import machine_files
-from floatframe.machines.kart import Kart, chassis_files, kart_files
+from floatframe.machines import copy_machine, parameters_of
+from floatframe.machines.kart import Kart, chassis_tables
 from floatframe.machines.kart.figures import torsion_stiffness, turn_of
 from floatframe.machines.kart.steady_turn import steady_turn, turn_eigenvalues
 
@@ -21,36 +21,33 @@ KART = Kart()
 METHOD = ff.GeneralizedAlpha(0.8, 1e-7)
 
 
-def written(folder, files):
-    for name, text in files.items():
-        (folder / name).write_text(text)
-    return folder
-
-
 @pytest.fixture(scope="module")
 def parts(tmp_path_factory):
-    folder = written(tmp_path_factory.mktemp("kart"), chassis_files(KART))
+    folder = tmp_path_factory.mktemp("kart")
+    copy_machine("kart", folder)
     chassis = cms.reduce_job(folder / "chassis.toml")
     cms.write(chassis, folder / "chassis.h5")
     return folder, chassis
 
 
-def driven(folder, kart, *, is_rigid):
-    (name, text), *_ = kart_files(kart, is_rigid=is_rigid).items()
-    (folder / name).write_text(text)
-    system, _ = ff.read_system(folder / name)
-    return turn_of(system, ff.integrate(system, METHOD, kart.duration, 2e-3))
-
-
 @pytest.fixture(scope="module")
 def turns(parts):
-    kart = replace(KART, steer_at=0.7, duration=1.8)
-    return {is_rigid: driven(parts[0], kart, is_rigid=is_rigid) for is_rigid in (True, False)}
+    def turn(is_rigid):
+        system, _ = ff.read_system(parts[0] / "kart.toml", {"steer_at": 0.7, "is_rigid": is_rigid})
+        return turn_of(system, ff.integrate(system, METHOD, 1.8, 2e-3))
+
+    return {is_rigid: turn(is_rigid) for is_rigid in (True, False)}
 
 
-def test_shipped_files_are_those_of_the_description():
-    made = chassis_files(KART) | kart_files(KART) | kart_files(KART, is_rigid=True)
-    assert {path.name: path.read_text() for path in machine_files("kart") if path.name != "README.md"} == made
+def test_the_files_have_the_dimensions_and_tables_of_the_description(parts):
+    given = parameters_of(parts[0] / "kart.toml")
+    front, rear = given.wheels
+    names = {"front_half_track": front["y"], "rear_half_track": rear["y"], "front_height": front["z"],
+             "rear_height": rear["z"], "rail_height": given.column[2], "wheelbase": given.wheelbase,
+             "kingpin_y": given.kingpin_y}  # fmt: skip
+    assert names == {field.name: getattr(KART, field.name) for field in fields(KART)}
+    for name, text in chassis_tables(KART).items():
+        assert (parts[0] / name).read_text() == text
 
 
 def test_torsion_of_the_reduced_chassis_is_that_of_its_finite_elements(parts):
@@ -73,18 +70,19 @@ def test_torsion_of_the_reduced_chassis_is_that_of_its_finite_elements(parts):
     assert_allclose(torsion_stiffness(chassis), 1.0 / (twist[0] - twist[1]), rtol=1e-6)
 
 
-def test_engine_and_axle_lower_the_modes_of_the_frame(tmp_path):
-    """Mass added anywhere lowers every frequency (Rayleigh): the engine against the frame with its axle."""
+def test_the_engine_lowers_the_modes_of_the_frame(parts):
+    """Mass added anywhere lowers every frequency (Rayleigh): the frame with and without its engine."""
     found = []
     for has_engine in (False, True):
-        folder = written(tmp_path, chassis_files(KART, has_engine=has_engine))
-        found.append(cms.reduce_job(folder / "chassis.toml").frequencies[:5])
+        removed = "" if has_engine else "masses.engine = {}"
+        (parts[0] / "frame.toml").write_text(f'extends = "chassis.toml"\n{removed}')
+        found.append(cms.reduce_job(parts[0] / "frame.toml").frequencies[:5])
     assert np.all(found[1] < found[0])
 
 
 def weight(chassis):
     """Return that of chassis, pilot, column, knuckles and wheels [N]."""
-    return G * (chassis.moments.gram[0, 0] + KART.pilot_mass + 2.5 + 2 * (1.5 + 2.5 + 4.0))
+    return G * (chassis.moments.gram[0, 0] + 75.0 + 2.5 + 2 * (1.5 + 2.5 + 4.0))
 
 
 @pytest.mark.parametrize("is_rigid", [True, False])
@@ -115,8 +113,7 @@ def test_in_the_turn_loads_move_by_the_lateral_acceleration_times_the_height_of_
 @pytest.mark.parametrize("is_rigid", [True, False])
 def test_the_steady_turn_is_where_the_run_ends_and_it_is_stable(turns, parts, is_rigid):
     """Second road: 1.1 s after the step the run turns within 1 % as the state without a time does."""
-    (name, text), *_ = kart_files(KART, is_rigid=is_rigid).items()
-    (parts[0] / name).write_text(text)
+    name = "kart_rigid.toml" if is_rigid else "kart.toml"
     motion = steady_turn(ff.read_system(parts[0] / name)[0], float(turns[is_rigid].speed[-1]))
     assert_allclose(1 / motion.curvature, turns[is_rigid].radius, rtol=0.01)
     loads = [

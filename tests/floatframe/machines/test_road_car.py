@@ -1,7 +1,7 @@
 """The road car: linkage against circles and spheres, posts against volumes and gas, a turn against four wheels."""
 
 import re
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -9,13 +9,14 @@ from numpy.testing import assert_allclose
 
 import cms
 import floatframe as ff
+from fe_models.foundation.parametric_file import read_parametric
 from floatframe.components.wheels import read_tyre_file, shipped_tyre
-from floatframe.machines import machine_files
-from floatframe.machines.road_car import CarOnPosts, Linkage, RoadCar, body_files, road_car_files
+from floatframe.machines import copy_machine, parameters_of
+from floatframe.machines.road_car import CarOnPosts, Linkage, RoadCar, body_mesh
 from floatframe.machines.road_car.closed_forms import MODES, roll_control_stiffness, transfer_shares
 from floatframe.machines.road_car.description import CORNERS
 from floatframe.machines.road_car.figures import car_mass, driven, steady_turn
-from floatframe.machines.road_car.systems import ON_GROUND, car_file, lane_change, rig_file
+from floatframe.machines.road_car.linkage import spring_preload
 from floatframe.model.elements.expressions import ExpressionElement
 from floatframe.model.rotations import rotation_matrix
 from tests.floatframe.components.wheels.magic_formula_oracle import version_61
@@ -36,30 +37,51 @@ def tyre(load, alpha, gamma, is_left):
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
+    """The machine, its body reduced; files of the rig with fixed subframes: hydraulics, bars, or springs alone."""
     place = tmp_path_factory.mktemp("car")
-    for name, text in body_files(CAR).items():
-        (place / name).write_text(text)
+    copy_machine("road-car", place)
     cms.write(cms.reduce_job(place / "body.toml"), place / "body.h5")
+    (place / "stiff_hydraulic.toml").write_text('extends = ["rig.toml", "fixed_subframes.toml"]')
+    (place / "stiff_bars.toml").write_text('extends = ["rig_bars.toml", "fixed_subframes.toml"]')
+    (place / "stiff_none.toml").write_text('extends = "stiff_bars.toml"\nparameters.bars = {front = 0.0, rear = 0.0}')
     return place
 
 
-def read(folder, text, name="car.toml"):
-    (folder / name).write_text(text)
-    return ff.read_system(folder / name)
+def on_posts(folder, support, heights):
+    """Return the car with rigid subframes on posts of given heights over time."""
+    changes = {f"couplers.post_{corner}.constant": height for corner, height in zip(CORNERS, heights, strict=True)}
+    return ff.read_system(folder / f"stiff_{support}.toml", changes)[0]
 
 
-def test_shipped_files_are_those_of_the_description():
-    own = ("README.md", "suspension_study.toml")
-    assert {
-        path.name: path.read_text() for path in machine_files("road-car") if path.name not in own
-    } == road_car_files()
+def test_the_files_have_the_numbers_of_the_closed_forms(folder):
+    given = parameters_of(folder / "lane_change.toml")
+    for name in ("front", "rear"):
+        axle, points = CAR.axle(name), getattr(given, name)
+        ends = dict(zip(("mount_front", "mount_rear"), axle.mounts, strict=True))
+        assert points == {each: list(ends[each] if each in ends else getattr(axle, each)) for each in points}
+        spring = given.springs[name]
+        assert (spring["stiffness"], spring["damping"], spring["preload"]) == (axle.spring, axle.damper, axle.preload)
+        assert parameters_of(folder / "lane_change_bars.toml").bars[name] == axle.bar
+    names = [field.name for field in fields(CAR) if hasattr(given, field.name) and field.name not in ("front", "rear")]
+    assert {"speed", "wheel", "upright", "lower_arm", "subframe", "mount_stiffness"} < set(names)
+    assert [getattr(given, name) for name in names] == [getattr(CAR, name) for name in names]
+    assert given.oil == {name: getattr(CAR.control, name) for name in given.oil}
+
+
+def test_with_bars_the_springs_carry_what_the_oil_did(folder):
+    given = parameters_of(folder / "lane_change_bars.toml")
+    for name in ("front", "rear"):
+        assert_allclose(given.springs[name]["preload"], spring_preload(CAR, name, "bars"), rtol=1e-6)
+
+
+def test_the_shipped_mesh_is_that_of_the_description(folder):
+    assert (folder / "body.inp").read_text() == body_mesh(CAR)
 
 
 def test_wheels_move_as_circles_and_spheres_say(folder):
     """Steer, inclination and place of the four wheels over 80 mm up and down, against the linkage by itself."""
     travel = {"type": "smooth-step", "t_start": 0.0, "t_end": 1.0, "first": -0.08, "last": 0.08}
-    text = rig_file(STIFF, "rig", support="none", heights=dict.fromkeys(CORNERS, travel))
-    system, _ = read(folder, text)
+    system = on_posts(folder, "none", [travel] * 4)
     motion = ff.kinematics(system, np.linspace(0.0, 1.0, 5))
     for corner, (name, side) in CORNERS.items():
         own, linkage = motion.body(f"upright_{corner}"), Linkage(CAR.axle(name), side)
@@ -74,8 +96,7 @@ def test_wheels_move_as_circles_and_spheres_say(folder):
 
 def posts(folder, support, heights):
     """Return the forces of the posts at rest, (4,) [N]."""
-    values = {c: {"type": "constant", "value": float(z)} for c, z in zip(CORNERS, heights, strict=True)}
-    system, _ = read(folder, rig_file(STIFF, "rig", support=support, heights=values), f"rig_{support}.toml")
+    system = on_posts(folder, support, [{"type": "constant", "value": float(z)} for z in heights])
     rest = ff.snapshot(system, ff.static_equilibrium(system))
     return np.array([ff.coupler_motion(system, rest, f"post_{corner}").force[0, 0] for corner in CORNERS])
 
@@ -102,10 +123,9 @@ def test_crossed_lines_stiffen_roll_by_the_gas_and_leave_warp_alone(folder):
 def test_a_steady_turn_is_that_of_four_wheels_and_the_linkage(folder):
     """Yaw rate, roll and wheel loads at 3 m/s² of the rigid car against equations of their own."""
     rack = 0.0035
-    turn_in = {"type": "smooth-step", "t_start": 0.05, "t_end": 0.6, "first": 0.0, "last": -rack}
-    text = car_file(CAR, {"rack": turn_in, "t_end": 1.8}, "circle", is_rigid=True, h=8e-3)
-    system, run = read(folder, text)
-    turn = driven(system, ff.integrate(system, run.integrator, run.t_end, run.h))
+    ramp = {f"joints.rack.motions.distance.{key}": value for key, value in (("t_start", 0.05), ("t_end", 0.6))}
+    system, run = ff.read_system(folder / "circle.toml", {"rack": rack, **ramp})
+    turn = driven(system, ff.integrate(system, run.integrator, 1.8, 8e-3))
     expected = steady_turn(CAR, car_mass(CAR, system), tyre, float(turn.speed[-1]), rack, "hydraulic")
     assert_allclose(turn.yaw_rate[-1], expected.yaw_rate, rtol=0.01)
     assert_allclose(turn.roll[-1], expected.roll, rtol=0.01)
@@ -122,8 +142,8 @@ def test_the_flexible_car_follows_its_driver(folder):
     """The first 0.2 s of the lane change: the body bends, the car turns as the rigid one within a tenth."""
     found = {}
     for is_rigid in (True, False):
-        system, run = read(folder, car_file(CAR, lane_change(CAR), "lanes", is_rigid=is_rigid, h=5e-3))
-        motion = ff.integrate(system, run.integrator, 0.2, run.h)
+        system, run = ff.read_system(folder / "lane_change.toml", {"is_rigid": is_rigid})
+        motion = ff.integrate(system, run.integrator, 0.2, 5e-3)
         found[is_rigid] = driven(system, motion).yaw_rate[-1]
         if not is_rigid:
             assert 1e-5 < np.abs(motion.body("chassis").q[-1]).max() < 1e-1
@@ -131,12 +151,13 @@ def test_the_flexible_car_follows_its_driver(folder):
     assert found[True] > 0.01
 
 
-def test_the_driver_knows_where_the_car_is_on_the_ground():
+def test_the_driver_knows_where_the_car_is_on_the_ground(folder):
     """Far down the road and turned about all axes: place and longitudinal axis are those of the body."""
     r, p = np.array([120.0, -3.0, 0.4]), np.array([0.9, 0.15, -0.2, 0.35]) / np.linalg.norm([0.9, 0.15, -0.2, 0.35])
     car = ff.RigidBody("car", mass=1.0, inertia=np.eye(3), position=r, orientation=p)
+    terms = read_parametric(folder / "lane_change.toml", ff.ModelError)["elements"]["driver"]["terms"]
     driver = ExpressionElement(
-        "driver", {"car": ff.Marker("car"), "road": ff.Marker("ground")}, terms=ON_GROUND,
+        "driver", {"car": ff.Marker("car"), "road": ff.Marker("ground")}, terms=terms,
         outputs={name: name for name in ("car_x", "car_y", "axis_x", "axis_y")},
     )  # fmt: skip
     system = ff.System(bodies=[car], elements=[driver])
@@ -146,12 +167,11 @@ def test_the_driver_knows_where_the_car_is_on_the_ground():
 
 def test_the_study_of_the_suspension_runs(folder, tmp_path):
     """Two evaluations, over the first 0.16 s and by one of its parameters: the stiffer bar rolls less."""
-    shipped = {path.name: path.read_text() for path in machine_files("road-car")}
+    copy_machine("road-car", tmp_path)
     (tmp_path / "body.h5").write_bytes((folder / "body.h5").read_bytes())
-    lanes = shipped["lane_change_bars.toml"]
-    assert lanes.count("t_end = 6.6") == 1
-    (tmp_path / "lane_change_bars.toml").write_text(lanes.replace("t_end = 6.6", "t_end = 0.16"))
-    text = shipped["suspension_study.toml"]
+    with (tmp_path / "lane_change_bars.toml").open("a") as file:
+        file.write("run.t_end = 0.16\n")
+    text = (tmp_path / "suspension_study.toml").read_text()
     assert text.count("iterations = ") == 1
     begin, end = text.index("[parameters.bar_rear]"), text.index("[objectives.side_slip]")
     text = "workers = 1\n" + text[:begin] + text[end:]
