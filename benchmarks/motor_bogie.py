@@ -2,7 +2,7 @@
 
 python -m benchmarks.motor_bogie FOLDER [picture.png]
 
-FOLDER holds the machine (floatframe machine motor-bogie) with its results (floatframe run): their starts are read.
+FOLDER holds the machine (floatframe example motor-bogie) with its results (floatframe run): their starts are read.
 """
 
 import sys

@@ -528,10 +528,19 @@ def export_command(
         raise ResultsError(f"--output {path}: expected a file name that ends in .csv, .pvd, .rsp, .drv or .tim")
 
 
+@app.command("machine", hidden=True, context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
+@guarded
+def machine_command(context: typer.Context) -> None:
+    """Name the command that copies the machines."""
+    from floatframe.errors import ModelError
+
+    raise ModelError(f"floatframe machine: the command is floatframe example {' '.join(context.args)}".rstrip())
+
+
 register(
     app,
     {
-        "Start": {"machine": prepare.machine_command, "check": analyses.check_command},
+        "Start": {"example": prepare.example_command, "check": analyses.check_command},
         "Compute": {
             "run": run_command,
             "resume": resume_command,

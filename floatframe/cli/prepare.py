@@ -13,24 +13,24 @@ import typer
 from cms.cli.console import guarded, print_table, say, stages
 from cms.cli.demo import environment
 
-__all__ = ["machine_command", "prepare_command", "prepare_parts"]
+__all__ = ["example_command", "prepare_command", "prepare_parts"]
 
 
 # the command machine: copies of ready machines ------------------------------------------------------------------------
 
 
 @guarded
-def machine_command(
+def example_command(
     name: Annotated[str | None, typer.Argument(help="A machine; without it the command lists them.")] = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Folder to copy it into; default: its name.")
     ] = None,
 ) -> None:
-    """Copy a ready machine into a folder, or list the machines.
+    """Copy an example machine into a folder, or list all examples.
 
     Its jobs and systems are copied.
 
-    Example: floatframe machine antenna -o my_antenna
+    Example: floatframe example antenna -o my_antenna
     """
     from floatframe.machines.catalogue import MACHINES, copy_machine
 

@@ -27,7 +27,7 @@ class Machine:
     shows: str  #: its content in one line
 
 
-#: every machine by the name with which `floatframe machine` copies it
+#: every machine by the name with which `floatframe example` copies it
 MACHINES: dict[str, Machine] = {
     "antenna": Machine(
         "a deployable antenna", "antenna", "slow opening on a rig and in space, latching shock in free flight"

@@ -26,7 +26,7 @@ def steady_turn(system: System, speed: float, *, near: SteadyMotion | None = Non
     Parameters
     ----------
     system
-        The system written by `kart_files`.
+        The system of `kart.toml`, with a flexible or a rigid chassis.
     speed
         Speed of the chassis [m/s].
     near

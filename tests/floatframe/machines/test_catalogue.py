@@ -31,6 +31,12 @@ def test_an_unknown_machine_is_refused_with_the_nearest():
 
 
 def test_the_command_lists_them():
-    outcome = CliRunner().invoke(app, ["machine"])
+    outcome = CliRunner().invoke(app, ["example"])
     assert outcome.exit_code == 0
     assert all(name in outcome.output for name in MACHINES)
+
+
+def test_the_old_name_of_the_command_names_the_new_one():
+    outcome = CliRunner().invoke(app, ["machine", "kart", "-o", "mine"])
+    assert outcome.exit_code != 0
+    assert "floatframe example kart -o mine" in outcome.output
