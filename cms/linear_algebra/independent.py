@@ -21,7 +21,7 @@ from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.tall.columns import beside, combine, dots, inner, squares
 
 __all__ = [
-    "Basis", "Columns", "Products", "gram", "gram_in_blocks", "independent_basis", "independent_columns",
+    "Basis", "DisplacementColumns", "Products", "gram", "gram_in_blocks", "independent_basis", "independent_columns",
     "orthonormal_basis", "within",
 ]  # fmt: skip
 
@@ -33,7 +33,7 @@ PRODUCT_BYTES = 128e6  #: memory for products with K or M
 
 
 @dataclass(eq=False)
-class Columns:
+class DisplacementColumns:
     """Displacement columns with their products and their origin; each block is a tall, thin matrix."""
 
     X: Array  #: (n_dof, k)
@@ -41,17 +41,17 @@ class Columns:
     MX: Array  #: (n_dof, k)
     T: Array  #: coefficients over the columns of the mode set, (n_columns, k)
 
-    def __matmul__(self, Z: Array) -> "Columns":
-        return Columns(combine(self.X, Z), combine(self.KX, Z), combine(self.MX, Z), self.T @ Z)
+    def __matmul__(self, Z: Array) -> "DisplacementColumns":
+        return DisplacementColumns(combine(self.X, Z), combine(self.KX, Z), combine(self.MX, Z), self.T @ Z)
 
-    def __getitem__(self, index: IntArray) -> "Columns":
-        return Columns(self.X[:, index], self.KX[:, index], self.MX[:, index], self.T[:, index])
+    def __getitem__(self, index: IntArray) -> "DisplacementColumns":
+        return DisplacementColumns(self.X[:, index], self.KX[:, index], self.MX[:, index], self.T[:, index])
 
-    def beside(self, other: "Columns") -> "Columns":
+    def beside(self, other: "DisplacementColumns") -> "DisplacementColumns":
         """Return both blocks side by side."""
-        return Columns(*(beside(getattr(self, a), getattr(other, a)) for a in ("X", "KX", "MX", "T")))
+        return DisplacementColumns(*(beside(getattr(self, a), getattr(other, a)) for a in ("X", "KX", "MX", "T")))
 
-    def inner(self, other: "Columns", omega2: float) -> Array:
+    def inner(self, other: "DisplacementColumns", omega2: float) -> Array:
         """Return selfᵀ (K + omega² M) other."""
         return inner(self.X, other.KX) + omega2 * inner(self.X, other.MX)
 
@@ -78,9 +78,9 @@ class Products:
         """Return Xᵀ K X and Xᵀ M X, (k, k)."""
         return gram_in_blocks(X, self.K), gram_in_blocks(X, self.M)
 
-    def beside(self, X: Array) -> Columns:
+    def beside(self, X: Array) -> DisplacementColumns:
         """Return columns with their products, (n_dof, k)."""
-        return Columns(X, self.K @ X, self.M @ X, np.eye(X.shape[1]))
+        return DisplacementColumns(X, self.K @ X, self.M @ X, np.eye(X.shape[1]))
 
 
 def gram_in_blocks(X: Array, A: SymmetricProduct) -> Array:
@@ -116,13 +116,13 @@ class Basis:
         """Return Q C, (n_dof, n)."""
         return combine(self.X, self.Z @ C)
 
-    def columns(self, products: Products) -> Columns:
+    def columns(self, products: Products) -> DisplacementColumns:
         """Return Q with its products, (n_dof, k)."""
         Q = products.beside(self.combine(np.eye(self.Z.shape[1])))
         Q.T = self.T
         return Q
 
-    def with_columns(self, new: Columns) -> "Basis":
+    def with_columns(self, new: DisplacementColumns) -> "Basis":
         """Return the basis extended by W-orthonormal columns that are W-orthogonal to it."""
         sides = []
         for G, product in ((self.G_K, new.KX), (self.G_M, new.MX)):
@@ -135,7 +135,7 @@ class Basis:
         return Basis(beside(self.X, new.X), Z, np.hstack([self.T, new.T]), G_K, G_M)
 
 
-def independent_columns(V: Array, body: FEBody, omega2: float) -> tuple[Columns, IntArray]:
+def independent_columns(V: Array, body: FEBody, omega2: float) -> tuple[DisplacementColumns, IntArray]:
     """Return W-orthonormal columns of the same span with their products, and the indices of redundant columns.
 
     Parameters
@@ -248,17 +248,17 @@ def within(G: Array, Z: Array) -> Array:
     return np.asarray((H + H.T) / 2)
 
 
-def _length(columns: Columns, omega2: float) -> Array:
+def _length(columns: DisplacementColumns, omega2: float) -> Array:
     """Return the W-length of every column, (k,)."""
     stiff = dots(columns.X, columns.KX)
     return np.sqrt(np.maximum(stiff + omega2 * dots(columns.X, columns.MX), 0.0))
 
 
-def _unit(columns: Columns, size: Array) -> Columns:
-    return Columns(columns.X / size, columns.KX / size, columns.MX / size, columns.T / size)
+def _unit(columns: DisplacementColumns, size: Array) -> DisplacementColumns:
+    return DisplacementColumns(columns.X / size, columns.KX / size, columns.MX / size, columns.T / size)
 
 
-def _orthonormalized(products: Products, new: Columns, omega2: float) -> Columns:
+def _orthonormalized(products: Products, new: DisplacementColumns, omega2: float) -> DisplacementColumns:
     """Make the columns W-orthonormal once more, with recomputed products, because the first step lost digits."""
     fresh = products.beside(new.X)
     fresh.T = new.T

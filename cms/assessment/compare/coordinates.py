@@ -11,7 +11,7 @@ import numpy as np
 import scipy.linalg as la
 
 from cms.assessment.quality.reference.ports import Ports
-from cms.linear_algebra.independent import Columns, Products, gram, independent_columns
+from cms.linear_algebra.independent import DisplacementColumns, Products, gram, independent_columns
 from cms.modes.families.families import Families
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.tall.columns import inner, subtract
@@ -103,10 +103,10 @@ class ReferenceBasis:
         """Return the translations of all nodes, including those of rigid interfaces, (3 n_nodes, k)."""
         return self.body.translations(X).reshape(3 * len(self.body.nodes), X.shape[1])
 
-    def _inner(self, Q: Columns, V: Columns) -> Array:
+    def _inner(self, Q: DisplacementColumns, V: DisplacementColumns) -> Array:
         return inner(Q.KX, V.X) + self.omega2 * inner(Q.MX, V.X)
 
-    def _remainder(self, V: Columns) -> Array:
+    def _remainder(self, V: DisplacementColumns) -> Array:
         """Return unit columns without their part in the reference, if the remainder exceeds rounding."""
         length = np.sqrt(np.maximum(self._length2(V), 0.0))
         rest = V.X / np.where(length > 0, length, 1.0)
@@ -115,12 +115,12 @@ class ReferenceBasis:
         is_new = (left > NOISE) & (length > 0)
         return np.ascontiguousarray(rest[:, is_new] / left[is_new])
 
-    def _without_reference(self, V: Columns) -> Array:
+    def _without_reference(self, V: DisplacementColumns) -> Array:
         rest = V.X.copy()
         subtract(rest, self._Q.X, self._inner(self._Q, V))
         return rest
 
-    def _length2(self, V: Columns) -> Array:
+    def _length2(self, V: DisplacementColumns) -> Array:
         return np.einsum("nk,nk->k", V.X, V.KX) + self.omega2 * np.einsum("nk,nk->k", V.X, V.MX)
 
 

@@ -9,7 +9,7 @@ import scipy.linalg as la
 from scipy.linalg.lapack import dpstrf
 
 from cms.errors import FactorizationError, ModeSetError
-from cms.linear_algebra.independent import Columns, gram
+from cms.linear_algebra.independent import DisplacementColumns, gram
 from cms.linear_algebra.solvers.factorization import factorize, shifted_matrix
 from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
 from cms.modes.centrifugal import CENTRIFUGAL
@@ -167,7 +167,7 @@ class _Span:
         self.groups += [group] * k
         expansion.ends = (*expansion.ends, self.n)
 
-    def _orthonormal(self, X: Array) -> Columns:
+    def _orthonormal(self, X: Array) -> DisplacementColumns:
         """Return W-orthonormal directions of elastic columns X outside the span: step (3).
 
         Multipliers are set to zero: motions that satisfy the constraints have the same energy with any multipliers, and
@@ -201,12 +201,12 @@ class _Span:
         G = gram(block.X, block.KX) + self.omega2 * gram(block.X, block.MX)
         return self._products(block.X @ la.solve_triangular(la.cholesky(G), np.eye(rank)))
 
-    def _without_span(self, block: Columns) -> Columns:
+    def _without_span(self, block: DisplacementColumns) -> DisplacementColumns:
         return self._products(block.X - self.columns.X @ self.columns.inner(block, self.omega2))
 
-    def _products(self, X: Array) -> Columns:
+    def _products(self, X: Array) -> DisplacementColumns:
         # the coefficients over the mode set are not needed
-        return Columns(X, self._K @ X, self._M @ X, np.zeros((0, X.shape[1])))
+        return DisplacementColumns(X, self._K @ X, self._M @ X, np.zeros((0, X.shape[1])))
 
     def receptance(self, band: tuple[float, float]) -> np.ndarray:
         """Return the elastic receptance of the boundary over the band, (n_f, n_b, n_b)."""
