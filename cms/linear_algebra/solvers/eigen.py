@@ -13,9 +13,8 @@ from cms.linear_algebra.solvers.factorization import Factorization, Matrix, fact
 from cms.linear_algebra.solvers.inverse import Inverse
 from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
 from cms.linear_algebra.solvers.mode_search import DenseSearch, KrylovSearch
-from cms.linear_algebra.solvers.petsc.factor import PetscFactor
 from cms.linear_algebra.solvers.shift_inverted import ArraySpace, ModeRequest, Modes, ShiftInverted
-from cms.linear_algebra.solvers.slepc_modes import RankSpace, SlepcSearch
+from cms.linear_algebra.solvers.slepc_modes import SlepcSearch, search_on_ranks
 from fe_models.body.couplings.submatrix import PrincipalBlock
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
@@ -34,8 +33,6 @@ ZERO = 1e-13  #: omega² relative to that median below which it is rounding of K
 TIGHTEST, LOOSEST = 1e-13, 0.1  #: tightest tolerance that rounding allows, and loosest tolerance that is meaningful
 MISMATCH = 1e-3  #: defect of K x = omega² M x that a factorisation of another matrix explains, or rounding of K
 MOST_PROOFS = 3
-#: mode search of a solver, if it is not block Lanczos on rank 0
-SEARCHES: dict[str, type[SlepcSearch]] = {"slepc": SlepcSearch}
 GAP = 1e-4  #: relative gap between two values of omega² in which modes can be counted
 
 
@@ -138,18 +135,12 @@ def eigenmodes(
             factorization = stack.enter_context(_factorize_shifted(matrix_of(K), matrix_of(M), shift, solver))
         if factorization.n != n:
             raise EigenError(f"eigenmodes: factorization: expected order {n}, got {factorization.n}")
-        kind: type[DenseSearch | KrylovSearch | SlepcSearch] = KrylovSearch
-        space: RankSpace | None = None
-        here = ArraySpace(n, numbering)
-        if is_dense:
-            kind = DenseSearch
-        elif isinstance(factorization, Factorization) and isinstance(factorization.factor, PetscFactor):
-            kind = SEARCHES.get(factorization.solver.name, KrylovSearch)
-            if kind is KrylovSearch and factorization.factor.ranks.size > 1:
-                space = RankSpace(factorization.factor, numbering)
-                stack.callback(space.close)
+        own_search, space = (None, None) if is_dense else search_on_ranks(factorization, numbering)
+        kind: type[DenseSearch | KrylovSearch | SlepcSearch] = DenseSearch if is_dense else own_search or KrylovSearch
+        if space is not None:
+            stack.callback(space.close)
         mass = M if space is not None or isinstance(M, SpreadMatrix) else matrix_of(M)
-        operator = ShiftInverted(mass, shift, factorization, tolerance, progress, space or here)
+        operator = ShiftInverted(mass, shift, factorization, tolerance, progress, space or ArraySpace(n, numbering))
         search = kind(operator, wanted)
         modes = search.modes(wanted)
         if asked.verify:

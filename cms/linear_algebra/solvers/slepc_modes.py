@@ -23,7 +23,7 @@ from fe_models.foundation.ranks.rows import Rows, collected, spread
 from fe_models.foundation.ranks.spread_columns import Part, SpreadColumns, own_part, spread_columns
 from fe_models.foundation.ranks.trim import give_back
 
-__all__ = ["RankSpace", "SlepcSearch"]
+__all__ = ["RankSpace", "SlepcSearch", "search_on_ranks"]
 
 
 # the tall columns of an iteration, distributed by rows: rank 0 holds keys of them, and small matrices -----------------
@@ -116,6 +116,20 @@ class RankSpace:
         assert isinstance(factorization, Factorization)
         assert factorization.factor is self.factor
         return lambda b: self.made(b.shape[1], solved_here, self.factor.key, self.rows, b.part)
+
+
+def search_on_ranks(
+    factorization: Inverse, numbering: IntArray | None
+) -> tuple["type[SlepcSearch] | None", RankSpace | None]:
+    """Return the mode search of a solver on ranks, None for block Lanczos, and where block Lanczos has its columns.
+
+    Without a factor on several ranks, both are None: block Lanczos with the arrays of this process.
+    """
+    if not isinstance(factorization, Factorization) or not isinstance(factorization.factor, PetscFactor):
+        return None, None
+    if factorization.solver.name == "slepc":
+        return SlepcSearch, None
+    return None, RankSpace(factorization.factor, numbering) if factorization.factor.ranks.size > 1 else None
 
 
 def rows_kept_here(ranks: Ranks, key: str, function: Callable[..., Any], *arguments: Any) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -90,22 +90,20 @@ def mode_set(
             recorded |= {"verified": str(modes.is_proven), "eigensolver": modes.method}
     if wanted is not None and wanted.cutoff is not None:
         recorded["cutoff"] = repr(float(wanted.cutoff))
+    columns, layout = [block.columns for block in blocks], families.body.layout
+    if layout is not None:  # columns of a distributed body are distributed, also where none of the blocks is
+        whole: Any = spread_beside(layout, *columns)
+    else:
+        whole = beside(*columns) if len(columns) > 1 else columns[0]
     return ModeSet(
         name,
-        side_by_side(families.body, [block.columns for block in blocks]),
+        whole,
         tuple(label for block in blocks for label in block.labels),
         np.concatenate([block.frequencies for block in blocks]),
         {**recorded, **(options or {})},
         tuple(group for block in blocks for group in block.groups),
         data or {},
     )
-
-
-def side_by_side(body: FEBody, columns: Sequence[Array]) -> Array:
-    """Return blocks of columns side by side; distributed if the matrices of the body are."""
-    if body.layout is not None:
-        return spread_beside(body.layout, *columns)  # type: ignore[return-value]
-    return beside(*columns) if len(columns) > 1 else columns[0]
 
 
 # checks common to all mode sets with vibration modes: how many modes are wanted, and whether that is possible ---------

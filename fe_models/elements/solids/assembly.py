@@ -186,7 +186,7 @@ def assembled_data(
     for kind, cells in lists.items():
         element = reference_element(kind, *rules)
         tables = kernel_tables(element)
-        n_a = len(element.nodes)
+        n_a = len(CELL_SHAPES[kind].nodes)
         # 9 + 1 numbers for each pair of nodes
         n_batch = min(len(cells), max(n_parts, int(BATCH_BYTES / (80 * n_a**2))))
         K_e, M_e = np.empty((n_batch, 3 * n_a, 3 * n_a)), np.empty((n_batch, n_a, n_a))
@@ -271,7 +271,7 @@ def kernel_tables(element: ReferenceElement) -> tuple[tuple[np.ndarray, ...], ..
     The tables of affine elements are the reference cell's nodes, (n_nodes, 3), those at e_1, e_2, e_3, (3,), and its
     integrals for pairs b >= a, row by row: ∫ ∂N_a/∂xi_k ∂N_b/∂xi_l in row 3 k + l, (9, n_pairs), and ∫ N_a N_b.
     """
-    stiffness, mass, nodes = element.stiffness, element.mass, element.nodes
+    stiffness, mass, nodes = element.stiffness, element.mass, CELL_SHAPES[element.kind].nodes
     on_axes = np.array([int(np.flatnonzero((nodes == axis).all(axis=1))[0]) for axis in np.eye(3)])
     a, b = np.triu_indices(len(nodes))
     gradients = np.einsum("q,qpk,qpl->klp", stiffness.weights, stiffness.gradients[:, a], stiffness.gradients[:, b])

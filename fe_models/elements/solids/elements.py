@@ -92,11 +92,6 @@ class ReferenceElement:
     stress: ShapeTable  #: shape functions at the sampling points of the stress
     extrapolation: Array  #: from the sampling points to the nodes, (n_nodes, n_points)
 
-    @property
-    def nodes(self) -> Array:
-        """Positions of the nodes in the reference cell, (n_nodes, 3)."""
-        return CELL_SHAPES[self.kind].nodes
-
 
 def quadrature(cell: str, degree: Degree) -> tuple[Array, Array]:
     """Return points (n_points, 3) and weights (n_points,) of a rule on "tet", "hex", "wedge" or "pyramid".
