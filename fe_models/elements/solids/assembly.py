@@ -316,7 +316,7 @@ def require_assemblable(mesh: Mesh) -> list[str]:
         )
     n_nodes = len(mesh.nodes)
     for kind in kinds:
-        cells, expected = mesh.cells[kind], len(CELL_SHAPES[kind].nodes)
+        cells, expected = mesh.cells[kind], reference_element(kind).mass.values.shape[1]
         if cells.ndim != 2 or cells.shape[1] != expected:
             raise MeshError(f"assembly: {kind}: expected (n_cells, {expected}) nodes, got {cells.shape}")
         if cells.min() < 0 or cells.max() >= n_nodes:
