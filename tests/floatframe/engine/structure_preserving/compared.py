@@ -18,9 +18,8 @@ EXACT = 1e-5  #: by which schemes that control their error may differ from the f
 #: what every change runs by IDA, beside all that it refuses; it serves to check the other schemes, and takes a second a
 #: part, so that the rest are long tests
 BY_IDA = (
-    "joint revolute", "joint sliding", "joint prismatic (driven)", "joints that repeat constraints",
-    "stiffened flexible body", "gravity", "spring-damper", "elastic contact", "law of three points",
-    "clearances.hinge", "rails.wheelset",
+    "joint sliding", "joint prismatic (driven)", "joints that repeat constraints", "stiffened flexible body",
+    "elastic contact", "law of three points", "clearances.hinge", "rails.wheelset",
 )  # fmt: skip
 
 
