@@ -25,6 +25,9 @@ SLOWEST = tuple(
         "pipeline/test_line", "floatframe/cli/test_commands", "floatframe/design/laboratory/test_laboratory",
         "floatframe/design/generation/test_generate", "floatframe/files/cosimulation/test_fmu",
         "pipeline/test_split_line", "floatframe/components/clearances/test_clearances",
+        "cms/assessment/rendering/test_render", "floatframe/machines/test_bogie",
+        "floatframe/design/studies/test_study", "floatframe/components/rails/test_wheelset",
+        "floatframe/machines/test_bogie_steady", "floatframe/machines/test_flexible_arm",
     )
 )  # fmt: skip
 

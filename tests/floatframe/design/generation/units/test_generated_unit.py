@@ -102,10 +102,16 @@ def mechanical_energy(case, z, z_dot):
     return energy
 
 
-def test_a_tree_on_a_free_base_keeps_its_energy_and_moves_as_in_the_engine(folder):
-    """With all joints there are, Euler parameters among the states."""
+@pytest.fixture(scope="module")
+def charts(folder):
+    """All joints there are, with gravity as a parameter, and their unit."""
     case = Case(all_charts())
-    made = ff.generate_fmu(case.system, folder / "charts.fmu")
+    return case, ff.generate_fmu(case.system, folder / "charts.fmu", parameters=["gravity"])
+
+
+def test_a_tree_on_a_free_base_keeps_its_energy_and_moves_as_in_the_engine(charts):
+    """With all joints there are, Euler parameters among the states."""
+    case, made = charts
     begin = case.model.positions()[0]
     rates = [each.name for each in made.variables if each.is_state][case.model.n_z :]
     values = states_at_the_end(made, "CoSimulation", start_values=dict(zip(rates, case.z_dot, strict=True)))
@@ -144,9 +150,8 @@ class Instance:
         return np.array(self.unit.getReal([self.place[name] for name in names]))
 
 
-def test_derivatives_are_those_of_the_model_with_parameters_as_set(folder):
-    case = Case(all_charts())
-    made = ff.generate_fmu(case.system, folder / "moved.fmu", parameters=["gravity"])
+def test_derivatives_are_those_of_the_model_with_parameters_as_set(charts):
+    case, made = charts
     one = Instance(made.path)
     states = [each.name for each in made.variables if each.is_state]
     one.set(states, [*case.z, *case.z_dot])
