@@ -162,3 +162,14 @@ def test_lines_of_segments_are_the_amplitudes_of_cosines_up_to_half_the_rate(n, 
     lines = np.setdiff1d(np.arange(n // 2 + 1), [7, 9, n // 2 - 1])  # beside a line, hann has half of it
     for amplitudes in found.amplitudes:
         assert_allclose(amplitudes[lines], expected[lines], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("n_t", "overlap", "starts"), [(64, 0.75, [0]), (79, 0.75, [0]), (80, 0.75, [0, 16]), (200, 0.5, range(0, 137, 32))]
+)
+def test_segments_of_a_waterfall_fill_the_record(n_t, overlap, starts):
+    time = 3.0 + np.arange(n_t) / 128
+    speed = np.arange(n_t, dtype=float)
+    found = frequency_map(Signal("a", time, np.sin(time), ""), speed, n_segment=64, overlap=overlap)
+    assert_allclose(found.times, [3.0 + (k + 31.5) / 128 for k in starts], rtol=1e-12)
+    assert_allclose(found.speeds, [k + 31.5 for k in starts], rtol=1e-12)

@@ -31,6 +31,20 @@ def test_white_noise_on_a_mass_has_the_rms_of_miles(Q):
     assert run.error.max() < 1e-4
 
 
+@pytest.mark.parametrize("units", ["m-kg-s", "mm-kg-ms"])
+def test_estimates_of_miles_are_those_of_each_mode_in_the_band_with_its_share_of_the_mass(units):
+    P, f, zeta = np.array([1.5, -0.4, 0.7, 2.0]), np.array([45.0, 80.0, 300.0, 3000.0]), [0.02, 0.01, 0.03, 0.05]
+    level = Level.of([(20, 0.01), (80, 0.04), (350, 0.04), (2000, 0.007)], "g2/Hz")
+    found = random_runs(masses(f, zeta, P, units), RandomTest("r", level, ("z",)))[0].miles
+    assert [each.mode for each in found] == [1, 2, 3]  # the last lies above the band
+    for k, each in enumerate(found):
+        Q = 1 / (2 * zeta[k])
+        density = level.at(f[k : k + 1])[0]
+        expected = [f[k], Q, density, np.sqrt(np.pi / 2 * f[k] * Q * density), P[k] ** 2 / (P @ P)]
+        own = [each.frequency, each.Q, each.density, each.grms, each.share]
+        assert_allclose(own, expected, rtol=1e-9)
+
+
 def test_densities_and_rms_are_those_of_pyyeti():
     from pyyeti import ode
 
