@@ -91,7 +91,7 @@ def test_growth_beside_the_critical_speed_is_that_of_the_linear_model(share):
         low, high = (low, V) if eigenvalues(p, V).real.max() > 0 else (V, high)
     V *= share
     root = max(eigenvalues(p, V), key=lambda each: (each.real, each.imag))
-    motion = integrate(suspended(p, V, 1e-4), GeneralizedAlpha(0.7, 1e-9), 0.6, 4e-4)
+    motion = integrate(suspended(p, V, 1e-4), GeneralizedAlpha(0.7, 1e-9), 0.6, 8e-4)
     y, t = motion.body("axle").r[:, 1], motion.t
     late = t > 0.15
     basis = np.exp(root.real * t[late])[:, None] * np.column_stack(

@@ -151,9 +151,10 @@ def histories(seed, n_t=400, n_q=4):
     ][seed % 4]
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("name", CRITERIA)
 def test_no_node_exceeds_its_bound(name, seed):
+    """Each kind of history by every criterion."""
     laws = [MeanStress(), MeanStress("goodman", 3000.0), MeanStress("gerber", 3000.0), MeanStress("swt"),
             MeanStress("walker", 0.3), MeanStress("fkm", 0.9), MeanStress("soderberg", 20.0)]  # fmt: skip
     rng = np.random.default_rng(seed)
