@@ -11,9 +11,11 @@ the derivatives of its m branches are the eigenvalues of - (psiᴴ P_lambda phi)
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.linalg as la
+from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array
 from floatframe.analyses.equilibrium import steady_rotation
@@ -66,7 +68,7 @@ class Balance:
         return np.asarray(self.of_rows[:, None] * la.solve(self.scaled.T, self.of_columns[:, None] * right))
 
 
-def balance_of(K: Array, J: Array, G: Array, V: Array, displacements: Array) -> Balance:
+def balance_of(K: NDArray[Any], J: Array, G: NDArray[Any], V: Array, displacements: Array) -> Balance:
     """Return the balance of these matrices; displacements, (n_u,): typical ones, by which K is scaled to one."""
     work = np.abs(K * displacements[:, None] * displacements).max(initial=0.0)
     diagonal = (work if work > 0 else 1.0) / displacements**2
