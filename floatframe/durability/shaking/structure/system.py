@@ -200,7 +200,7 @@ def shaken_system(
         if row.is_relative:
             d[0, :, :6] -= rigid_rows(linear.output_values[chosen], bases[0])[:3]
         if len(bases) == 1 and row.outputs[0].kind in ("displacement", "rotation", "stress"):
-            d[0][np.abs(d[0]) < ROUNDING * max(1.0, float(np.abs(row.weights).max()))] = 0.0
+            d[0][np.abs(d[0]) < ROUNDING * np.abs(row.weights).max()] = 0.0
         E_rows.append(e)
         D_rows.append(d)
     return ShakenModel(
