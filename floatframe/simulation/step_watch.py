@@ -27,6 +27,7 @@ It works for second-order methods, with fixed steps and with an error tolerance:
     of place and b of speed combine to sqrt(a² + b²), since they turn into one another.
 (6) The first step is compared alone, with two half steps of the same damping, where accelerations change much in it.
     A stiff spring with a damper settles before the comparisons of (1), while this step may be wrong by the whole sag.
+    While companions run, so are steps in which a force jumps, and the ones after them, in runs without events.
 
 (7) A run that continues another one in time (`State.watched`) is a piece of one motion, and its errors are relative to
     the motion since that began. If a companion reached the end of the other run, the error of the last state is passed
@@ -207,7 +208,8 @@ class StepWatch:
     is_on: bool = True
     n_before: int = 0  #: number of steps of earlier runs that this one continues
     is_piece: bool = False  #: whether it starts from a state whose errors are unknown
-    first_error: Array | float = 0.0  #: error of position and rotation in the first step, not yet added, (n_b, 2)
+    #: error of position and rotation in the first step, or in one with a jump, not yet added, (n_b, 2)
+    first_error: Array | float = 0.0
     error: Array | None = None  #: error of the state where the run begins, not in `total`; see `error_of`
     n_companion_steps: int = 0  #: number of steps that companions have covered
     companions_done: bool = False  #: whether only windows follow
@@ -305,12 +307,13 @@ class StepWatch:
             if n_done < 2:
                 return 1 if n_done == 0 else FIRST_CHECK - 1
             gone = 0 if self.companion is None else n_done - self.companion.start
-            if not self.is_comparable(n_done):
+            if not self.is_comparable(n_done) or self.follows_jump(n_done):
                 return 1
             if self.is_long:
                 n = min(max(FIRST_CHECK, gone), MOST_BETWEEN_CHECKS)
             else:
                 n = max(FIRST_CHECK, gone // CHECK_INTERVAL // 2 * 2)
+            n = next((k for k in range(1, n) if self.follows_jump(n_done + k)), n)
             n_left = self.n_total - n_done
             return n if n < n_left or self.is_comparable(self.n_total) else max(1, n_left // 2 * 2)
         if self.is_window(n_done):
@@ -332,10 +335,12 @@ class StepWatch:
         """
         last = first + n_steps
         if self.has_companion:
-            if last == 1 and self.may_err_at_once(system, begin, end, h):
-                halves = Companion.begun(self.integrator, begin, self.work_arrays(system), 0, HALVES, events=events)
+            has_jump = self.follows_jump(first) and self.companion is not None and self.companion.events is None
+            if n_steps == 1 and (first == 0 or has_jump) and self.may_err_at_once(system, begin, end, h):
+                work = new_work(compiled_system(system).model) if first else self.work_arrays(system)
+                halves = Companion.begun(self.integrator, begin, work, first, HALVES, events=events)
                 if halves.follow(system, end, last, t0, h, self.jumps):
-                    self.first_error = halves.peak
+                    self.first_error = np.maximum(self.first_error, halves.peak)
                     self.update_size(begin.state, end.state, h)
             if self.companion is None and self.is_long and (begin.h == 0.0 or first < FIRST_CHECK):
                 return None
@@ -349,6 +354,10 @@ class StepWatch:
             self.open_window = [(first, begin), (last, end)]
             return None
         return self.close_window(system, end, last, t0, h)
+
+    def follows_jump(self, n_done: int) -> bool:
+        """Return whether a force jumps in the step after n_done, or in or at the end of the one before."""
+        return n_done in self.jumps or n_done - 1 in self.jumps
 
     def may_err_at_once(self, system: System, begin: Memory, end: Memory, h: float) -> bool:
         """Return whether the first step alone may have an error that counts, from the change of accelerations in it.

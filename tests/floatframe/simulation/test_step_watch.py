@@ -609,6 +609,31 @@ def test_a_first_step_that_is_wrong_counts_where_the_motion_settles_after_it(wei
     assert ("steps" in kinds(motion)) == (not beside)
 
 
+def test_a_step_in_which_a_force_jumps_counts_where_the_motion_settles_after_it():
+    """Exact: a damped mass on a stiff spring, pushed by a force that begins between two comparisons of the watch."""
+    h, n, damping, force, at = 0.05, 25, 0.3, 9.81, 11.0
+    omega = 2 * np.pi * 1.3 / h
+    sag, swing = force / omega**2, omega * np.sqrt(1 - damping**2)
+    body = RigidBody("mass", 1.0, np.eye(3), position=(0.3, 0, 0))
+    rail = PrismaticJoint("rail", GROUND, Marker("mass", position=(-0.3, 0, 0)), axis=(1, 0, 0))
+    spring = JointForce("spring", "rail", "distance", stiffness=omega**2, damping=2 * damping * omega)
+    step = piecewise([0.0, at * h], [constant(0.0), constant(1.0)])
+    push = PointForce("push", Marker("mass", position=np.zeros(3)), force=(force, 0, 0), amplitude=step)
+    motion = integrate(System([body], [rail], [spring, push]), GeneralizedAlpha(0.0), n * h, h)
+
+    def exact(t):
+        t = np.maximum(t - at * h, 0.0)
+        return sag * (
+            1 - np.exp(-damping * omega * t) * (np.cos(swing * t) + damping * omega / swing * np.sin(swing * t))
+        )
+
+    way = exact(np.linspace(0, n * h, 20000)).max()
+    error = np.abs(motion.body("mass").r[:, 0] - 0.3 - exact(motion.t)) / way
+    assert error.max() > 0.05
+    assert error[16:].max() < 0.02
+    assert "steps" in kinds(motion)
+
+
 @pytest.mark.parametrize(("stiffness", "is_repeated"), [(1.0, False), (1e8, True)])
 def test_a_first_step_is_repeated_only_where_accelerations_change_in_it(stiffness, is_repeated, monkeypatch):
     """A falling mass on a soft spring, or on one that a step does not resolve: 10 rad in a step."""
