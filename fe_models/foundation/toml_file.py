@@ -162,11 +162,12 @@ def validated(
     except ValidationError as problem:
         details = problem.errors(include_url=False)
         place = data.place if isinstance(data, FileContent) else lambda location: ""
-        problems = [f"{describe(model, detail)}{place(detail['loc'])}" for detail in details]
-    if len(problems) == 1:
+        problems = [f"{describe(model, detail)}{place(detail['loc'])}" for detail in details[:MOST_PROBLEMS]]
+    n = len(details)
+    if n == 1:
         raise error(f"{path}: {problems[0]}")
-    n = len(problems)
-    problems = [*problems[:MOST_PROBLEMS], *([f"... and {n - MOST_PROBLEMS} more"] if n > MOST_PROBLEMS else [])]
+    if n > MOST_PROBLEMS:
+        problems.append(f"... and {n - MOST_PROBLEMS} more")
     raise error("\n".join([f"{path}: {n} problems:", *(f"  {text}" for text in problems)]))
 
 
