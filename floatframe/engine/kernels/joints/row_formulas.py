@@ -77,6 +77,7 @@ def by_code(name: str, functions: Mapping[int, Callable[..., Any]], arguments: s
         else:
             lines.append(f"    return f_{k}({arguments})")
     names: dict[str, Any] = {f"f_{k}": function for k, function in enumerate(different)}
+    names["__name__"] = __name__  # the module, a part of the symbol: stored code is found by it
     exec("\n".join(lines), names)
     return inner(names[name])
 

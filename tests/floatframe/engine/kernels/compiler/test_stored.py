@@ -11,6 +11,7 @@ from numba.core import types
 from floatframe.engine.kernels.compiler import stored
 from floatframe.engine.kernels.compiler.lean import InnerLibrary, entry, inner, loops
 from floatframe.engine.kernels.compiler.stored import code_key, delete_old
+from floatframe.engine.kernels.joints.row_formulas import by_code
 
 SOURCE = """
 def called(x):
@@ -80,6 +81,17 @@ def test_an_edited_function_and_its_callers_alone_are_compiled(written):
     written.clear()
     assert made(SOURCE.replace("0.5", "0.75"))["run"](3.0) == 3.0 * 2.0 + 0.75 - 1.0 + 3.0
     assert names_of(written) == ["called", "caller"]
+
+
+def test_a_table_of_functions_is_read_from_disk(written):
+    # without a module it was stored under one symbol and looked for under another
+    source = SOURCE.replace("caller(x) + other(x)", "chosen(1, x)").replace(
+        "def run", "chosen = by_code('chosen', {0: other, 1: caller}, 'x')\n\ndef run"
+    )
+    for names in (["called", "caller", "chosen", "other"], []):
+        written.clear()
+        assert made(source, by_code=by_code)["run"](3.0) == 3.0 * 2.0 + 0.5 - 1.0
+        assert names_of(written) == names
 
 
 def test_functions_of_one_name_with_other_values_are_kept_apart(written):
