@@ -7,8 +7,7 @@ from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.connection import row_rates
 from floatframe.engine.kernels.connections.coupler import coupler_power
 from floatframe.engine.kernels.connections.element_law import law_power
-from floatframe.engine.kernels.connections.pair_force import pair_energy, pair_power
-from floatframe.engine.kernels.connections.spring_damper import spring_tension
+from floatframe.engine.kernels.connections.pair_force import is_pair, pair_power
 from floatframe.engine.kernels.connections.user_force import user_force_power
 from floatframe.engine.kernels.joints.coordinate_force import coordinate_force, coordinate_power, coordinate_strain
 from floatframe.engine.kernels.joints.loaded_rows import normal_force
@@ -26,17 +25,7 @@ from floatframe.engine.kernels.memory import (
     SPRINGS,
     STRAIN,
 )
-from floatframe.engine.kernels.model import (
-    BUSHING,
-    CONTACT,
-    COUPLER,
-    DAMPING,
-    ELEMENT,
-    JOINT,
-    SPRING,
-    STIFFNESS,
-    USER_FORCE,
-)
+from floatframe.engine.kernels.model import COUPLER, DAMPING, ELEMENT, JOINT, STIFFNESS, USER_FORCE
 from floatframe.engine.kernels.time_function import time_function
 from floatframe.engine.kernels.vector import add, cross, dot, put, put_sum, scaled, sub, turned, turned_back, vector
 from floatframe.model.joints.rows.kinds import NOTHING, VELOCITY
@@ -85,14 +74,9 @@ def diagnose(model, work, out, drift):
     for c in range(model.connections.size.shape[0]):
         for k in range(N_DRIFTS):
             drift[c, k] = 0.0
-        if model.connections.law[c] == SPRING:
-            i, springs = model.connections.item[c], model.springs
-            _, length, _ = spring_tension(model, work, c)
-            out[SPRINGS] += (
-                0.5 * springs.stiffness[i] * (length - springs.free_length[i]) ** 2 + springs.preload[i] * length
-            )
-        elif model.connections.law[c] == BUSHING or model.connections.law[c] == CONTACT:
-            out[SPRINGS] += pair_energy(model, work, c)
+        if is_pair(model.connections.law[c]):
+            energy, _, _ = pair_power(model, work, c)
+            out[SPRINGS] += energy
         elif model.connections.law[c] == ELEMENT:
             energy, _, _ = law_power(model, work, c)
             out[SPRINGS] += energy
@@ -190,8 +174,8 @@ def power(model, work):
                 given, taken, total = loaded_power(model, work, c)
                 loads += given - (total if driven != 0.0 else 0.0)
                 dissipated += taken
-        elif law == BUSHING or law == CONTACT:
-            given, taken = pair_power(model, work, c)
+        elif is_pair(law):
+            _, given, taken = pair_power(model, work, c)
             loads += given
             dissipated += taken
         elif law == COUPLER:
@@ -202,13 +186,6 @@ def power(model, work):
             _, given, taken = law_power(model, work, c)
             loads += given
             dissipated += taken
-        elif law == SPRING:
-            i, springs = model.connections.item[c], model.springs
-            _, length, rate = spring_tension(model, work, c)
-            dissipated += springs.damping[i] * rate * rate
-            if springs.table[i] >= 0:
-                value, _, _ = time_function(model.functions, springs.table[i], length - springs.free_length[i])
-                loads -= value * rate
     for d in range(model.body_loads.body.shape[0]):
         loads += body_load_power(model, work, d)
     for i in range(model.bodies.kind.shape[0]):

@@ -41,6 +41,7 @@ __all__ = [
     "PairWork",
     "Past",
     "Solver",
+    "SpringWork",
     "StateWork",
     "TapeWork",
     "UserWork",
@@ -144,11 +145,31 @@ class ConnectionWork(NamedTuple):
 
 
 class PairWork(NamedTuple):
-    """One bushing or contact, see kernels/connections/pair_force.py."""
+    """One spring, bushing or contact, see kernels/connections/pair_force.py; ground axes."""
 
-    law: Array = real(10, unit="N, N m, m/s")  #: F and M on A, N, and v_0 of a contact, from the motion
-    motion: Array = real(18)  #: variation of d, phi_A, phi_B, and of their rates
-    change: Array = real(10)  #: of `law` by it
+    d: Array = real(3, unit="m")  #: r_B - r_A
+    A: Array = real(3, 3)  #: axes of A
+    B: Array = real(3, 3)  #: axes of B
+    v: Array = real(3, unit="m/s")  #: velocity of B seen from A
+    omega: Array = real(3, unit="rad/s")  #: of B less that of A
+    F: Array = real(3, unit="N")  #: on A
+    N: Array = real(3, unit="N m")  #: -N on B
+    v_0: Array = real(unit="m/s")  #: speed of approach of a contact
+    motion: Array = real(12)  #: variation of d, of the rotation of B, of v and omega, seen from A
+    F_change: Array = real(3)  #: changes by it, seen from A
+    N_change: Array = real(3)
+    v_0_change: Array = real()
+    slopes: Array = real(10, 12)  #: of F, nothing, N and v_0 by unit variations
+
+
+class SpringWork(NamedTuple):
+    """One spring, see kernels/connections/spring_damper.py."""
+
+    length: Array = real(unit="m")
+    rate: Array = real(unit="m/s")
+    tension_by_length: Array = real(unit="N/m")
+    stiffness: Array = real(unit="N/m")  #: with the slope of the table
+    given: Array = real(unit="W")  #: power that enters by the table
 
 
 class BushingWork(NamedTuple):
@@ -159,10 +180,9 @@ class BushingWork(NamedTuple):
     xi_dot: Array = real(6, unit="m/s, rad/s")
     force: Array = real(6, unit="N, N m")  #: f, m
     slope: Array = real(6, unit="N/m, N m")  #: of the tables
-    v: Array = real(3, unit="m/s")  #: d_dot
+    v: Array = real(3, unit="m/s")  #: of B seen from A
     omega: Array = real(3, unit="rad/s")  #: of B less that of A
-    mean: Array = real(3, unit="rad/s")  #: rotations of A and B, by their shares in the axes
-    gamma: Array = real(3, unit="rad/s")  #: angular velocity of C
+    gamma: Array = real(3, unit="rad/s")  #: angular velocity of C seen from A
     p: Array = real(3, unit="N m")  #: f × e
     alpha: Array = real()
     beta: Array = real()
@@ -180,7 +200,6 @@ class ContactWork(NamedTuple):
     """One contact, see kernels/connections/contact.py."""
 
     N: Array = real(3)
-    d: Array = real(3, unit="m")
     rho: Array = real(3, unit="m")
     V: Array = real(3, unit="m/s")  #: velocity of B at the point of contact relative to A
     V_t: Array = real(3, unit="m/s")  #: slip
@@ -299,6 +318,7 @@ class Work(NamedTuple):
     lines: LineWork = LineWork()
     connections: ConnectionWork = ConnectionWork()
     pair: PairWork = PairWork()
+    spring: SpringWork = SpringWork()
     bushing: BushingWork = BushingWork()
     contact: ContactWork = ContactWork()
     gaps: GapWork = GapWork()

@@ -6,22 +6,22 @@ same in A, B and C,
 
     e = Cᵀ d,  xi = (e, theta),  (f, m) = dV/dxi + D xi_dot,  V = 1/2 xiᵀ K xi + preload · xi + tables of each xi_i
 
-Variations in the axes of C, a and b the rotations of A and B, u = b - a, t = |theta|:
+Variations seen from A in the axes of C, u the rotation of B, t = |theta|:
 
     dtheta = S u,   S = alpha 1 + beta theta thetaᵀ + sigma tilde(theta),   beta = (1 - alpha)/t²
         axes of A, B: alpha = (t/2) cot(t/2), sigma = -1/2, 1/2;   half way: alpha = (t/2)/sin(t/2), sigma = 0
-    dc = (1 - share) a + share b - tau theta × u              the rotation of C
+    dc = share u - tau theta × u                              the rotation of C
         axes of A, B: tau = 0;   half way: tau = tan(t/4)/(2 t)
     de = Cᵀ dd + e × dc
 
-so that by virtual work, with p = f × e,  F = C f is the force on A (on B the opposite), and the moments are
+so that by virtual work, with p = f × e,  F = C f is the force on A (on B the opposite), and the moment on B is
 
-    on A:  M = C (q - (1 - share) p)        on B:  -N = -C (q + share p)        q = tau theta × p + Sᵀ m
+    -N = -C (q + share p),      q = tau theta × p + Sᵀ m
 
 In axes of A or B turns are counted: of all rotation vectors of A_Aᵀ A_B, theta + 2 pi n theta/t, the one is taken that
 is nearest to where the rates of the last step lead (`kernels/turns.py`). Half way t < pi.
 
-`bushing_variation` gives the exact change of F, M and N; rates follow the same formulas with velocities for variations.
+`bushing_variation` gives the exact change of F and N; rates follow the same formulas with velocities for variations.
 
 Described in `floatframe.model.forces.bushing`.
 """
@@ -48,7 +48,7 @@ from floatframe.engine.kernels.vector import (
     vector,
 )
 
-__all__ = ["bushing_energy", "bushing_power", "bushing_state", "bushing_variation", "continued", "rotation_vector"]
+__all__ = ["bushing_power", "bushing_state", "bushing_variation", "continued", "rotation_vector"]
 
 SERIES_BELOW = 0.01  # t² at the switch
 # value of t below which the direction of the rotation vector is only rounding, compared with full turns
@@ -172,24 +172,20 @@ def law(row, x):
 
 @inner
 def bushing_state(model, work, c):
-    """Write the deformations of bushing c into work.bushing, and F, M and N into work.pair."""
-    a, b, i, markers = model.connections.a[c], model.connections.b[c], model.connections.item[c], work.markers
-    s, K, D = work.bushing, model.bushings.stiffness[i], model.bushings.damping[i]
+    """Write the deformations of bushing c into work.bushing, and F and N into work.pair."""
+    i, pair, s = model.connections.item[c], work.pair, work.bushing
+    K, D, A, B = model.bushings.stiffness[i], model.bushings.damping[i], pair.A, pair.B
     share, angle = model.bushings.share[i], model.bushings.angle[i]
-    theta = rotation_vector(markers.A[a], markers.A[b])
+    theta = rotation_vector(A, B)
     if angle >= 0:
         theta = continued(theta, vector(work.state.angle[angle:]))
-    C = axes_of(markers.A[a], markers.A[b], theta, share)
+    C = axes_of(A, B, theta, share)
     s.alpha, s.beta, s.alpha_1, s.beta_1, s.tau, s.tau_1 = scalars(dot(theta, theta), share)
     s.sigma = share - 0.5
-    omega_a, omega_b = vector(markers.omega[a]), vector(markers.omega[b])
-    e = turned_back(C, sub(markers.r[b], markers.r[a]))
+    e, v, omega = turned_back(C, pair.d), turned_back(C, pair.v), turned_back(C, pair.omega)
     put(s.xi, 0, e)
     put(s.xi, 3, theta)
-    v = turned_back(C, sub(markers.v[b], markers.v[a]))
-    omega = turned_back(C, sub(omega_b, omega_a))
-    mean = turned_back(C, add(scaled(1.0 - share, omega_a), scaled(share, omega_b)))
-    gamma = sub(mean, scaled(s.tau, cross(theta, omega)))
+    gamma = sub(scaled(share, omega), scaled(s.tau, cross(theta, omega)))
     put(s.xi_dot, 0, add(v, cross(e, gamma)))
     put(s.xi_dot, 3, by_S(s, omega, s.sigma))
     for r in range(6):
@@ -205,34 +201,28 @@ def bushing_state(model, work, c):
     put_matrix(s.C, C)
     put(s.v, 0, v)
     put(s.omega, 0, omega)
-    put(s.mean, 0, mean)
     put(s.gamma, 0, gamma)
     put(s.p, 0, p)
-    put(work.pair.law, 0, turned(C, f))
-    put(work.pair.law, 3, turned(C, sub(turning, scaled(1.0 - share, p))))
-    put(work.pair.law, 6, turned(C, add(turning, scaled(share, p))))
+    put(pair.F, 0, turned(C, f))
+    put(pair.N, 0, turned(C, add(turning, scaled(share, p))))
 
 
 @inner
 def bushing_variation(model, work, c):
-    """Write the change of F, M, N for the variation of the motion in work.pair, ground axes."""
+    """Write the change of F and N, seen from A, for the variation of the motion in work.pair."""
     s, pair, i = work.bushing, work.pair, model.connections.item[c]
-    K, D, C = model.bushings.stiffness[i], model.bushings.damping[i], matrix(s.C)
+    K, D, C, share = model.bushings.stiffness[i], model.bushings.damping[i], matrix(s.C), model.bushings.share[i]
     e, theta, omega, gamma = vector(s.xi), vector(s.xi[3:]), vector(s.omega), vector(s.gamma)
-    a, b = turned_back(C, pair.motion[3:6]), turned_back(C, pair.motion[6:9])
-    u = sub(b, a)
-    share = model.bushings.share[i]
-    dc = sub(add(scaled(1.0 - share, a), scaled(share, b)), scaled(s.tau, cross(theta, u)))
+    u = turned_back(C, pair.motion[3:6])
+    dc = sub(scaled(share, u), scaled(s.tau, cross(theta, u)))
     dtheta = by_S(s, u, s.sigma)
     k = dot(theta, dtheta)
     de = add(turned_back(C, pair.motion[:3]), cross(e, dc))
     # rates
-    domega_a, domega_b = turned_back(C, pair.motion[12:15]), turned_back(C, pair.motion[15:18])
-    dv = add(turned_back(C, pair.motion[9:12]), cross(s.v, dc))
-    domega = add(sub(domega_b, domega_a), cross(omega, dc))
-    dmean = add(add(scaled(1.0 - share, domega_a), scaled(share, domega_b)), cross(s.mean, dc))
+    dv = add(turned_back(C, pair.motion[6:9]), cross(s.v, dc))
+    domega = add(turned_back(C, pair.motion[9:12]), cross(omega, dc))
     by_turn = add(scaled(s.tau_1 * k, cross(theta, omega)), scaled(s.tau, cross(dtheta, omega)))
-    dgamma = sub(dmean, add(by_turn, scaled(s.tau, cross(theta, domega))))
+    dgamma = sub(scaled(share, domega), add(by_turn, scaled(s.tau, cross(theta, domega))))
     put(s.dxi, 0, de)
     put(s.dxi, 3, dtheta)
     put(s.dxi_dot, 0, add(dv, add(cross(de, gamma), cross(e, dgamma))))
@@ -246,31 +236,19 @@ def bushing_variation(model, work, c):
     by_force = add(scaled(s.tau, cross(theta, dp)), by_S(s, dm, -s.sigma))
     turning = add(add(by_turn, by_force), by_dS(s, k, dtheta, m, -s.sigma))
     turn = turned(C, dc)
-    put(pair.change, 0, add(turned(C, df), cross(turn, pair.law)))
-    put(pair.change, 3, add(turned(C, sub(turning, scaled(1.0 - share, dp))), cross(turn, pair.law[3:])))
-    put(pair.change, 6, add(turned(C, add(turning, scaled(share, dp))), cross(turn, pair.law[6:])))
-
-
-@inner
-def bushing_energy(model, work, c):
-    """Return 1/2 xiᵀ K xi + preload · xi; tables count as forces, see `bushing_power`."""
-    s, i = work.bushing, model.connections.item[c]
-    bushing_state(model, work, c)
-    total = 0.0
-    for r in range(6):
-        total += s.xi[r] * (0.5 * law(model.bushings.stiffness[i, r], s.xi) + model.bushings.preload[i, r])
-    return total
+    put(pair.F_change, 0, add(turned(C, df), cross(turn, pair.F)))
+    put(pair.N_change, 0, add(turned(C, add(turning, scaled(share, dp))), cross(turn, pair.N)))
 
 
 @inner
 def bushing_power(model, work, c):
-    """Return the power that enters by tables, and the power dissipated by damping."""
-    s, i = work.bushing, model.connections.item[c]
-    bushing_state(model, work, c)
-    given, taken = 0.0, 0.0
+    """Return 1/2 xiᵀ K xi + preload · xi, the power that enters by tables, and the power dissipated by damping."""
+    s, own, i = work.bushing, model.bushings, model.connections.item[c]
+    stored, given, taken = 0.0, 0.0, 0.0
     for r in range(6):
-        taken += s.xi_dot[r] * law(model.bushings.damping[i, r], s.xi_dot)
-        if model.bushings.table[i, r] >= 0:
-            value, _, _ = time_function(model.functions, model.bushings.table[i, r], s.xi[r])
+        stored += s.xi[r] * (0.5 * law(own.stiffness[i, r], s.xi) + own.preload[i, r])
+        taken += s.xi_dot[r] * law(own.damping[i, r], s.xi_dot)
+        if own.table[i, r] >= 0:
+            value, _, _ = time_function(model.functions, own.table[i, r], s.xi[r])
             given -= value * s.xi_dot[r]
-    return given, taken
+    return stored, given, taken

@@ -15,7 +15,6 @@ from floatframe.engine.kernels.connections.coupler import (
 )
 from floatframe.engine.kernels.connections.element_law import law_derivatives, law_rates, law_rows
 from floatframe.engine.kernels.connections.pair_force import pair_derivatives, pair_rows
-from floatframe.engine.kernels.connections.spring_damper import spring_derivatives, spring_rows
 from floatframe.engine.kernels.connections.user_force import user_force_derivatives, user_force_rows
 from floatframe.engine.kernels.joints.relative_motion import direction, distance, put_pair, relative_velocity
 from floatframe.engine.kernels.joints.row_formulas import (
@@ -26,7 +25,7 @@ from floatframe.engine.kernels.joints.row_formulas import (
     wrench_value,
 )
 from floatframe.engine.kernels.marker import marker_acceleration_bias
-from floatframe.engine.kernels.model import BUSHING, CONTACT, COUPLER, ELEMENT, JOINT, SPRING, USER_FORCE
+from floatframe.engine.kernels.model import COUPLER, ELEMENT, JOINT, USER_FORCE
 from floatframe.engine.kernels.vector import cross, dot, put, put_sum, scaled, sub, vector
 from floatframe.model.joints.rows.kinds import DOT, NOTHING, POINT, POSITION, VELOCITY
 
@@ -60,10 +59,8 @@ def connection_rows(model, work, c, c_k):
         put_sum(wrench[a], 3, vector(w[model.markers.moment[a] :]))
     if model.markers.moment[b] >= 0:
         put_sum(wrench[b], 3, scaled(-1.0, vector(w[model.markers.moment[b] :])))
-    if law == BUSHING or law == CONTACT:
+    if law != JOINT:
         pair_rows(model, work, c, c_k)
-    elif law == SPRING:
-        spring_rows(model, work, c, c_k)
     else:
         d = distance(work.markers, a, b)
         for k in range(w0, w0 + size):
@@ -111,10 +108,8 @@ def connection_derivatives(model, work, c, c_k):
             P_b[r, j] = 0.0
         for j in range(size):
             V[r, j] = 0.0
-    if law == BUSHING or law == CONTACT:
+    if law != JOINT:
         pair_derivatives(model, work, c, c_k)
-    elif law == SPRING:
-        spring_derivatives(model, work, c, c_k)
     else:
         w = work.state.w[w0 : w0 + size]
         for r in range(size):

@@ -6,7 +6,7 @@ N: unit normal from A to B, of the plane (fixed in A) or along d = r_B - r_A; de
     f   = k xⁿ max(0, 1 + (h/v_0) x_dot)  for x > 0            v_0 speed of approach at the beginning of the contact
     F_B = f N - mu f V_t/sqrt(|V_t|² + v_s²)                   V_t slip at the point rho = -R_B N from the centre of B
 
-and on the markers F = -F_B, M = (d + rho) × F on A, -N_w = -rho × F on B. v_0 is an unknown of its own: while there is
+and on the markers F = -F_B on A, -N_w = -rho × F on B. v_0 is an unknown of its own: while there is
 no contact minus the speed of approach (at least the slow one), in contact the value from the beginning of the step.
 
 Described in `floatframe.model.forces.sphere_contact`.
@@ -17,7 +17,7 @@ import math
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.vector import add, cross, dot, norm, put, scaled, sub, turned, vector
 
-__all__ = ["contact_energy", "contact_gap", "contact_power", "contact_state", "contact_variation"]
+__all__ = ["V_0", "contact_gap", "contact_power", "contact_state", "contact_variation"]
 
 V_0 = 9  # index of the approach speed among the unknowns, after F, M, N
 
@@ -34,33 +34,28 @@ def contact_gap(model, r, A, c):
 
 @inner
 def contact_state(model, work, c):
-    """Write the contact quantities of contact c into work.contact, and F, M, N and v_0 into work.pair."""
-    a, b, i, markers = model.connections.a[c], model.connections.b[c], model.connections.item[c], work.markers
-    s, own, w0 = work.contact, model.contacts, model.connections.w0[c]
-    omega_a, omega_b = vector(markers.omega[a]), vector(markers.omega[b])
-    d, d_dot = sub(markers.r[b], markers.r[a]), sub(markers.v[b], markers.v[a])
+    """Write the contact quantities of contact c into work.contact, and F, N and v_0 into work.pair."""
+    i, own, s, pair = model.connections.item[c], model.contacts, work.contact, work.pair
+    d, v = vector(pair.d), vector(pair.v)
     if own.is_sphere[i]:
         N = scaled(1 / norm(d), d)
         s.gap = norm(d) - own.radius_b[i] - own.radius_a[i]
-        s.rate = dot(N, d_dot)
     else:
-        N = turned(markers.A[a], model.rows.x[w0])
+        N = turned(pair.A, model.rows.x[model.connections.w0[c]])
         s.gap = dot(N, d) - own.radius_b[i]
-        s.rate = dot(N, sub(d_dot, cross(omega_a, d)))
+    s.rate = dot(N, v)
     rho = scaled(-own.radius_b[i], N)
-    V = sub(add(d_dot, cross(omega_b, rho)), cross(omega_a, add(d, rho)))
+    V = add(v, cross(pair.omega, rho))
     V_t = sub(V, scaled(dot(N, V), N))
     normal_force(model, work, c)
     s.slip = math.sqrt(dot(V_t, V_t) + own.slip_speed[i] ** 2)
     F = sub(scaled(own.friction[i] * s.f / s.slip, V_t), scaled(s.f, N))
     put(s.N, 0, N)
-    put(s.d, 0, d)
     put(s.rho, 0, rho)
     put(s.V, 0, V)
     put(s.V_t, 0, V_t)
-    put(work.pair.law, 0, F)
-    put(work.pair.law, 3, cross(add(d, rho), F))
-    put(work.pair.law, 6, cross(rho, F))
+    put(pair.F, 0, F)
+    put(pair.N, 0, cross(rho, F))
 
 
 @inner
@@ -70,11 +65,11 @@ def normal_force(model, work, c):
     start, slow = work.state.w_start[model.connections.w0[c] + V_0], own.slow[i]
     s.depth, s.f, s.f_by_depth, s.f_by_rate, s.v_0_by_rate = max(-s.gap, 0.0), 0.0, 0.0, 0.0, 0.0
     if s.gap >= 0.0:
-        work.pair.law[V_0] = min(s.rate, -slow)
+        work.pair.v_0 = min(s.rate, -slow)
         s.v_0_by_rate = 1.0 if s.rate < -slow else 0.0
         return
     v_0 = start if start > 0.0 else max(-start, slow)
-    work.pair.law[V_0] = v_0
+    work.pair.v_0 = v_0
     n, h = own.exponent[i], own.dissipation[i] / v_0
     spring, factor = own.stiffness[i] * s.depth**n, 1.0 - h * s.rate
     if factor > 0.0:
@@ -85,26 +80,17 @@ def normal_force(model, work, c):
 
 @inner
 def contact_variation(model, work, c):
-    """Write the change of F, M, N and v_0 for the variation of the motion in work.pair, ground axes."""
-    a, b, i, markers = model.connections.a[c], model.connections.b[c], model.connections.item[c], work.markers
-    s, own, pair = work.contact, model.contacts, work.pair
-    omega_a, omega_b, d_dot = vector(markers.omega[a]), vector(markers.omega[b]), sub(markers.v[b], markers.v[a])
-    N, d, rho, V, V_t, F = vector(s.N), vector(s.d), vector(s.rho), vector(s.V), vector(s.V_t), vector(pair.law)
-    dd, dphi_a, dd_dot = vector(pair.motion), vector(pair.motion[3:]), vector(pair.motion[9:])
-    domega_a, domega_b = vector(pair.motion[12:]), vector(pair.motion[15:])
+    """Write the change of F, N and v_0, seen from A, for the variation of the motion in work.pair."""
+    i, own, s, pair = model.connections.item[c], model.contacts, work.contact, work.pair
+    N, rho, V, V_t, F = vector(s.N), vector(s.rho), vector(s.V), vector(s.V_t), vector(pair.F)
+    dd, dv, dN = vector(pair.motion), vector(pair.motion[6:]), (0.0, 0.0, 0.0)
+    gap = dot(N, dd)
     if own.is_sphere[i]:
-        gap = dot(N, dd)
-        dN = scaled(1 / dot(N, d), sub(dd, scaled(gap, N)))
-        rate = dot(dN, d_dot) + dot(N, dd_dot)
-    else:
-        dN = cross(dphi_a, N)
-        gap = dot(dN, d) + dot(N, dd)
-        rate = dot(dN, sub(d_dot, cross(omega_a, d)))
-        rate += dot(N, sub(dd_dot, add(cross(omega_a, dd), cross(domega_a, d))))
-    # V = d_dot + omega_B × rho - omega_A × (d + rho), V_t = V - N (N·V)
+        dN = scaled(1 / norm(pair.d), sub(dd, scaled(gap, N)))
+    rate = dot(dN, pair.v) + dot(N, dv)
+    # V = v + omega × rho, V_t = V - N (N·V)
     drho = scaled(-own.radius_b[i], dN)
-    of_a = add(cross(domega_a, add(d, rho)), cross(omega_a, add(dd, drho)))
-    dV = sub(add(dd_dot, add(cross(domega_b, rho), cross(omega_b, drho))), of_a)
+    dV = add(dv, add(cross(pair.motion[9:], rho), cross(pair.omega, drho)))
     change = dot(dN, V) + dot(N, dV)
     dV_t = sub(dV, add(scaled(change, N), scaled(dot(N, V), dN)))
     # F = mu f V_t / slip - f N
@@ -112,24 +98,15 @@ def contact_variation(model, work, c):
     rub, slowed = own.friction[i] / s.slip, dot(V_t, dV_t) / s.slip**2
     friction = add(scaled(rub * (df - s.f * slowed), V_t), scaled(rub * s.f, dV_t))
     dF = sub(friction, add(scaled(df, N), scaled(s.f, dN)))
-    put(pair.change, 0, dF)
-    put(pair.change, 3, add(cross(add(dd, drho), F), cross(add(d, rho), dF)))
-    put(pair.change, 6, add(cross(drho, F), cross(rho, dF)))
-    pair.change[V_0] = s.v_0_by_rate * rate
-
-
-@inner
-def contact_energy(model, work, c):
-    """Return k x^(n + 1)/(n + 1)."""
-    own, i = model.contacts, model.connections.item[c]
-    contact_state(model, work, c)
-    return own.stiffness[i] * work.contact.depth ** (own.exponent[i] + 1.0) / (own.exponent[i] + 1.0)
+    put(pair.F_change, 0, dF)
+    put(pair.N_change, 0, add(cross(drho, F), cross(rho, dF)))
+    pair.v_0_change = s.v_0_by_rate * rate
 
 
 @inner
 def contact_power(model, work, c):
-    """Return the power dissipated by restitution and friction."""
+    """Return k x^(n + 1)/(n + 1), the power that enters, zero, and the power dissipated by restitution and friction."""
     s, own, i = work.contact, model.contacts, model.connections.item[c]
-    contact_state(model, work, c)
     spring = own.stiffness[i] * s.depth ** own.exponent[i]
-    return -(s.f - spring) * s.rate + own.friction[i] * s.f * dot(s.V_t, s.V_t) / s.slip
+    lost = -(s.f - spring) * s.rate + own.friction[i] * s.f * dot(s.V_t, s.V_t) / s.slip
+    return spring * s.depth / (own.exponent[i] + 1.0), 0.0, lost
