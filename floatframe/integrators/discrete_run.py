@@ -4,12 +4,11 @@ import numpy as np
 
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.initial_conditions.initial import (
-    consistent_motion,
     solve_accelerations,
     with_compatible_velocities,
 )
 from floatframe.engine.kernels.entry import Outcome
-from floatframe.engine.kernels.memory import Memory, Rows, memory_at
+from floatframe.engine.kernels.memory import Memory, Rows
 from floatframe.engine.kernels.work import Work
 from floatframe.engine.structure_preserving.compiled import kept_of
 from floatframe.engine.structure_preserving.system import discrete_system
@@ -17,12 +16,10 @@ from floatframe.errors import ModelError
 from floatframe.integrators.integrator import (
     LEAST_STEP,
     Failure,
+    Integrator,
+    failure_of_element,
     has_divided_steps,
     observed,
-    one_step_of,
-    started_anew,
-    with_angles,
-    words_of_contact,
 )
 from floatframe.model.state import State
 from floatframe.model.system import System
@@ -30,7 +27,7 @@ from floatframe.model.system import System
 __all__ = ["DiscreteScheme", "check_options"]
 
 
-class DiscreteScheme:
+class DiscreteScheme(Integrator):
     """A scheme that steps from bodies to bodies."""
 
     tolerance: float
@@ -51,21 +48,10 @@ class DiscreteScheme:
 
         `a` holds the multipliers: of joints zero, of equations of elements those that fulfil them there.
         """
-        known, angle = (None, None) if before is None else (before.w, before.angle)
-        consistent = consistent_motion(system, state, t=t, known=known, angle=angle)
+        memory = super().start(system, t, state, before)
         held = discrete_system(system, type(self).__name__).held
         is_of_law = np.isin(held, compiled_system(system).model.laws.equation)
-        f = np.where(is_of_law, consistent.w[held], 0.0)
-        memory = memory_at(consistent.state, consistent.u_dot, consistent.w, f)
-        return with_angles(system, t, memory, before, state)
-
-    def after_jump(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
-        """Return the memory after a jump of forces at t, and the results there."""
-        return started_anew(self, system, t, memory, work)
-
-    def step(self, system: System, t: float, h: float, memory: Memory) -> Memory:
-        """Return the memory one step of size h later; `ConvergenceError` if it fails."""
-        return one_step_of(self, system, t, h, memory)
+        return memory.changed(a=np.where(is_of_law, memory.w[held], 0.0))
 
     def observe(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
         """Return the results at a state, with accelerations and reactions of the equations of motion."""
@@ -83,7 +69,7 @@ class DiscreteScheme:
         self, system: System, memory: Memory, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
     ) -> tuple[Memory, Rows, int, Failure | None]:
         """Advance by n_steps of size h, the first of them number `first` from t0; see `Integrator`."""
-        from floatframe.engine.structure_preserving.kernels.newton import NO_ACCELERATION
+        from floatframe.engine.kernels.generalized_alpha import NO_ACCELERATION
         from floatframe.engine.structure_preserving.kernels.steps import discrete_kernels
 
         compiled = compiled_system(system)
@@ -94,7 +80,7 @@ class DiscreteScheme:
         step = kept.step
         kept.go_on_from(memory, memory.a, is_anew=bool(work.solver.c_k == 0.0))
         work.solver.c_k[...] = 1.0
-        after = memory.copied()
+        after = memory.changed(h_next=min(float(memory.h_next) or h, h)).copied()
         rows, outcome = discrete_kernels.advance(
             model, work, kept.discrete, step, memory=after, t0=t0, h=h, first=first, n_steps=n_steps, every=every,
             tolerance=self.tolerance, max_iterations=self.max_iterations, length=ds.length, h_min=least,
@@ -105,7 +91,7 @@ class DiscreteScheme:
             work.past.n[...] = 0
             again = self.advance(system, memory, work, t0=t0, h=h, first=first, n_steps=outcome.n_steps, every=every)
             return *again[:3], failure
-        kept.after = after = after.changed(a=step.f_kept, h=h, power=memory.power)
+        kept.after = after = after.changed(power=memory.power)
         return after, rows, outcome.n_steps, explained(compiled, work, outcome, self.max_iterations, least)
 
 
@@ -113,27 +99,12 @@ def explained(
     compiled: CompiledSystem, work: Work, outcome: Outcome, max_iterations: int, least: float
 ) -> Failure | None:
     """Return the reason of a failed step; None if none failed."""
-    from floatframe.engine.structure_preserving.kernels.newton import (
-        CONVERGED,
-        NO_ACCELERATION,
-        SINGULAR,
-        STOPPED,
-        UNRESOLVED,
-    )
+    from floatframe.engine.kernels.generalized_alpha import DONE, NO_ACCELERATION, SINGULAR
 
-    if outcome.status == CONVERGED:
+    if outcome.status == DONE:
         return None
-    if outcome.status == STOPPED:
-        return Failure(compiled.stop_words[int(work.counted.stopped) - 1], outcome.excess)
-    if outcome.status == UNRESOLVED:
-        return Failure(words_of_contact(compiled, work, least, "h"), outcome.excess)
-    if int(work.counted.no_number):
-        name = compiled.connection_names[int(work.counted.no_number) - 1]
-        words = (
-            f"element {name!r} is not finite (NaN or infinity) for a finite motion; check its law, or "
-            "choose a smaller h if it is only known near the motion"
-        )
-        return Failure(words, outcome.excess)
+    if failure := failure_of_element(compiled, work, outcome, least, "h"):
+        return failure
     words = f"Newton's method did not converge in {max_iterations} iterations"
     if outcome.status == NO_ACCELERATION:
         words = "where it ends, constraints depend on each other or a force has no direction: no accelerations"

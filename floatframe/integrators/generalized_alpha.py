@@ -14,7 +14,6 @@ from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.initial_conditions.constraint_words import open_joints
 from floatframe.engine.initial_conditions.initial import (
     ConsistentState,
-    consistent_motion,
     solve_accelerations,
     work_from,
 )
@@ -28,22 +27,20 @@ from floatframe.engine.initial_conditions.step_filter import (
     spin_of,
     step_filter,
 )
-from floatframe.engine.kernels.memory import Memory, Rows, memory_at
+from floatframe.engine.kernels.entry import Outcome
+from floatframe.engine.kernels.memory import Memory, Rows
 from floatframe.engine.kernels.model import COUPLER, JOINT, MASS, Model
 from floatframe.engine.kernels.work import Work
 from floatframe.errors import ModelError
 from floatframe.integrators.integrator import (
     LEAST_STEP,
     Failure,
+    Integrator,
+    failure_of_element,
     has_divided_steps,
-    observed,
-    one_step_of,
     started_anew,
-    with_angles,
-    words_of_contact,
 )
 from floatframe.model.joints.rows import is_held_position
-from floatframe.model.state import State
 from floatframe.model.system import System
 
 __all__ = ["GeneralizedAlpha", "hht", "newmark", "trapezoidal"]
@@ -52,7 +49,7 @@ LONGER = 1 + 1e-6  #: ratio below which two step sizes count as equal
 
 
 @dataclass(frozen=True)
-class GeneralizedAlpha:
+class GeneralizedAlpha(Integrator):
     """Generalized-alpha for index-3 equations of motion on a Lie group [1]_ [2]_, second order.
 
     (1) predict: a_new = a
@@ -146,12 +143,6 @@ class GeneralizedAlpha:
         gamma = 0.5 + alpha_f - alpha_m
         return alpha_m, alpha_f, 0.25 * (gamma + 0.5) ** 2, gamma
 
-    def start(self, system: System, t: float, state: State | None = None, before: Memory | None = None) -> Memory:
-        """Return the memory at the beginning: the consistent state and its accelerations."""
-        known, angle = (None, None) if before is None else (before.w, before.angle)
-        consistent = consistent_motion(system, state, t=t, known=known, angle=angle)
-        return with_angles(system, t, memory_at(consistent.state, consistent.u_dot, consistent.w), before, state)
-
     def after_jump(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
         """Return the memory after a jump of forces at t, and the results there.
 
@@ -178,20 +169,6 @@ class GeneralizedAlpha:
         z = self.filter_at(compiled, after, float(memory.h), t, full=True, spin=spin, work=work)
         assert z is not None
         return after, z.twice(u_dot - memory.u_dot)
-
-    def step(self, system: System, t: float, h: float, memory: Memory) -> Memory:
-        """Return the memory one step of size h later.
-
-        Raises
-        ------
-        ConvergenceError
-            If Newton's method fails.
-        """
-        return one_step_of(self, system, t, h, memory)
-
-    def observe(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
-        """Return the memory with the power at its state, and the results there."""
-        return observed(system, t, memory, work)
 
     def advance(
         self, system: System, memory: Memory, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
@@ -300,29 +277,21 @@ class GeneralizedAlpha:
             state = replace(state, u=state.u + closing_velocities(z, after, memory.w, t, h, rows))
         return memory.changed(state=state, u_dot=u_dot, a=a, h=h, h_next=h)
 
-    def explain(self, system: System, work: Work, outcome: tuple, u: Array, h: float) -> Failure:
+    def explain(self, system: System, work: Work, outcome: Outcome, u: Array, h: float) -> Failure:
         """Return the reason of a failed step of size h that began with velocities u, (n_u,)."""
         from floatframe.engine.kernels.generalized_alpha import (
             INACCURATE,
             SINGULAR_BODY,
             SINGULAR_CONNECTION,
-            STOPPED,
             TURNED,
-            UNRESOLVED,
         )
 
         compiled = compiled_system(system)
         least = self.least_step(h, compiled)
         fast_turn = words_of_fast_turn(compiled, u, least or h)
         status, _, _, index, excess = outcome
-        no_number = int(work.counted.no_number)
-        if no_number:
-            name = compiled.connection_names[no_number - 1]
-            words = (
-                f"element {name!r} is not finite (NaN or infinity) for a finite motion; check its law, or "
-                "choose a smaller h if it is only known near the motion"
-            )
-            return Failure(words, excess)
+        if failure := failure_of_element(compiled, work, outcome, least, "h_min or h"):
+            return failure
         if status == SINGULAR_BODY:
             name = compiled.body_names[index]
             if fast_turn:
@@ -342,10 +311,6 @@ class GeneralizedAlpha:
                 ', joint coordinates (formulation = "relative"), EnergyMomentum, or the frame of the body on the axis'
             )
             return Failure(words, excess)
-        if status == STOPPED:
-            return Failure(compiled.stop_words[index], excess)
-        if status == UNRESOLVED:
-            return Failure(words_of_contact(compiled, work, least, "h_min or h"), excess)
         if status == INACCURATE:
             words = (
                 f"its error stays above error_tolerance = {self.error_tolerance} down to the smallest "

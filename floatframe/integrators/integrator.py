@@ -1,6 +1,6 @@
 """What integrators have in common: their protocol, the reason of a failed step, and ways from memory to memory."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -9,12 +9,13 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.file_frames import state_of_file
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
-from floatframe.engine.initial_conditions.initial import counted_angles_of
+from floatframe.engine.initial_conditions.initial import consistent_motion, counted_angles_of
 from floatframe.engine.initial_conditions.newton_equations import displaced
-from floatframe.engine.kernels.memory import Memory, Rows
+from floatframe.engine.kernels.entry import Outcome
+from floatframe.engine.kernels.memory import WORK_GIVEN, WORK_TAKEN, Memory, Rows, memory_at, new_rows
 from floatframe.engine.kernels.model import Model
 from floatframe.engine.kernels.work import Work, new_work
-from floatframe.errors import ConvergenceError
+from floatframe.errors import ConvergenceError, FloatframeError
 from floatframe.model.rotations import continued_rotation, rotation_log
 from floatframe.model.state import State
 from floatframe.model.system import System
@@ -25,17 +26,16 @@ __all__ = [
     "FollowedRotations",
     "Integrator",
     "counted_on",
+    "failure_of_element",
     "has_divided_steps",
     "joined_rows",
     "memory_of_past",
     "observed",
-    "observed_unless_stopped",
+    "observed_outputs",
     "one_by_one",
-    "one_step_of",
     "started_anew",
     "turned_on",
     "with_angles",
-    "words_of_contact",
 ]
 
 LEAST_STEP = 1e-6  #: fraction of the largest step, for steps that may be divided without a given smallest step
@@ -53,22 +53,33 @@ class Integrator(Protocol):
     """A method with its parameters: a frozen dataclass of plain numbers, all that changes in the memory."""
 
     def start(self, system: System, t: float, state: State | None = None, before: Memory | None = None) -> Memory:
-        """Return the memory at the beginning, from a consistent state.
+        """Return the memory at the beginning: the consistent state and its accelerations.
 
         Counted angles, angles of couplers and states of user forces go on from those of a memory `before`.
         """
+        known, angle = (None, None) if before is None else (before.w, before.angle)
+        made = consistent_motion(system, state, t=t, known=known, angle=angle)
+        return with_angles(system, t, memory_at(made.state, made.u_dot, made.w), before, state)
 
     def after_jump(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
         """Return the memory after a jump of forces at t, and the results there.
 
         Positions and velocities are continuous.
         """
+        return started_anew(self, system, t, memory, work)
 
     def step(self, system: System, t: float, h: float, memory: Memory) -> Memory:
         """Return the memory one step of size h later; `ConvergenceError` if it fails."""
+        work = new_work(compiled_system(system).model)
+        after, _, _, failure = self.advance(system, memory, work, t0=t, h=h, first=0, n_steps=1, every=2)
+        if failure is not None:
+            words = f"the step of {h:g} from t = {t:g} failed: {failure.words}"
+            raise ConvergenceError(words, t=t, h=h, residual=failure.residual)
+        return after
 
     def observe(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
         """Return the memory with the power at its state, and the results there."""
+        return observed(system, t, memory, work)
 
     def advance(
         self, system: System, memory: Memory, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
@@ -81,6 +92,7 @@ class Integrator(Protocol):
             The memory after the last good step; the rows of results; how many steps were good; why the next was not,
             or None.
         """
+        raise NotImplementedError
 
 
 def started_anew(method: Integrator, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
@@ -98,16 +110,6 @@ def counted_on(fresh: Memory, memory: Memory) -> Memory:
         n_rejected=memory.n_rejected,
         h_next=0.0,
     )
-
-
-def one_step_of(method: Integrator, system: System, t: float, h: float, memory: Memory) -> Memory:
-    """Return the memory one step of size h later, as computed by `advance`; `ConvergenceError` if it fails."""
-    work = new_work(compiled_system(system).model)
-    after, _, _, failure = method.advance(system, memory, work, t0=t, h=h, first=0, n_steps=1, every=2)
-    if failure is not None:
-        words = f"the step of {h:g} from t = {t:g} failed: {failure.words}"
-        raise ConvergenceError(words, t=t, h=h, residual=failure.residual)
-    return after
 
 
 def one_by_one(
@@ -227,14 +229,37 @@ class FollowedRotations:
         return np.zeros(3) if i < 0 else np.asarray(self.state.R[i] @ self.state.u[self.u0[i] + 3 : self.u0[i] + 6])
 
 
-def observed_unless_stopped(
-    system: System, t: float, memory: Memory, work: Work
-) -> tuple[Memory, Rows, Failure | None]:
-    """Return the same as `observed`, and the reason if an element ends the run at the state; otherwise None."""
-    work.counted.stopped[...] = 0
-    after, rows = observed(system, t, memory, work)
-    stop = int(work.counted.stopped)
-    return after, rows, Failure(compiled_system(system).stop_words[stop - 1], 0.0) if stop else None
+def observed_outputs(
+    outputs: Iterable[tuple[float, State, Array, Array]], name: str, system: System, memory: Memory, work: Work, *,
+    h: float, first: int, every: int,
+) -> tuple[Memory, list[Rows], int, Failure | None, bool]:  # fmt: skip
+    """Return memory, rows, number of good outputs, reason of failure, and whether an element ended the run.
+
+    Work and dissipation are summed by the trapezoidal rule.
+
+    Parameters
+    ----------
+    outputs
+        Time, state, u_dot and w at output times h apart, as a solver with steps of its own finds them.
+    name
+        Of the solver, for messages.
+    """
+    rows, n_good = [new_rows(compiled_system(system).model, 0)], 0
+    try:
+        for t, state, u_dot, w in outputs:
+            after = memory.changed(state=state, u_dot=u_dot, w=w, h=h, n_steps=memory.n_steps + 1)
+            work.counted.stopped[...] = 0
+            after, row = observed(system, t, turned_on(system, after, h), work)
+            if stop := int(work.counted.stopped):
+                return memory, rows, n_good, Failure(compiled_system(system).stop_words[stop - 1], 0.0), True
+            memory = after.changed(work=memory.work + 0.5 * h * (memory.power + after.power))
+            row.diagnostics[0, [WORK_GIVEN, WORK_TAKEN]] = memory.work
+            n_good += 1
+            if (first + n_good) % every == 0:
+                rows.append(row)
+    except (FloatframeError, np.linalg.LinAlgError) as error:
+        return memory, rows, n_good, Failure(f"{name}: {error}", np.inf), False
+    return memory, rows, n_good, None, False
 
 
 def observed(system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
@@ -250,14 +275,32 @@ def joined_rows(parts: Sequence[Rows]) -> Rows:
     return parts[0] if len(parts) == 1 else Rows(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 
-def words_of_contact(compiled: CompiledSystem, work: Work, least: float, smaller: str) -> str:
-    """Return a message with the contact that needs steps below the smallest size, and with the remedy."""
+def failure_of_element(
+    compiled: CompiledSystem, work: Work, outcome: Outcome, least: float, smaller: str
+) -> Failure | None:
+    """Return the reason of a failed step that an element or a contact gives, whatever the method; else None.
+
+    least: the smallest step; smaller: what may be given to have shorter ones.
+    """
+    from floatframe.engine.kernels.generalized_alpha import STOPPED, UNRESOLVED
+
+    if no_number := int(work.counted.no_number):
+        words = (
+            f"element {compiled.connection_names[no_number - 1]!r} is not finite (NaN or infinity) for a finite "
+            "motion; check its law, or choose a smaller h if it is only known near the motion"
+        )
+        return Failure(words, outcome.excess)
+    if outcome.status == STOPPED:
+        return Failure(compiled.stop_words[outcome.singular], outcome.excess)
+    if outcome.status != UNRESOLVED:
+        return None
     c = int(compiled.model.gaps.connection[int(work.gaps.shortest)])
-    return (
+    words = (
         f"contact {compiled.connection_names[c]!r} takes steps of {float(work.gaps.step):.3g} s, expected h_min = "
         f"{least:.3g} at least: with longer steps it would gain energy; give a smaller {smaller}, or a softer "
         "contact"
     )
+    return Failure(words, outcome.excess)
 
 
 def has_divided_steps(model: Model) -> bool:

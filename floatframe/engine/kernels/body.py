@@ -51,6 +51,7 @@ __all__ = [
     "modal_block",
     "modal_term",
     "moved_inertia",
+    "newton_block",
     "put_rigid_blocks",
     "put_rigid_row",
 ]
@@ -61,6 +62,13 @@ def block(types, t, which, size):
     """Return a constant block of a type of bodies as a view of the flat store."""
     start = types.block0[t, which]
     return types.blocks[start : start + size]
+
+
+@view
+def newton_block(model, work, i):
+    """Return the Newton matrix of body i, (6 + n, 6 + n), as a view of the flat store."""
+    n = 6 + model.bodies.n_q[i]
+    return work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((n, n))
 
 
 @loops

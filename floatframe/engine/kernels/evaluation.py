@@ -3,7 +3,7 @@
 Described in `floatframe.model.forces.loads`, `floatframe.integrators.ida`.
 """
 
-from floatframe.engine.kernels.body import body_forces, body_tangent
+from floatframe.engine.kernels.body import body_forces, body_tangent, newton_block
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.connection import connection_derivatives, connection_rows
 from floatframe.engine.kernels.joints.deformed_line import slide_marker
@@ -123,7 +123,7 @@ def linearize(model, work, c_m, c_d, c_k):
         n = 6 + model.bodies.n_q[i]
         turning = work.bodies.T_right[i]
         put_matrix(turning, turning_by_unknown(model, work, i))
-        H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((n, n))
+        H = newton_block(model, work, i)
         tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning)
         for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
             m = model.bodies.ends[e]

@@ -60,6 +60,8 @@ __all__ = [
     "DIVERGED",
     "DONE",
     "INACCURATE",
+    "NO_ACCELERATION",
+    "SINGULAR",
     "SINGULAR_BODY",
     "SINGULAR_CONNECTION",
     "STOPPED",
@@ -71,6 +73,7 @@ __all__ = [
     "is_resized",
     "is_too_long",
     "keep_iterate",
+    "load_memory",
     "load_state",
     "mean_square",
     "next_acceleration",
@@ -83,8 +86,10 @@ __all__ = [
 ]
 
 DONE, DIVERGED, SINGULAR_BODY, SINGULAR_CONNECTION, INACCURATE, STOPPED = 0, 1, 2, 3, 4, 5
-UNRESOLVED = 7  # status: a step is too long for a contact; 6 is `tree.kernels.steps.SINGULAR`
+SINGULAR = 6  # status: the Newton matrix is singular, in a formulation with one matrix
+UNRESOLVED = 7  # status: a step is too long for a contact
 TURNED = 8  # status: a body rotates too far in a step
+NO_ACCELERATION = 9  # status: a step has no accelerations at its end, of a scheme that needs none
 #: largest rotation in a step [rad] of a body with joints away from its axis; above 1.15 joints can add energy
 MOST_TURN = 1.0
 # distance of a joint from the axis of rotation, relative to the size of the system, above which it is away from it
@@ -809,17 +814,19 @@ def step_after(h, error, most_error, has_failed):
     return min(max(fitting, LEAST * h), MOST * h)
 
 
-def time_loop(try_step, write):
+def time_loop(load, try_step, write):
     """Return the compiled loop over the steps of a formulation.
 
     Parameters
     ----------
+    load
+        (model, work, memory, others): write the iterate at the state in the memory, for gaps.
     try_step
         (model, work, memory, others, order, t, h): advance the memory to t by a step of size h, unless it fails or its
         error is too large; return (status, index of what is singular, last correction by the allowed one, error).
     write
-        (model, work, memory, others, t, rows): write the next row of the results. others: further records of the
-        formulation.
+        (model, work, memory, others, t, rows): write the next row of the results, and return DONE or why there is
+        none. others: further records of the formulation.
     """
 
     @inner
@@ -847,7 +854,7 @@ def time_loop(try_step, write):
                     n_parts = max(1.0, math.ceil(left / memory.h_next * (1.0 - 1e-9)))
                 part = left / n_parts
                 if has_gaps:
-                    load_state(work.state, memory)
+                    load(model, work, memory, others)
                     shorter = max(step_before_contact(model, work, end - left, part), h_min)
                     if shorter < part:
                         part, n_parts = shorter, 2.0
@@ -875,7 +882,9 @@ def time_loop(try_step, write):
                 memory.h_next = max(shorter, h_min)
                 has_failed = True
             if (first + k + 1) % order.every == 0:
-                write(model, work, memory, others, end, rows)
+                status = write(model, work, memory, others, end, rows)
+                if status != DONE:
+                    return status, k, work.counted.rows, work.counted.stopped - 1, excess
             keep_past(work.past, memory, memory.a, memory.h)
         return DONE, order.n_steps, work.counted.rows, -1, excess
 
@@ -905,6 +914,13 @@ def write_absolute_row(model, work, memory, others, t, rows):
     """Write the next row of the results."""
     write_row(model, work, memory, t, rows)
     settle_row(model, work, memory, rows)
+    return DONE
 
 
-advance = time_loop(try_absolute_step, write_absolute_row)
+@inner
+def load_memory(model, work, memory, others):
+    """Write the iterate at the state in the memory."""
+    load_state(work.state, memory)
+
+
+advance = time_loop(load_memory, try_absolute_step, write_absolute_row)

@@ -9,6 +9,7 @@ and Z do not turn with the body, so that they can serve for many steps; P, R and
 
 import math
 
+from floatframe.engine.kernels.body import newton_block
 from floatframe.engine.kernels.compiler.compilation import inner, small
 from floatframe.engine.kernels.connections.connection import (
     connection_derivatives,
@@ -53,7 +54,7 @@ def factorize_tangents(model, work):
     work.counted.factorisations += 1
     for i in range(model.bodies.kind.shape[0]):
         n = 6 + model.bodies.n_q[i]
-        H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((n, n))
+        H = newton_block(model, work, i)
         if not lu_factor(H, work.solver.pivot[model.bodies.u0[i] : model.bodies.u0[i + 1]]):
             return i
         for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
@@ -369,7 +370,7 @@ def assemble_masses(model, work, c_k):
     linearize(model, work, 1.0, 0.0, 0.0)
     for i in range(bodies.kind.shape[0]):
         n, t = 6 + bodies.n_q[i], bodies.kind[i]
-        H = work.solver.H[bodies.h0[i] : bodies.h0[i + 1]].reshape((n, n))
+        H = newton_block(model, work, i)
         step = 1 if types.is_diagonal[t, STIFFNESS - MASS] else n - 5
         for k in range(n - 6):
             if not H[6 + k, 6 + k] > 0.0:

@@ -16,7 +16,7 @@ one nearest to the value before), the force or torque on A (3), and where a PUSH
 
 import math
 
-from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.compiler.compilation import inner, small
 from floatframe.engine.kernels.joints.relative_motion import (
     add_coordinate_gradient,
     add_pair,
@@ -37,15 +37,22 @@ __all__ = [
     "coordinate_rows",
     "coordinate_second_rate",
     "coordinate_tangent_rate",
+    "ends_and_row",
     "predict_coordinate",
 ]
+
+
+@small
+def ends_and_row(model, p):
+    """Return the markers of coordinate p, and its first row."""
+    return model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
 
 
 @inner
 def force_direction(model, work, p):
     """Return the direction in which the force of coordinate p acts, ground axes."""
     rows, markers = model.rows, work.markers
-    a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
+    a, b, k = ends_and_row(model, p)
     if rows.kind[k] == SPAN:
         d = distance(markers, a, b)
         return scaled(1 / norm(d), d)
@@ -69,7 +76,7 @@ def turning_gradient(model, work, k, a, b):
 def coordinate_motion(model, work, p):
     """Return value and rate of coordinate p; an angle is the value nearest to the unknown X."""
     rows, markers = model.rows, work.markers
-    a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
+    a, b, k = ends_and_row(model, p)
     if rows.kind[k] == SPAN:
         e = force_direction(model, work, p)
         return dot(e, distance(markers, a, b)), dot(e, relative_velocity(markers, a, b))
@@ -89,7 +96,7 @@ def predict_coordinate(coordinates, state, p, h):
 @inner
 def coordinate_rows(model, work, p, Q, c_k):
     """Write the rows of coordinate p with force Q, and its wrench on both markers."""
-    a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
+    a, b, k = ends_and_row(model, p)
     g, w, wrench = work.connections.g, work.state.w, work.markers.wrench
     x, v = coordinate_motion(model, work, p)
     g[k] = c_k * (w[k] - x)
@@ -112,7 +119,7 @@ def coordinate_rows(model, work, p, Q, c_k):
 def coordinate_gradient(model, work, p, r, by_x, by_v):
     """Add by_x dx + by_v dv of coordinate p to row r of P at both markers."""
     markers = work.markers
-    a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
+    a, b, k = ends_and_row(model, p)
     P_a, P_b = work.connections.P[a], work.connections.P[b]
     if model.rows.kind[k] != SPAN:
         add_coordinate_gradient(model.rows, markers, k, a, b, P_a, P_b, r, by_x, by_v)
@@ -139,7 +146,8 @@ def clear_derivatives(model, work, c, i):
 @inner
 def coordinate_derivatives(model, work, c, p, Q, column, by_unknown, c_k):
     """Write the rows of P and V of coordinate p, of connection c, whose force is Q = by_unknown w[column]."""
-    a, b, k, w0 = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p], model.connections.w0[c]
+    a, b, k = ends_and_row(model, p)
+    w0 = model.connections.w0[c]
     P_a, P_b, V = work.connections.P[a], work.connections.P[b], work.connections.V[c]
     r = k - w0
     V[r, r], V[r + 1, r + 1] = 1.0, 1.0
@@ -172,7 +180,7 @@ def coordinate_derivatives(model, work, c, p, Q, column, by_unknown, c_k):
 def coordinate_tangent_rate(model, work, p):
     """Return the rate of coordinate p from its gradient; for an angle between non-parallel axes it differs from v."""
     rows = model.rows
-    a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
+    a, b, k = ends_and_row(model, p)
     if rows.kind[k] == SPAN or rows.kind[k] == PUSH:
         _, v = coordinate_motion(model, work, p)
         return v
@@ -186,7 +194,7 @@ def coordinate_second_rate(model, work, p, bias_a, bias_b):
     For angles with parallel axes.
     """
     markers = work.markers
-    a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
+    a, b, k = ends_and_row(model, p)
     kind = model.rows.kind[k]
     if kind != SPAN and kind != PUSH:
         return -dot(turning_gradient(model, work, k, a, b), sub(bias_b[3:], bias_a[3:]))

@@ -13,49 +13,40 @@ their work h Q times the rate, exactly.
 import math
 
 from floatframe.engine.kernels.compiler.compilation import inner
-from floatframe.engine.kernels.vector import cross, dot, norm, scaled, sub, turned, vector
-from floatframe.engine.structure_preserving.kernels.markers import add_direction, add_force, add_moment, turning
+from floatframe.engine.kernels.vector import add, cross, dot, norm, scaled, sub, turned, vector
+from floatframe.engine.structure_preserving.kernels.markers import (
+    add_moment,
+    add_pair,
+    begin_unit_load,
+    end_unit_load,
+    turning,
+)
 from floatframe.engine.structure_preserving.kernels.rows import (
-    angle_change,
+    add_slide,
     angle_loads,
     angle_of,
     mean_direction,
-    mean_distance,
-    slip_change,
 )
 from floatframe.model.joints.rows.kinds import PUSH, SPAN, TWIST_B
 
-__all__ = ["add_coordinate_force", "add_impulsive_force", "add_pair", "coordinate_at", "coordinate_change",
-           "coordinate_ends", "coordinate_rate", "counted", "ends_of_step", "span_lengths"]  # fmt: skip
+__all__ = ["add_coordinate_force", "add_impulsive_force", "coordinate_at", "coordinate_change", "coordinate_ends",
+           "coordinate_rate", "counted", "ends_of_step", "span"]  # fmt: skip
 
 
 @inner
-def add_pair(step, a, b, F):
-    """Add a force on B and its opposite on A."""
-    add_force(step, b, F)
-    add_force(step, a, scaled(-1.0, F))
-
-
-@inner
-def span_lengths(step, a, b):
-    """Return the distances of two points at the start and end of the force interval."""
-    d_0 = sub(vector(step.x_0[b]), vector(step.x_0[a]))
-    return norm(d_0), norm(sub(vector(step.x_f[b]), vector(step.x_f[a])))
+def span(step, a, b):
+    """Return the mean distance of two points over the force interval, and its derivative by the mean of r_B - r_A."""
+    d_0, d_1 = sub(vector(step.x_0[b]), vector(step.x_0[a])), sub(vector(step.x_f[b]), vector(step.x_f[a]))
+    mean = 0.5 * (norm(d_0) + norm(d_1))
+    return mean, scaled(0.5 / mean, add(d_0, d_1))
 
 
 @inner
 def coordinate_change(model, discrete, step, k, a, b):
-    """Return the change of the coordinate of row k over the step."""
-    kind = model.rows.kind[k]
-    if kind == PUSH:
-        slip, _, _ = slip_change(model, discrete, step, vector(model.rows.x[k]), a, b)
-        return slip
-    if kind == SPAN:
-        l_0, l_1 = span_lengths(step, a, b)
-        return 2.0 * dot(mean_distance(step, a, b), sub(vector(step.dx[b]), vector(step.dx[a]))) / (l_0 + l_1)
-    if kind == TWIST_B:
-        return -angle_change(model, discrete, step, k, b, a)
-    return angle_change(model, discrete, step, k, a, b)
+    """Return the change of the coordinate of row k over the step: the work of a unit force along it."""
+    begin_unit_load(step, a, b)
+    add_coordinate_force(model, discrete, step, k, a, b, 1.0)
+    return end_unit_load(model, step, a, b)
 
 
 @inner
@@ -101,13 +92,10 @@ def add_coordinate_force(model, discrete, step, k, a, b, Q):
     """Add the loads of a force or torque Q along the coordinate of row k."""
     kind = model.rows.kind[k]
     if kind == PUSH:
-        x = vector(model.rows.x[k])
-        _, E, d = slip_change(model, discrete, step, x, a, b)
-        add_pair(step, a, b, scaled(Q, E))
-        add_direction(model, discrete, step, a, x, scaled(Q, d))
+        add_slide(model, discrete, step, a, b, vector(model.rows.x[k]), Q)
     elif kind == SPAN:
-        l_0, l_1 = span_lengths(step, a, b)
-        add_pair(step, a, b, scaled(2.0 * Q / (l_0 + l_1), mean_distance(step, a, b)))
+        _, e = span(step, a, b)
+        add_pair(step, a, b, scaled(Q, e))
     elif kind == TWIST_B:
         angle_loads(model, discrete, step, k, b, a, -Q)
     else:

@@ -56,12 +56,16 @@ from floatframe.engine.kernels.vector import (
     unit,
     vector,
 )
-from floatframe.engine.structure_preserving.kernels.coordinates import add_pair
-from floatframe.engine.structure_preserving.kernels.markers import deformation, mean_jacobian, put_end_of_forces
-from floatframe.engine.structure_preserving.kernels.rows import add_product, held, mean_direction, product_change
+from floatframe.engine.structure_preserving.kernels.markers import (
+    add_pair,
+    deformation,
+    mean_jacobian,
+    put_end_of_forces,
+)
+from floatframe.engine.structure_preserving.kernels.rows import add_product, held, mean_direction
 from floatframe.model.joints.rows.kinds import LINE_TURN
 
-__all__ = ["add_line_reaction", "begin_lines", "line_change", "line_rate", "line_steps", "line_value"]
+__all__ = ["add_line_reaction", "begin_lines", "line_rate", "line_steps", "line_value"]
 
 NEAR, FAR = 0.5 - 0.5 / math.sqrt(3.0), 0.5 + 0.5 / math.sqrt(3.0)  # points of Gauss' rule, exact to degree three
 BEGIN, END, MEAN = range(3)
@@ -256,20 +260,6 @@ def add_line_reaction(model, discrete, step, k, a, b, f):
     if model.lines.row[line] < 0:
         t = vector(step.line_t[line])
         add_pair(step, a, b, scaled(f * turn_by_place(model, step, k, a, b) / dot(t, t), t))
-
-
-@inner
-def line_change(model, discrete, step, k, a, b):
-    """Return the change of row k, LINE or LINE_TURN, due to the motion alone: the work of a unit multiplier."""
-    d = sub(vector(step.dx[b]), vector(step.dx[a]))
-    if model.rows.kind[k] != LINE_TURN:
-        return dot(mean_normal(model, step, k, a), d)
-    total = product_change(model, discrete, step, a, vector(model.rows.x[k]), b, vector(model.rows.y[k]))
-    line = model.markers.line[a]
-    if model.lines.row[line] < 0:
-        t = vector(step.line_t[line])
-        total += turn_by_place(model, step, k, a, b) * dot(t, d) / dot(t, t)
-    return total
 
 
 @inner

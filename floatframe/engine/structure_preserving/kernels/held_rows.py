@@ -3,41 +3,41 @@
 import math
 
 from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.connections.coordinate import ends_and_row
 from floatframe.engine.kernels.vector import add, cross, dot, norm, scaled, sub, vector
 from floatframe.engine.structure_preserving.kernels import deformed_lines, rows
 from floatframe.engine.structure_preserving.kernels.coordinates import (
     add_coordinate_force,
-    add_pair,
     coordinate_change,
     ends_of_step,
 )
-from floatframe.engine.structure_preserving.kernels.markers import add_direction, add_moment, ends, turning
-from floatframe.engine.structure_preserving.kernels.rows import held, mean_direction, mean_distance
+from floatframe.engine.structure_preserving.kernels.markers import (
+    add_moment,
+    add_pair,
+    begin_unit_load,
+    end_unit_load,
+    ends,
+)
+from floatframe.engine.structure_preserving.kernels.rows import (
+    add_product,
+    add_slide,
+    held,
+    mean_direction,
+    mean_distance,
+)
 from floatframe.model.joints.rows.kinds import COUPLE, LINE, LINE_TURN, RIM_HEIGHT, ROLL
 
-__all__ = [
-    "add_coupler_reaction",
-    "add_height_reaction",
-    "add_reaction",
-    "add_roll_reaction",
-    "coupler_change",
-    "coupler_rate",
-    "coupler_value",
-    "roll_value",
-    "row_change",
-    "row_rate",
-    "row_value",
-]
+__all__ = ["add_reaction", "row_change", "row_rate", "row_value"]
 
 
 @inner
-def row_value(model, step, c, k):
-    """Return the value of row k of connection c at the end of a step."""
+def row_value(model, discrete, step, c, k):
+    """Return the value of row k of connection c at the end of a step; for ROLL the displacement of the rim over it."""
     kind, a, b = model.rows.kind[k], model.connections.a[c], model.connections.b[c]
     if kind == COUPLE:
         return coupler_value(model, step, c)
     if kind == ROLL:
-        return roll_value(model, step, k, a, b)
+        return row_change(model, discrete, step, c, k)
     if kind == LINE or kind == LINE_TURN:
         return deformed_lines.line_value(model, step, k, a, b)
     return rows.row_value(model, step, k, a, b)
@@ -61,13 +61,13 @@ def add_reaction(model, discrete, step, c, k, f):
 
 @inner
 def row_change(model, discrete, step, c, k):
-    """Return the change of row k over the step due to the motion alone; rows of a rolling disc do not need it."""
-    kind, a, b = model.rows.kind[k], model.connections.a[c], model.connections.b[c]
-    if kind == COUPLE:
+    """Return the change of row k over the step due to the motion alone: the work of a unit multiplier."""
+    if model.rows.kind[k] == COUPLE:
         return coupler_change(model, discrete, step, c)
-    if kind == LINE or kind == LINE_TURN:
-        return deformed_lines.line_change(model, discrete, step, k, a, b)
-    return rows.row_change(model, discrete, step, k, a, b)
+    a, b = model.connections.a[c], model.connections.b[c]
+    begin_unit_load(step, a, b)
+    add_reaction(model, discrete, step, c, k, 1.0)
+    return end_unit_load(model, step, a, b)
 
 
 @inner
@@ -95,7 +95,7 @@ def coupler_value(model, step, c):
     constant, _ = held(model, k, step.end.state.time)
     total = -constant
     for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
-        row, a, b = model.coordinates.row[p], model.coordinates.a[p], model.coordinates.b[p]
+        a, b, row = ends_and_row(model, p)
         _, end = ends_of_step(model, step, row, a, b)
         total += model.coordinates.factor[p] * end
     return model.rows.x[k, 0] * total
@@ -107,7 +107,7 @@ def add_coupler_reaction(model, discrete, step, c, f):
     i = model.connections.item[c]
     scale = model.rows.x[model.elements.core[i], 0]
     for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
-        row, a, b = model.coordinates.row[p], model.coordinates.a[p], model.coordinates.b[p]
+        a, b, row = ends_and_row(model, p)
         add_coordinate_force(model, discrete, step, row, a, b, scale * model.coordinates.factor[p] * f)
 
 
@@ -116,7 +116,7 @@ def coupler_change(model, discrete, step, c):
     """Return the change of the row of coupler c due to the motion over the step."""
     i, total = model.connections.item[c], 0.0
     for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
-        row, a, b = model.coordinates.row[p], model.coordinates.a[p], model.coordinates.b[p]
+        a, b, row = ends_and_row(model, p)
         total += model.coordinates.factor[p] * coordinate_change(model, discrete, step, row, a, b)
     return model.rows.x[model.elements.core[i], 0] * total
 
@@ -151,10 +151,8 @@ def slope(model, step, k, a, b):
 def add_height_reaction(model, discrete, step, k, a, b, f):
     """Add the loads of the height with multiplier f."""
     z, y = vector(model.rows.z[k]), vector(model.rows.y[k])
-    N, n, g = mean_direction(step, a, z), mean_direction(step, b, y), f * slope(model, step, k, a, b)
-    add_pair(step, a, b, scaled(f, N))
-    add_direction(model, discrete, step, a, z, add(scaled(f, mean_distance(step, a, b)), scaled(g, n)))
-    add_direction(model, discrete, step, b, y, scaled(g, N))
+    add_slide(model, discrete, step, a, b, z, f)
+    add_product(model, discrete, step, a, z, b, y, f * slope(model, step, k, a, b))
 
 
 @inner
@@ -164,15 +162,6 @@ def rim(model, step, k, a, b):
     n = scaled(1.0 / norm(n), n)
     u = sub(N, scaled(dot(N, n), n))
     return mean_direction(step, a, vector(model.rows.x[k])), scaled(-model.rows.c[k] / norm(u), u)
-
-
-@inner
-def roll_value(model, step, k, a, b):
-    """Return the displacement of the rim along t over the step."""
-    t, rho = rim(model, step, k, a, b)
-    arm = add(mean_distance(step, a, b), rho)
-    turned_by = sub(cross(turning(model, step, b), rho), cross(turning(model, step, a), arm))
-    return dot(t, add(sub(vector(step.dx[b]), vector(step.dx[a])), turned_by))
 
 
 @inner

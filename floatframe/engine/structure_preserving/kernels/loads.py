@@ -17,7 +17,6 @@ from floatframe.engine.kernels.vector import (
     dot,
     matrix,
     matrix_sum,
-    norm,
     put_sum,
     scaled,
     scaled_matrix,
@@ -28,13 +27,13 @@ from floatframe.engine.kernels.vector import (
 from floatframe.engine.structure_preserving.kernels.coordinates import (
     add_coordinate_force,
     add_impulsive_force,
-    add_pair,
     coordinate_change,
     coordinate_ends,
     coordinate_rate,
+    span,
 )
-from floatframe.engine.structure_preserving.kernels.markers import add_force, add_moment, ends, turning
-from floatframe.engine.structure_preserving.kernels.rows import force_of_row
+from floatframe.engine.structure_preserving.kernels.markers import add_force, add_moment, add_pair, ends, turning
+from floatframe.engine.structure_preserving.kernels.rows import force_of_row, mean_distance
 from floatframe.model.joints.rows.kinds import PUSH
 
 __all__ = ["body_load", "coordinate_load", "normal_force", "point_load", "spring_load"]
@@ -45,21 +44,18 @@ def spring_load(model, step, c):
     """Add the loads of spring-damper c."""
     a, b, s, springs = model.connections.a[c], model.connections.b[c], model.connections.item[c], model.springs
     k, damping, free, preload = springs.stiffness[s], springs.damping[s], springs.free_length[s], springs.preload[s]
-    d_0 = sub(vector(step.x_0[b]), vector(step.x_0[a]))
-    d_1 = sub(vector(step.x_f[b]), vector(step.x_f[a]))
-    d = scaled(0.5, add(d_0, d_1))
     if k != 0.0 and free == 0.0 and damping == 0.0 and preload == 0.0 and springs.table[s] < 0:
-        add_pair(step, a, b, scaled(-k, d))  # through length zero
+        add_pair(step, a, b, scaled(-k, mean_distance(step, a, b)))  # through length zero
         return 0.0, 0.0
-    both = norm(d_0) + norm(d_1)
-    change = 2.0 * dot(d, sub(vector(step.dx[b]), vector(step.dx[a]))) / both
-    tension = k * (0.5 * both - free) + preload + damping * change / step.h
+    length, e = span(step, a, b)
+    change = dot(e, sub(vector(step.dx[b]), vector(step.dx[a])))
+    tension = k * (length - free) + preload + damping * change / step.h
     given = 0.0
     if springs.table[s] >= 0:
-        value, _, _ = time_function(model.functions, springs.table[s], 0.5 * both - free)
+        value, _, _ = time_function(model.functions, springs.table[s], length - free)
         tension += value
         given = -value * change
-    add_pair(step, a, b, scaled(-2.0 * tension / both, d))
+    add_pair(step, a, b, scaled(-tension, e))
     return given, damping * change * change / step.h
 
 

@@ -23,7 +23,7 @@ Gonzalez (1996), Journal of Nonlinear Science 6, 449-467, of the map th -> exp(t
 import math
 
 from floatframe.engine.kernels.body import column_sum
-from floatframe.engine.kernels.compiler.compilation import inner, loops
+from floatframe.engine.kernels.compiler.compilation import inner, loops, small
 from floatframe.engine.kernels.marker import bent_shapes, shape, shape_sum
 from floatframe.engine.kernels.rotation import exp_matrix, left_jacobian
 from floatframe.engine.kernels.vector import (
@@ -45,8 +45,8 @@ from floatframe.engine.kernels.vector import (
     vector,
 )
 
-__all__ = ["add_direction", "add_force", "add_moment", "begin_markers", "change", "ends", "marker_loads", "marker_step",
-           "put_end_of_forces", "turning"]  # fmt: skip
+__all__ = ["add_direction", "add_force", "add_moment", "add_pair", "begin_markers", "begin_unit_load", "change",
+           "end_unit_load", "ends", "marker_loads", "marker_step", "put_end_of_forces", "turning"]  # fmt: skip
 
 SMALL = 1e-14  # square of an elastic rotation in a step below which its Cayley vector is T dth to rounding
 NONE = (0.0, 0.0, 0.0)
@@ -101,9 +101,7 @@ def begin_markers(model, discrete, step):
 def marker_step(model, discrete, step, m):
     """Write the motion of marker m over the step of its body."""
     i = model.markers.body[m]
-    put(step.F[m], 0, NONE)
-    put(step.T[m], 0, NONE)
-    put(step.m[m], 0, NONE)
+    clear_loads(step, 0, m)
     if i < 0:
         return
     n, q0, R_m = model.bodies.n_q[i], model.bodies.q0[i], matrix(step.R_m[i])
@@ -213,29 +211,69 @@ def turning(model, step, m):
     return add(vector(step.theta_G[i]), turned(step.R_m[i], vector(step.dpsi[m])))
 
 
+@small
+def clear_loads(step, which, m):
+    """Set a set of loads on a marker to zero."""
+    put(step.F[which, m], 0, NONE)
+    put(step.T[which, m], 0, NONE)
+    put(step.m[which, m], 0, NONE)
+
+
+@inner
+def begin_unit_load(step, a, b):
+    """Take the loads that follow on two markers as those whose work is asked for."""
+    clear_loads(step, 1, a)
+    clear_loads(step, 1, b)
+    step.is_unit = 1
+
+
+@inner
+def end_unit_load(model, step, a, b):
+    """Return the work of the loads since `begin_unit_load` over the step."""
+    step.is_unit = 0
+    return work_of_loads(model, step, a) + work_of_loads(model, step, b)
+
+
+@inner
+def work_of_loads(model, step, m):
+    """Return the work of the second set of loads on a marker: F · dx + T · theta_G + m · psi."""
+    i = model.markers.body[m]
+    if i < 0:
+        return 0.0
+    of_turns = dot(step.T[1, m], step.theta_G[i]) + dot(step.m[1, m], step.dpsi[m])
+    return dot(step.F[1, m], step.dx[m]) + of_turns
+
+
 @inner
 def add_force(step, m, F):
     """Add a force at a marker."""
-    put_sum(step.F[m], 0, F)
+    put_sum(step.F[step.is_unit, m], 0, F)
+
+
+@inner
+def add_pair(step, a, b, F):
+    """Add a force on B and its opposite on A."""
+    add_force(step, b, F)
+    add_force(step, a, scaled(-1.0, F))
 
 
 @inner
 def add_direction(model, discrete, step, m, e, G):
     """Add a load on direction e of a marker, with work G · dE."""
     E_0, E_1 = ends(step, m, e)
-    put_sum(step.T[m], 0, cross(scaled(0.5, add(E_0, E_1)), G))
+    put_sum(step.T[step.is_unit, m], 0, cross(scaled(0.5, add(E_0, E_1)), G))
     i = model.markers.body[m]
     if i >= 0 and discrete.turns[m]:
-        put_sum(step.m[m], 0, cross(turned(step.E_mean[m], e), turned_back(step.R_m[i], G)))
+        put_sum(step.m[step.is_unit, m], 0, cross(turned(step.E_mean[m], e), turned_back(step.R_m[i], G)))
 
 
 @inner
 def add_moment(model, step, m, T):
     """Add a moment on a marker, whose work is that over its rotation."""
-    put_sum(step.T[m], 0, T)
+    put_sum(step.T[step.is_unit, m], 0, T)
     i = model.markers.body[m]
     if i >= 0:
-        put_sum(step.m[m], 0, turned_back(step.R_m[i], T))
+        put_sum(step.m[step.is_unit, m], 0, turned_back(step.R_m[i], T))
 
 
 @loops
@@ -244,13 +282,13 @@ def marker_loads(model, discrete, step, m):
     i = model.markers.body[m]
     if i < 0:
         return
-    n, u0, F = model.bodies.n_q[i], model.bodies.u0[i], vector(step.F[m])
+    n, u0, F = model.bodies.n_q[i], model.bodies.u0[i], vector(step.F[0, m])
     put_sum(step.load, u0, F)
-    put_sum(step.load, u0 + 3, add(vector(step.T[m]), cross(vector(step.lever[m]), F)))
+    put_sum(step.load, u0 + 3, add(vector(step.T[0, m]), cross(vector(step.lever[m]), F)))
     if n == 0:
         return
     psi, F_B = step.psi[6 * discrete.psi0[m] :], turned_back(step.R_m[i], F)
-    T = turned_back(step.Gamma[m], vector(step.m[m])) if discrete.turns[m] else NONE
+    T = turned_back(step.Gamma[m], vector(step.m[0, m])) if discrete.turns[m] else NONE
     for k in range(n):
         d, th = shape(psi, n, k)
         step.load[u0 + 6 + k] += dot(d, F_B) + dot(th, T)

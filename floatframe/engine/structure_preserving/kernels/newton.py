@@ -9,6 +9,7 @@ Derivatives are differences of residuals, those of unknowns far from each other 
 import math
 
 from floatframe.engine.kernels.compiler.compilation import inner, matrix_loops
+from floatframe.engine.kernels.generalized_alpha import DIVERGED, DONE, SINGULAR
 from floatframe.engine.kernels.model import BUSHING, CONTACT, ELEMENT, JOINT, SPRING, USER_FORCE
 from floatframe.engine.kernels.vector import cross, matrix, norm, put_sum, scaled, sub, turned_back, vector
 from floatframe.engine.structure_preserving.kernels.bodies import body_inertia, body_step
@@ -32,12 +33,6 @@ from floatframe.engine.structure_preserving.kernels.markers import marker_loads,
 from floatframe.engine.structure_preserving.kernels.records import SMALL
 
 __all__ = [
-    "CONVERGED",
-    "NOT_CONVERGED",
-    "NO_ACCELERATION",
-    "SINGULAR",
-    "STOPPED",
-    "UNRESOLVED",
     "add_loads",
     "band_factor",
     "band_solve",
@@ -112,7 +107,6 @@ MANY = 7  # number of iterations of a step after which the next one starts with 
 # error after a correction relative to the allowed correction, because the factors are not those of the iterate
 LEFT = 1e-2
 ROUNDOFF = 2e-15  # of a position
-CONVERGED, NOT_CONVERGED, SINGULAR, NO_ACCELERATION, STOPPED, UNRESOLVED = range(6)
 
 
 @inner
@@ -204,7 +198,7 @@ def write_residual(model, work, discrete, step):
                 rate = row_rate(model, step, connection, k, step.t_force)
                 step.residual[n_u + j] = row_change(model, discrete, step, connection, k) + h * rate + soft
             else:
-                step.residual[n_u + j] = row_value(model, step, connection, k) + soft
+                step.residual[n_u + j] = row_value(model, discrete, step, connection, k) + soft
         if model.connections.law[connection] == USER_FORCE:
             write_state_residual(model, work, discrete, step, connection)
     for m in range(model.markers.body.shape[0]):
@@ -330,7 +324,7 @@ def smallest(model, step, order):
 
 @inner
 def solve(model, work, discrete, step, order, stage, is_exact):
-    """Find the unknowns of a step. Return CONVERGED, NOT_CONVERGED or SINGULAR.
+    """Find the unknowns of a step. Return DONE, DIVERGED or SINGULAR.
 
     is_exact: with derivatives made anew in each iteration that needs them, as far as it goes.
     """
@@ -350,7 +344,7 @@ def solve(model, work, discrete, step, order, stage, is_exact):
         if not math.isfinite(change):
             step.is_due[stage] = 1
             step.excess = math.inf
-            return NOT_CONVERGED
+            return DIVERGED
         allowed = order.tolerance * size_of(discrete, step) + least
         change = max(change, step.state_change * allowed / order.tolerance)
         step.excess = change / allowed
@@ -359,9 +353,9 @@ def solve(model, work, discrete, step, order, stage, is_exact):
         if (change <= allowed and left <= LEFT * allowed) or is_rounding:
             if iteration >= MANY:
                 step.is_due[stage] = 1
-            return CONVERGED
+            return DONE
         if change > SLOW * last or (is_exact and change > 1e-3 * last):
             step.is_due[stage] = 1
         last = change
     step.is_due[stage] = 1
-    return NOT_CONVERGED
+    return DIVERGED

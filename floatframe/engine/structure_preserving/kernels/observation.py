@@ -6,6 +6,7 @@
 
 import math
 
+from floatframe.engine.kernels.body import newton_block
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.connection import constraint_rates
 from floatframe.engine.kernels.evaluation import evaluate, linearize
@@ -28,7 +29,7 @@ def factorize(model, work, discrete, is_weighted):
     if is_weighted:
         for i in range(model.bodies.kind.shape[0]):
             n, first = model.bodies.n_q[i], discrete.weighted0[i]
-            H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((6 + n, 6 + n))
+            H = newton_block(model, work, i)
             for k in range(n):
                 for j in range(n):
                     H[6 + k, 6 + j] += discrete.weighted[first + k * n + j]

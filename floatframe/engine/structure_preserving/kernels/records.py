@@ -147,9 +147,10 @@ class StepWork(NamedTuple):
     dpsi: Array = real(n_m, 3, unit="rad")  #: body axes
     psi: Array = real(Size("6 n of markers"))  #: Psi_sigma, Psi_r [6, k] at q_mean, at 6 psi0
     shape: Array = real(6 * n_most)  #: those of one marker
-    F: Array = real(n_m, 3, unit="N")
-    T: Array = real(n_m, 3, unit="N m")
-    m: Array = real(n_m, 3, unit="N m")  #: on the elastic rotation, body axes
+    F: Array = real(2, n_m, 3, unit="N")  #: loads of all forces, and of one alone whose work is asked for
+    T: Array = real(2, n_m, 3, unit="N m")
+    m: Array = real(2, n_m, 3, unit="N m")  #: on the elastic rotation, body axes
+    is_unit: IntArray = integer()  #: whether loads are added to the second set
     # deformed lines
     station_d: Array = real(3, n_stations, 3, unit="m")  #: displacements of stations at both ends, and means, body axes
     station_th: Array = real(3, n_stations, 3, unit="rad")  #: and rotations

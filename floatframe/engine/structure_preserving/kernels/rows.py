@@ -12,7 +12,7 @@ from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.joints.relative_motion import prescribed_at
 from floatframe.engine.kernels.joints.row_formulas import HELD, by_code
 from floatframe.engine.kernels.vector import add, cross, dot, scaled, sub, turned, vector
-from floatframe.engine.structure_preserving.kernels.markers import add_direction, add_force, change, ends
+from floatframe.engine.structure_preserving.kernels.markers import add_direction, add_pair, ends
 from floatframe.model.joints.rows.kinds import (
     DISTANCE,
     DOT,
@@ -25,8 +25,8 @@ from floatframe.model.joints.rows.kinds import (
     TURN_B,
 )
 
-__all__ = ["add_reaction", "angle_change", "angle_loads", "angle_of", "end_angle", "force_of_row", "held",
-           "mean_direction", "mean_distance", "row_change", "row_rate", "row_value", "slip_change"]  # fmt: skip
+__all__ = ["add_reaction", "add_slide", "angle_loads", "angle_of", "force_of_row", "held", "mean_direction",
+           "mean_distance", "row_rate", "row_value"]  # fmt: skip
 
 
 #: the value of a row that depends on places and time alone, as in all other formulations
@@ -109,14 +109,13 @@ def force_of_row(model, step, k, a, b):
 def add_reaction(model, discrete, step, k, a, b, f):
     """Add the loads of row k with multiplier f, whose work is f times the change of the row."""
     kind = model.rows.kind[k]
-    if model.rows.is_length[k]:
-        F = scaled(f, force_of_row(model, step, k, a, b))
-        if kind == SLIDE or kind == SCREW:
-            add_direction(model, discrete, step, a, slide_axis(model, k), scaled(f, mean_distance(step, a, b)))
-        add_force(step, b, F)
-        add_force(step, a, scaled(-1.0, F))
+    if kind == SLIDE or kind == SCREW:
+        add_slide(model, discrete, step, a, b, slide_axis(model, k), f)
         if kind == SCREW:
             angle_loads(model, discrete, step, k, a, b, -model.rows.c[k] * f)
+        return
+    if model.rows.is_length[k]:
+        add_pair(step, a, b, scaled(f, force_of_row(model, step, k, a, b)))
         return
     first, e, second, d = factors(model, step, k, a, b)
     add_product(model, discrete, step, first, e, second, d, f)
@@ -143,33 +142,6 @@ def add_product(model, discrete, step, a, e, b, y, f):
     E, D = mean_direction(step, a, e), mean_direction(step, b, y)
     add_direction(model, discrete, step, a, e, scaled(f, D))
     add_direction(model, discrete, step, b, y, scaled(f, E))
-
-
-@inner
-def product_change(model, discrete, step, a, e, b, y):
-    """Return the change of the product of direction e of marker a and y of marker b."""
-    E, D = mean_direction(step, a, e), mean_direction(step, b, y)
-    dE, dD = change(model, discrete, step, a, e, E), change(model, discrete, step, b, y, D)
-    return dot(dE, D) + dot(E, dD)
-
-
-@inner
-def row_change(model, discrete, step, k, a, b):
-    """Return the change of row k over the step due to the motion alone: the work of a unit multiplier."""
-    kind = model.rows.kind[k]
-    if kind == POINT or kind == DISTANCE:
-        F = force_of_row(model, step, k, a, b)
-        return dot(F, sub(vector(step.dx[b]), vector(step.dx[a])))
-    if kind == SLIDE or kind == SCREW:
-        slip, _, _ = slip_change(model, discrete, step, slide_axis(model, k), a, b)
-        if kind == SCREW:
-            slip -= model.rows.c[k] * angle_change(model, discrete, step, k, a, b)
-        return slip
-    first, e, second, d = factors(model, step, k, a, b)
-    total = product_change(model, discrete, step, first, e, second, d)
-    if kind == EQUAL_TURN:
-        total -= product_change(model, discrete, step, a, vector(model.rows.z[k]), b, vector(model.rows.y[k]))
-    return total
 
 
 @inner
@@ -200,12 +172,6 @@ def angle_of(model, A, k, a, b):
 
 
 @inner
-def end_angle(model, step, k, a, b):
-    """Return the angle of row k at the end of the force interval."""
-    return angle_of(model, step.A_f, k, a, b)
-
-
-@inner
 def angle_parts(model, step, k, a, b):
     """Return E, Z, D (means), S and C (means) and kappa of the angle of row k."""
     E_0, E_1 = ends(step, a, vector(model.rows.x[k]))
@@ -232,19 +198,8 @@ def angle_loads(model, discrete, step, k, a, b, f):
 
 
 @inner
-def angle_change(model, discrete, step, k, a, b):
-    """Return the change of the angle of row k over the step."""
-    E, Z, D, S, C, kappa = angle_parts(model, step, k, a, b)
-    dE = change(model, discrete, step, a, vector(model.rows.x[k]), E)
-    dZ = change(model, discrete, step, a, vector(model.rows.z[k]), Z)
-    dD = change(model, discrete, step, b, vector(model.rows.y[k]), D)
-    dS, dC = -(dot(dE, D) + dot(E, dD)), dot(dZ, D) + dot(Z, dD)
-    return kappa * (C * dS - S * dC)
-
-
-@inner
-def slip_change(model, discrete, step, x, a, b):
-    """Return the change of the distance along an axis x of A, the mean axis and the mean vector from A to B."""
+def add_slide(model, discrete, step, a, b, x, f):
+    """Add the loads of a force f along the axis x of A, whose work is f times the change of the distance along it."""
     E, d = mean_direction(step, a, x), mean_distance(step, a, b)
-    dE = change(model, discrete, step, a, x, E)
-    return dot(dE, d) + dot(E, sub(vector(step.dx[b]), vector(step.dx[a]))), E, d
+    add_pair(step, a, b, scaled(f, E))
+    add_direction(model, discrete, step, a, x, scaled(f, d))

@@ -3,18 +3,23 @@
 Described in `floatframe.integrators.energy_momentum`, `floatframe.integrators.variational`.
 """
 
-import math
-
 from floatframe.engine.kernels.body import block
 from floatframe.engine.kernels.compiler.compilation import inner, kept_entry
 from floatframe.engine.kernels.compiler.structure import converter
 from floatframe.engine.kernels.connections.contact import contact_gap
-from floatframe.engine.kernels.connections.gap import next_step, step_before_contact
+from floatframe.engine.kernels.connections.gap import next_step
 from floatframe.engine.kernels.entry import CompiledEntry, Order
-from floatframe.engine.kernels.generalized_alpha import load_state
+from floatframe.engine.kernels.generalized_alpha import (
+    DONE,
+    NO_ACCELERATION,
+    STOPPED,
+    UNRESOLVED,
+    copy,
+    load_state,
+    time_loop,
+)
 from floatframe.engine.kernels.memory import GIVEN, TAKEN, Memory, Rows
 from floatframe.engine.kernels.model import Model
-from floatframe.engine.kernels.past import keep_past
 from floatframe.engine.kernels.turns import count_turns
 from floatframe.engine.kernels.vector import add, cross, dot, matrix, put, scaled, sub, turned, turned_back, vector
 from floatframe.engine.kernels.work import Work
@@ -31,10 +36,6 @@ from floatframe.engine.structure_preserving.kernels.held_rows import row_change
 from floatframe.engine.structure_preserving.kernels.markers import begin_markers, marker_loads
 from floatframe.engine.structure_preserving.kernels.memory import expect_angles, keep, recall, remember
 from floatframe.engine.structure_preserving.kernels.newton import (
-    CONVERGED,
-    NO_ACCELERATION,
-    STOPPED,
-    UNRESOLVED,
     add_loads,
     move,
     solve,
@@ -121,7 +122,7 @@ def solve_both_ways(model, work, discrete, step, order, stage):
     """Find the unknowns with the stored factors, otherwise with new factors in each iteration."""
     guess(model, step)
     status = solve(model, work, discrete, step, order, stage, False)
-    if status != CONVERGED:
+    if status != DONE:
         guess(model, step)
         status = solve(model, work, discrete, step, order, stage, True)
     return status
@@ -133,7 +134,7 @@ def conserving_step(model, work, discrete, step, memory, order):
     step.t_force, step.is_still, step.is_closing = 0.5 * (step.t_0 + step.end.state.time), 0, 0
     begin(model, discrete, step, memory)
     status = solve_both_ways(model, work, discrete, step, order, 0)
-    if status != CONVERGED:
+    if status != DONE:
         return status
     take_multipliers(step)
     move(model, discrete, step)
@@ -171,7 +172,7 @@ def variational_step(model, work, discrete, step, memory, order):
     h = step.h
     begin(model, discrete, step, memory)
     status = solve_both_ways(model, work, discrete, step, order, 0)
-    if status != CONVERGED:
+    if status != DONE:
         return status
     take_multipliers(step)
     move(model, discrete, step)
@@ -215,11 +216,11 @@ def variational_step(model, work, discrete, step, memory, order):
             step.P_0[k] = step.P_1[k] + 0.5 * h * (step.elastic[k] + step.load[k])
     step.is_closing = 2
     status = solve(model, work, discrete, step, order, 1, False)
-    if status != CONVERGED:
+    if status != DONE:
         for k in range(step.z.shape[0]):
             step.z[k] = 0.0
         status = solve(model, work, discrete, step, order, 1, True)
-        if status != CONVERGED:
+        if status != DONE:
             return status
     take_multipliers(step)
     for j in range(step.f.shape[0]):
@@ -269,11 +270,12 @@ def is_too_long(model, work, discrete, step):
 
 
 @inner
-def begin_iterate(model, work, step, memory):
+def begin_iterate(model, work, memory, others):
     """Use the state in the memory as the iterate, with the mean accelerations of the previous step.
 
     Not those of the memory, which are those of the last output: outputs do not change a motion.
     """
+    _, step = others
     load_state(work.state, memory)
     for i in range(model.bodies.kind.shape[0]):
         t, n, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.u0[i]
@@ -293,73 +295,39 @@ def take_size(step, h):
 
 
 @inner
-def take_parts(model, work, discrete, step, memory, order, t_0, t_1):
-    """Advance the memory from t_0 to t_1 by one step, divided if contacts require it; return the status.
-
-    With h_min above 0 a part that fails is tried again, shorter, down to it.
-    """
-    h, has_gaps, left, has_failed = order.h, model.gaps.connection.shape[0] > 0, order.h, False
-    if memory.h_next <= 0.0 or memory.h_next > h:
-        memory.h_next = h
-    while left > 0.0:
-        part, is_last = left, True
-        if order.h_min > 0.0:
-            part = left / max(1.0, math.ceil(left / memory.h_next * (1.0 - 1e-9)))
-            if has_gaps:
-                begin_iterate(model, work, step, memory)
-                part = max(step_before_contact(model, work, t_1 - left, part), order.h_min)
-            is_last = part >= left
-            part = min(part, left)
-        step.t_0, step.end.state.time = t_0 if left == h else t_1 - left, t_1 if is_last else t_1 - (left - part)
-        take_size(step, part)
-        if discrete.scheme == CONSERVING:
-            status = conserving_step(model, work, discrete, step, memory, order)
-        else:
-            status = variational_step(model, work, discrete, step, memory, order)
-        memory.n_iterations += step.n_iterations
-        step.n_iterations = 0
-        if status == CONVERGED:
-            count_angles(model, work, memory, part)
-            memory.n_steps += 1
-            left = 0.0 if is_last else left - part
-            wanted = part if has_failed else 2.0 * part
-            if has_gaps:
-                wanted = min(h if work.gaps.n_closed == 0 else wanted, work.gaps.step)
-            memory.h_next = min(wanted, h)
-            has_failed = False
-            if work.counted.stopped > 0:
-                return STOPPED
-            continue
-        if part <= order.h_min or order.h_min <= 0.0:
-            return status
-        memory.n_rejected += 1
-        memory.h_next = max(work.gaps.step if status == UNRESOLVED else 0.5 * part, order.h_min)
-        has_failed = True
-    return CONVERGED
+def try_discrete_step(model, work, memory, others, order, t, h):
+    """Advance the memory to t by a step of size h, see `kernels.generalized_alpha.time_loop`."""
+    discrete, step = others
+    work.counted.no_number = 0
+    step.t_0, step.end.state.time = t - h, t
+    take_size(step, h)
+    if discrete.scheme == CONSERVING:
+        status = conserving_step(model, work, discrete, step, memory, order)
+    else:
+        status = variational_step(model, work, discrete, step, memory, order)
+    memory.n_iterations += step.n_iterations
+    step.n_iterations = 0
+    if status == DONE:
+        count_angles(model, work, memory, h)
+        copy(step.f_kept, memory.a)
+        memory.h = order.h
+    return status, -1, step.excess, -1.0
 
 
 @inner
-def advance(model, work, discrete, step, memory, rows, order):
-    """Advance by n_steps of size h, the first with the number `first` from t0; keep the state after every `every`-th.
+def write_discrete_row(model, work, memory, others, t, rows):
+    """Write the next row of the results.
 
-    Return (status, good steps, rows written). A step is good where its output can be made: after NO_ACCELERATION the
-    memory has gone one step further.
+    A step is good where its output can be made: after NO_ACCELERATION the memory has gone one step further. The row at
+    the end of a step that ends the run belongs to the step.
     """
-    h = order.h
-    work.counted.rows = 0
-    for k in range(order.n_steps):
-        work.counted.no_number = 0
-        t_0, t_1 = order.t0 + (order.first + k) * h, order.t0 + (order.first + k + 1) * h
-        status = take_parts(model, work, discrete, step, memory, order, t_0, t_1)
-        if status != CONVERGED:
-            return status, k, work.counted.rows
-        if (order.first + k + 1) % order.every == 0:
-            if not observe(model, work, discrete, step, memory, t_1, rows):
-                return NO_ACCELERATION, k, work.counted.rows
-            if work.counted.stopped > 0:  # row at the end of the step, which belongs to the step
-                return STOPPED, k, work.counted.rows - 1
-        keep_past(work.past, memory, step.f_kept, h)
-    return CONVERGED, order.n_steps, work.counted.rows
+    discrete, step = others
+    if not observe(model, work, discrete, step, memory, t, rows):
+        return NO_ACCELERATION
+    if work.counted.stopped > 0:
+        work.counted.rows -= 1
+        return STOPPED
+    return DONE
 
 
 @inner
@@ -370,6 +338,8 @@ def count_angles(model, work, memory, h):
     load_state(work.state, memory)
     count_turns(model, work, memory, h)
 
+
+advance = time_loop(begin_iterate, try_discrete_step, write_discrete_row)
 
 # the compiled entry of the conserving and variational schemes; compiled when one of them is first used ----------------
 
@@ -387,10 +357,7 @@ def make_entry(digest):
             return 0, 0, 0, -1, 0.0
         model, work, discrete = as_model(model_table), as_work(work_table), as_discrete(discrete_table)
         step, memory = as_step(step_table), as_memory(memory_table)
-        status, n_steps, n_rows = advance(
-            model, work, discrete, step, memory, as_rows(rows_table), as_order(order_table)
-        )  # fmt: skip
-        return status, n_steps, n_rows, -1, step.excess
+        return advance(model, work, memory, as_rows(rows_table), (discrete, step), as_order(order_table))
 
     return kept_entry(run)
 

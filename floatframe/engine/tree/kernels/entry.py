@@ -7,7 +7,7 @@ from floatframe.engine.kernels.compiler.compilation import kept_entry
 from floatframe.engine.kernels.compiler.structure import converter
 from floatframe.engine.kernels.diagnostics import power
 from floatframe.engine.kernels.entry import ADVANCE, OBSERVE, CompiledEntry, Order, Outcome
-from floatframe.engine.kernels.generalized_alpha import DONE
+from floatframe.engine.kernels.generalized_alpha import DONE, SINGULAR
 from floatframe.engine.kernels.memory import GIVEN, TAKEN, Memory, Rows
 from floatframe.engine.kernels.model import Model
 from floatframe.engine.kernels.records import zeros
@@ -16,7 +16,7 @@ from floatframe.engine.tree.kernels.accelerations import accelerate, constrain
 from floatframe.engine.tree.kernels.evaluation import evaluate_tree
 from floatframe.engine.tree.kernels.kinematics import joint_motion, move_joints, place_bodies
 from floatframe.engine.tree.kernels.projection import put_reactions
-from floatframe.engine.tree.kernels.steps import SINGULAR, advance_tree, correct, renew, write_tree_row
+from floatframe.engine.tree.kernels.steps import advance_tree, correct, renew, write_tree_row
 from floatframe.engine.tree.kernels.tangent import assemble, write_tangent
 from floatframe.engine.tree.kernels.tree import JointWork, TangentWork, Tree, new_tangent_work
 

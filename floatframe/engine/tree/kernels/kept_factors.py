@@ -17,7 +17,7 @@ Fronts are upper halves, their rows Uᵀ of the factors with inverse diagonals.
 
 import math
 
-from floatframe.engine.kernels.body import put_block, put_column
+from floatframe.engine.kernels.body import newton_block, put_block, put_column
 from floatframe.engine.kernels.compiler.compilation import inner, loops, matrix_loops, view
 from floatframe.engine.kernels.evaluation import tangent_of_body
 from floatframe.engine.kernels.marker import shape
@@ -39,7 +39,7 @@ from floatframe.engine.kernels.vector import (
     unit_matrix,
     vector,
 )
-from floatframe.engine.tree.kernels.projection import force_slopes
+from floatframe.engine.tree.kernels.projection import subtract_slopes
 
 __all__ = ["factorize_poses", "keep_bodies", "solve_kept"]
 
@@ -48,10 +48,9 @@ __all__ = ["factorize_poses", "keep_bodies", "solve_kept"]
 def keep_bodies(model, work, tree, c_m, c_d, c_k):
     """Write the reused matrices of bodies; `evaluate_tree` has been called."""
     for i in range(tree.parent.shape[0]):
-        n = model.bodies.n_q[i]
         turning = work.bodies.T_right[i]
         put_matrix(turning, scaled_matrix(0.0, unit_matrix()))
-        H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((6 + n, 6 + n))
+        H = newton_block(model, work, i)
         tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning)
         symmetrise(H)
 
@@ -71,7 +70,7 @@ def factorize_poses(model, work, tree, joints, tangent, c_d, c_k):
     """Factorise with the reused matrices at the poses of the iterate; return whether the matrix is regular."""
     for i in range(tree.parent.shape[0]):
         n, m = model.bodies.n_q[i], tree.far[i]
-        H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((6 + n, 6 + n))
+        H = newton_block(model, work, i)
         if n > 0:
             put_screws(model, work, m, n, tangent.S[i])
         F = front(tree, tangent, i)
@@ -82,12 +81,7 @@ def factorize_poses(model, work, tree, joints, tangent, c_d, c_k):
         F, J = front(tree, tangent, i), tangent.J[tree.s0[i] : tree.m0[i]]
         pose_columns(work, tree, joints, tangent, i)
         add_columns(F, J, n)
-        for k in range(tree.column0[i], tree.column0[i + 1]):
-            s = tree.unknown[k]
-            if s >= 0 and tree.row[k] >= 0:
-                _, Q_x, Q_v = force_slopes(model, work, tree, i, tree.row[k])
-                c = n + s - tree.s0[i]
-                F[c, c] -= c_k * Q_x + c_d * Q_v
+        subtract_slopes(model, work, tree, i, F, n - tree.s0[i], c_d, c_k)
         if not factorize_front(F, n_l):
             return False
         parent = tree.parent[i]

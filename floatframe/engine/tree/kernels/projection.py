@@ -12,7 +12,7 @@ from floatframe.engine.kernels.marker import wrench_to_body
 from floatframe.engine.kernels.vector import add, cross, dot, put, scaled, sub, turned, vector
 from floatframe.model.joints.rows.kinds import PUSH
 
-__all__ = ["project", "put_reactions"]
+__all__ = ["project", "put_reactions", "subtract_slopes"]
 
 
 @inner
@@ -72,6 +72,16 @@ def force_slopes(model, work, tree, i, row):
     x, v = loaded_coordinate(model.rows, work.markers, row, a, b)
     Q, Q_x, Q_v, _ = coordinate_force(model, work, row, model.rows.kind[row] != PUSH, x, v, 0.0)
     return Q, Q_x, Q_v
+
+
+@inner
+def subtract_slopes(model, work, tree, i, K, shift, c_d, c_k):
+    """Subtract the derivatives of forces along the coordinates of the joint of body i; shift: of unknowns to rows."""
+    for k in range(tree.column0[i], tree.column0[i + 1]):
+        s = tree.unknown[k]
+        if s >= 0 and tree.row[k] >= 0:
+            _, Q_x, Q_v = force_slopes(model, work, tree, i, tree.row[k])
+            K[s + shift, s + shift] -= c_k * Q_x + c_d * Q_v
 
 
 @inner

@@ -18,6 +18,7 @@ from floatframe.engine.kernels.generalized_alpha import (
     MOST_TURN,
     OF_MOTION,
     OFF_AXIS,
+    SINGULAR,
     SLOW,
     TURNED,
     UNRESOLVED,
@@ -29,6 +30,7 @@ from floatframe.engine.kernels.generalized_alpha import (
     is_resized,
     is_too_long,
     keep_iterate,
+    load_memory,
     load_state,
     mean_square,
     ratio_of_steps,
@@ -57,9 +59,8 @@ from floatframe.engine.tree.kernels.tangent import write_tangent
 from floatframe.engine.tree.kernels.tree_factors import factorize_tree, solve_newton, solve_wrenches
 from floatframe.engine.tree.kernels.weights import sizes_of_step, squared_size, weigh
 
-__all__ = ["SINGULAR", "advance_tree", "correct", "renew", "write_tree_row"]
+__all__ = ["advance_tree", "correct", "renew", "write_tree_row"]
 
-SINGULAR = 6  #: status: the Newton matrix is singular
 MANY = 4  # number of iterations of a step after which the next one starts with new factors
 EXACT_STEPS = 4  # number of steps with exact matrices after the reused ones have failed
 FAR_SPIN = 0.2  # rotation [rad] in a step of a body with separate spin, above which steps use exact matrices
@@ -533,6 +534,7 @@ def write_next_row(model, work, memory, others, t, rows):
         settle_row(model, work, memory, rows)
     if work.solver.is_due == 1:
         tangent.is_kept = 0  # this overwrites its factors of the bodies
+    return DONE
 
 
-advance_tree = time_loop(try_tree_step, write_next_row)
+advance_tree = time_loop(load_memory, try_tree_step, write_next_row)

@@ -9,7 +9,15 @@ since all bodies of a subtree move alike by what moves its first. Derivatives of
 of the forces that stay in axes of bodies or ground are all there.
 """
 
-from floatframe.engine.kernels.body import block, column, coupling, inertia_rate, put_rigid_blocks, put_rigid_row
+from floatframe.engine.kernels.body import (
+    block,
+    column,
+    coupling,
+    inertia_rate,
+    newton_block,
+    put_rigid_blocks,
+    put_rigid_row,
+)
 from floatframe.engine.kernels.compiler.compilation import inner, loops, small
 from floatframe.engine.kernels.connections.connection import connection_derivatives
 from floatframe.engine.kernels.evaluation import tangent_of_body
@@ -33,7 +41,7 @@ from floatframe.engine.kernels.vector import (
     vector,
 )
 from floatframe.engine.tree.kernels.jets import carrier, mode_rate, mode_screws, put_mode_jet, write_jets
-from floatframe.engine.tree.kernels.projection import force_slopes
+from floatframe.engine.tree.kernels.projection import subtract_slopes
 from floatframe.engine.tree.kernels.spatial import (
     pair,
     pair_sum,
@@ -117,7 +125,7 @@ def of_body(model, work, joints, tangent, i, c_m, c_d, c_k):
     n, u0, q0 = model.bodies.n_q[i], model.bodies.u0[i], model.bodies.q0[i]
     turning = work.bodies.T_right[i]
     put_matrix(turning, unit_matrix())
-    H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((6 + n, 6 + n))
+    H = newton_block(model, work, i)
     tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning)
     A, turn = tangent.rigid, work.bodies.by_turn[u0 : u0 + 6 + n]
     rigid_columns(model, work, i, A)
@@ -186,7 +194,7 @@ def assemble(model, work, tree, tangent, c_d, c_k):
         of_subtree(tree, tangent, i)
         turning_columns(model, tree, tangent, i)
         turning_modes(model, work, tree, tangent, i, c_k)
-        loaded_columns(model, work, tree, tangent, i, c_d, c_k)
+        subtract_slopes(model, work, tree, i, tangent.K, 0, c_d, c_k)
         parent = tree.parent[i]
         if parent >= 0:
             for r in range(6):
@@ -208,7 +216,7 @@ def of_modes(model, work, tree, tangent, i):
     n, q0, m0, K = model.bodies.n_q[i], model.bodies.q0[i], tree.m0[i], tangent.K
     if n == 0:
         return
-    H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((6 + n, 6 + n))
+    H = newton_block(model, work, i)
     R, p, f = work.state.R[i], sub(vector(work.state.r[i]), vector(tangent.origin)), tangent.f
     for k in range(n):
         put_pair_of(f, 0, wrench_of_column(H, 6 + k, R, p))
@@ -303,16 +311,6 @@ def add_second_order(model, work, tangent, i, m, k, factor, F, row):
             d, th = shape(model.markers.bend[first + 6 * n * l : first + 6 * n * (l + 1)], n, k)
             total -= dot(d, f) + dot(th, of_turn)
         row[l] += factor * total
-
-
-@inner
-def loaded_columns(model, work, tree, tangent, i, c_d, c_k):
-    """Subtract the derivatives of forces along the coordinates of the joint of body i."""
-    for k in range(tree.column0[i], tree.column0[i + 1]):
-        s = tree.unknown[k]
-        if s >= 0 and tree.row[k] >= 0:
-            _, Q_x, Q_v = force_slopes(model, work, tree, i, tree.row[k])
-            tangent.K[s, s] -= c_k * Q_x + c_d * Q_v
 
 
 @inner

@@ -12,10 +12,11 @@ equations of the modes that move the near marker. Outwards Y = X of the parent +
 Wrenches that are kept are found from V - C K⁻¹ B, a column of K⁻¹ B being one more solution.
 """
 
+from floatframe.engine.kernels.body import newton_block
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.dense import lu_factor, lu_solve, lu_solve_columns
 from floatframe.engine.kernels.vector import sub, vector
-from floatframe.engine.tree.kernels.projection import force_slopes
+from floatframe.engine.tree.kernels.projection import subtract_slopes
 from floatframe.engine.tree.kernels.spatial import pair, put_pair_of, turned_power, wrench_of_column
 from floatframe.engine.tree.kernels.tangent import add_second_order, inner_product, product_of, unit_of
 from floatframe.engine.tree.kernels.tree import COLUMN, NEAR_MODE
@@ -52,7 +53,7 @@ def factorize_tree(model, work, tree, tangent, c_d, c_k):
 def modal_forces(model, work, tangent, i):
     """Write the force of body i by its own modes."""
     n, q0 = model.bodies.n_q[i], model.bodies.q0[i]
-    H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((6 + n, 6 + n))
+    H = newton_block(model, work, i)
     R, p = work.state.R[i], sub(vector(work.state.r[i]), vector(tangent.origin))
     for k in range(n):
         put_pair_of(tangent.by_mode[q0 + k], 0, wrench_of_column(H, 6 + k, R, p))
@@ -69,9 +70,8 @@ def add_turning(row, screw, F):
 def factorize_joint(model, work, tree, tangent, i, c_d, c_k):
     """Eliminate the unknowns of body i, and add the remainder to its parent. Return whether its matrix is regular."""
     s0, n_l, m0, q0 = tree.s0[i], tree.s0[i + 1] - tree.s0[i], tree.m0[i], model.bodies.q0[i]
-    n = model.bodies.n_q[i]
     A, F = tangent.D[i], tangent.F[i]
-    H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((6 + n, 6 + n))
+    H = newton_block(model, work, i)
     L = tangent.L[tree.l0[i] : tree.l0[i + 1]].reshape((n_l, n_l))
     R, W = tangent.G[s0 : s0 + n_l], tangent.W[s0 : s0 + n_l]
     for k in range(n_l):
@@ -113,11 +113,7 @@ def factorize_joint(model, work, tree, tangent, i, c_d, c_k):
                 if o >= 0:
                     for e in range(18):
                         L[k, l] += row[e] * tangent.jet[o, e]
-    for k in range(tree.column0[i], tree.column0[i + 1]):
-        s = tree.unknown[k]
-        if s >= 0 and tree.row[k] >= 0:
-            _, Q_x, Q_v = force_slopes(model, work, tree, i, tree.row[k])
-            L[s - s0, s - s0] -= c_k * Q_x + c_d * Q_v
+    subtract_slopes(model, work, tree, i, L, -s0, c_d, c_k)
     if n_l > 0:
         if not lu_factor(L, tangent.L_pivot[s0 : s0 + n_l]):
             return False
@@ -148,8 +144,8 @@ def turning_far(tree, tangent, i, j, k, L, F):
 def add_to_parent(model, work, tree, tangent, i, c_k):
     """Add P of the joint of body i to its parent: to its force, and to the force and equations of its modes."""
     parent, P, F = tree.parent[i], tangent.D[i], tangent.F[i]
-    n, q0 = model.bodies.n_q[parent], model.bodies.q0[parent]
-    H = work.solver.H[model.bodies.h0[parent] : model.bodies.h0[parent + 1]].reshape((6 + n, 6 + n))
+    q0 = model.bodies.q0[parent]
+    H = newton_block(model, work, parent)
     f = tangent.f
     for j in range(tree.jet0[i], tree.jet0[i + 1]):
         if tree.jet_kind[j] != NEAR_MODE:

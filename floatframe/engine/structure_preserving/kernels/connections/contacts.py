@@ -15,9 +15,15 @@ import math
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.contact import V_0, contact_gap
 from floatframe.engine.kernels.vector import add, cross, dot, norm, scaled, sub, vector
-from floatframe.engine.structure_preserving.kernels.coordinates import add_pair, span_lengths
-from floatframe.engine.structure_preserving.kernels.markers import add_direction, add_moment, turning
-from floatframe.engine.structure_preserving.kernels.rows import mean_direction, mean_distance, slip_change
+from floatframe.engine.structure_preserving.kernels.coordinates import span
+from floatframe.engine.structure_preserving.kernels.markers import (
+    add_moment,
+    add_pair,
+    begin_unit_load,
+    end_unit_load,
+    turning,
+)
+from floatframe.engine.structure_preserving.kernels.rows import add_slide, mean_direction, mean_distance
 
 __all__ = ["contact_load", "speed_of_approach"]
 
@@ -55,6 +61,18 @@ def known_speed(model, step, c):
 
 
 @inner
+def add_normal_force(model, discrete, step, c, f):
+    """Add the loads of a normal force f, whose work is f times the change of the gap; return its mean direction."""
+    a, b, x = model.connections.a[c], model.connections.b[c], vector(model.rows.x[model.connections.w0[c]])
+    if model.contacts.is_sphere[model.connections.item[c]]:
+        _, N = span(step, a, b)
+        add_pair(step, a, b, scaled(f, N))
+        return N
+    add_slide(model, discrete, step, a, b, x, f)
+    return mean_direction(step, a, x)
+
+
+@inner
 def contact_load(model, discrete, step, c):
     """Add the loads of contact c, and return the work that restitution and friction dissipate."""
     a, b, i, own = model.connections.a[c], model.connections.b[c], model.connections.item[c], model.contacts
@@ -62,25 +80,15 @@ def contact_load(model, discrete, step, c):
     f_s = spring_force(own.stiffness[i], own.exponent[i], gap_0, gap_1)
     if f_s == 0.0:
         return 0.0
-    x, dx = vector(model.rows.x[model.connections.w0[c]]), sub(vector(step.dx[b]), vector(step.dx[a]))
-    d = mean_distance(step, a, b)
-    l_0, l_1 = span_lengths(step, a, b)
-    if own.is_sphere[i]:
-        way = 2.0 * dot(d, dx) / (l_0 + l_1)
-    else:
-        way, _, _ = slip_change(model, discrete, step, x, a, b)
+    begin_unit_load(step, a, b)
+    N = add_normal_force(model, discrete, step, c, 1.0)
+    way = end_unit_load(model, step, a, b)
     f = f_s * max(1.0 - own.dissipation[i] / known_speed(model, step, c) * way / step.h, 0.0)
     taken = (f_s - f) * way
-    N = d
-    if own.is_sphere[i]:
-        add_pair(step, a, b, scaled(2.0 * f / (l_0 + l_1), d))
-    else:
-        N = mean_direction(step, a, x)
-        add_pair(step, a, b, scaled(f, N))
-        add_direction(model, discrete, step, a, x, scaled(f, d))
+    add_normal_force(model, discrete, step, c, f)
     if own.friction[i] == 0.0:
         return taken
-    N = scaled(1.0 / norm(N), N)
+    N, d, dx = scaled(1.0 / norm(N), N), mean_distance(step, a, b), sub(vector(step.dx[b]), vector(step.dx[a]))
     rho = scaled(-own.radius_b[i], N)
     arm = add(d, rho)
     slip = add(dx, sub(cross(turning(model, step, b), rho), cross(turning(model, step, a), arm)))

@@ -3,6 +3,7 @@
 from floatframe.engine.kernels.body import axial
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.bushing import continued, law, rotation_vector
+from floatframe.engine.kernels.connections.coordinate import ends_and_row
 from floatframe.engine.kernels.connections.user_force import element_of, user_outputs
 from floatframe.engine.kernels.rotation import exp_matrix
 from floatframe.engine.kernels.time_function import time_function
@@ -26,14 +27,19 @@ from floatframe.engine.kernels.vector import (
 )
 from floatframe.engine.structure_preserving.kernels.coordinates import (
     add_impulsive_force,
-    add_pair,
     coordinate_change,
     coordinate_ends,
     coordinate_rate,
     counted,
     ends_of_step,
 )
-from floatframe.engine.structure_preserving.kernels.markers import add_direction, change, mean_jacobian, relative_cayley
+from floatframe.engine.structure_preserving.kernels.markers import (
+    add_direction,
+    add_pair,
+    change,
+    mean_jacobian,
+    relative_cayley,
+)
 from floatframe.engine.structure_preserving.kernels.rows import mean_distance
 
 __all__ = ["bushing_load", "user_force_load", "user_state_residual"]
@@ -149,7 +155,7 @@ def user_force_load(model, work, discrete, step, c):
     n, inputs = last - first, work.users.inputs
     inputs[0] = step.t_force
     for p in range(first, last):
-        k, a, b = model.coordinates.row[p], model.coordinates.a[p], model.coordinates.b[p]
+        a, b, k = ends_and_row(model, p)
         change = coordinate_change(model, discrete, step, k, a, b)
         begin, end = coordinate_ends(model, step, k, a, b, change)
         inputs[1 + p - first] = counted(model, k, end, step.known[k]) - 0.5 * (end - begin)
@@ -160,7 +166,7 @@ def user_force_load(model, work, discrete, step, c):
     for p in range(first, last):
         if model.coordinates.force[p] >= 0:
             Q = work.users.outputs[model.coordinates.core[p] - model.elements.core[i]]
-            k, a, b = model.coordinates.row[p], model.coordinates.a[p], model.coordinates.b[p]
+            a, b, k = ends_and_row(model, p)
             add_impulsive_force(model, discrete, step, k, a, b, Q)
             given += Q * inputs[1 + n + p - first] * step.h
     return given
@@ -174,7 +180,7 @@ def user_state_residual(model, work, discrete, step, c):
     n, inputs = last - first, work.users.inputs
     inputs[0] = 0.5 * (step.t_0 + step.end.state.time)
     for p in range(first, last):
-        k, a, b = model.coordinates.row[p], model.coordinates.a[p], model.coordinates.b[p]
+        a, b, k = ends_and_row(model, p)
         begin, end = ends_of_step(model, step, k, a, b)
         inputs[1 + p - first] = 0.5 * (begin + end)
         rate = (end - begin) / step.h

@@ -305,11 +305,11 @@ def add_axes_moment(model, discrete, step, m, M):
     if square > 0.0:
         along = dot(M, turn) / square
         inside = add(inside, scaled(along * (1.0 / cosine - 2.0 / (1.0 + cosine)), turn))
-    put_sum(step.T[m], 0, M)
+    put_sum(step.T[0, m], 0, M)
     for k in range(3):
         G = scaled(0.5, cross(inside, (E[0][k], E[1][k], E[2][k])))
         eps = (step.E_mean[m, 0, k], step.E_mean[m, 1, k], step.E_mean[m, 2, k])
-        put_sum(step.m[m], 0, cross(eps, turned_back(step.R_m[i], G)))
+        put_sum(step.m[0, m], 0, cross(eps, turned_back(step.R_m[i], G)))
 
 
 @inner
