@@ -3,6 +3,7 @@
 Evaluated in `floatframe.engine.kernels.evaluation`.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,24 +14,19 @@ from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.initial_conditions.gaps import gaps_at, has_gaps
 from floatframe.engine.initial_conditions.initial import (
     assembled,
-    consistent_motion,
     solve_accelerations,
     with_compatible_velocities,
 )
-from floatframe.engine.kernels.memory import WORK_GIVEN, WORK_TAKEN, Memory, Rows, memory_at, new_rows
+from floatframe.engine.kernels.memory import Memory, Rows
 from floatframe.engine.kernels.model import COUPLER, USER_FORCE
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import FloatframeError, ModelError
 from floatframe.integrators.integrator import (
     Failure,
     FollowedRotations,
+    Integrator,
     joined_rows,
-    observed,
-    observed_unless_stopped,
-    one_step_of,
-    started_anew,
-    turned_on,
-    with_angles,
+    observed_outputs,
 )
 from floatframe.integrators.passed_contacts import Stretch, stretches_of_passed_contact
 from floatframe.integrators.remembered_contacts import require_no_remembered_contacts
@@ -44,7 +40,7 @@ MOST_STEPS = 100_000  #: between two outputs
 
 
 @dataclass(frozen=True)
-class Ida:
+class Ida(Integrator):
     """Backward differentiation of orders one to five with variable steps: SUNDIALS IDA [1]_, through scikit-sundae.
 
     Joints enter by their second derivatives: accelerations and reactions follow from the state by one linear system
@@ -89,59 +85,36 @@ class Ida:
                     "not know; use GeneralizedAlpha"
                 )
         require_no_remembered_contacts(compiled, "Ida")
-        made = consistent_motion(system, state, t=t, angle=None if before is None else before.angle)
-        memory = memory_at(made.state, made.u_dot, made.w, np.zeros(0))
-        return with_angles(system, t, memory, before, state)
-
-    def after_jump(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
-        """Return the memory after a jump of forces at t, and the results there."""
-        return started_anew(self, system, t, memory, work)
-
-    def step(self, system: System, t: float, h: float, memory: Memory) -> Memory:
-        """Return the memory a time h later; `ConvergenceError` if it fails."""
-        return one_step_of(self, system, t, h, memory)
-
-    def observe(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
-        """Return the memory with the power at its state, and the results there."""
-        work.state.time[...] = t
-        return observed(system, t, memory, work)
+        return super().start(system, t, state, before).changed(a=np.zeros(0))
 
     def advance(
         self, system: System, memory: Memory, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
     ) -> tuple[Memory, Rows, int, Failure | None]:
         """Advance by n_steps output times, the first of them number `first` from t0; see `integrator.Integrator`."""
-        compiled = compiled_system(system)
-        own = new_work(compiled.model)
-        t: Array = t0 + h * np.arange(first, first + n_steps + 1, dtype=float)
-        made = Motion(compiled, own)
-        made.rotations = FollowedRotations(compiled.model, own, float(t[0]), memory)
+        made = Motion(compiled_system(system), t0 + h * first, memory)
+        times: Array = t0 + h * np.arange(first, first + n_steps + 1, dtype=float)
+        memory, rows, n_good, failure, _ = observed_outputs(
+            self.outputs(made, times, memory), "IDA", system, memory, work, h=h, first=first, every=every
+        )
+        return memory.changed(n_iterations=memory.n_iterations + made.n_evaluations), joined_rows(rows), n_good, failure
+
+    def outputs(self, made: "Motion", times: Array, memory: Memory) -> Iterator[tuple[float, State, Array, Array]]:
+        """Yield time, state, u_dot and w at each time but the first."""
+        compiled, own = made.compiled, made.work
         solution = self.solved_past_contacts if has_gaps(compiled) else self.solved
-        reached, message = solution(made, t, flattened(memory.state))
-        rows, n_good, failure, has_stopped = [new_rows(compiled.model, 0)], 0, None, False
-        made.rotations = FollowedRotations(compiled.model, own, float(t[0]), memory)
-        for k, (at, y) in enumerate(reached, start=first + 1):
-            if not np.isfinite(y).all() or abs(at - t[k - first]) > 1e-9 * h:  # it may end before its failure
+        reached, message = solution(made, times, flattened(memory.state))
+        made.rotations.begin(float(times[0]), memory.angle, memory.angle_rate)
+        for t, (at, y) in zip(times[1:], reached, strict=False):
+            if not np.isfinite(y).all() or abs(at - t) > 1e-9 * (times[1] - times[0]):  # it may end before its failure
                 break
-            own.state.time[...] = t[k - first]
+            own.state.time[...] = t
             own.counted.no_number[...] = 0  # of a trial beyond
-            state = assembled(compiled, own, state_of(compiled, y))
-            state = with_compatible_velocities(compiled, own, state)
-            u_dot, w = made.accelerations(t[k - first], state)
-            after = memory.changed(state=state, u_dot=u_dot, w=w, h=h, n_steps=memory.n_steps + 1)
-            after = turned_on(system, after, h)
-            after, row, failure = observed_unless_stopped(system, float(t[k - first]), after, work)
-            has_stopped = failure is not None
-            if has_stopped:
-                break
-            memory = after.changed(work=memory.work + 0.5 * h * (memory.power + after.power))
-            row.diagnostics[0, [WORK_GIVEN, WORK_TAKEN]] = memory.work
-            if k % every == 0:
-                rows.append(row)
-            n_good += 1
-        if n_good < n_steps and not has_stopped:
-            failure = Failure(f"IDA: {made.problem or message}", np.inf)
-        memory = memory.changed(n_iterations=memory.n_iterations + made.n_evaluations)
-        return memory, joined_rows(rows), n_good, failure
+            state = with_compatible_velocities(compiled, own, assembled(compiled, own, state_of(compiled, y)))
+            yield (float(t), state, *made.accelerations(t, state))
+        else:
+            if len(reached) == len(times) - 1:
+                return
+        raise ModelError(made.problem or message)
 
     def solved(self, made: "Motion", t: Array, y_0: Array) -> tuple[list[tuple[float, Array]], str]:
         """Return times and y at all times but the first, as far as the solver gets, and its message."""
@@ -217,10 +190,9 @@ def state_of(compiled: CompiledSystem, y: Array) -> State:
 class Motion:
     """The rates of a system, with a count; errors are stored, because they cannot pass through the solver."""
 
-    rotations: FollowedRotations  #: of bushings
-
-    def __init__(self, compiled: CompiledSystem, work: Work) -> None:
-        self.compiled, self.work = compiled, work
+    def __init__(self, compiled: CompiledSystem, t: float, memory: Memory) -> None:
+        self.compiled, self.work = compiled, new_work(compiled.model)
+        self.rotations = FollowedRotations(compiled.model, self.work, t, memory)  #: of bushings
         self.n_evaluations, self.problem = 0, ""
 
     def accelerations(self, t: float, state: State) -> tuple[Array, Array]:

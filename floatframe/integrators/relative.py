@@ -14,6 +14,7 @@ from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.initial_conditions.initial import work_from
 from floatframe.engine.initial_conditions.newton_equations import displaced, set_iterate
 from floatframe.engine.initial_conditions.step_filter import Beginning, Spin
+from floatframe.engine.kernels.entry import Outcome
 from floatframe.engine.kernels.memory import Memory, Rows
 from floatframe.engine.kernels.model import Model
 from floatframe.engine.kernels.work import Work, new_work
@@ -22,7 +23,7 @@ from floatframe.engine.tree.kernels.tree import JointWork, TangentWork, Tree, ne
 from floatframe.engine.tree.topology import tree_of
 from floatframe.errors import ModelError
 from floatframe.integrators.generalized_alpha import LONGER, GeneralizedAlpha, rows_closed_by_positions, words_of_turn
-from floatframe.integrators.integrator import Failure, Integrator, one_step_of, started_anew
+from floatframe.integrators.integrator import Failure, Integrator, started_anew
 from floatframe.integrators.relative_ode import RelativeOde
 from floatframe.model.rotations import rotation_exp
 from floatframe.model.state import State
@@ -34,7 +35,7 @@ NEAR_BY = 1e-3  #: fraction of a step for the difference that gives the rates of
 
 
 @dataclass(frozen=True)
-class RelativeGeneralizedAlpha:
+class RelativeGeneralizedAlpha(Integrator):
     """Generalized-alpha in the coordinates of joints and modes (docs/relative.md §6), otherwise as `GeneralizedAlpha`.
 
     (1) predict: a_new = a for every unknown s = (z, q)
@@ -82,10 +83,6 @@ class RelativeGeneralizedAlpha:
         """The same method in absolute coordinates."""
         return GeneralizedAlpha(**asdict(self))
 
-    def start(self, system: System, t: float, state: State | None = None, before: Memory | None = None) -> Memory:
-        """Return the memory at the beginning: the consistent state and its accelerations."""
-        return self.absolute.start(system, t, state, before)
-
     def after_jump(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
         """Return the memory after a jump of forces at t, and the results there; as `GeneralizedAlpha`."""
         if memory.h == 0.0:
@@ -98,10 +95,6 @@ class RelativeGeneralizedAlpha:
             _, joints = joint_iterate(compiled, tree, memory.state, each)
             a += sign * in_slots(tree, joints, each, joints.acceleration)
         return after.changed(u_dot=u_dot, a=a), rows
-
-    def step(self, system: System, t: float, h: float, memory: Memory) -> Memory:
-        """Return the memory one step of size h later; `ConvergenceError` if Newton's method fails."""
-        return one_step_of(self, system, t, h, memory)
 
     def observe(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
         """Return the memory with the power at its state, and the results there."""
@@ -158,10 +151,9 @@ class RelativeGeneralizedAlpha:
             memory = shifted(system, memory, way, h, method.coefficients, t, rows)
         return memory.changed(u_dot=u_dot, a=a, h=h, h_next=h)
 
-    def explain(self, system: System, work: Work, outcome: tuple, u: Array, h: float) -> Failure | None:
+    def explain(self, system: System, work: Work, outcome: Outcome, u: Array, h: float) -> Failure | None:
         """Return the reason of a failed step of size h that began with velocities u, (n_u,); None if none failed."""
-        from floatframe.engine.kernels.generalized_alpha import TURNED
-        from floatframe.engine.tree.kernels.steps import SINGULAR
+        from floatframe.engine.kernels.generalized_alpha import SINGULAR, TURNED
 
         if outcome[0] == 0:
             return None

@@ -16,25 +16,21 @@ from fe_models.foundation.words import nearest
 from floatframe.engine.compiling.callbacks import raise_errors_of
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.initial_conditions.gaps import gaps_at, has_gaps
-from floatframe.engine.initial_conditions.initial import consistent_motion, has_normal_friction
+from floatframe.engine.initial_conditions.initial import has_normal_friction
 from floatframe.engine.initial_conditions.newton_equations import set_iterate
-from floatframe.engine.kernels.memory import WORK_GIVEN, WORK_TAKEN, Memory, Rows, memory_at, new_rows
+from floatframe.engine.kernels.memory import Memory, Rows
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.engine.structure_preserving.bodies import central_bodies
 from floatframe.engine.tree.kernels.tree import new_joint_work, new_tangent_work
 from floatframe.engine.tree.topology import SystemTree, tree_of
-from floatframe.errors import FloatframeError, ModelError
+from floatframe.errors import ModelError
 from floatframe.integrators.integrator import (
     Failure,
     FollowedRotations,
+    Integrator,
     joined_rows,
-    observed,
-    observed_unless_stopped,
+    observed_outputs,
     one_by_one,
-    one_step_of,
-    started_anew,
-    turned_on,
-    with_angles,
 )
 from floatframe.integrators.passed_contacts import Stretch, stretches_of_passed_contact
 from floatframe.integrators.remembered_contacts import require_no_remembered_contacts
@@ -55,7 +51,7 @@ SETTLED = 1e-12  #: tolerance of the last change of reactions and similar unknow
 
 
 @dataclass(frozen=True)
-class RelativeOde:
+class RelativeOde(Integrator):
     """SciPy's `solve_ivp` on the ordinary differential equation of the independent coordinates (docs/relative.md §7).
 
     (1) coordinates that close the loops are chosen by pivoted LU, and anew where the choice wears out
@@ -100,45 +96,17 @@ class RelativeOde:
                     "use GeneralizedAlpha"
                 )
         require_no_remembered_contacts(compiled, "RelativeOde")
-        known, angle = (None, None) if before is None else (before.w, before.angle)
-        made = consistent_motion(system, state, t=t, known=known, angle=angle)
-        memory = memory_at(made.state, made.u_dot, made.w, np.zeros(0))
-        return with_angles(system, t, memory, before, state)
-
-    def after_jump(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
-        """Return the memory after a jump of forces at t, and the results there."""
-        return started_anew(self, system, t, memory, work)
-
-    def step(self, system: System, t: float, h: float, memory: Memory) -> Memory:
-        """Return the memory a time h later; `ConvergenceError` if it fails."""
-        return one_step_of(self, system, t, h, memory)
-
-    def observe(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
-        """Return the memory with the power at its state, and the results there."""
-        return observed(system, t, memory, work)
+        return super().start(system, t, state, before).changed(a=np.zeros(0))
 
     def advance(
         self, system: System, memory: Memory, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
     ) -> tuple[Memory, Rows, int, Failure | None]:
         """Advance by n_steps output times, the first of them number `first` from t0; see `integrator.Integrator`."""
         times: Array = t0 + h * np.arange(first, first + n_steps + 1, dtype=float)
-        rows, n_good, failure, has_stopped = [new_rows(compiled_system(system).model, 0)], 0, None, False
         motion = Motion(system, memory, float(times[0]))
-        try:
-            for t, state, u_dot, w in motion.outputs(self, times):
-                after = memory.changed(state=state, u_dot=u_dot, w=w, h=h, n_steps=memory.n_steps + 1)
-                after = turned_on(system, after, h)
-                after, row, failure = observed_unless_stopped(system, t, after, work)
-                has_stopped = failure is not None
-                if has_stopped:
-                    break
-                memory = after.changed(work=memory.work + 0.5 * h * (memory.power + after.power))
-                row.diagnostics[0, [WORK_GIVEN, WORK_TAKEN]] = memory.work
-                n_good += 1
-                if (first + n_good) % every == 0:
-                    rows.append(row)
-        except (FloatframeError, np.linalg.LinAlgError) as error:
-            failure = Failure(f"{self.method}: {error}", np.inf)
+        memory, rows, n_good, failure, has_stopped = observed_outputs(
+            motion.outputs(self, times), self.method, system, memory, work, h=h, first=first, every=every
+        )
         memory = memory.changed(n_iterations=memory.n_iterations + motion.n_evaluations)
         if failure is not None and n_steps > 1 and not has_stopped and compiled_system(system).stop_words:
             begun = first + n_good  # its stop may precede the failure: output by output up to the stop
