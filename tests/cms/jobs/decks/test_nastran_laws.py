@@ -362,6 +362,27 @@ def test_parameters_of_the_case_control_count(tmp_path):
             body_of(tmp_path, text, head=f"SOL 103\nCEND\n{line}\nBEGIN BULK\n")
 
 
+def test_wtmass_scales_every_mass(tmp_path):
+    """Of materials, of lengths and areas, of rods, and those of points by CONM1, CONM2 and CMASS2."""
+    text = (
+        "GRID,1,,0.,0.,0.\nGRID,2,,1.,.2,.1\nGRID,3,,1.5,1.,.3\nGRID,4,,.4,1.2,.8\n"
+        "CBAR,1,1,1,2,0.,0.,1.\nCBAR,2,1,2,3,0.,0.,1.\nCBAR,5,1,4,1,0.,0.,1.\nPBAR,1,1,2.-3,3.-6,1.-6,2.-6,1.7\n"
+        "CROD,3,2,3,4\nPROD,2,1,1.-3,1.-6,,.9\n" + MATERIAL +
+        "CONM2,10,2,,3.,.1,.2,-.1\n,.5,,.6,,,.7\nCMASS2,12,1.5,4,1\nCMASS2,13,1.5,4,2\nCMASS2,14,1.5,4,3\n"
+        "CONM1,11,3,,2.,,2.,,\n,2.,,,,.4,,,\n,,.5,,,,,,.6\n"
+    )  # fmt: skip
+    plain, _ = body_of(tmp_path, text)
+    scaled, _ = body_of(tmp_path, "PARAM,WTMASS,.25\n" + text)
+    M = plain.M.toarray()
+    x = (plain.dofs[:, 1] == 0).astype(float)
+    lengths = [np.linalg.norm(each) for each in ([1, 0.2, 0.1], [0.5, 0.8, 0.2], [0.4, 1.2, 0.8], [1.1, -0.2, -0.5])]
+    line = 7800 * 2e-3 + 1.7
+    expected = line * sum(lengths[:3]) + (7800 * 1e-3 + 0.9) * lengths[3] + 3.0 + 1.5 + 2.0
+    assert_allclose(x @ M @ x, expected, rtol=1e-9)
+    assert_allclose(scaled.M.toarray(), 0.25 * M, rtol=0, atol=1e-12 * np.abs(M).max())
+    assert_allclose(scaled.K.toarray(), plain.K.toarray(), rtol=1e-12, atol=0)
+
+
 def test_structural_damping_is_named(tmp_path):
     text = GRIDS + f"{ORIENTED}\n" + SECTION + "MAT1,1,2.+11,,.3,7800.,,,.05\nPARAM,G,.02\n"
     body, deck = body_of(tmp_path, text)

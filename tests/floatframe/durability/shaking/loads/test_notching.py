@@ -30,6 +30,16 @@ def test_a_response_limit_is_kept_and_met_within_its_notch():
     assert notch.reason == "limit of mass acceleration z"
 
 
+def test_a_factor_on_the_response_is_that_much_less_of_the_limit():
+    found = notched_sine(MODEL, SINE, [ResponseLimit("mass acceleration z", 5.0, factor=1.25)])
+    same = notched_sine(MODEL, SINE, [ResponseLimit("mass acceleration z", 4.0)])
+    assert_allclose(found.notched, same.notched, rtol=1e-12)
+    in_density = notched_random(MODEL, RANDOM, [ResponseLimit("mass acceleration z", 5.0, factor=1.25)])
+    assert_allclose(
+        in_density.notched, notched_random(MODEL, RANDOM, [ResponseLimit("mass acceleration z", 3.2)]).notched
+    )
+
+
 def test_the_limit_that_allows_least_is_the_reason():
     limits = [
         ResponseLimit("mass acceleration z", 5.0, name="mirror"),
