@@ -39,9 +39,17 @@ __all__ = ["JointMotion", "Motion", "MovedBody", "motion_of"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Motion(Trajectory):
-    """A motion with its system."""
+    """A motion with its system.
 
-    known: System | Callable[[], System | None] | None = None  #: the system, or a function that finds it when needed
+    Parameters
+    ----------
+    head, source, is_complete, path, validity
+        As in `Trajectory`.
+    known
+        The system, or a function that finds it when needed; None: not known.
+    """
+
+    known: System | Callable[[], System | None] | None = None
 
     @cached_property
     def system(self) -> System:

@@ -1,5 +1,6 @@
-"""Every parameter of a public function is documented in the section Parameters of its docstring."""
+"""Parameters of public functions and fields of public data classes stand in the section Parameters of the docstring."""
 
+import dataclasses
 import importlib
 import inspect
 import re
@@ -31,8 +32,21 @@ def test_public_functions_document_every_parameter(package):
     assert missing == {}, "expected these parameters in the section Parameters, with shape and unit"
 
 
-def test_help_of_a_rigid_body_explains_every_field_and_the_point_of_its_inertia():
+@pytest.mark.parametrize("package", PACKAGES)
+def test_public_data_classes_document_every_field(package):
+    module = importlib.import_module(package)
+    named = {name: getattr(module, name) for name in module.__all__}
+    classes = {name: each for name, each in named.items() if inspect.isclass(each) and dataclasses.is_dataclass(each)}
+    assert len(classes) > 30
+    missing = {
+        name: left
+        for name, each in classes.items()
+        if (left := {f.name for f in dataclasses.fields(each) if not f.name.startswith("_")} - documented(each))
+    }
+    assert missing == {}, "expected these fields in the section Parameters, with shape and unit"
+
+
+def test_help_of_a_rigid_body_names_the_point_of_its_inertia():
     from floatframe import RigidBody
 
-    assert set(inspect.signature(RigidBody).parameters) == documented(RigidBody)
     assert "Inertia tensor about the centre of mass" in inspect.getdoc(RigidBody)
