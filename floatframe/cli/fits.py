@@ -301,20 +301,32 @@ def optimization_record(result: "OptimizationResult") -> dict[str, Any]:
 
 
 def best_system(result: "OptimizationResult") -> str:
-    """Return the system file with the best values of the parameters; comments and order are kept."""
+    """Return the system file with the best values of the parameters.
+
+    Comments and order are kept, except where a value stands in another file or in a repeated table: the file that
+    results is returned then.
+    """
     import tomlkit
 
+    from fe_models.foundation.parametric_file import read_parametric
     from fe_models.foundation.toml_file import holder_of
     from floatframe.errors import SystemFileError
 
     design = result.design
-    text = Path(design.study.system).read_text(encoding="utf-8-sig")
-    document = tomlkit.parse(text)
+    path = Path(design.study.system)
+    document: Any = tomlkit.parse(path.read_text(encoding="utf-8-sig"))
     point = design.point(result.best.evaluation.values)
-    paths = [path for p in design.parameters for path in p.paths]
-    for path, value in zip(paths, point, strict=True):
-        holder, key = holder_of(document, path, design.study.system, SystemFileError)
-        holder[key] = value
+    values = dict(zip([path for p in design.parameters for path in p.paths], point, strict=True))
+    parameters = read_parametric(path, SystemFileError).parameters
+    try:
+        for name, value in values.items():
+            if name in parameters:
+                document.setdefault("parameters", tomlkit.table())[name] = value
+            else:
+                holder, key = holder_of(document, name, path, SystemFileError)
+                holder[key] = value
+    except SystemFileError:
+        document = dict(read_parametric(path, SystemFileError, values))
     return str(tomlkit.dumps(document))
 
 
