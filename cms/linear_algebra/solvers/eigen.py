@@ -135,7 +135,8 @@ def eigenmodes(
             factorization = stack.enter_context(_factorize_shifted(matrix_of(K), matrix_of(M), shift, solver))
         if factorization.n != n:
             raise EigenError(f"eigenmodes: factorization: expected order {n}, got {factorization.n}")
-        own_search, space = (None, None) if is_dense else search_on_ranks(factorization, numbering)
+        is_here = is_dense or factorization.solver.spread is None
+        own_search, space = (None, None) if is_here else search_on_ranks(factorization, numbering)
         kind: type[DenseSearch | KrylovSearch | SlepcSearch] = DenseSearch if is_dense else own_search or KrylovSearch
         if space is not None:
             stack.callback(space.close)
