@@ -5,7 +5,7 @@ It works for second-order methods, with fixed steps and with an error tolerance:
 (1) A companion is the same motion with steps twice as long (or an error tolerance eight times as large). It costs half
     a step for each step of the run. The run and the companion differ by three times the error of the run. This includes
     how the motion magnifies or damps earlier errors.
-(2) If that error exceeds `SCREEN` of the limit, or a long step fails, or a flexible body turns by more than `FAR_TURN`
+(2) If that error or that of (6) exceeds `SCREEN` of the limit, long steps fail or a flexible body turns by `FAR_TURN`
     in a step, a companion with half steps starts from the same memory and replaces the first one. It differs from the
     run by 3/4 of the error. Only its estimate is reported. From the start of a run it has little numerical damping
     (`LIGHT`): a run may damp vibrations that its steps do not resolve, and equal damping would hide what they do to the
@@ -430,7 +430,8 @@ class StepWatch:
             is_fit = not (is_far and self.coarse.ratio == DOUBLES)
             if not (is_fit and self.coarse.follow(system, end, last, t0, h, self.jumps)):
                 self.coarse, self.coarse_fails = None, True
-        is_small = is_good and self.relative_errors(system, other.peak).max() < SCREEN * self.limit
+        found = np.maximum(other.peak, self.first_error)  # double steps may not see what half steps found in one step
+        is_small = is_good and self.relative_errors(system, found).max() < SCREEN * self.limit
         if other.ratio == DOUBLES and not is_small:
             doubles_fail, other = not is_good, self.refined(system, t0, other)
             if doubles_fail:
