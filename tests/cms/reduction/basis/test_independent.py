@@ -8,13 +8,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from cms.linear_algebra import independent
 from cms.linear_algebra.independent import Products, gram_in_blocks, independent_basis
-from cms.linear_algebra.solvers import tall
 from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
 from cms.modes.mode_sets.classical import craig_bampton, unrestrained_attachment
 from cms.reduction.basis import finishing
 from cms.reduction.basis.finishing import finish
 from cms.reduction.basis.frames import NodalFrame, TisserandFrame, frame_condition
 from fe_models.body.couplings.couplings import couple
+from fe_models.foundation.tall import columns
 from tests.bodies import bar
 
 ROUNDOFF = 1e-12
@@ -125,11 +125,11 @@ def test_columns_that_differ_by_little_and_redundant_ones_are_told_apart(body):
 @pytest.mark.parametrize("order", ["C", "F"])
 @pytest.mark.parametrize("m", [3, 6, 9, 10])
 def test_a_product_in_the_place_of_its_factor_lies_in_one_piece(m, order, monkeypatch):
-    monkeypatch.setattr(tall, "SLICE", 7)
+    monkeypatch.setattr(columns, "SLICE", 7)
     rng = np.random.default_rng(0)
     X, C = np.asarray(rng.normal(size=(50, 10)), order=order), rng.normal(size=(10, m))
     expected = X @ C
-    found = tall.combined(X, C)
+    found = columns.combined(X, C)
     assert np.shares_memory(found, X) == (m >= 5)
     assert found.flags[f"{order}_CONTIGUOUS"]
     assert_allclose(found, expected, rtol=0, atol=ROUNDOFF * np.abs(expected).max())
