@@ -316,14 +316,14 @@ def best_system(result: "OptimizationResult") -> str:
     path = Path(design.study.system)
     document: Any = tomlkit.parse(path.read_text(encoding="utf-8-sig"))
     point = design.point(result.best.evaluation.values)
-    values = dict(zip([path for p in design.parameters for path in p.paths], point, strict=True))
+    values = dict(zip([key for p in design.parameters for key in p.paths], point, strict=True))
     parameters = read_parametric(path, SystemFileError).parameters
     try:
         for name, value in values.items():
             if name in parameters:
                 document.setdefault("parameters", tomlkit.table())[name] = value
             else:
-                holder, key = holder_of(document, name, path, SystemFileError)
+                holder, key = holder_of(document, name, str(path), SystemFileError)
                 holder[key] = value
     except SystemFileError:
         document = dict(read_parametric(path, SystemFileError, values))
