@@ -340,14 +340,14 @@ def info_command(
     Example: floatframe info swing.h5 --json
     """
     from floatframe.errors import ResultsError
-    from floatframe.results.trajectory import read_results
+    from floatframe.results.trajectory import read_trajectory
 
     if file.suffix == ".toml":
         raise ResultsError(f"{file}: expected a results file (.h5) or a robot (.urdf); try floatframe check {file}")
     if file.suffix == ".urdf":
         exchange.print_robot(file, as_json=json)
         return
-    trajectory = read_results(file)
+    trajectory = read_trajectory(file)
     if json:
         import json as json_module
 
@@ -396,9 +396,9 @@ def plot_command(
     from floatframe.pictures.sensor_plots import plot_sensors
     from floatframe.results.sensor_choice import chosen_measurements
     from floatframe.results.sensors import measured
-    from floatframe.results.trajectory import read_results
+    from floatframe.results.trajectory import read_trajectory
 
-    trajectory = read_results(file)
+    trajectory = read_trajectory(file)
     path = output_path(output, file.with_suffix(".png"), ResultsError, overwrite_of=(file, *trajectory.files))
     ending = path.suffix.lower().removeprefix(".")
     if ending not in ("png", "svg", "pdf"):
@@ -454,11 +454,11 @@ def animate_command(
     from floatframe.model.bodies.rigid_body import RigidBody
     from floatframe.pictures.animation import animate, bodies_of
     from floatframe.pictures.body_colors import BODY_COLORS
-    from floatframe.results.trajectory import read_results
+    from floatframe.results.trajectory import read_trajectory
 
     if color not in BODY_COLORS:
         raise ResultsError(f"--color {color}: expected one of {', '.join(BODY_COLORS)}{nearest(color, BODY_COLORS)}")
-    trajectory = read_results(file)
+    trajectory = read_trajectory(file)
     path = output_path(
         output, file.with_suffix(".gif"), ResultsError, overwrite_of=(file, *trajectory.files), needs_file=True
     )
@@ -503,9 +503,9 @@ def export_command(
     from floatframe.pictures.animation import bodies_of
     from floatframe.results.export import export_csv, export_vtk
     from floatframe.results.sensor_choice import chosen_measurements
-    from floatframe.results.trajectory import read_results
+    from floatframe.results.trajectory import read_trajectory
 
-    trajectory = read_results(file)
+    trajectory = read_trajectory(file)
     path = output_path(output, file.with_suffix(".csv"), ResultsError, overwrite_of=(file, *trajectory.files))
     bodies = bodies_of(trajectory)
     if path.suffix.lower() == ".csv":

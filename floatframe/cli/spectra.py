@@ -64,9 +64,9 @@ def chosen_signals(
 ) -> "tuple[Signals, list[Signal | None], tuple[Path, ...]]":
     """Return the chosen channels of a results file or measured file, the channels `others`, and the files read."""
     if file.suffix.lower() == ".h5" or file.is_dir():
-        from floatframe.results.trajectory import read_results
+        from floatframe.results.trajectory import read_trajectory
 
-        trajectory = read_results(file)
+        trajectory = read_trajectory(file)
         signals = sensor_signals(trajectory, names, rate)
         found = [sensor_signals(trajectory, [name], rate)[1] if name else None for name in others]
         return signals, found, (file, *map(Path, trajectory.files))

@@ -49,7 +49,7 @@ def view_command(
     from floatframe.errors import ModelError, ResultsError
     from floatframe.pictures.viewer.modes_view import view_modes
     from floatframe.pictures.viewer.motion_view import require_color, view
-    from floatframe.results.trajectory import read_results
+    from floatframe.results.trajectory import read_trajectory
 
     require_color(color)
     if file.suffix.lower() in (".npz", ".mat"):
@@ -75,7 +75,7 @@ def view_command(
                 page = view_modes(model, linear.equilibrium, system_modes(linear), path, n_modes=n_modes, color=color,
                                   largest=largest)  # fmt: skip
     else:
-        trajectory = read_results(file)
+        trajectory = read_trajectory(file)
         path = page_path(output, file, (file, *trajectory.files))
         with stages(remaining=True) as clock, clock("page"):
             page = view(trajectory, path, sensors=sensors, color=color, magnification=magnification, largest=largest)

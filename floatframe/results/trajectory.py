@@ -18,7 +18,7 @@ from floatframe.results.head import BodyEntry, Head
 from floatframe.results.results_file import ArraySource, open_results, validity_text
 from floatframe.results.validity import ValidityNote, notes_from_json
 
-__all__ = ["BodyMotion", "Drift", "Energies", "Reaction", "Trajectory", "read_results"]
+__all__ = ["BodyMotion", "Drift", "Energies", "Reaction", "Trajectory", "read_trajectory"]
 
 
 @frozen_copies
@@ -217,7 +217,7 @@ class Trajectory:
         return self.source.read("diagnostics")[:, 7:10]
 
 
-def read_results(path: str | os.PathLike[str]) -> Trajectory:
+def read_trajectory(path: str | os.PathLike[str]) -> Trajectory:
     """Return the trajectory in a results file, or the part left by a killed run (with `is_complete` False).
 
     Parameters

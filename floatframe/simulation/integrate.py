@@ -39,7 +39,7 @@ from floatframe.results.head import Head
 from floatframe.results.motion import Motion, motion_of
 from floatframe.results.results_file import MemorySource, validity_text
 from floatframe.results.sensors import measured
-from floatframe.results.trajectory import Trajectory, read_results
+from floatframe.results.trajectory import Trajectory, read_trajectory
 from floatframe.results.validity import ValidityNote, notes_from_json, notes_to_json
 from floatframe.results.writer import ResultsPlace, ResultsWriter, last_restart
 from floatframe.simulation.energy_watch import EnergyWatch
@@ -547,7 +547,7 @@ class Run:
             arrays = MemorySource(joint_rows(self.system, self.kept))
             return Motion(head, arrays, is_complete=True, validity=self.watch.notes, known=self.system)
         self.writer.finish(self.summary(memory))
-        return motion_of(read_results(self.writer.path), self.system)
+        return motion_of(read_trajectory(self.writer.path), self.system)
 
 
 @dataclass(frozen=True, eq=False)
@@ -610,5 +610,5 @@ def motion_so_far(run: Run) -> tuple[Motion, str]:
         return Motion(run.head, arrays, is_complete=False, validity=run.watch.notes, known=run.system), ""
     run.writer.close_segment()
     return motion_of(
-        read_results(run.writer.folder), run.system
+        read_trajectory(run.writer.folder), run.system
     ), f"; the motion so far is in {str(run.writer.folder)!r}"

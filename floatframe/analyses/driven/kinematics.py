@@ -39,7 +39,7 @@ from floatframe.model.system import System
 from floatframe.results.motion import Motion, motion_of
 from floatframe.results.results_file import MemorySource
 from floatframe.results.small_motions.joint_rates import coordinate_rows, driven_coordinates
-from floatframe.results.trajectory import read_results
+from floatframe.results.trajectory import read_trajectory
 from floatframe.results.writer import ResultsPlace, ResultsWriter
 from floatframe.simulation.motion_head import head_of, joint_rows
 
@@ -233,7 +233,7 @@ def kinematics(
                 error.trajectory = Motion(head, MemorySource(joint_rows(system, kept)), is_complete=False, known=system)
             else:
                 writer.close_segment()
-                error.trajectory = motion_of(read_results(writer.folder), system)
+                error.trajectory = motion_of(read_trajectory(writer.folder), system)
                 error.args = (f"{error}; the motion so far is in {str(writer.folder)!r}",)
             raise
         except BaseException:
@@ -243,7 +243,7 @@ def kinematics(
         if writer is None:
             return Motion(head, MemorySource(joint_rows(system, kept)), is_complete=True, known=system)
         writer.finish()
-        return motion_of(read_results(writer.path), system)
+        return motion_of(read_trajectory(writer.path), system)
 
 
 def first_instant(system: System, work: Work, state: State, t: float, elasticity: Elasticity) -> Instant:

@@ -38,7 +38,7 @@ from floatframe.durability.shaking.shake import shake
 from floatframe.durability.shaking.shake_file import read_shake
 from floatframe.durability.shaking.structure.model import ShakenModel, driven, modal_response
 from floatframe.errors import FatigueError
-from floatframe.results.trajectory import Trajectory, read_results
+from floatframe.results.trajectory import Trajectory, read_trajectory
 
 __all__ = ["Assessment", "assess", "equivalent_repeats", "shaken_damage", "shaken_spectra"]
 
@@ -250,7 +250,7 @@ def places_of(given: FatigueFile, body: ReducedBody) -> tuple[IntArray | None, I
 
 def block_of(section: BlockSection, given: FatigueFile, body: ReducedBody) -> LoadBlock:
     """Return the load block of a results file, after checking that it was computed with the body."""
-    trajectory = read_results(section.results)
+    trajectory = read_trajectory(section.results)
     name = section.name or section.results.stem
     _, entry = trajectory.entry(section.body)
     if entry.digest and entry.digest != digest(given.body):

@@ -10,8 +10,7 @@ from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ResultsError
 from floatframe.model.system import System
 from floatframe.results.motion import Motion, motion_of
-from floatframe.results.trajectory import Trajectory
-from floatframe.results.trajectory import read_results as read_trajectory
+from floatframe.results.trajectory import Trajectory, read_trajectory
 
 __all__ = ["read_results", "recorded_system"]
 

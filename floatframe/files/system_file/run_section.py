@@ -23,7 +23,7 @@ from floatframe.integrators.integrator import Integrator
 from floatframe.integrators.relative import RelativeGeneralizedAlpha, in_formulation
 from floatframe.model.state import State
 from floatframe.model.system import System
-from floatframe.results.trajectory import read_results
+from floatframe.results.trajectory import read_trajectory
 from floatframe.simulation.foreign_units import Coupling
 from floatframe.simulation.step_watch import WATCHES
 
@@ -169,7 +169,7 @@ class RunOptions:
 
 def last_state_of(path: Path, system: System) -> State:
     """Return the last state in a results file; `SystemFileError` if it does not fit the system."""
-    motion, compiled = read_results(path), compiled_system(system)
+    motion, compiled = read_trajectory(path), compiled_system(system)
     n_q = compiled.model.bodies.n_q
     for kind, expected, found in (
         ("units", [system.units.name], [motion.units.name]),

@@ -37,7 +37,7 @@ from floatframe.results.recovery import elastic_displacements, require_same_mode
 from floatframe.results.sensor_choice import chosen_measurements
 from floatframe.results.sensors import measured
 from floatframe.results.sensors.measurement import Measurement
-from floatframe.results.trajectory import Trajectory, read_results
+from floatframe.results.trajectory import Trajectory, read_trajectory
 
 __all__ = [
     "LARGEST",
@@ -319,7 +319,7 @@ def motion_of(motion: Trajectory | Equilibrium | str | os.PathLike[str], system:
         if system is None:
             raise ResultsError("view: an equilibrium is shown with its system; give system=")
         return snapshot(system, motion)
-    return read_results(motion)
+    return read_trajectory(motion)
 
 
 def known_system(trajectory: Trajectory) -> System | None:

@@ -17,7 +17,7 @@ from floatframe.cli.app import app
 from floatframe.pictures.animation import bodies_of
 from floatframe.results.energy_balance import balance_defect, energy_scale
 from floatframe.results.export import run_record
-from floatframe.results.trajectory import read_results
+from floatframe.results.trajectory import read_trajectory
 from tests.floatframe.cli.examples import FLEXIBLE, RIGID
 from tests.root import ROOT, heed_signals
 from tests.synthetic import synthetic_reduced_body
@@ -62,7 +62,7 @@ def assert_refused(result, *words):
 
 def test_run_computes_the_motion_that_the_file_describes(results):
     """The stick falls about the pin: energy gives its speed at the last position."""
-    trajectory = read_results(results)
+    trajectory = read_trajectory(results)
     assert trajectory.is_complete
     motion = trajectory.body("stick")
     height = motion.r[-1, 2]
@@ -85,7 +85,7 @@ def test_a_flexible_body_runs_from_its_modal_file(folder):
     (folder / "spin.toml").write_text(FLEXIBLE)
     result = run("run", folder / "spin.toml")
     assert result.exit_code == 0, result.output
-    record = run_record(read_results(folder / "spin.h5"))
+    record = run_record(read_trajectory(folder / "spin.h5"))
     assert record["bodies"][0]["n_modes"] == 5
     assert len(record["bodies"][0]["digest"]) == 64
 
@@ -160,7 +160,7 @@ def test_animate_refuses_a_modal_file_that_has_changed(folder):
 
 
 def test_the_energy_defect_is_the_balance_over_the_energy_that_moves(results):
-    trajectory = read_results(results)
+    trajectory = read_trajectory(results)
     energies = trajectory.energies
     total = energies.kinetic + energies.gravity
     assert_allclose(balance_defect(trajectory), total - total[0], rtol=0, atol=1e-13 * energy_scale(trajectory))
@@ -206,7 +206,7 @@ def test_bodies_in_other_units_are_converted_with_a_note(folder, caplog):
     result = run("run", folder / "spin.toml", "-o", folder / "spin.h5")
     assert result.exit_code == 0
     assert "part.h5 is in units mm-t-s: converted to those of the system, m-kg-s" in caplog.text
-    part = bodies_of(read_results(folder / "spin.h5"))["part"]
+    part = bodies_of(read_trajectory(folder / "spin.h5"))["part"]
     assert_allclose(part.nodes, synthetic_reduced_body().nodes / 1000, rtol=1e-14)
 
 

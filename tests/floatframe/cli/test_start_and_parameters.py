@@ -14,7 +14,7 @@ from floatframe.files.system_file.read_system import read_system
 from floatframe.files.system_file.recorded_system import recorded_system
 from floatframe.files.system_file.run_section import RunOptions
 from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_matrix
-from floatframe.results.trajectory import read_results
+from floatframe.results.trajectory import read_trajectory
 
 CART = """
 [parameters]
@@ -77,7 +77,7 @@ def run(*arguments, program=app):
 
 
 def heights(path):
-    motion = read_results(path)
+    motion = read_trajectory(path)
     return np.array([motion.state(k).r[1, 2] for k in range(len(motion.t))])
 
 
@@ -86,7 +86,7 @@ def test_a_run_begins_in_equilibrium_with_its_velocities(folder, formulation):
     (folder / "cart.toml").write_text(CART + f'start = "equilibrium"\nformulation = "{formulation}"\n')
     run("run", folder / "cart.toml")
     assert_allclose(heights(folder / "cart.h5"), -2.0 * 9.81 / 500.0, rtol=0, atol=1e-10)
-    assert_allclose(read_results(folder / "cart.h5").state(-1).r[:, 0], 0.15, rtol=1e-9)
+    assert_allclose(read_trajectory(folder / "cart.h5").state(-1).r[:, 0], 0.15, rtol=1e-9)
 
 
 def test_a_run_begins_in_the_last_state_of_another(folder):
@@ -159,7 +159,7 @@ def test_the_key_from_is_called_so_in_messages(folder, line, words):
 
 def test_set_replaces_parameters_and_keys_and_the_results_record_them(folder):
     run("run", folder / "cart.toml", "--set", "mass=3.0", "--set", "run.h=5e-4", "--set", "bodies.slider.mass=4.0")
-    motion = read_results(folder / "cart.h5")
+    motion = read_trajectory(folder / "cart.h5")
     assert motion.head.run["changes"] == {"mass": 3.0, "run.h": 5e-4, "bodies.slider.mass": 4.0}
     assert len(motion.t) == 101
     system = recorded_system(motion)

@@ -9,7 +9,7 @@ from numpy.testing import assert_array_equal
 import floatframe as ff
 from floatframe.errors import ResultsError
 from floatframe.results.motion import motion_of
-from floatframe.results.trajectory import read_results as read_trajectory
+from floatframe.results.trajectory import read_trajectory
 from tests.floatframe.results.examples import SYSTEM
 
 HINGE = ff.RevoluteJoint("pin", ff.GROUND, ff.Marker("rod", "end_b"), axis=(0.2, 1.0, 0.1))

@@ -40,12 +40,13 @@ def pair_state(model, work, c):
     d = distance(markers, a, b)
     put(pair.d, 0, d)
     put(pair.v, 0, slip(markers, a, b, d))
+    if model.connections.law[c] == SPRING:
+        spring_state(model, work, c)
+        return
     put(pair.omega, 0, sub(vector(markers.omega[b]), vector(markers.omega[a])))
     put_matrix(pair.A, matrix(markers.A[a]))
     put_matrix(pair.B, matrix(markers.A[b]))
-    if model.connections.law[c] == SPRING:
-        spring_state(model, work, c)
-    elif model.connections.law[c] == BUSHING:
+    if model.connections.law[c] == BUSHING:
         bushing_state(model, work, c)
     else:
         contact_state(model, work, c)
@@ -85,6 +86,10 @@ def pair_derivatives(model, work, c, c_k):
     for k in range(12):
         pair.motion[k] = 0.0
     for k in range(12):
+        if size == ON_A and k % 6 > 2:  # a spring feels no rotation
+            for r in range(ON_A):
+                pair.slopes[r, k] = 0.0
+            continue
         pair.motion[k] = 1.0
         if model.connections.law[c] == SPRING:
             spring_variation(model, work, c)
