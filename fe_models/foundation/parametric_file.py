@@ -115,25 +115,51 @@ def json_schema(model: type[Table], *, is_parametric: bool) -> dict[str, Any]:
     """Return the JSON schema of the files of a model, with which editors complete keys and show their meanings.
 
     In a parametric file, every value may be a text with an expression, every table may be repeated, and
-    `[parameters]` and `extends` are keys of the file.
+    `[parameters]` and `extends` are keys of the file. No key is required, because another file may hold it.
     """
     schema = model.model_json_schema()
     if not is_parametric:
         return schema
-    for table in (schema, *schema.get("$defs", {}).values()):
-        for name, value in table.get("properties", {}).items():
-            if name != "kind":
-                table["properties"][name] = {
-                    "description": value.get("description", ""),
-                    "anyOf": [value, {"type": "string", "pattern": r"\{.+\}"}],
-                }  # fmt: skip
-        if table is not schema and "properties" in table:
+    tables = {name: with_expressions(table) for name, table in schema.get("$defs", {}).items()}
+    schema = with_expressions(schema)
+    for table in tables.values():
+        if "properties" in table:
             table["properties"]["repeat"] = {"description": "a count, a table of names with counts or lists, or rows"}
+    if tables:
+        schema["$defs"] = tables
     schema["properties"]["parameters"] = {"type": "object", "description": "values and expressions by name"}
     schema["properties"]["extends"] = {
         "type": ["string", "array"], "description": "a file over which this one is merged, or several"
     }  # fmt: skip
     return schema
+
+
+EXPRESSION = {"type": "string", "pattern": r"\{.+\}"}
+REMOVED = {"type": "object", "maxProperties": 0}  #: an empty table takes away the key of a base file
+
+
+def with_expressions(schema: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a JSON schema in which each value within the described one may be a text with an expression."""
+
+    def either(value: Any) -> Any:
+        if not isinstance(value, dict) or "const" in value:
+            return value
+        words = {key: value[key] for key in ("description",) if key in value}
+        return words | {"anyOf": [with_expressions(value), EXPRESSION, REMOVED]}
+
+    found = {key: value for key, value in schema.items() if key != "required"}
+    for key in ("items", "additionalProperties"):
+        if key in found:
+            found[key] = either(found[key])
+    if "prefixItems" in found:
+        found["prefixItems"] = [either(value) for value in found["prefixItems"]]
+    if "anyOf" in found:
+        found["anyOf"] = [with_expressions(value) for value in found["anyOf"]]
+    if "properties" in found:
+        found["properties"] = {
+            name: value if name == "kind" else either(value) for name, value in found["properties"].items()
+        }
+    return found
 
 
 def extended_files(path: Path, error: type[Exception]) -> tuple[Path, ...]:

@@ -68,13 +68,13 @@ def derivatives(units, analysis, method="direct"):
     """Return values and gradient of outputs, in SI of a metre."""
     other = other_units(units)
     system = replace(arm() if other.units == SI else in_units(arm(), other.units, R, PLACE), sensors=SENSORS)
-    outputs = MODES if analysis == "eig" else OUTPUTS
+    outputs = MODES if analysis == "modes" else OUTPUTS
     run = {"t_end": 0.02 * other.factor("s"), "h": 2.5e-3 * other.factor("s")} if analysis == "run" else {}
     found = sensitivities(system, list(outputs), list(PARAMETERS), analysis=analysis, method=method, **run)
-    per_second = 1 / other.factor("s") if analysis == "eig" and units in SIZES else None  # else told in Hz
+    per_second = 1 / other.factor("s") if analysis == "modes" and units in SIZES else None  # else told in Hz
     of = np.array([other.factor(unit) if per_second is None else (per_second if unit == "Hz" else 1.0)
                    for unit in outputs.values()])  # fmt: skip
-    if analysis == "eig" and per_second is None:
+    if analysis == "modes" and per_second is None:
         of = np.ones(len(outputs))
     by = np.array([other.factor(unit) for unit in PARAMETERS.values()])
     return found.values / of, found.gradient * by / of[:, None]
@@ -82,7 +82,7 @@ def derivatives(units, analysis, method="direct"):
 
 @pytest.mark.parametrize("units", UNITS)
 @pytest.mark.parametrize(("analysis", "method"), [("run", "direct"), ("run", "adjoint"), ("static", "direct"),
-                                                  ("static", "adjoint"), ("eig", "direct")])  # fmt: skip
+                                                  ("static", "adjoint"), ("modes", "direct")])  # fmt: skip
 def test_derivatives_are_alike_in_other_units_and_sizes(analysis, method, units):
     (values, gradient), (found, other) = derivatives(SI.name, analysis), derivatives(units, analysis, method)
     assert_allclose(found, values, rtol=1e-6, atol=1e-9)

@@ -419,13 +419,14 @@ def compare_sources(case: Case) -> Iterator[Compared]:
     back = np.divide(A, scale[:, None], out=np.zeros_like(A), where=scale[:, None] != 0)
     u = V @ back
     E = u - case.Phi @ Z
-    rounding = SUSPECT_ENERGY * rounding_of_energy(case.body, np.abs(V) @ np.abs(back))
+    columns = np.abs(V) @ np.abs(back)  # the shapes that add up to the modes
+    rounding = SUSPECT_ENERGY * rounding_of_energy(case.body, columns)
     error = np.sqrt(np.maximum(np.einsum("nk,nk->k", E, case.body.K @ E) - rounding, 0.0))
     work = (case.Phi @ Z).T @ K_Phi
     energy = np.sqrt(np.maximum(np.diag(work), 0.0))
     yield apart("columns.A", error, np.zeros_like(error), energy, axes=case.axes_words)
-    rounding = SUSPECT_ENERGY * np.finfo(float).eps * (np.abs(A).T @ np.abs(F))
-    error = np.maximum(np.abs(A.T @ F - work) - rounding, 0.0)
+    terms = np.abs(A).T @ np.abs(F) + columns.T @ (abs(case.body.K) @ np.abs(case.Phi @ Z))
+    error = np.maximum(np.abs(A.T @ F - work) - SUSPECT_ENERGY * np.finfo(float).eps * terms, 0.0)
     yield apart("columns.A", error, np.zeros_like(error), np.outer(energy, energy), axes=f"{case.axes_words} -")
 
 
