@@ -134,8 +134,8 @@ def json_schema(model: type[Table], *, is_parametric: bool) -> dict[str, Any]:
     return schema
 
 
-EXPRESSION = {"type": "string", "pattern": r"\{.+\}"}
-REMOVED = {"type": "object", "maxProperties": 0}  #: an empty table takes away the key of a base file
+EXPRESSION_SCHEMA = {"type": "string", "pattern": r"\{.+\}"}
+REMOVED_SCHEMA = {"type": "object", "maxProperties": 0}  #: an empty table takes away the key of a base file
 
 
 def with_expressions(schema: Mapping[str, Any]) -> dict[str, Any]:
@@ -145,7 +145,7 @@ def with_expressions(schema: Mapping[str, Any]) -> dict[str, Any]:
         if not isinstance(value, dict) or "const" in value:
             return value
         words = {key: value[key] for key in ("description",) if key in value}
-        return words | {"anyOf": [with_expressions(value), EXPRESSION, REMOVED]}
+        return words | {"anyOf": [with_expressions(value), EXPRESSION_SCHEMA, REMOVED_SCHEMA]}
 
     found = {key: value for key, value in schema.items() if key != "required"}
     for key in ("items", "additionalProperties"):

@@ -114,11 +114,11 @@ def test_inertia_of_a_giant_is_noted(tmp_path, caplog):
     path = tmp_path / "crank.toml"
     path.write_text(CRANK.replace("inertia = [[1e-3, 0, 0], [0, 0.03, 0], [0, 0, 0.03]]",
                                   "inertia = [[1e4, 0, 0], [0, 3e5, 0], [0, 0, 3e5]]"))  # fmt: skip
-    CliRunner().invoke(app, ["info", str(path)])
+    CliRunner().invoke(app, ["check", str(path)])
     assert "rigid body 'rod' has mass and inertia of a part with a radius of gyration of 548 m" in caplog.text
     caplog.clear()
     path.write_text(CRANK)
-    CliRunner().invoke(app, ["info", str(path)])
+    CliRunner().invoke(app, ["check", str(path)])
     assert not caplog.text
 
 

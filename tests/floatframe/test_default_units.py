@@ -146,13 +146,17 @@ UNIT = re.compile(r"\[([^\]]*)\]")
 
 
 def described(kind):
-    """Yield name, default and comment of the fields of a dataclass that have a number as default."""
-    source = inspect.getsource(kind)
+    """Yield name, default and description of fields that have a number as default.
+
+    The description stands under Parameters in the docstring, or in a comment at the field.
+    """
+    source, text = inspect.getsource(kind), inspect.getdoc(kind) or ""
     for each in fields(kind):
         if isinstance(each.default, float) and each.default != 0.0:
+            words = re.search(rf"^{each.name}\n((?:    .*\n?)+)", text, re.MULTILINE)
             line = re.search(rf"^((?:    #: .*\n)*)    {each.name}:(.*)$", source, re.MULTILINE)
             above, beside = line.groups() if line else ("", "")
-            yield each.name, each.default, beside if "#:" in beside else above
+            yield each.name, each.default, words.group(1) if words else beside if "#:" in beside else above
 
 
 def parts():
@@ -169,11 +173,11 @@ def parts():
 
 
 def test_no_default_with_a_unit_is_a_plain_number():
-    """The comment of a field says its unit in brackets: [m/s]."""
+    """The description of a field states its unit in brackets: [m/s]."""
     n_found = 0
     for kind in parts():
         for name, default, line in described(kind):
-            unit = UNIT.findall(line.partition("#:")[2])
+            unit = UNIT.findall(line)
             if unit and unit[-1] not in ("1", "rad", "-"):
                 assert isinstance(default, Quantity), f"{kind.__module__}.{kind.__name__}.{name} = {default} {unit}"
                 n_found += 1

@@ -69,6 +69,7 @@ if TYPE_CHECKING:
 __all__ = ["LinearSystem", "NamedMotions", "linearize"]
 
 RANK = 1e-10  #: singular value of the scaled rows below which a row is redundant
+ROUNDING = 1e-14  #: stiffness of motions relative to the sum of its terms, below which it is their rounding error
 NOISE = 1e-10  #: relative to the largest component of a motion; smaller ones are rounding errors
 #: motion of a joint, by that of bodies that move as far as the farthest, below which it is a state of last choice
 FAINT = 1e-6
@@ -443,6 +444,7 @@ def linearize(
     require_steady(compiled, about, work, parts, N, np.eye(N.shape[1]) if roll is None else roll.S)
     D_0, D_1, D_2 = parts.full(Omega, Omega_t)
     K_z = N.T @ D_0 @ N
+    K_z = np.where(np.abs(K_z) <= ROUNDING * (np.abs(N).T @ np.abs(D_0) @ np.abs(N)), 0.0, K_z)
     force, force_rate = parts.body_forces(by_inputs)
     moves = np.array([*(isinstance(channel, DriveMotion | BaseMotion) for channel in inputs), *[False] * n_states])
     Y, size = motions_of_inputs(small, parts, by_inputs, N, K_z, D_0, moves)

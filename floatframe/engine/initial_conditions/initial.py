@@ -69,6 +69,7 @@ __all__ = [
 
 ASSEMBLED = 1e-12  #: largest |g| of an assembled system; for points relative to the size of the system
 MOST_ITERATIONS = 30
+ENDLESS = 1e12  #: a correction (rad, or in units of length) that only a singular matrix gives
 OF_STEP = 0.1  #: fraction of a step for differences that give rates of accelerations
 NEAREST = 1e-6  #: the same fraction if a contact is near
 NEAR_BY = 1e-3  #: small displacement from a position: in rad, or relative to the size of the system
@@ -248,7 +249,7 @@ def closed(compiled: CompiledSystem, model: Model, work: Work, state: State, w: 
             y, _ = solve(with_modal_weight(model, parts.H, STIFF_START), parts, np.zeros(len(work.state.u)), -error)
         except RuntimeError:
             break
-        if not np.isfinite(y).all():
+        if not np.abs(y).max() < ENDLESS:  # or not a number: the equations are singular
             break
         state = displaced(model, state, in_ground_axes(model, state, y))
     return state, np.where(np.abs(error / scale).max() <= 1e-9, 0.0, error)

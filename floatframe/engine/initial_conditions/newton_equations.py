@@ -127,7 +127,11 @@ class NewtonFactors:
     """
 
     def __init__(self, H: tuple[Array, ...], parts: Linearized) -> None:
-        """Factorise, as a dense matrix if it is small; RuntimeError if it is exactly singular."""
+        """Factorise, as a dense matrix if it is small; RuntimeError if it is exactly singular.
+
+        A pivot of zero in the dense matrix may be rounding of terms of very different size; the order of sparse
+        elimination keeps such terms apart.
+        """
         first = np.cumsum([0, *(len(block) for block in H)]).tolist()
         J, G, V = parts.J, parts.G, parts.V
         self.n_u, n_w = first[-1], G.shape[0]
@@ -142,14 +146,13 @@ class NewtonFactors:
         self.of_columns, self.of_rows = balanced_scales(diagonal, abs(J), abs(G), abs(V))
         values = self.of_rows[row] * values * self.of_columns[column]
         self.sparse: SuperLU | None = None
-        if n > DENSE:
-            self.sparse = splu(sp.csc_array((values, (row, column)), shape=(n, n)))
-            return
-        matrix = np.zeros((n, n))
-        matrix[row, column] = values
-        *self.dense, info = dgetrf(matrix, overwrite_a=True)
-        if info > 0:
-            raise RuntimeError("Factor is exactly singular")
+        if n <= DENSE:
+            matrix = np.zeros((n, n))
+            matrix[row, column] = values
+            *self.dense, info = dgetrf(matrix, overwrite_a=True)
+            if info == 0:
+                return
+        self.sparse = splu(sp.csc_array((values, (row, column)), shape=(n, n)))
 
     def solve(self, forces: Array, rows: Array) -> tuple[Array, Array]:
         """Return y, (n_u,), and w, (n_w,)."""
