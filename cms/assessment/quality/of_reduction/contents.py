@@ -425,8 +425,10 @@ def compare_sources(case: Case) -> Iterator[Compared]:
     work = (case.Phi @ Z).T @ K_Phi
     energy = np.sqrt(np.maximum(np.diag(work), 0.0))
     yield apart("columns.A", error, np.zeros_like(error), energy, axes=case.axes_words)
-    terms = np.abs(A).T @ np.abs(F) + columns.T @ (abs(case.body.K) @ np.abs(case.Phi @ Z))
-    error = np.maximum(np.abs(A.T @ F - work) - SUSPECT_ENERGY * np.finfo(float).eps * terms, 0.0)
+    rounding = np.finfo(float).eps * (np.abs(A).T @ np.abs(F)) + np.sqrt(
+        np.outer(rounding_of_energy(case.body, columns), rounding_of_energy(case.body, case.Phi @ Z))
+    )
+    error = np.maximum(np.abs(A.T @ F - work) - SUSPECT_ENERGY * rounding, 0.0)
     yield apart("columns.A", error, np.zeros_like(error), np.outer(energy, energy), axes=f"{case.axes_words} -")
 
 
