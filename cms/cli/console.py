@@ -112,14 +112,14 @@ def register(app: typer.Typer, groups: Mapping[str, Mapping[str, Callable[..., N
 def commands(name: str, help: str, *, hints: Mapping[str, str] | None = None) -> typer.Typer:
     """Return an application with the options --version and --debug.
 
-    hints: the commands that users of other programs and of earlier versions look for under other names.
+    hints: what to use in place of commands that this program does not have, by name; {} stands for the arguments.
     """
     known = hints or {}
 
     class Hinting(TyperGroup):
         def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-            if args[0] in known and args[0] not in self.commands:
-                ctx.fail(f"No such command {args[0]!r}. Use {known[args[0]]}.")
+            if args[0] in known:
+                ctx.fail(f"No such command {args[0]!r}. Use {known[args[0]].format(' '.join(args[1:]) or 'FILE')}.")
             return super().resolve_command(ctx, args)
 
     app = Commands(

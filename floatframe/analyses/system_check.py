@@ -10,15 +10,16 @@ import scipy.linalg as la
 
 from cms.assessment.quality.record import QualityRecord, Verdict
 from fe_models.foundation.arrays import Array
-from floatframe.analyses.linear.linearization import allowed_motions
-from floatframe.analyses.system_matrices import tangents
+from floatframe.analyses.linear.linearization import allowed_motions, massive_and_massless
+from floatframe.analyses.linear.system_modes import undamped_modes
+from floatframe.analyses.system_matrices import Tangents, tangents
 from floatframe.engine.compiling.file_frames import state_of_engine
-from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.freedoms import Mobility
 from floatframe.engine.initial_conditions.initial import ConsistentState, consistent_motion, mobility
 from floatframe.engine.initial_conditions.newton_equations import set_iterate
 from floatframe.engine.initial_conditions.placement import REPORTED, body_sizes
-from floatframe.engine.kernels.work import Work, new_work
+from floatframe.engine.kernels.work import new_work
 from floatframe.errors import FloatframeError
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.state import State
@@ -34,12 +35,24 @@ NEAR = 1e-6  #: displacement relative to the size of a body, or relative change 
 
 @dataclass(frozen=True)
 class SystemVibrations:
-    """Undamped vibrations of a system at one state, joints closed, forces and springs included."""
+    """Undamped vibrations of a system at one state, with its joints, forces and springs.
 
-    frequencies: Array  #: from the lowest, without free motions, (n,) [Hz, or 1 over the unit of time]
-    bodies: tuple[str, ...]  #: the body with most of the kinetic energy, of each vibration
-    n_free: int  #: motions without stiffness
-    n_unstable: int  #: motions with negative stiffness: the state is no minimum of the potential energy
+    Parameters
+    ----------
+    frequencies
+        From the lowest, without free motions, (n,) [1 over the unit of time].
+    bodies
+        The body with most of the kinetic energy of each vibration.
+    n_free
+        Number of motions without stiffness.
+    n_unstable
+        Number of motions with negative stiffness: the state is no minimum of the potential energy.
+    """
+
+    frequencies: Array
+    bodies: tuple[str, ...]
+    n_free: int
+    n_unstable: int
 
 
 def check_system(
@@ -66,19 +79,19 @@ def check_system(
         Whether the method keeps h; if not, h is the largest step.
     """
     records = [mobility_record(system)]
-    made: ConsistentState | None = None
     if records[0].verdict != "fail":
         try:
             made = consistent_motion(system, state)
-            records += start_records(system, state, made)
         except FloatframeError as error:
-            words = str(error)
-            records.append(record("start", "State at the start", "fail", words, "see the message; the run stops here"))
-    found = None if made is None else system_vibrations(system, made)
-    if found is not None:
-        records.append(vibration_record(system, found))
-        if h is not None:
-            records.append(step_record(system, found, h, has_fixed_steps=has_fixed_steps))
+            records.append(record("start", "State at the start", "fail", str(error)))
+        else:
+            parts = tangents_at(system, made)
+            records += start_records(system, state, made, parts.M)
+            found = system_vibrations(system, parts)
+            if found is not None:
+                records.append(vibration_record(system, found))
+            if found is not None and h is not None:
+                records.append(step_record(system, found, h, has_fixed_steps=has_fixed_steps))
     if t_end is not None and h is not None:
         n_steps = max(1, ceil(t_end / h * (1 - 1e-12)))
         missed = [*frequency_words(system, 0.0, h, n_steps, has_steps_of_one_size=has_fixed_steps)]
@@ -103,7 +116,7 @@ def mobility_record(system: System) -> QualityRecord:
     try:
         found = mobility(system)
     except FloatframeError as error:
-        return record("mobility", "Mobility", "fail", str(error), "place the bodies at their joints")
+        return record("mobility", "Mobility", "fail", str(error))
     words = (
         f"{found.n_freedoms} independent motions: {found.n_bodies} bodies with {found.n_modes} modes less "
         f"{found.n_constraints} constraints; {found.mobility} if all bodies were rigid (count of Gruebler "
@@ -131,8 +144,11 @@ def redundant_words(found: Mobility) -> str:
     return words
 
 
-def start_records(system: System, state: State | None, made: ConsistentState) -> Iterator[QualityRecord]:
-    """Yield the records of the start: how far the joints move the bodies, and how fast these begin."""
+def start_records(system: System, state: State | None, made: ConsistentState, M: Array) -> Iterator[QualityRecord]:
+    """Yield the records of the start: how far the joints move the bodies, the largest speed and acceleration.
+
+    M: mass matrix of the bodies at the start, (n_u, n_u).
+    """
     compiled, units = compiled_system(system), system.units
     given = compiled.placed if state is None else state_of_engine(compiled, state)
     way, size = np.linalg.norm(made.state.r - given.r, axis=1), body_sizes(compiled)
@@ -156,7 +172,6 @@ def start_records(system: System, state: State | None, made: ConsistentState) ->
             f"{compiled.body_names[i]!r}"
         )
     if given.u.any():
-        M = tangents(compiled.model, work_at(compiled, made)).M
         change = made.state.u - given.u
         changed = np.sqrt(max(float(change @ M @ change), 0.0) / float(given.u @ M @ given.u))
         parts.append(
@@ -167,44 +182,46 @@ def start_records(system: System, state: State | None, made: ConsistentState) ->
     yield record("start", "State at the start", "pass", "; ".join(parts))
 
 
-def work_at(compiled: CompiledSystem, made: ConsistentState) -> Work:
-    """Return working arrays that hold a state with its accelerations and wrenches."""
+def tangents_at(system: System, made: ConsistentState) -> Tangents:
+    """Return the mass, damping and stiffness matrices of a system at a consistent state."""
+    compiled = compiled_system(system)
     work = new_work(compiled.model)
     set_iterate(work, made.state, made.u_dot, made.w)
-    return work
+    return tangents(compiled.model, work)
 
 
-def system_vibrations(system: System, made: ConsistentState) -> SystemVibrations | None:
+def system_vibrations(system: System, parts: Tangents) -> SystemVibrations | None:
     """Return the undamped vibrations of a system at one state; None if it has too many motions, or none.
 
-    They are those of the tangent matrices on the motions that the joints allow, K z = omega² M z, in which the state
-    counts as at rest: what turns or accelerates changes the low ones.
+    They are those of its matrices on the motions that the joints allow, K z = omega² M z, as if it were at rest there:
+    rotation and acceleration of the whole change the low ones. Motions without mass follow the others statically.
+
+    Parameters
+    ----------
+    system
+        The system.
+    parts
+        Its matrices at this state.
     """
-    compiled = compiled_system(system)
-    parts = tangents(compiled.model, work_at(compiled, made))
-    N = allowed_motions(system, parts.G)
+    compiled, N = compiled_system(system), allowed_motions(system, parts.G)
     if not 0 < N.shape[1] <= MOST_MOTIONS:
         return None
     M, K = N.T @ parts.M @ N, N.T @ parts.K @ N
     M, K = (M + M.T) / 2, (K + K.T) / 2
-    size = 1 / np.sqrt(np.maximum(np.diag(M), np.finfo(float).tiny))
-    has_mass = np.diag(M) > 0
-    size = np.where(has_mass, size, 1.0)
-    pairs, vectors = la.eig(size[:, None] * K * size, size[:, None] * M * size, homogeneous_eigvals=True)
-    above, below = pairs.real
-    finite = np.abs(below) > np.finfo(float).eps * len(M) * np.abs(below).max()
-    squares = above[finite] / below[finite]
-    moves = N @ (size[:, None] * vectors.real[:, finite])
+    T, static = massive_and_massless(M)
+    if static.shape[1]:
+        T = T - static @ la.solve(static.T @ K @ static, static.T @ K @ T)
+    squares, Z = undamped_modes(T.T @ K @ T, T.T @ M @ T)
     highest = float(np.abs(squares).max(initial=0.0))
     vibrates, unstable = squares > STILL**2 * highest, squares < -(STILL**2) * highest
-    order = np.flatnonzero(vibrates)[np.argsort(squares[vibrates])]
-    first = compiled.model.bodies.u0
-    energy = np.stack([
-        np.einsum("ik,ij,jk->k", moves[u:v], parts.M[u:v, u:v], moves[u:v]) for u, v in pairwise(first)
-    ])  # fmt: skip
+    moves = (N @ T @ Z)[:, vibrates]
+    energy = [
+        np.einsum("ik,ij,jk->k", moves[u:v], parts.M[u:v, u:v], moves[u:v])
+        for u, v in pairwise(compiled.model.bodies.u0)
+    ]
     return SystemVibrations(
-        frequencies=np.sqrt(squares[order]) / (2 * np.pi),
-        bodies=tuple(compiled.body_names[int(k)] for k in energy[:, order].argmax(axis=0)),
+        frequencies=np.sqrt(squares[vibrates]) / (2 * np.pi),
+        bodies=tuple(compiled.body_names[k] for k in np.argmax(energy, axis=0)),
         n_free=int((~vibrates & ~unstable).sum()),
         n_unstable=int(unstable.sum()),
     )
@@ -251,7 +268,7 @@ def body_record(body: FlexibleBody, system: System) -> QualityRecord:
     words = f"{reduced.n_q} modes up to {highest:.4g} Hz alone in its frame"
     if body.is_stiffened:
         words += "; geometric stiffening acts"
-        return record(f"body {body.name}", f"Body {body.name!r}", "info", words)
-    why = "switched off" if reduced.geometric else "not in its file"
-    words += f"; geometric stiffening is {why}: fast turning and large axial loads do not stiffen it"
+    else:
+        why = "switched off" if reduced.geometric else "not in its file"
+        words += f"; geometric stiffening is {why}: fast rotation and large axial loads do not stiffen it"
     return record(f"body {body.name}", f"Body {body.name!r}", "info", words)

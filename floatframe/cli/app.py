@@ -46,11 +46,12 @@ app = commands(
     "floatframe",
     "Flexible multibody dynamics: bodies from modal files, joints and forces become motion.",
     hints={
-        "eig": "floatframe modes",
-        "study": "floatframe compare",
-        "bode": "floatframe response",
-        "simulate": "floatframe run",
-        "reduce": "cms reduce",
+        "eig": "floatframe modes {}",
+        "study": "floatframe compare {}",
+        "machine": "floatframe example {}",
+        "bode": "floatframe response {}",
+        "simulate": "floatframe run {}",
+        "reduce": "cms reduce {}",
     },
 )
 
@@ -526,15 +527,6 @@ def export_command(
         say(f"wrote {path} and {len(written) - 1} surfaces in {path.with_suffix('')}")
     else:
         raise ResultsError(f"--output {path}: expected a file name that ends in .csv, .pvd, .rsp, .drv or .tim")
-
-
-@app.command("machine", hidden=True, context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
-@guarded
-def machine_command(context: typer.Context) -> None:
-    """Name the command that copies the machines."""
-    from floatframe.errors import ModelError
-
-    raise ModelError(f"floatframe machine: the command is floatframe example {' '.join(context.args)}".rstrip())
 
 
 register(

@@ -303,8 +303,8 @@ def optimization_record(result: "OptimizationResult") -> dict[str, Any]:
 def best_system(result: "OptimizationResult") -> str:
     """Return the system file with the best values of the parameters.
 
-    Comments and order are kept, except where a value stands in another file or in a repeated table: the file that
-    results is returned then.
+    Comments and order are kept. Where a value stands in a file that this one extends, or in a repeated table, the
+    resolved file is returned instead.
     """
     import tomlkit
 

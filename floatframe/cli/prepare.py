@@ -16,7 +16,7 @@ from cms.cli.demo import environment
 __all__ = ["example_command", "prepare_command", "prepare_parts"]
 
 
-# the command machine: copies of ready machines ------------------------------------------------------------------------
+# the command example: copies of ready machines ------------------------------------------------------------------------
 
 
 @guarded

@@ -107,7 +107,7 @@ def plot_drift(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
     if len(kept) < len(peaks):
         less = len(peaks) - len(kept)
         ax.text(0.99, 0.02, f"{less} below {SHOWN * most:.0e}", ha="right", transform=ax.transAxes, alpha=0.6)
-    labelled(ax, f"drift of joints [{length}, rad]")
+    ax.set_ylabel(f"drift of joints [{length}, rad]")
     if kept:
         ax.legend(fontsize="small", ncols=2, loc="upper left")
     return ax

@@ -20,7 +20,7 @@ from floatframe.model.system import System
 from floatframe.results.energy_balance import balance_defect, energy_scale
 from floatframe.results.place_motion import interface_motion
 from floatframe.results.recovery import elastic_displacements, nodal_displacements, require_same_modes
-from floatframe.results.sensors import measured, sensor_of, sensors_of
+from floatframe.results.sensors import coordinate_sensors, measured, sensors_of
 from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.trajectory import Trajectory
 
@@ -66,8 +66,7 @@ def motion_table(
     for name in ("kinetic", "strain", "gravity", "springs", "work", "dissipated", "total", "balance"):
         table[f"energy {name} [{Nm}]"] = getattr(energies, name)
     if system is not None:
-        coordinates = [sensor_of(system, f"{j.name}.{c}") for j in system.joints for c in j.coordinates]
-        for measurement in measured(system, trajectory, [*coordinates, *sensors_of(system)]).values():
+        for measurement in measured(system, trajectory, [*coordinate_sensors(system), *sensors_of(system)]).values():
             table |= dict(zip(measurement.headers, measurement.columns.values(), strict=True))
     return table
 

@@ -24,7 +24,8 @@ from floatframe.model.system import System
 from floatframe.results.joint_coordinates import CoordinateMotion, joint_coordinate
 from floatframe.results.place_motion import PlaceMotion, interface_motion, nodal_stress
 from floatframe.results.recovery import nodal_displacements
-from floatframe.results.sensors import measured, measurement_of, sensor_of, sensors_of
+from floatframe.results.sensor_choice import chosen_measurements
+from floatframe.results.sensors import coordinate_sensors, measured, measurement_of, sensors_of
 from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.trajectory import BodyMotion, Drift, Reaction, Trajectory
 
@@ -81,18 +82,20 @@ class Motion(Trajectory):
         ModelError
             If there is no such sensor, coordinate or column.
         """
-        owner, _, column = name.rpartition(" ")
-        if owner and owner in {sensor.name for sensor in self.system.sensors}:
-            name = f"{owner}.{column}"
         return measurement_of(self.system, self, name)
 
     def measurements(self, *names: str) -> tuple[Measurement, ...]:
-        """Return the measurements of sensors by name; without names, of all joint coordinates and all sensors."""
-        if names:
-            return tuple(self.sensor(name) for name in names)
+        """Return the measurements of sensors and coordinates by name, with * and ? for letters; without names, of all.
+
+        Raises
+        ------
+        ModelError
+            If names fit nothing.
+        """
         system = self.system
-        coordinates = [sensor_of(system, f"{joint.name}.{c}") for joint in system.joints for c in joint.coordinates]
-        return tuple(measured(system, self, [*coordinates, *sensors_of(system)]).values())
+        if names:
+            return tuple(chosen_measurements(system, self, names))
+        return tuple(measured(system, self, [*coordinate_sensors(system), *sensors_of(system)]).values())
 
     def to_dataframe(self, *names: str) -> "DataFrame":
         """Return a pandas DataFrame of measurements over time (see `measurements`), columns such as "tip x".
@@ -207,14 +210,9 @@ def motion_of(trajectory: Trajectory, system: System | Callable[[], System | Non
 
 
 def columns_of(measurements: tuple[Measurement, ...]) -> tuple[dict[str, Array], dict[str, str]]:
-    """Return the columns of measurements as "sensor column", and their units."""
-    columns: dict[str, Array] = {}
-    units: dict[str, str] = {}
-    for measurement in measurements:
-        for name, values in measurement.columns.items():
-            sensor = measurement.sensor
-            whole = sensor.replace(".", " ") if sensor.endswith(f".{name}") else f"{sensor} {name}"
-            columns[whole], units[whole] = values, measurement.units[name]
+    """Return the columns of measurements and their units, by channel."""
+    columns = {one.channel(name): values for one in measurements for name, values in one.columns.items()}
+    units = {one.channel(name): unit for one in measurements for name, unit in one.units.items()}
     return columns, units
 
 

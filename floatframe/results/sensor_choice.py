@@ -6,7 +6,7 @@ from fnmatch import fnmatchcase
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.model.system import System
-from floatframe.results.sensors import measured, measurement_of, sensor_of, sensors_of
+from floatframe.results.sensors import coordinate_sensors, measured, measurement_of, sensor_of, sensors_of
 from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.trajectory import Trajectory
 
@@ -18,16 +18,16 @@ WILD = "*?"
 def chosen_measurements(system: System, trajectory: Trajectory, names: Sequence[str]) -> list[Measurement]:
     """Return the measurements of the sensors with the given names, each once, in the order of the names.
 
-    A name is that of a sensor, a column "sensor.column", or a coordinate "joint.coordinate". In names of sensors and
-    coordinates, * stands for any letters and ? for one letter; if none matches, also in "sensor.column".
+    A name is that of a sensor, of a column, "sensor.column" or "sensor column", or of a coordinate, "joint.coordinate".
+    In names of sensors and coordinates, * stands for any letters and ? for one letter; if none matches, also in
+    "sensor.column".
 
     Raises
     ------
     ModelError
         If names match nothing; the message lists each with the nearest name.
     """
-    coordinates = [f"{joint.name}.{c}" for joint in system.joints for c in joint.coordinates]
-    known = [*(sensor.name for sensor in sensors_of(system)), *coordinates]
+    known = [sensor.name for sensor in (*sensors_of(system), *coordinate_sensors(system))]
     whole: dict[str, Measurement] | None = None
     found: dict[str, Measurement] = {}
     missing: list[str] = []

@@ -244,15 +244,8 @@ class LinearSystem:
     def motions_with_and_without_mass(self) -> tuple[Array, Array]:
         """Return bases of z: motions with mass (orthonormal with respect to it) with states, and massless motions."""
         n, n_states = self.n_z, len(self.states)
-        M = self.M[:n, :n]
-        scale = 1 / np.sqrt(np.maximum(np.diag(M), np.finfo(float).tiny))
-        values, vectors = la.eigh(scale[:, None] * M * scale)
-        is_massive = values > MASSLESS
-        static = scale[:, None] * vectors[:, ~is_massive]
-        # scaled so that a massless motion with a tiny diagonal mass does not degrade the others
-        static /= np.linalg.norm(static, axis=0)
-        dynamic = la.block_diag(scale[:, None] * vectors[:, is_massive], np.eye(n_states))
-        return dynamic, np.pad(static, ((0, n_states), (0, 0)))
+        dynamic, static = massive_and_massless(self.M[:n, :n])
+        return la.block_diag(dynamic, np.eye(n_states)), np.pad(static, ((0, n_states), (0, 0)))
 
     def feedthrough(self) -> Array:
         """Return the direct effect of inputs on outputs, D of the state space, (n_outputs, n_inputs).
@@ -668,6 +661,17 @@ def seen_from(T: Array, mass: Array) -> Array:
     """Return the mass matrix over T x, from the mass matrix over x."""
     by_x = np.linalg.inv(T)
     return np.asarray(by_x.T @ mass @ by_x)
+
+
+def massive_and_massless(M: Array) -> tuple[Array, Array]:
+    """Return bases of the motions with mass, (n, n_massive), and without, (n, n_massless), of a mass matrix (n, n)."""
+    scale = 1 / np.sqrt(np.maximum(np.diag(M), np.finfo(float).tiny))
+    values, vectors = la.eigh(scale[:, None] * M * scale)
+    is_massive = values > MASSLESS
+    static = scale[:, None] * vectors[:, ~is_massive]
+    # scaled so that a massless motion with a tiny diagonal mass does not degrade the others
+    static /= np.linalg.norm(static, axis=0)
+    return scale[:, None] * vectors[:, is_massive], static
 
 
 def allowed_motions(system: System, G: Array) -> Array:

@@ -97,9 +97,7 @@ def signals_of(measurements: Sequence[Measurement], units: Units) -> Signals:
         If there is no column, or no time.
     """
     columns = [
-        (one.sensor if one.sensor.endswith(f".{name}") else f"{one.sensor} {name}", values, one.units[name])
-        for one in measurements
-        for name, values in one.quantities.items()
+        (one.channel(name), values, one.units[name]) for one in measurements for name, values in one.quantities.items()
     ]
     if not columns or not len(measurements[0].t):
         raise SignalError("signals: no sensor has measured anything; name one, or a joint coordinate")

@@ -61,6 +61,7 @@ __all__ = [
     "StressChannel",
     "StressSensor",
     "VonMisesSensor",
+    "coordinate_sensors",
     "measured",
     "measurement_of",
     "sensor_of",
@@ -128,6 +129,15 @@ def sensors_of(system: System) -> tuple[Sensor, ...]:
     return cast(tuple[Sensor, ...], system.sensors)
 
 
+def coordinate_sensors(system: System) -> tuple[Sensor, ...]:
+    """Return a sensor "joint.coordinate" for every coordinate of every joint."""
+    return tuple(
+        CoordinateSensor(f"{joint.name}.{coordinate}", joint.name, coordinate)
+        for joint in system.joints
+        for coordinate in joint.coordinates
+    )
+
+
 def sensor_of(system: System, name: str) -> Sensor:
     """Return a sensor of the system by name, or a sensor for "joint.coordinate" or "element.output".
 
@@ -136,33 +146,32 @@ def sensor_of(system: System, name: str) -> Sensor:
     ModelError
         If there is none; the message has the nearest name.
     """
-    joint, _, coordinate = name.rpartition(".")
-    for each in system.joints:
-        if each.name == joint and coordinate in each.coordinates:
-            return CoordinateSensor(name, joint, coordinate)
-    if joint in [element.name for element in system.elements]:
-        return ElementSensor(name, joint, coordinate)
+    coordinates = coordinate_sensors(system)
+    owner, _, output = name.rpartition(".")
+    for each in coordinates:
+        if each.name == name:
+            return each
+    if owner in [element.name for element in system.elements]:
+        return ElementSensor(name, owner, output)
     for sensor in sensors_of(system):
         if sensor.name == name:
             return sensor
-    coordinates = [f"{each.name}.{c}" for each in system.joints for c in each.coordinates]
-    choices = [*(sensor.name for sensor in system.sensors), *coordinates, *(each.name for each in system.elements)]
+    choices = [each.name for each in (*system.sensors, *coordinates, *system.elements)]
     raise ModelError(f"system {system.name!r}: no sensor or joint coordinate {quoted(name)}{nearest(name, choices)}")
 
 
 def measurement_of(system: System, trajectory: Trajectory, name: str) -> Measurement:
-    """Return the measurement of "sensor", "joint.coordinate", or one of their columns, "sensor.column".
+    """Return the measurement of "sensor", "joint.coordinate", or of a column, "sensor.column" or "sensor column".
 
     Raises
     ------
     ModelError
         If there is no such sensor, coordinate or column; the message has the nearest name.
     """
-    owner, _, column = name.rpartition(".")
-    names = [sensor.name for sensor in system.sensors]
-    coordinates = [f"{joint.name}.{c}" for joint in system.joints for c in joint.coordinates]
+    names = {sensor.name for sensor in (*system.sensors, *coordinate_sensors(system))}
+    owner, _, column = name.rpartition(" " if name.rpartition(" ")[0] in names else ".")
     elements = [element.name for element in system.elements]
-    if name in names or name in coordinates or owner in elements or owner not in (*names, *coordinates):
+    if name in names or owner in elements or owner not in names:
         sensor = sensor_of(system, name)
         return measured(system, trajectory, [sensor])[sensor.name]
     whole = measured(system, trajectory, [sensor_of(system, owner)])[owner]

@@ -66,6 +66,10 @@ class Measurement:
         """Names of the columns for tables, with sensor, column and unit."""
         return tuple(f"{self.sensor} {name} [{self.units[name]}]".replace("  ", " ") for name in self.columns)
 
+    def channel(self, column: str) -> str:
+        """Return the name of a column among those of all sensors, "sensor column"; "sensor.column" stays as it is."""
+        return self.sensor if self.sensor.endswith(f".{column}") else f"{self.sensor} {column}"
+
 
 class Sensor(Protocol):
     """A frozen dataclass that measures motions; all of them are in `floatframe.results.sensors.SENSORS`."""

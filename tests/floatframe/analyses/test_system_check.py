@@ -5,62 +5,79 @@ import json
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 from floatframe import FlexibleBody, Marker, RevoluteJoint, System
-from floatframe.analyses.system_check import check_system, system_vibrations
+from floatframe.analyses.system_check import check_system, system_vibrations, tangents_at
 from floatframe.cli.app import app
 from floatframe.engine.initial_conditions.initial import consistent_motion
 from floatframe.files.system_file.read_system import read_system
 from tests.synthetic import synthetic_reduced_body
 
 STIFFNESS, MASS, HEAVY, RADIUS = 1400.0, 0.3, 2.0, 250.0  # N/mm, t, t, mm
+TURN = Rotation.from_rotvec([0.3, -0.5, 0.7])
+OFFSET = np.array([1200.0, -700.0, 400.0])  # mm
 
-SLEDGE = f"""
+
+def sledge_file(units="mm-t-s"):
+    """A sledge on a rail with a spring, and a pendulum on its head; turned, off the origin."""
+    kg, s = {"mm-t-s": (1.0, 1.0), "mm-kg-ms": (1e3, 1e3)}[units]  # units in a tonne and a second
+
+    def way(x, y, z, per_second=0.0):
+        return (TURN.apply([x, y, z]) * s**-per_second).tolist()
+
+    def place(x, y, z):
+        return (TURN.apply([x, y, z]) + OFFSET).tolist()
+
+    return f"""
 [system]
-units = "mm-t-s"
-gravity = [0, 0, -9810.0]
+units = "{units}"
+gravity = {way(0, 0, -9810.0, 2)}
 
 [bodies.sledge]
-mass = {MASS}
-inertia = [[4e3, 0, 0], [0, 5e3, 0], [0, 0, 6e3]]
-position = [150.0, 40.0, 30.0]
-velocity = [20.0, 0.0, 5.0]
+mass = {MASS * kg}
+inertia = [[{4e3 * kg}, 0, 0], [0, {5e3 * kg}, 0], [0, 0, {6e3 * kg}]]
+position = {place(150.0, 40.0, 30.0)}
+velocity = {way(20.0, 0.0, 5.0, 1)}
 
 [bodies.bob]
-mass = {HEAVY}
-inertia = [[1e-3, 0, 0], [0, 1e-3, 0], [0, 0, 1e-3]]
-position = [-900.0, 300.0, {RADIUS}]
+mass = {HEAVY * kg}
+inertia = [[{1e-3 * kg}, 0, 0], [0, {1e-3 * kg}, 0], [0, 0, {1e-3 * kg}]]
+position = {place(-900.0, 300.0, RADIUS)}
 
 [joints.rail]
 type = "prismatic"
 body_a = "ground"
 body_b = "sledge"
-marker_a = [0, 40.0, 30.0]
-marker_b = [-150.0, 0, 0]
-axis = [1, 0, 0]
+marker_a = {place(0, 40.0, 30.0)}
+marker_b = {way(-150.0, 0, 0)}
+axis = {way(1, 0, 0)}
 
 [joints.pin]
 type = "revolute"
 body_a = "ground"
 body_b = "bob"
-marker_a = [-900.0, 300.0, 0.0]
-marker_b = [0, 0, {-RADIUS}]
-axis = [0, 1, 0]
+marker_a = {place(-900.0, 300.0, 0.0)}
+marker_b = {way(0, 0, -RADIUS)}
+axis = {way(0, 1, 0)}
 
 [forces.spring]
 type = "spring-damper"
 body_a = "ground"
 body_b = "sledge"
-marker_a = [-500.0, 40.0, 30.0]
+marker_a = {place(-500.0, 40.0, 30.0)}
 marker_b = [0, 0, 0]
-stiffness = {STIFFNESS}
+stiffness = {STIFFNESS * kg / s**2}
 free_length = 650.0
 
 [run]
-t_end = 0.5
-h = 1e-3
+t_end = {0.5 * s}
+h = {1e-3 * s}
 """
+
+
+SLEDGE = sledge_file()
 
 
 @pytest.fixture
@@ -76,27 +93,36 @@ def checked(path, *arguments):
     return result, {each["name"]: each for each in record["records"]} if record else {}
 
 
-def test_frequencies_free_and_falling_motions_are_those_of_the_closed_form(sledge):
+AWAY = f"bodies.sledge.position={(TURN.apply([150.0, 40.0, 90.0]) + OFFSET).tolist()}"  # 60 mm off its rail
+UNITS = [("mm-t-s", 1.0), ("mm-kg-ms", 1e-3)]  # with seconds in the unit of time
+
+
+@pytest.mark.parametrize(("units", "second"), UNITS)
+def test_frequencies_free_and_falling_motions_are_those_of_the_closed_form(tmp_path, units, second):
     """A spring of stiffness k and a mass m; a pendulum that stands on its head has negative stiffness."""
-    system, _ = read_system(sledge)
-    found = system_vibrations(system, consistent_motion(system))
-    assert_allclose(found.frequencies, [np.sqrt(STIFFNESS / MASS) / (2 * np.pi)], rtol=1e-9)
+    (tmp_path / "sledge.toml").write_text(sledge_file(units))
+    system, _ = read_system(tmp_path / "sledge.toml")
+    found = system_vibrations(system, tangents_at(system, consistent_motion(system)))
+    assert_allclose(found.frequencies, [np.sqrt(STIFFNESS / MASS) / (2 * np.pi) * second], rtol=1e-9)
     assert found.bodies == ("sledge",)
     assert (found.n_free, found.n_unstable) == (0, 1)
 
 
-def test_the_record_names_mobility_velocities_and_the_step_that_follows_the_vibration(sledge):
-    result, records = checked(sledge)
+@pytest.mark.parametrize(("units", "second"), UNITS)
+def test_the_record_names_mobility_velocities_and_the_step_that_follows_the_vibration(tmp_path, units, second):
+    (tmp_path / "sledge.toml").write_text(sledge_file(units))
+    result, records = checked(tmp_path / "sledge.toml")
     assert result.exit_code == 0
     assert records["mobility"]["reason"].startswith(
         "2 independent motions: 2 bodies with 0 modes less 10 constraints; 2 if"
     )
-    assert "speed is 20 mm/s, of body 'sledge'" in records["start"]["reason"]
+    assert f"speed is {20 * second:.3g} mm/{units[-2:].strip('-')}, of body 'sledge'" in records["start"]["reason"]
     change = 5.0 / np.hypot(20.0, 5.0)
     assert f"change the given velocities by {change:.2g} of their size" in records["start"]["reason"]
     period = 2 * np.pi / np.sqrt(STIFFNESS / MASS)
+    assert f"from {1 / period:.4g} Hz" in records["vibrations"]["reason"]
     assert_allclose(records["step"]["value"], period / 1e-3, rtol=1e-9)
-    assert f"h = {period / 20:.2g} follows the slowest" in records["step"]["reason"]
+    assert f"h = {period / 20 / second:.2g} follows the slowest" in records["step"]["reason"]
     assert records["step"]["verdict"] == "pass"
 
 
@@ -104,7 +130,12 @@ def test_the_record_names_mobility_velocities_and_the_step_that_follows_the_vibr
     ("setting", "name", "verdict", "words"),
     [
         ("run.h=0.02", "step", "warn", "follows 0 of 1 vibrations"),
-        ("bodies.sledge.position=[150.0, 40.0, 90.0]", "placement", "warn", "moves body 'sledge' by 60 mm"),
+        (
+            f"bodies.sledge.position={(TURN.apply([150.0, 40.0, 90.0]) + OFFSET).tolist()}",
+            "placement",
+            "warn",
+            "moves body 'sledge' by 60 mm",
+        ),
     ],
 )
 def test_what_makes_a_result_doubtful_is_a_warning_with_a_remedy(sledge, setting, name, verdict, words):
@@ -116,8 +147,8 @@ def test_what_makes_a_result_doubtful_is_a_warning_with_a_remedy(sledge, setting
 
 
 def test_a_run_that_would_be_refused_fails_with_the_redundant_constraints_of_each_joint(sledge):
-    second = SLEDGE.replace("[joints.pin]", '[joints.again]\ntype = "prismatic"\nbody_a = "ground"\nbody_b = "sledge"\n'
-                            "marker_a = [0, 40.0, 30.0]\naxis = [1, 0, 0]\n\n[joints.pin]")  # fmt: skip
+    rail = SLEDGE[SLEDGE.index("[joints.rail]") : SLEDGE.index("[joints.pin]")]
+    second = SLEDGE.replace("[joints.pin]", rail.replace("rail", "again") + "[joints.pin]")
     sledge.write_text(second)
     result, records = checked(sledge)
     assert result.exit_code == 1

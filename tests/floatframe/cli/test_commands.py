@@ -276,10 +276,10 @@ def test_help_names_the_commands_and_loads_nothing_heavy():
 @pytest.mark.parametrize(
     ("program", "name", "now"),
     [
-        (app, "eig", "floatframe modes"),
-        (app, "study", "floatframe compare"),
-        (app, "reduce", "cms reduce"),
-        (cms_app, "study", "floatframe compare FILE for models of a body in a mechanism"),
+        (app, "eig", "floatframe modes swing.toml."),
+        (app, "study", "floatframe compare swing.toml."),
+        (app, "reduce", "cms reduce swing.toml."),
+        (cms_app, "study", "floatframe compare swing.toml for models of a body in a mechanism"),
     ],
 )
 def test_a_command_under_another_name_is_answered_with_its_name_here(program, name, now):
