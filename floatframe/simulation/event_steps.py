@@ -36,7 +36,7 @@ from floatframe.results.sensors import sensor_of
 from floatframe.results.trajectory import Trajectory
 from floatframe.results.writer import arrays_of
 from floatframe.simulation.events import Event, events_of, off_at_start, require_events, switched
-from floatframe.simulation.passage import MOST_NEIGHBOURS, expected_passage, passage
+from floatframe.simulation.passage import MOST_NEIGHBOURS, direct_values, expected_passage, passage
 from floatframe.simulation.stop_events import (
     INWARD,
     StopEvent,
@@ -49,7 +49,6 @@ from floatframe.simulation.stop_events import (
     sum_size,
 )
 from floatframe.simulation.switch_events import SwitchEvent, beyond_zero, sign_of, switch_events, with_signs
-from floatframe.simulation.watched_values import direct_values
 
 __all__ = ["EventWatch"]
 

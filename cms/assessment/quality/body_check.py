@@ -1,7 +1,15 @@
 """All checks of a reduced body without its full model."""
 
 from cms.assessment.quality.of_body.buckling import check_buckling
-from cms.assessment.quality.of_body.descriptions import check_damping_told, check_labels, check_mesh_order, check_scope
+from cms.assessment.quality.of_body.descriptions import (
+    check_damping,
+    check_damping_told,
+    check_dropped_columns,
+    check_labels,
+    check_mesh_order,
+    check_scope,
+    check_step_size,
+)
 from cms.assessment.quality.of_body.effective_mass import check_driven_mass
 from cms.assessment.quality.of_body.identities import (
     check_energy_shares,
@@ -23,7 +31,6 @@ from cms.assessment.quality.of_body.recovery_rows import (
     check_recovery_shapes,
 )
 from cms.assessment.quality.of_body.second_order import check_second_order, check_turned_loads
-from cms.assessment.quality.of_body.step_size import check_damping, check_dropped_columns, check_step_size
 from cms.assessment.quality.of_body.symmetry import check_definiteness, check_kinetic_energy, check_symmetry
 from cms.assessment.quality.of_body.unit_hints import check_units
 from cms.assessment.quality.record import QualityRecord

@@ -1,6 +1,6 @@
 """The recursions of the engine with terms; every sum and product is simplified when it is created.
 
-Positions, motions and forces come from the kernels of engine/tree/recursion, which are called with terms (tracing.py).
+Positions, motions and forces come from the kernels of engine/tree/recursion, which are called with terms (`Traced`).
 Only what flexible bodies and their markers do is written here anew (elastic.py), because it needs fewer products
 without tables and without branches.
 
@@ -10,17 +10,17 @@ through A E in one node if A contains more than one angle.
 """
 
 from collections import defaultdict
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from types import SimpleNamespace
+from types import FunctionType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 from numpy import cross
 
 from floatframe.design.generation.elastic import MarkerPlace, MarkerRates, ModalForces, ModalMoments
-from floatframe.design.generation.graph import Scalar, Terms, terms
+from floatframe.design.generation.graph import Graph, Scalar, Terms, terms
 from floatframe.design.generation.links import Link, TreeTerms
-from floatframe.design.generation.tracing import Traced
 from floatframe.engine.kernels.records import zeros
 from floatframe.engine.tree.recursion import entry, newton_euler
 from floatframe.engine.tree.recursion.nodes import FIXED, ROTATION, SCREW, NodeWork
@@ -28,6 +28,35 @@ from floatframe.engine.tree.recursion.nodes import FIXED, ROTATION, SCREW, NodeW
 __all__ = ["Recursion", "forward_dynamics", "inverse_dynamics", "mass_matrix", "shifted_moments", "turned_moment"]
 
 DENSE = 6  #: largest number of products of two matrices that are applied one after the other
+
+
+class Traced:
+    """Kernels called with terms: what they compute becomes expressions of the graph.
+
+    A kernel is a function of Python that numba compiles. Without numba it accepts arrays of any objects. Here it calls
+    other kernels without numba as well, and functions of `math` that accept terms.
+
+    given: functions that replace kernels wherever they are called, by the names of the kernels.
+    """
+
+    def __init__(self, graph: Graph, given: Mapping[str, Callable]) -> None:
+        self.given = given
+        self.known: dict[Callable, Callable] = {}
+        self.math = SimpleNamespace(sin=lambda x: graph.sin(graph.scalar(x)), cos=lambda x: graph.cos(graph.scalar(x)))
+
+    def __call__(self, kernel: Any) -> Callable:
+        """Return a kernel as a function of Python that accepts terms."""
+        source = kernel.py_func
+        if source.__name__ in self.given:
+            return self.given[source.__name__]
+        if source not in self.known:
+            space: dict[str, Any] = {"math": self.math}
+            self.known[source] = FunctionType(source.__code__, space)
+            for name in source.__code__.co_names:
+                value = source.__globals__.get(name)
+                if name != "math" and value is not None:
+                    space[name] = self(value) if hasattr(value, "py_func") else value
+        return self.known[source]
 
 
 def n_products(R: Terms) -> int:

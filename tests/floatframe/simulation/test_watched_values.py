@@ -30,8 +30,8 @@ from floatframe.engine.kernels.work import new_work
 from floatframe.integrators.integrator import memory_of_past
 from floatframe.integrators.relative import RelativeGeneralizedAlpha
 from floatframe.results.sensors import CoordinateSensor
+from floatframe.simulation.passage import direct_values
 from floatframe.simulation.restart import restart_record
-from floatframe.simulation.watched_values import direct_values
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 from tests.floatframe.simulation.examples import double_pendulum, falling
 

@@ -5,10 +5,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from cms.assessment.quality.body_check import check_body
+from cms.assessment.quality.of_body.descriptions import step_size
 from cms.assessment.quality.of_body.effective_mass import effective_mass, effective_mass_at
 from cms.assessment.quality.of_body.interface_motions import missing_motions
 from cms.assessment.quality.of_body.moments_of_mass import check_moments_of_shapes, masses_at_nodes
-from cms.assessment.quality.of_body.step_size import step_size
 from cms.assessment.quality.reference.free_pencil import free_elastic_modes, free_pencil
 from cms.body.invariants import moments_from_gram
 from cms.errors import BodyError
