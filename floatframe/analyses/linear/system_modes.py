@@ -13,6 +13,7 @@ __all__ = ["SystemModes", "system_modes"]
 
 ROUNDING = 1e-13  #: rounding error of a matrix entry, relative to the terms of its sum
 MODEL = 1e-10  #: relative error of a matrix entry, because steady motions and equilibria have about this error
+UNDAMPED = 1e-12  #: entry of the modal damping matrix, relative to the frequency, that counts as rounding error
 LOW = 1e-10  #: omega², relative to the highest one, below which modes are solved for again in their own subspace
 FREE = 1e-7  #: rate of a unit motion, relative to the highest frequency, below which the motion meets no resistance
 LEAST_BODY_MOTION = 1e-9  #: motion of bodies, relative to the change of states, below which a mode has only states
@@ -102,15 +103,16 @@ def system_modes(linear: LinearSystem) -> SystemModes:
     M, C, K = (np.asarray(a)[:n, :n] for a in (system.M, system.C, system.K))
     omega2, Z = undamped_modes((K + K.T) / 2, (M + M.T) / 2)
     highest = float(np.sqrt(np.abs(omega2).max(initial=0.0))) or 1.0  # 1 if only states act as springs
-    modal_C = Z.T @ C @ Z
+    beside = ROUNDING * motions_beside(system, Z)
+    # errors of the entries of Z.T @ K @ Z and Z.T @ C @ Z, by the frequencies of their own two modes
+    higher = np.maximum.outer(np.abs(omega2), np.abs(omega2))
+    error_K = MODEL * higher + ROUNDING * np.abs(Z).T @ np.abs(K) @ np.abs(Z) + beside.T @ np.abs(K) @ beside
+    error_C = UNDAMPED * np.sqrt(higher) + ROUNDING * np.abs(Z).T @ np.abs(C) @ np.abs(Z)
     is_conservative = not system.states and (
-        np.abs(modal_C).max(initial=0.0) <= 1e-12 * highest
-        and np.abs(Z.T @ (K - K.T) @ Z).max(initial=0.0) <= 1e-10 * highest**2
+        (np.abs(Z.T @ C @ Z) <= error_C).all() and (np.abs(Z.T @ (K - K.T) @ Z) <= 2 * error_K).all()
     )
     if is_conservative:
-        noise = ROUNDING * np.einsum("zk,zk->k", np.abs(Z), np.abs(K) @ np.abs(Z)) + MODEL * np.abs(omega2)
-        beside = ROUNDING * motions_beside(system, Z)
-        noise += np.einsum("zk,zk->k", beside, np.abs(K) @ beside)
+        noise = np.diag(error_K)
         omega2 = np.where(np.abs(omega2) <= noise, 0.0, omega2)
         root = np.sqrt(omega2.astype(complex))
         eigenvalues, shapes = np.where(omega2 >= 0, 1j * root.real, root.imag), Z.astype(complex)
@@ -120,8 +122,7 @@ def system_modes(linear: LinearSystem) -> SystemModes:
             shapes = np.column_stack([shapes, shapes[:, k]])
     else:
         A, of_terms = state_matrix(system, Z, highest)
-        dA = ROUNDING * of_terms + MODEL * np.abs(A)
-        beside, rates = ROUNDING * motions_beside(system, Z), slice(n, 2 * n)
+        dA, rates = ROUNDING * of_terms + MODEL * np.abs(A), slice(n, 2 * n)
         dA[rates, :n] += beside.T @ np.abs(K) @ beside / highest
         dA[rates, rates] += beside.T @ np.abs(C) @ beside
         eigenvalues, vectors, errors = eigenvalues_with_errors(A, dA)

@@ -9,8 +9,10 @@ from numpy.testing import assert_allclose
 from floatframe import (
     GROUND,
     Bushing,
+    JointForce,
     Marker,
     PlanarJoint,
+    PointForce,
     PrismaticJoint,
     RevoluteJoint,
     RigidBody,
@@ -69,6 +71,49 @@ def test_a_whirl_that_grows_below_a_stiff_mode_is_told(k_stiff):
 @pytest.mark.parametrize("k_stiff", [1e3, 1e9, 1e13])
 def test_a_damped_whirl_below_a_stiff_mode_is_stable(k_stiff):
     assert modes_at(rotor("a", k_stiff), 500.0).is_stable
+
+
+@pytest.mark.parametrize("k_stiff", [1e3, 1e13])
+@pytest.mark.parametrize("force", [50.0, 200.0, 400.0])
+def test_links_under_a_follower_flutter_below_a_stiff_mode(force, k_stiff):
+    """Ziegler's two links without damping: angles a, b; force * l (b - a) acts on a. They vibrate, flutter, topple.
+
+    Beside springs of 1e13 N/m, the asymmetric stiffness of the links was taken for rounding.
+    """
+    length, m, J, k = 0.5, 2.0, 0.05, 30.0
+    x, z, tensor = A[:, 0], A[:, 2], A @ np.diag([J / 2, J, J]) @ A.T
+    bodies = [RigidBody(name, m, tensor, position=PLACE + part * length * x)
+              for name, part in (("first", 0.5), ("second", 1.5))]  # fmt: skip
+    end, begin = 0.5 * length * x, -0.5 * length * x
+    joints = [
+        RevoluteJoint("low", Marker(GROUND, position=PLACE), Marker("first", position=begin), axis=z),
+        RevoluteJoint("knee", Marker("first", position=end), Marker("second", position=begin), axis=z),
+    ]
+    springs = [JointForce(f"spring {name}", name, "angle", stiffness=k) for name in ("low", "knee")]
+    follower = PointForce("push", Marker("second", position=end), force=-force * x, is_follower=True)
+    small, bushing = stiff(k_stiff)
+    system = System([*bodies, small], joints, [*springs, follower, bushing])
+    modes = system_modes(linearize(system, static_equilibrium(system), inputs=(), outputs=()))
+    M = np.array([[J + 1.25 * m * length**2, m * length**2 / 2], [m * length**2 / 2, J + m * length**2 / 4]])
+    K = k * np.array([[2.0, -1], [-1, 1]]) + force * length * np.array([[-1.0, 1], [0, 0]])
+    expected = np.sqrt(-np.linalg.eigvals(np.linalg.solve(M, K)).astype(complex))
+    for root in (*expected, *-expected):
+        if root.imag >= 0:
+            assert_allclose(modes.eigenvalues[np.abs(modes.eigenvalues - root).argmin()], root, rtol=1e-9, atol=0)
+    assert modes.is_stable == (force < 100.0)
+
+
+@pytest.mark.parametrize("k_stiff", [1e3, 1e13])
+def test_weak_damping_counts_beside_a_stiff_mode(k_stiff):
+    """m x'' + d x' + k x = 0 with a rate of 1e-6 per second, below 1e7 rad/s."""
+    sledge = RigidBody("sledge", 2.0, np.eye(3))
+    rail = PrismaticJoint("rail", GROUND, Marker("sledge"), axis=(1, 0, 0))
+    spring = SpringDamper("spring", Marker(GROUND, position=(-1, 0, 0)), Marker("sledge"), 50.0, 4e-6, free_length=1.0)
+    small, bushing = stiff(k_stiff)
+    system = System([sledge, small], [rail], [spring, bushing])
+    modes = system_modes(linearize(system, static_equilibrium(system), inputs=(), outputs=()))
+    own = np.abs(modes.eigenvalues - 5j).argmin()
+    assert_allclose(modes.eigenvalues[own].real, -1e-6, rtol=1e-6)
 
 
 @pytest.mark.parametrize("has_damper", [False, True])
