@@ -86,8 +86,8 @@ def inner(X: Any, Y: Any) -> Array:
 
 def dots(X: Any, Y: Any) -> Array:
     """Return Σ_n X_nk Y_nk for every column, (k,)."""
-    if (far := elsewhere(X)) is not None:
-        return np.asarray(sum(far.on_rows(dots, X, Y)))
+    if (far := elsewhere(X, Y)) is not None:
+        return np.asarray(sum(far.on_rows(dots, far.like(X), far.like(Y))))
     return np.asarray(np.einsum("nk,nk->k", X, Y))
 
 

@@ -71,7 +71,7 @@ def test_columns_are_combined_in_their_place_down_to_none():
 
 
 class HalvedColumns:
-    """Columns in two pieces: the least that the protocol asks for."""
+    """Columns in two pieces, with the members of the protocol that the functions use."""
 
     def __init__(self, first, second):
         self.pieces, self.shape = (first, second), (len(first) + len(second), first.shape[1])
@@ -107,7 +107,8 @@ def test_columns_of_any_kind_are_treated_as_arrays():
     assert_allclose(inner(far, far_Y), X.T @ Y, **close)
     assert_allclose(inner(far, Y), X.T @ Y, **close)
     assert_allclose(inner(X, far_Y), X.T @ Y, **close)
-    assert_allclose(dots(far, far), (X * X).sum(axis=0), **close)
+    for products in (dots(far, far), dots(far, X), dots(X, far)):
+        assert_allclose(products, (X * X).sum(axis=0), **close)
     assert_allclose(squares(d, far), d @ X**2, **close)
     assert_allclose(rows_times(S, far), S @ X, **close)
     for product in (combine(far, C), combined(far, C)):
