@@ -1,6 +1,5 @@
 """Eigenmodes of distributed matrices: the space of rank rows, and the search by SLEPc."""
 
-import weakref
 from collections.abc import Callable
 from typing import Any
 
@@ -18,7 +17,7 @@ from fe_models.body.couplings.submatrix import spread_block
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.ranks.product import RowsProduct
 from fe_models.foundation.ranks.ranks import Ranks
-from fe_models.foundation.ranks.row_layout import RowLayout, dropped, new_key
+from fe_models.foundation.ranks.row_layout import RowLayout, new_key
 from fe_models.foundation.ranks.rows import Rows, collected, spread
 from fe_models.foundation.ranks.spread_columns import Part, SpreadColumns, own_part, spread_columns
 from fe_models.foundation.ranks.trim import give_back
@@ -38,7 +37,7 @@ class RankBasis:
     def __init__(self, space: "RankSpace", capacity: int) -> None:
         self.layout, self.key = space.layout, new_key()
         self.layout.ask(basis_here, self.key, space.rows, capacity)
-        weakref.finalize(self, dropped.append, self.key).atexit = False
+        self.layout.free_with(self, self.key)
 
     def columns(self, first: int, last: int) -> SpreadColumns:
         """Return some columns, (n, last - first)."""
@@ -68,7 +67,7 @@ class RankProduct:
         else:
             space.ranks.store[self.key] = matrix_of(A)
         space.layout.ask(product_here, self.key, space.rows)
-        weakref.finalize(self, dropped.append, self.key).atexit = False
+        space.layout.free_with(self, self.key)
 
     def __matmul__(self, x: SpreadColumns) -> SpreadColumns:
         """Return A x, (n, k)."""

@@ -9,7 +9,6 @@ Every rank whose nodes touch an element at a cut computes that element. Entries 
 because the elements of a node are added in the same order.
 """
 
-import weakref
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -23,7 +22,7 @@ from fe_models.elements.solids.assembly import assemble, node_graph, require_ass
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.ranks.ranks import Ranks
-from fe_models.foundation.ranks.row_layout import RowLayout, asked, dropped, new_key
+from fe_models.foundation.ranks.row_layout import RowLayout, asked, new_key
 from fe_models.foundation.ranks.rows import Rows, even_rows
 from fe_models.foundation.ranks.spread_matrix import OwnRows, SpreadMatrix
 from fe_models.foundation.ranks.trim import give_back
@@ -62,7 +61,7 @@ class SpreadMesh:
         """Let every rank keep the part of the mesh that it assembled; layout: distribution of the nodes."""
         self.layout, self.key = layout, new_key()
         layout.ask(mesh_here, self.key)
-        weakref.finalize(self, dropped.append, self.key).atexit = False
+        layout.free_with(self, self.key)
 
 
 def assemble_on_ranks(

@@ -30,6 +30,7 @@ class MpiRanks:
         self.comm = self.MPI.COMM_WORLD
         self.rank, self.size = self.comm.rank, self.comm.size
         self.store: dict[str, Any] = {}
+        self.unreferenced: list[str] = []
         self._is_over = False
 
     def everywhere(self, function: Callable[..., Any], *arguments: Any) -> list[Any]:

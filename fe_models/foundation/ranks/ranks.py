@@ -26,6 +26,7 @@ class Ranks(Protocol):
     rank: int
     size: int
     store: dict[str, Any]
+    unreferenced: list[str]  #: on rank 0: keys whose data nothing refers to; ranks drop them with the next request
     comm: Any  #: communicator of mpi4py, for functions that run on all ranks; None without MPI
 
     def everywhere(self, function: Callable[..., Any], *arguments: Any) -> list[Any]:
@@ -50,6 +51,7 @@ class OneRank:
 
     def __init__(self) -> None:
         self.store: dict[str, Any] = {}
+        self.unreferenced: list[str] = []
 
     def everywhere(self, function: Callable[..., Any], *arguments: Any) -> list[Any]:
         """Call the function here."""

@@ -1,5 +1,6 @@
 """Distribution of the rows of matrices and tall columns over the ranks, and requests to all of these ranks."""
 
+import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,10 +13,9 @@ from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.ranks.ranks import Ranks
 from fe_models.foundation.ranks.rows import Rows
 
-__all__ = ["RowLayout", "asked", "dropped", "new_key"]
+__all__ = ["RowLayout", "asked", "new_key"]
 
 numbers = count()
-dropped: list[str] = []  #: keys without references; ranks drop their data with the next request
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,10 +48,15 @@ class RowLayout:
         """Call function(ranks, *arguments) on all ranks, after they have dropped data without references."""
         return asked(self.ranks, function, *arguments)
 
+    def free_with(self, owner: object, key: str) -> None:
+        """Let all ranks drop the data of a key with the first request after the last reference to the owner is gone."""
+        weakref.finalize(owner, self.ranks.unreferenced.append, key).atexit = False
+
 
 def asked(ranks: Ranks, function: Callable[..., Any], *arguments: Any) -> list[Any]:
     """Call function(ranks, *arguments) on all ranks, after they have dropped data without references."""
-    return ranks.everywhere(asked_here, [dropped.pop() for _ in range(len(dropped))], function, *arguments)
+    keys = ranks.unreferenced
+    return ranks.everywhere(asked_here, [keys.pop() for _ in range(len(keys))], function, *arguments)
 
 
 def new_key() -> str:

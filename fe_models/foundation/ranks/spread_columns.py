@@ -7,7 +7,6 @@ ranks compute operations such as Xᵀ Y with their own rows at once, and rank 0 
 """
 
 import operator
-import weakref
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
@@ -15,7 +14,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.ranks.ranks import Ranks
-from fe_models.foundation.ranks.row_layout import RowLayout, dropped, new_key
+from fe_models.foundation.ranks.row_layout import RowLayout, new_key
 from fe_models.foundation.ranks.rows import Rows, collected, own_rows, receive, send
 from fe_models.foundation.ranks.trim import give_back
 
@@ -49,7 +48,7 @@ class SpreadColumns:
         self.layout, self.part, self.source = layout, part, source
         self.shape = (layout.n, part.last - part.first)
         if source is None:
-            weakref.finalize(self, dropped.append, part.key).atexit = False
+            layout.free_with(self, part.key)
 
     __iter__ = None  #: no iteration over rows
 

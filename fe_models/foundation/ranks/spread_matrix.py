@@ -4,7 +4,6 @@ The row order (`order`) places neighbours near each other, so that a rank needs 
 principal block stay on their ranks, so factorisation and eigensolver use them without redistribution.
 """
 
-import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -16,7 +15,7 @@ from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
 from fe_models.foundation.ranks.product import RowsProduct
 from fe_models.foundation.ranks.ranks import Ranks
-from fe_models.foundation.ranks.row_layout import RowLayout, dropped, new_key
+from fe_models.foundation.ranks.row_layout import RowLayout, new_key
 from fe_models.foundation.ranks.rows import Rows, collected, own_rows, receive, send
 from fe_models.foundation.ranks.spread_columns import Part, SpreadColumns, own_part
 from fe_models.foundation.ranks.trim import give_back
@@ -61,7 +60,7 @@ class SpreadMatrix:
         self.layout = RowLayout(ranks, order, rows)
         self.ranks, self.order, self.rows, self.key = ranks, order, rows, new_key()
         self.position = self.layout.position
-        weakref.finalize(self, dropped.append, self.key).atexit = False
+        self.layout.free_with(self, self.key)
         found = self._ask(made_here, self.key, rows, function, *arguments)
         self.nnz = sum(entries for entries, _ in found)
         self.largest = max(largest for _, largest in found)  #: largest magnitude of all entries

@@ -100,6 +100,15 @@ def test_columns_that_nobody_names_are_forgotten(layout, X):
     assert layout.ranks.stores == [{}] * layout.ranks.size
 
 
+def test_requests_to_other_ranks_leave_columns_to_forget(layout, X):
+    there, others = spread_columns(layout, X), RowLayout(ThreadRanks(layout.ranks.size), layout.order, layout.rows)
+    del there
+    gc.collect()
+    others.ask(lambda ranks: None)
+    layout.ask(lambda ranks: None)
+    assert layout.ranks.stores == [{}] * layout.ranks.size
+
+
 def test_what_is_made_on_the_ranks_stays_there(layout, X):
     made = spread_columns(layout, X).made(1, np.sum, spread_columns(layout, X), 1, None, None, True)
     assert_array_equal(made.whole(), X.sum(axis=1, keepdims=True))
