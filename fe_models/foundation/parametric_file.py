@@ -40,7 +40,7 @@ log = logging.getLogger(__name__)
 
 
 def mirrored(value: Any, side: float) -> Any:
-    """Return a point, [x, y, z], with y times `side` (1: left, -1: right); of lists and tables, all points in them."""
+    """Return a point, [x, y, z], with y times `side` (1: left, -1: right), or a list or table with all its points."""
     if isinstance(value, dict):
         return {key: mirrored(inner, side) for key, inner in value.items()}
     if not isinstance(value, list | tuple):
@@ -135,29 +135,32 @@ def json_schema(model: type[Table], *, is_parametric: bool) -> dict[str, Any]:
 
 
 EXPRESSION_SCHEMA = {"type": "string", "pattern": r"\{.+\}"}
-REMOVED_SCHEMA = {"type": "object", "maxProperties": 0}  #: an empty table takes away the key of a base file
+REMOVED_SCHEMA = {"type": "object", "maxProperties": 0}  #: an empty table removes the key that a base file gives
 
 
 def with_expressions(schema: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a JSON schema in which each value within the described one may be a text with an expression."""
+    """Return the schema with expressions allowed for every key and list entry, and empty tables for every key."""
 
-    def either(value: Any) -> Any:
+    def either(value: Any, *others: Any) -> Any:
+        """Return the schema of a value, of an expression, or of another schema."""
         if not isinstance(value, dict) or "const" in value:
             return value
-        words = {key: value[key] for key in ("description",) if key in value}
-        return words | {"anyOf": [with_expressions(value), EXPRESSION_SCHEMA, REMOVED_SCHEMA]}
+        words = {"description": value["description"]} if "description" in value else {}
+        return words | {"anyOf": [with_expressions(value), EXPRESSION_SCHEMA, *others]}
 
     found = {key: value for key, value in schema.items() if key != "required"}
-    for key in ("items", "additionalProperties"):
-        if key in found:
-            found[key] = either(found[key])
+    if "items" in found:
+        found["items"] = either(found["items"])
     if "prefixItems" in found:
         found["prefixItems"] = [either(value) for value in found["prefixItems"]]
     if "anyOf" in found:
         found["anyOf"] = [with_expressions(value) for value in found["anyOf"]]
+    if "additionalProperties" in found:
+        found["additionalProperties"] = either(found["additionalProperties"], REMOVED_SCHEMA)
     if "properties" in found:
         found["properties"] = {
-            name: value if name == "kind" else either(value) for name, value in found["properties"].items()
+            name: value if name == "kind" else either(value, REMOVED_SCHEMA)
+            for name, value in found["properties"].items()
         }
     return found
 

@@ -67,6 +67,12 @@ def test_a_schema_knows_parameters_and_repeat(schemas):
     jsonschema.validate(content, schemas["system"])
 
 
+@pytest.mark.parametrize(("entry", "fits"), [("{-g}", True), (-9.81, True), ({}, False), ("g", False)])
+def test_an_entry_of_a_list_may_be_an_expression_but_no_empty_table(schemas, entry, fits):
+    content = {"parameters": {"g": 9.81}, "system": {"units": "m-kg-s", "gravity": [0, 0, entry]}}
+    assert jsonschema.Draft202012Validator(schemas["system"]).is_valid(content) == fits
+
+
 def test_an_unknown_kind_is_refused_with_the_nearest():
     result = CliRunner().invoke(app, ["schema", "sytem"])
     assert result.exit_code == 2
