@@ -392,8 +392,9 @@ def compare_load_cases(case: Case) -> Iterator[Compared]:
 def compare_sources(case: Case) -> Iterator[Compared]:
     """Labels and shares by the columns of the file; the columns by the mode set, up to a scale for each column.
 
-    The forces of the modes on the columns V are F = VᵀK Phi; the coordinates A satisfy V A = Phi up to rigid motion,
-    which rounding hides where columns nearly repeat each other, and AᵀF = PhiᵀK Phi, which it hides much less.
+    The forces of the modes on the columns V are F = VᵀK Phi. The coordinates A satisfy V A = Phi up to rigid motion, so
+    that AᵀF = PhiᵀK Phi. Both are compared: where columns nearly repeat each other, the rounding of the first is much
+    larger than that of the second.
     """
     file = case.reduced
     if file.columns is None:
@@ -407,7 +408,8 @@ def compare_sources(case: Case) -> Iterator[Compared]:
     V, Z = case.modes.columns, case.by_energy
     if len(file.columns.labels) != V.shape[1]:
         return
-    K_Phi = case.body.K @ (case.Phi @ Z)
+    Phi = case.Phi @ Z
+    K_Phi = case.body.K @ Phi
     G, F, A = V.T @ K_Phi, np.asarray(file.columns.F) @ Z, np.asarray(file.columns.A) @ Z
     energy = np.einsum("nc,nc->c", V, case.body.K @ V)
     works = energy > SUSPECT_ENERGY * rounding_of_energy(case.body, V)  # the others are rigid-body motions
@@ -417,19 +419,16 @@ def compare_sources(case: Case) -> Iterator[Compared]:
     scale = np.divide(np.einsum("ck,ck->c", G, F), own, out=np.zeros_like(own), where=works & (own > 0))
     yield apart("columns.F", scale[:, None] * F, G, size[:, None], axes=f"column {case.axes_words}")
     back = np.divide(A, scale[:, None], out=np.zeros_like(A), where=scale[:, None] != 0)
-    u = V @ back
-    E = u - case.Phi @ Z
-    columns = np.abs(V) @ np.abs(back)  # the shapes that add up to the modes
-    rounding = SUSPECT_ENERGY * rounding_of_energy(case.body, columns)
-    error = np.sqrt(np.maximum(np.einsum("nk,nk->k", E, case.body.K @ E) - rounding, 0.0))
-    work = (case.Phi @ Z).T @ K_Phi
-    energy = np.sqrt(np.maximum(np.diag(work), 0.0))
-    yield apart("columns.A", error, np.zeros_like(error), energy, axes=case.axes_words)
-    rounding = np.finfo(float).eps * (np.abs(A).T @ np.abs(F)) + np.sqrt(
-        np.outer(rounding_of_energy(case.body, columns), rounding_of_energy(case.body, case.Phi @ Z))
-    )
+    E = V @ back - Phi
+    terms = rounding_of_energy(case.body, np.abs(V) @ np.abs(back))  # of the terms of V A
+    defect = np.maximum(np.einsum("nk,nk->k", E, case.body.K @ E) - SUSPECT_ENERGY * terms, 0.0)
+    work = Phi.T @ K_Phi
+    size = np.sqrt(np.maximum(np.diag(work), 0.0))
+    yield apart("columns.A", np.sqrt(defect), np.zeros_like(defect), size, axes=case.axes_words)
+    rounding = np.sqrt(np.outer(terms, rounding_of_energy(case.body, Phi)))
+    rounding += np.finfo(float).eps * (np.abs(A).T @ np.abs(F))
     error = np.maximum(np.abs(A.T @ F - work) - SUSPECT_ENERGY * rounding, 0.0)
-    yield apart("columns.A", error, np.zeros_like(error), np.outer(energy, energy), axes=f"{case.axes_words} -")
+    yield apart("columns.A", error, np.zeros_like(error), np.outer(size, size), axes=f"{case.axes_words} -")
 
 
 def compare_stress(case: Case) -> Iterator[Compared]:
