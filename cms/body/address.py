@@ -64,7 +64,7 @@ class Address:
     node
         The user's number; "INSTANCE.number" if several instances have it.
     element
-        The same for an element: selects the kept nodes of its surface.
+        The user's number of an element, as for a node; selects the kept nodes of its surface.
     set
         Name of a set; selects its kept nodes, or the kept nodes of its elements.
     position

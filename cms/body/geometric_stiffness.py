@@ -38,7 +38,7 @@ class RotatedLoads:
     spin
         Matrices of the products of angular velocities, (6, 3, n_q) [sqrt(kg) m per q].
     interfaces
-        (n_loaded, 6, 3, n_q) [1/sqrt(kg) and 1/(sqrt(kg) m) per q].
+        Matrices of the loads of interfaces, (n_loaded, 6, 3, n_q) [1/sqrt(kg) and 1/(sqrt(kg) m) per q].
     """
 
     translation: Array
@@ -105,10 +105,10 @@ class GeometricStiffness:
         Matrices for a unit force (3) and a unit moment (3) at each loaded interface, axes of B, (n_loaded, 6, n_q, n_q)
         [1/(kg m) and 1/(kg m²) per q²].
     turned
-        Needed to transform the matrices to other frames; None: not recorded, a rotation is then assumed to rotate the
-        loads.
+        Rotated loads, with which the matrices are transformed to other frames; None: not recorded, a rotation is then
+        assumed to rotate the loads.
     spread
-        Needed to transform them to a Buckens frame; None: left out, or not recorded.
+        Distributed loads, with which the matrices are transformed to a Buckens frame; None: left out, or not recorded.
     is_loaded
         Whether the loads of each of `ReducedBody.interfaces` are in `interfaces`; loads of other interfaces do not
         stiffen the body; empty: all are included.

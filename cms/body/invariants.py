@@ -45,11 +45,11 @@ class Moments:
     C1
         1C, ∫ phi_a,k, (3, n_q) [kg].
     P
-        ∫ c_a phi_b,k, (3, 3, n_q) [kg m].
+        Moments of places and shapes, ∫ c_a phi_b,k, (3, 3, n_q) [kg m].
     S_kl
-        ∫ phi_a,k phi_b,l, (3, 3, n_q, n_q) [kg].
+        Moments of shapes, ∫ phi_a,k phi_b,l, (3, 3, n_q, n_q) [kg].
     is_exact
-        False: from bare matrices that are not M_s ⊗ 1.
+        Whether the moments are exact; False: they follow from bare matrices that are not M_s ⊗ 1.
     missing
         Unknown terms of `INERTIA_TERMS`, in their order.
 

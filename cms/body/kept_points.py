@@ -32,7 +32,7 @@ class KeptPoints:
     rotation
         Rotation vectors in B, zero if unknown, (n, 3, n_q) [1/m].
     source
-        One of `SOURCES` for each, (n,).
+        Source of each rotation, one of `SOURCES`, (n,).
 
     Raises
     ------

@@ -102,7 +102,8 @@ class ReducedInterface:
     members
         Member nodes, indices into `ReducedBody.nodes`, (n_members,).
     has_rotation
-        False: Psi has no rotation (rows 3-5 are zero) and is the mean translation of the members, which are collinear.
+        Whether Psi has rotations; False: rows 3-5 are zero, because the members are collinear, and rows 0-2 are their
+        mean translation.
     """
 
     name: str
@@ -182,7 +183,8 @@ class ReducedBody:
     geometric
         Geometric stiffness; None: left out, or not known.
     quadratic
-        g_kl of the kept nodes in B, displacement ½ Σ q_k q_l g_kl, (n_kept, 3, n_q, n_q) [1/(kg m)]; None: left out.
+        Quadratic modes g_kl of the kept nodes in B, (n_kept, 3, n_q, n_q) [1/(kg m)], with the displacement
+        ½ Σ q_k q_l g_kl; None: left out.
     numbering
         The user's numbers of kept nodes and elements, and the sets.
     kept

@@ -307,9 +307,10 @@ class FEBody:
     surface
         Triangles of nodes, (n_tri, 3).
     element_model
-        None: bare matrices; only integrals that follow from the matrices are exact.
+        Mass integrals, stress and geometric stiffness by the elements; None: bare matrices; only integrals that follow
+        from these are exact.
     recovery
-        None: the dofs are the mesh dofs.
+        Map from the dofs to those of the mesh; None: the dofs are the mesh dofs.
     load_cases
         Named loads over the dofs of this body.
     stress_points

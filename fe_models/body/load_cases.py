@@ -30,7 +30,7 @@ class LoadCase:
     kind
         Kind in one word, such as one of `LOAD_CASE_KINDS`.
     f
-        Conjugate to the dofs of the body, mesh axes, (n_dof,) [N, N m].
+        Generalised forces over the dofs of the body, mesh axes, (n_dof,) [N, N m].
     """
 
     name: str

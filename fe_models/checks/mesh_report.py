@@ -105,13 +105,13 @@ class MeshReport(Report):
     n_cells
         Number of cells by type.
     lo
-        Bounding box of the used nodes, (3,) [m].
+        Lower corner of the bounding box of the used nodes, (3,) [m].
     hi
         Upper corner of the bounding box, (3,) [m].
     volume
         Volume of the cells [m³].
     mass
-        [kg]; None: no material was given.
+        Mass of the cells [kg]; None: no material was given.
     mass_centre
         Centre of mass, (3,) [m].
     n_parts
@@ -129,9 +129,9 @@ class MeshReport(Report):
     findings
         Faults of the mesh, and doubts about it.
     first_order
-        None: no first-order cells, or not measured.
+        Error of the lowest frequencies due to first-order cells; None: there are none, or it was not measured.
     origin
-        Origin of the mesh, as the mesh states it.
+        Origin of the mesh by label, such as the size of a geometry; see `Mesh.origin`.
     angles
         Smallest and largest angle between neighbouring faces of a cell [degrees].
     lowest_jacobian

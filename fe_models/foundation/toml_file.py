@@ -396,7 +396,7 @@ def first_key(here: dict[str, Any] | list[Any], path: str) -> tuple[Any, str | N
 
 
 def line_numbers(text: str) -> dict[Location, int]:
-    """Return the line, from 1, of each table and key of a valid TOML text; the first line of a value of several."""
+    """Return the line, from 1, of each table and key of a valid TOML text; of a value on several lines, the first."""
     found: dict[Location, int] = {}
     table: Location = ()
     n_rows: dict[Location, int] = {}

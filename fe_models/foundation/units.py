@@ -23,11 +23,11 @@ class Units:
     name
         Key in `UNIT_SYSTEMS`, such as "mm-t-s".
     length
-        [m] of one length unit.
+        One length unit in metres.
     mass
-        [kg] of one mass unit.
+        One mass unit in kilograms.
     time
-        [s] of one time unit.
+        One time unit in seconds.
     length_symbol
         Symbol of the length unit, such as "mm".
     mass_symbol

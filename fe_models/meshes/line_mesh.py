@@ -26,7 +26,7 @@ class LineMesh:
     Parameters
     ----------
     nodes
-        (n_nodes, 3), in the length unit of the model.
+        Positions of the nodes, (n_nodes, 3), in the length unit of the model.
     lines
         End nodes, (n_lines, 2).
     line_sets
@@ -44,9 +44,9 @@ class LineMesh:
     included
         sha256 of each file that the source includes.
     node_numbers
-        Numbers in the file, (n_nodes,); empty: none.
+        Numbers of the nodes in the file, (n_nodes,); empty: none.
     line_numbers
-        Numbers in the file, (n_lines,); empty: none.
+        Numbers of the lines in the file, (n_lines,); empty: none.
     notes
         Descriptions of what the reader left out or changed.
 

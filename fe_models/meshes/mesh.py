@@ -35,7 +35,7 @@ class Mesh:
     Parameters
     ----------
     nodes
-        (n_nodes, 3), in the length unit of the model.
+        Positions of the nodes, (n_nodes, 3), in the length unit of the model.
     cells
         Solid cells by type in `SOLID_TYPES`, (n_cells, nodes per cell).
     cell_sets
@@ -53,9 +53,9 @@ class Mesh:
     included
         sha256 of each file that the source includes.
     node_numbers
-        Numbers in the file, (n_nodes,); empty: none.
+        Numbers of the nodes in the file, (n_nodes,); empty: none.
     cell_numbers
-        Numbers in the file, (n_cells,), by cell type.
+        Numbers of the cells in the file, (n_cells,), by cell type.
     notes
         Descriptions of what the reader left out or changed.
     origin

@@ -21,7 +21,7 @@ class NodeCloud:
     Parameters
     ----------
     nodes
-        (n_nodes, 3), in the length unit of the model.
+        Positions of the nodes, (n_nodes, 3), in the length unit of the model.
     node_sets
         Nodes of each group, including groups of lines and points.
     face_sets
@@ -33,7 +33,7 @@ class NodeCloud:
     included
         sha256 of each file that the source includes.
     node_numbers
-        Numbers in the file, (n_nodes,); empty: none.
+        Numbers of the nodes in the file, (n_nodes,); empty: none.
     notes
         Descriptions of what the reader left out or changed.
     """

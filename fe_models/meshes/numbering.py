@@ -37,7 +37,7 @@ class NamedSet:
     kind
         "nodes" or "elements".
     members
-        Rows of the nodes, or of the surface triangles of its elements, (n,).
+        Indices of the nodes of the body, or of the surface triangles of its elements, (n,).
     size
         Number of nodes or elements in the deck or mesh.
     """
@@ -68,8 +68,8 @@ class Numbering:
     nodes
         Number of each node, `NONE` where it has none, (n_nodes,).
     on_skin
-        1: the row is a point of a skin (of beams or shells) that moves with the node of that number; 0: the row is the
-        node itself, (n_nodes,); empty: all rows are nodes.
+        Kind of each row, (n_nodes,): 1 for a point of a skin (of beams or shells) that moves with the node of that
+        number, 0 for the node itself; empty: all rows are nodes.
     elements
         Number of the element behind each triangle, (n_tri,).
     instances

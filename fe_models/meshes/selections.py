@@ -46,7 +46,7 @@ class FaceGroup:
     name
         Name of the group of faces.
     also
-        Further groups.
+        Names of further groups.
     """
 
     name: str

@@ -24,7 +24,7 @@ class ShellMesh:
     Parameters
     ----------
     nodes
-        (n_nodes, 3), in the length unit of the model.
+        Positions of the nodes, (n_nodes, 3), in the length unit of the model.
     cells
         Cells by type in `FLAT_TYPES`, (n_cells, 3) and (n_cells, 4).
     cell_sets
@@ -42,11 +42,11 @@ class ShellMesh:
     included
         sha256 of each file that the source includes.
     node_numbers
-        Numbers in the file, (n_nodes,); empty: none.
+        Numbers of the nodes in the file, (n_nodes,); empty: none.
     cell_numbers
-        Numbers in the file, (n_cells,), by cell type.
+        Numbers of the cells in the file, (n_cells,), by cell type.
     line_numbers
-        Numbers in the file, (n_lines,); empty: none.
+        Numbers of the lines in the file, (n_lines,); empty: none.
     notes
         Descriptions of what the reader left out or changed.
 

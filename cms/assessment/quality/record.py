@@ -32,7 +32,7 @@ class QualityRecord:
     name
         Key in `LIMITS`, such as "frequency-error".
     title
-        The same in words.
+        The question in words.
     value
         Value without unit; NaN where the question does not apply.
     tolerance
@@ -44,7 +44,7 @@ class QualityRecord:
     action
         Remedy; "" if none is needed.
     data
-        Arrays, numbers and words behind it, for tables and plots.
+        Arrays, numbers and words from which the value follows, for tables and plots.
     """
 
     name: str

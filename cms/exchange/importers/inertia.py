@@ -40,11 +40,11 @@ class FullMass:
     Parameters
     ----------
     M
-        Both triangles, basic axes, (n_full, n_full).
+        Mass matrix with both triangles, basic axes, (n_full, n_full).
     dofs
         (node number, component 0-5) of every row, (n_full, 2).
     places
-        Node number -> place, basic axes.
+        Position of each node by its number, basic axes, (3,).
     """
 
     M: sp.csc_array

@@ -31,7 +31,7 @@ def moments_of_invariants(
     (1) R = ½ tr(J0) 1 - J0
     (2) P_k = ½ tr(3C_k) 1 - 3C_kᵀ, its antisymmetric part by 2C
     (3) S_ab,kl: trace by the modal mass, the part antisymmetric in a, b by 4C, the rest by 5C, S_lk = M_kl 1 - 5C_kl;
-        half the antisymmetric part of 5C is 4C
+        the antisymmetric part of 5C_kl is tilde(4C_kl) / 2
     (4) what is None is missing
 
     Parameters

@@ -71,7 +71,7 @@ class RampDamping:
     Parameters
     ----------
     steps
-        (frequency [Hz], ratio below it), ascending.
+        Pairs (frequency [Hz], ratio below it), by ascending frequency.
     above
         Ratio at and above the last frequency.
     """

@@ -44,7 +44,7 @@ class NodalFrame:
     at
         Name of the interface; None: given dofs, or six chosen from all boundary dofs.
     origin
-        Origin in mesh coordinates, (3,) [m]; None: the default.
+        Origin in mesh coordinates, (3,) [m]; None: the reference point of the interface, or the centre of mass.
     axes
         x, y and z axis of the frame in mesh axes, orthonormal; None: the mesh axes.
     dofs
@@ -65,7 +65,7 @@ class TisserandFrame:
     Parameters
     ----------
     origin
-        Origin in mesh coordinates, (3,) [m]; None: the default.
+        Origin in mesh coordinates, (3,) [m]; None: the undeformed centre of mass.
     axes
         x, y and z axis of the frame in mesh axes, orthonormal; None: the mesh axes.
 
@@ -87,7 +87,7 @@ class BuckensFrame:
     Parameters
     ----------
     origin
-        Origin in mesh coordinates, (3,) [m]; None: the default.
+        Origin in mesh coordinates, (3,) [m]; None: the weighted centre of the nodes.
     axes
         x, y and z axis of the frame in mesh axes, orthonormal; None: the mesh axes.
     """

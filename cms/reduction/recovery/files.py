@@ -324,7 +324,7 @@ class CraigBampton:
     M
         Mass, (n, n), n = n_b + n_modes.
     K
-        (n, n), without coupling between boundary and modes.
+        Stiffness, (n, n), without coupling between boundary and modes.
     D
         Damping, (n, n).
     T

@@ -28,7 +28,7 @@ class Rows:
     Parameters
     ----------
     quantity
-        One of `QUANTITIES`.
+        Quantity of the rows, one of `QUANTITIES`.
     at
         Nodes or elements by number; node sets or groups, interfaces, stress points by name; empty: all places, which is
         not allowed for rows of nodes.
@@ -39,8 +39,8 @@ class Rows:
 
     Raises
     ------
-    If the quantity is unknown, or does not fit the other fields.
-        If the quantity is unknown, or does not go with what is given.
+    RecoveryError
+        If the quantity is unknown, or does not fit the other fields.
     """
 
     quantity: str

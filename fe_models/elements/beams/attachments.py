@@ -26,7 +26,7 @@ class PointMass:
     mass
         Mass [kg].
     inertia
-        About the centre of mass, mesh axes, (3, 3) [kg m²], or three principal values, or one value for all axes.
+        Inertia about the centre of mass, mesh axes, (3, 3) [kg m²], or three principal values, or one for all axes.
     offset
         Vector from the node to the centre of mass, mesh axes, (3,) [m].
 
@@ -72,13 +72,13 @@ class Spring:
     nodes
         Indices of the two nodes.
     stiffness
-        (6,) diagonal or (6, 6): three translations, three rotations [N/m, N, N m].
+        Stiffness of three translations and three rotations, (6,) diagonal or (6, 6) [N/m, N, N m].
     damping
         Viscous damping, (6,) or (6, 6) [N s/m, N s, N m s]; None: no damping.
     point
         Point at which the spring acts, (3,) [m]; None: midway between the nodes.
     triad
-        Axes as columns, (3, 3).
+        Axes of the spring as columns, in mesh axes, (3, 3).
 
     Raises
     ------
@@ -116,9 +116,9 @@ class RigidLink:
     Parameters
     ----------
     node
-        The leader, which keeps its dofs.
+        Index of the leading node, which keeps its dofs.
     followers
-        Nodes that follow, (n,).
+        Indices of the nodes that follow it, (n,).
 
     Raises
     ------

@@ -31,9 +31,9 @@ class BeamProperty:
     orientation
         Vector towards local y; None: from the mesh, or else such that z points up.
     shear
-        False: no shear deformation (Euler-Bernoulli).
+        Whether sections shear (Timoshenko); False: they stay normal to the axis (Euler-Bernoulli).
     rotary_inertia
-        False: no rotary inertia in bending; torsion keeps its inertia.
+        Whether there is rotary inertia in bending; torsion has its inertia in any case.
     added_mass
         Additional mass per length, without stiffness [kg/m].
     """

@@ -210,9 +210,9 @@ class BoxSection:
     Parameters
     ----------
     width
-        Outer, along y [m].
+        Outer width along y [m].
     height
-        Outer, along z [m].
+        Outer height along z [m].
     web
         Thickness of the two walls along z [m].
     flange
@@ -275,7 +275,7 @@ class ISection:
     width
         Width of the flanges, along y [m].
     height
-        Outer, along z [m].
+        Outer height along z [m].
     web
         Thickness of the web [m].
     flange
@@ -354,7 +354,7 @@ class GeneralSection:
     A_sz
         Shear area along z [m²].
     shear_center
-        (y, z) from the centroid [m].
+        Position (y, z) of the shear centre relative to the centroid [m].
     outline
         Polygon (y, z), anticlockwise, (n, 2) [m]; None: the rectangle with the same A, Iy, Iz.
     """

@@ -182,9 +182,9 @@ class StiffnessProperty:
     thickness
         Nominal thickness [m].
     stiffness
-        Rows of [[A, B], [B, D]], from eps_x eps_y gamma_xy kappa_x kappa_y kappa_xy to N_x N_y N_xy M_x M_y M_xy.
+        Rows of [[A, B], [B, D]], which maps eps_x eps_y gamma_xy kappa_x kappa_y kappa_xy to N_x N_y N_xy M_x M_y M_xy.
     shear_stiffness
-        Rows of H, from gamma_xz gamma_yz to Q_x Q_y [N/m].
+        Rows of H, which maps gamma_xz gamma_yz to Q_x Q_y [N/m].
     direction
         Direction in mesh axes; its projection onto a cell is x.
     offset

@@ -34,15 +34,15 @@ class CadFace:
     centre
         Centroid of the area, (3,).
     lo
-        Bounding box, (3,).
+        Lower corner of the bounding box, (3,).
     hi
         Upper corner of the bounding box, (3,).
     normal
-        Outward, (3,), of a plane.
+        Outward normal of a plane, (3,).
     radius
         Radius of a cylinder or sphere.
     axis
-        Direction, (3,), of a cylinder; its first large component is positive.
+        Direction of the axis of a cylinder, (3,); its first large component is positive.
     point
         Point on the axis of a cylinder nearest to the centroid, or centre of a sphere, (3,).
     is_hole
@@ -52,7 +52,7 @@ class CadFace:
     colour
         Colour in the file, "#rrggbb".
     solids
-        Numbers of the solids it bounds, from 1.
+        Numbers of the solids that the face bounds, from 1.
     """
 
     number: int

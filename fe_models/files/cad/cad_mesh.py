@@ -33,11 +33,11 @@ class MeshSize:
     size
         Largest edge of an element [length].
     smallest
-        Least edge that curvature and small features ask for; None: 0.05 of the size.
+        Smallest edge of an element at curved surfaces and small features [length]; None: 0.05 of `size`.
     curvature
-        Elements around a full circle; 0: the size does not follow curvature.
+        Number of elements around a full circle; 0: the size does not follow curvature.
     order
-        1: four-node tetrahedra, 2: ten-node ones with middle nodes on the surfaces.
+        Order of the tetrahedra; 1: four nodes, 2: ten nodes, with middle nodes on the surfaces.
     optimise
         Whether the tetrahedra are improved after meshing.
 

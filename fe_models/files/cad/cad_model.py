@@ -58,7 +58,7 @@ class CadPart:
     volume
         Volume of all solids [length³].
     lo
-        Bounding box, (3,).
+        Lower corner of the bounding box, (3,).
     hi
         Upper corner of the bounding box, (3,).
     """

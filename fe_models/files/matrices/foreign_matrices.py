@@ -36,32 +36,31 @@ class ForeignMatrices:
     D
         Viscous damping, (n_dof, n_dof).
     dofs
-        (node number, component 0-5 or `SCALAR`) of every row, (n_dof, 2); None: not said.
+        (node number, component 0-5 or `SCALAR`) of every row, (n_dof, 2); None: the files do not state it.
     row_nodes
-        Instead of dofs: the nodes of the rows in their order, 3 or 6 rows to each.
+        Number of the node of every 3 or 6 consecutive rows, (n,), for files without `dofs`.
     node_numbers
         Numbers of `nodes`, (n_nodes,).
     nodes
-        Positions in the basic axes of the model, (n_nodes, 3); None: not said.
+        Positions in the basic axes of the model, (n_nodes, 3); None: the files do not state them.
     systems
-        Node number -> R, (3, 3): columns are the axes, in basic axes, in which its dofs are written; others: basic
-        axes.
+        Axes of the dofs of a node by its number, as columns in basic axes, (3, 3); other nodes have basic axes.
     loads
-        Name -> forces over the rows, (n_dof,).
+        Forces over the rows by name, (n_dof,).
     others
-        Further matrices of the files by name, as they stand.
+        Further matrices of the files by name, unchanged.
     triangle
-        Matrix -> what was stored: both, lower, upper, diagonal.
+        Stored triangle of each matrix by its name: both, lower, upper, diagonal.
     constrained
         Rows that are held, (n,).
     removed
-        Dofs without rows as they are held.
+        Dofs that have no rows because they are held, (node number, component), (n, 2).
     program
         Program that wrote the files, if they name it.
     files
-        Path -> sha256.
+        sha256 of each file by its path.
     notes
-        What was left out, changed or assumed, in words.
+        Descriptions of what the readers left out, changed or assumed.
 
     Raises
     ------
