@@ -20,7 +20,7 @@ from floatframe.design.identification.regressors import LinearForm
 from floatframe.design.identification.tree_samples import TreeSamples, as_placed, gravity_of, rigid_tree, tree_samples
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.tree.kernels.tree import Tree
-from floatframe.engine.tree.topology import tree_of
+from floatframe.engine.tree.topology import CoordinateName, tree_of
 from floatframe.errors import ModelError
 
 __all__ = [
@@ -42,8 +42,9 @@ __all__ = [
     "silent_directions",
     "square_to",
     "tensor_row",
-    "typical",
-    "typical_channels",
+    "typical_coordinates",
+    "typical_forces",
+    "typical_parameters",
     "typical_rows",
     "typical_time",
 ]
@@ -138,7 +139,7 @@ def silent_directions(form: LinearForm) -> Array:
     if not found:
         return np.zeros((len(form.names), 0))
     U, s, _ = la.svd(np.array(found).T, full_matrices=False)
-    return typical(form)[:, None] * U[:, s > 1e-9 * s[0]]
+    return typical_parameters(form)[:, None] * U[:, s > 1e-9 * s[0]]
 
 
 def moves_of(form: LinearForm, placed: TreeSamples, tree: Tree, i: int, size: float) -> list[Move]:
@@ -364,7 +365,7 @@ def silent_at_base(form: LinearForm) -> Array:
     if inertial.shape[1]:
         inertial = la.orth(inertial)
     silent = np.hstack([np.vstack([inertial, np.zeros((p - 10 * n_b, inertial.shape[1]))]), drives])
-    return typical(form)[:, None] * silent
+    return typical_parameters(form)[:, None] * silent
 
 
 def unseen(weights: Array, least: np.floating) -> Array:
@@ -415,7 +416,8 @@ class BaseParameters:
     source: str  #: the measured quantities, one of `SOURCES`
     kept: IntArray  #: leading parameter of each combination, (n_base,)
     B: Array  #: (n_base, p), the identity in the columns `kept`
-    silent: Array  #: directions without effect, orthonormal where parameters are divided by `typical`, (p, k)
+    #: directions without effect, orthonormal where parameters are divided by `typical_parameters`, (p, k)
+    silent: Array
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -425,8 +427,7 @@ class BaseParameters:
     @property
     def without_effect(self) -> tuple[str, ...]:
         """Names of parameters without any effect."""
-        used = np.abs(self.B).max(axis=0, initial=0.0) > SHOWN
-        return tuple(name for name, is_used in zip(self.form.names, used, strict=True) if not is_used)
+        return tuple(name for name, is_used in zip(self.form.names, self.B.any(axis=0), strict=True) if not is_used)
 
     def values(self, phi: Array) -> Array:
         """Return beta, (n_base,), from parameters, (p,)."""
@@ -478,7 +479,7 @@ def silent_by_rules(form: LinearForm, source: str) -> Array:
         return silent_directions(form)
     if source == "reactions":
         return silent_at_base(form)
-    size = typical(form)[:, None]
+    size = typical_parameters(form)[:, None]
     spaces = [(silent / size).T for silent in (silent_directions(form), silent_at_base(form))]
     return common(spaces).T * size
 
@@ -486,8 +487,7 @@ def silent_by_rules(form: LinearForm, source: str) -> Array:
 def random_samples(form: LinearForm, seed: int = 0) -> TreeSamples:
     """Return random instants with angles over a full turn, or near the placed position if there are loops."""
     rng = np.random.default_rng(seed)
-    is_length = np.array([column.unit == "m" for column in form.columns])
-    size, time = np.where(is_length, compiled_system(form.system).length, 1.0), typical_time(form)
+    size, time = typical_coordinates(form, form.columns), typical_time(form)
     if form.independent is None:
         x = rng.uniform(-np.pi, np.pi, (N_SAMPLES * len(form.system.bodies), len(size))) * size
     else:
@@ -506,17 +506,20 @@ def form_rows(form: LinearForm, samples: TreeSamples, source: str) -> Array:
     return np.concatenate(parts, axis=1).reshape(-1, len(form.names))
 
 
-def typical_rows(form: LinearForm, samples: TreeSamples, source: str) -> Array:
-    """Return `form_rows` divided by typical magnitudes of channels and parameters, without units, (n rows, p)."""
-    channels, size = typical_channels(form, source), typical(form)
-    rows = form_rows(form, samples, source).reshape(-1, len(channels), len(size))
-    return (rows * size / channels[:, None]).reshape(-1, len(size))
+def typical_rows(form: LinearForm, rows: Array, source: str) -> Array:
+    """Return rows of measured quantities divided by typical magnitudes of forces and parameters, (n rows, p)."""
+    forces, p = typical_forces(form, source), len(form.names)
+    return (rows.reshape(-1, len(forces), p) * typical_parameters(form) / forces[:, None]).reshape(-1, p)
 
 
 def sampled_silence(form: LinearForm, samples: TreeSamples, source: str) -> Array:
-    """Return directions without effect from the singular values of sampled rows, independent."""
-    _, s, Vt = la.svd(typical_rows(form, samples, source), full_matrices=False)
-    return Vt[s <= RANK * s[0]].T * typical(form)[:, None]
+    """Return independent directions without effect, from the singular values of sampled rows."""
+    rows = typical_rows(form, form_rows(form, samples, source), source)
+    _, s, Vt = la.svd(rows, full_matrices=False)
+    return Vt[s <= RANK * s[0]].T * typical_parameters(form)[:, None]
+
+
+# typical magnitudes: bodies of mass 1 and of the size of the system, that fall by half of it in the typical time
 
 
 def typical_time(form: LinearForm) -> float:
@@ -525,26 +528,30 @@ def typical_time(form: LinearForm) -> float:
     return float(np.sqrt(compiled_system(form.system).length / g)) if g > 0 else 1.0
 
 
-def typical(form: LinearForm) -> Array:
-    """Return typical magnitudes of the parameters of bodies of mass 1, (p,): by size and `typical_time`."""
-    size, time = compiled_system(form.system).length, typical_time(form)
-    of_term = {"motor-inertia": 1.0, "viscous": 1 / time, "coulomb": size / time**2, "offset": size / time**2}
-    lever = {"m": {"motor-inertia": 1.0, "viscous": 1.0}, "rad": {"motor-inertia": size**2, "viscous": size**2}}
-    body = np.array([1.0] + [size] * 3 + [size**2] * 6)
-    drives = [
-        of_term[term] * lever[column.unit].get(term, 1.0 if column.unit == "m" else size)
-        for term in form.terms
-        for column in tree_of(form.system).columns
-    ]
-    return np.concatenate([np.tile(body, len(form.system.bodies)), drives])
+def typical_coordinates(form: LinearForm, columns: Sequence[CoordinateName]) -> Array:
+    """Return typical magnitudes of coordinates, the size of the system or a radian, (n_c,)."""
+    size = compiled_system(form.system).length
+    return np.array([size if column.unit == "m" else 1.0 for column in columns])
 
 
-def typical_channels(form: LinearForm, source: str) -> Array:
-    """Return typical magnitudes of the measured forces and torques, by the same bodies, (n_channels,)."""
+def typical_parameters(form: LinearForm) -> Array:
+    """Return typical magnitudes of the parameters of bodies and drives, (p,)."""
     size, time = compiled_system(form.system).length, typical_time(form)
-    torques = [1.0 if column.unit == "m" else size for column in form.columns]
-    lever = [*(torques if source != "reactions" else []), *([1.0] * 3 + [size] * 3 if source != "torques" else [])]
-    return np.array(lever) * size / time**2
+    x = typical_coordinates(form, tree_of(form.system).columns)
+    factors = {"motor-inertia": x / time**2, "viscous": x / time}  # of a parameter in its force; other factors are 1
+    drives = [(size / time) ** 2 / x / factors.get(term, 1.0) for term in form.terms]
+    return np.concatenate([*([1.0], [size] * 3, [size**2] * 6) * len(form.system.bodies), *drives])
+
+
+def typical_forces(form: LinearForm, source: str) -> Array:
+    """Return typical magnitudes of the measured forces and torques, (n_channels,)."""
+    size, work = compiled_system(form.system).length, (compiled_system(form.system).length / typical_time(form)) ** 2
+    parts = []
+    if source != "reactions":
+        parts.append(work / typical_coordinates(form, form.columns))
+    if source != "torques":
+        parts.append(work / np.array([size] * 3 + [1.0] * 3))
+    return np.concatenate(parts)
 
 
 def combined(form: LinearForm, source: str, silent: Array) -> BaseParameters:
@@ -553,7 +560,7 @@ def combined(form: LinearForm, source: str, silent: Array) -> BaseParameters:
     Parameters are eliminated one by one, each from the direction in which it is largest, in the order of `preference`.
     """
     p, k = silent.shape
-    size = typical(form)
+    size = typical_parameters(form)
     N = silent / size[:, None]
     left_out: list[int] = []
     rest = N.copy()

@@ -20,7 +20,12 @@ import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
-from floatframe.design.identification.base_parameters import BaseParameters, base_parameters, typical, typical_channels
+from floatframe.design.identification.base_parameters import (
+    BaseParameters,
+    base_parameters,
+    typical_forces,
+    typical_rows,
+)
 from floatframe.design.identification.regressors import LinearForm
 from floatframe.design.identification.tree_samples import TreeSamples
 from floatframe.errors import ModelError
@@ -237,8 +242,8 @@ def estimate(
         )
     if not y.any():
         raise ModelError("estimate: all measured torques and reactions are zero")
-    require_excited(base, W)
-    alike = typical_channels(form, measured.source)  # forces and torques in one measure, until their noise is known
+    require_excited(base, every)
+    alike = typical_forces(form, measured.source)  # forces and torques in one measure, until their noise is known
     sigma, weights = alike, np.ones((n, n_channels))
     beta = solved(W, y, sigma, weights)
     for _ in range(1 if method == "ordinary" else ROUNDS):
@@ -278,10 +283,9 @@ def solved(W: Array, y: Array, sigma: Array, weights: Array) -> Array:
     return la.lstsq(A / size, (y * root).ravel(), lapack_driver="gelsy")[0] / size
 
 
-def require_excited(base: BaseParameters, W: Array) -> None:
-    """Raise `ModelError` with the combinations that a motion does not excite."""
-    channels = typical_channels(base.form, base.source)
-    A = (W * typical(base.form)[base.kept] / channels[:, None]).reshape(-1, W.shape[-1])
+def require_excited(base: BaseParameters, rows: Array) -> None:
+    """Raise `ModelError` with the combinations that a motion, with its rows (n, n_channels, p), does not excite."""
+    A = base.rows(typical_rows(base.form, rows, base.source))
     size = np.linalg.norm(A, axis=0)
     seen = size > 1e-10 * size.max()
     missing = [name for name, is_seen in zip(base.names, seen, strict=True) if not is_seen]

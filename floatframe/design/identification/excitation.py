@@ -22,10 +22,12 @@ from scipy.optimize import LinearConstraint, minimize
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
-from floatframe.design.identification.base_parameters import BaseParameters, typical_rows
-from floatframe.design.identification.regressors import LinearForm
-from floatframe.engine.compiling.system import compiled_system
-from floatframe.engine.tree.topology import CoordinateName
+from floatframe.design.identification.base_parameters import (
+    BaseParameters,
+    form_rows,
+    typical_coordinates,
+    typical_rows,
+)
 from floatframe.errors import ModelError
 
 __all__ = ["ExcitingMotion", "MotionLimits", "exciting_motion"]
@@ -154,7 +156,8 @@ def exciting_motion(
         if key not in known:
             C = x.reshape(n_c, width)
             samples = form.samples(*(block @ C.T for block in blocks))
-            s = la.svdvals(base.rows(typical_rows(form, samples, base.source)))
+            rows = typical_rows(form, form_rows(form, samples, base.source), base.source)
+            s = la.svdvals(base.rows(rows))
             room = np.inf
             if is_limited.any():
                 tau = form.torques(samples)[:, is_limited] @ form.values
@@ -163,7 +166,8 @@ def exciting_motion(
         return known[key]
 
     scale = np.concatenate([
-        scales_of(form, column, each, period, width) for column, each in zip(form.columns, bounds, strict=True)
+        scales_of(each, size, period, width)
+        for each, size in zip(bounds, typical_coordinates(form, form.columns), strict=True)
     ])  # fmt: skip
     rows, low, high = [], [], []
     for k, each in enumerate(bounds):
@@ -223,11 +227,14 @@ def checked(name: str, limits: Mapping[str, MotionLimits], names: tuple[str, ...
     return each
 
 
-def scales_of(form: LinearForm, column: CoordinateName, each: MotionLimits, period: float, width: int) -> Array:
-    """Return typical magnitudes of the coefficients of a coordinate, (width,): its range, and that in a period."""
+def scales_of(each: MotionLimits, size: float, period: float, width: int) -> Array:
+    """Return typical magnitudes of the coefficients of a coordinate, (width,): of c, and of the a and b of its rate.
+
+    The offset c is half of the range, or `size` without limits; the rate is that times 2 pi / period.
+    """
     half = 0.5 * (each.high - each.low)
     if not np.isfinite(half):
-        half = compiled_system(form.system).length if column.unit == "m" else 1.0
+        half = size
     return np.concatenate([[half], np.full(width - 1, 2 * np.pi / period * half)])
 
 

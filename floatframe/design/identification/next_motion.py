@@ -6,10 +6,9 @@ import numpy as np
 import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
-from floatframe.design.identification.base_parameters import form_rows
+from floatframe.design.identification.base_parameters import form_rows, typical_coordinates
 from floatframe.design.identification.estimation import Estimate
 from floatframe.design.identification.excitation import ExcitingMotion, MotionLimits, exciting_motion
-from floatframe.engine.compiling.system import compiled_system
 
 __all__ = ["NextMotion", "next_motion"]
 
@@ -48,9 +47,9 @@ def next_motion(made: Estimate, *, seed: int = 0) -> NextMotion | None:
     duration = float(t[-1] - t[0]) * n / (n - 1)
     w = 2 * np.pi / duration
     limits = {}
-    for k, column in enumerate(form.columns):
+    shares = LEAST * typical_coordinates(form, form.columns)
+    for k, (column, least) in enumerate(zip(form.columns, shares, strict=True)):
         low, high = float(x[:, k].min()), float(x[:, k].max())
-        least = LEAST * (compiled_system(form.system).length if column.unit == "m" else 1.0)
         spare = max(least - (high - low), 0.0)
         limits[column.name] = MotionLimits(
             low - spare, high + spare, max(float(np.abs(rate[:, k]).max()), least * w),

@@ -90,6 +90,7 @@ def case(units, size):
 def test_base_parameters_are_the_same_combinations(units, size, source, by):
     one, other = (base_parameters(each.form, source=source, by=by) for each in (case(SI.name, 1.0), case(units, size)))
     assert list(other.kept) == list(one.kept)
+    assert other.without_effect == one.without_effect
     values = [base.values(each.parameters()) for base, each in ((one, case(SI.name, 1.0)), (other, case(units, size)))]
     assert_allclose(values[1] / scales(case(units, size))[one.kept], values[0], rtol=1e-6, atol=1e-9)
 

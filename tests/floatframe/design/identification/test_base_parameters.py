@@ -1,5 +1,7 @@
 """Base parameters: rules over the joints and the rank of sampled forms find the same."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.linalg as la
@@ -144,6 +146,27 @@ def test_names_say_the_combination_of_a_double_pendulum():
     assert base.names == (
         "S_x(one) + 0.5 m(two)", "S_y(one)", "J_zz(one) + 0.25 m(two)", "S_x(two)", "S_y(two)", "J_zz(two)",
     )  # fmt: skip
+    assert "m(one)" in base.without_effect
+    assert "m(two)" not in base.without_effect
+
+
+@pytest.mark.parametrize("by", ["rules", "samples"])
+@pytest.mark.parametrize("size", [1.0, 1e-6])
+def test_a_mass_that_acts_by_its_small_lever_alone_has_an_effect(size, by):
+    """Without gravity the mass of the second link is part of the inertia of the first one, times length²."""
+    rng = np.random.default_rng(0)
+    hinges = [
+        RevoluteJoint("hinge1", Marker("ground"), Marker("one"), axis=(0, 0, 1)),
+        RevoluteJoint("hinge2", Marker("one", position=(0.5 * size, 0, 0)), Marker("two"), axis=(0, 0, 1)),
+    ]
+    bodies = [
+        replace(body, inertia=body.inertia * size**2, center_of_mass=body.center_of_mass * size)
+        for body in (some_body("one", rng), some_body("two", rng, position=(0.5 * size, 0, 0)))
+    ]
+    base = base_parameters(linear_form(System(bodies, hinges)), by=by)
+    names = base.form.names
+    row = list(base.kept).index(names.index("J_zz(one)"))
+    assert_allclose(base.B[row, names.index("m(two)")], (0.5 * size) ** 2, rtol=1e-6)
     assert "m(one)" in base.without_effect
     assert "m(two)" not in base.without_effect
 
