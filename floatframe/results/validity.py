@@ -48,7 +48,7 @@ class ValidityNote:
     in_mean_axes
         The same rotation relative to mean axes, if the body has another frame; -1: unknown.
     advice
-        Remedy for steps or energy; for functions of time: problem and remedy.
+        Remedy, for notes about steps or energy; problem and remedy, for functions of time.
     """
 
     body: str

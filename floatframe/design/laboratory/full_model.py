@@ -26,7 +26,7 @@ class FullModel:
     Parameters
     ----------
     most_dofs
-        More are refused: matrices are dense, a factorisation costs their third power.
+        Largest number of dofs; larger models are refused, because the cost of dense matrices grows with its cube.
     """
 
     most_dofs: int = MOST_DOFS

@@ -61,7 +61,7 @@ class Reference:
     t
         Times, (n_t,).
     columns
-        "sensor column" -> (n_t,).
+        Values over time, (n_t,) each, by "sensor column".
     """
 
     words: str

@@ -37,7 +37,7 @@ class Criterion:
     name
         One of `CRITERIA`.
     tensor
-        One of `TENSORS`, for signed-von-mises and principal.
+        "full" or "surface": the components of stress that signed-von-mises and principal use.
     n_planes
         Number of planes over 180 degrees.
     findley_k

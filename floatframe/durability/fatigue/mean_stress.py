@@ -48,9 +48,9 @@ class MeanStress:
     name
         One of `MEAN_STRESS`.
     value
-        a strength [Pa], Walker's exponent, or the sensitivity M.
+        Parameter of the correction: a strength [Pa], Walker's exponent, or the sensitivity M.
     credit_compression
-        Goodman, soderberg, morrow: whether a compressive mean is beneficial.
+        Whether a compressive mean stress increases the life; for goodman, soderberg and morrow.
     """
 
     name: str = "none"

@@ -38,7 +38,7 @@ class NotchRequest:
     kind
         Kind of test, "sine" or "random".
     tests
-        Names; (): all of the kind.
+        Names of the notched tests; (): all of the kind.
     deepest
         Largest allowed depth of a notch [dB].
     """
@@ -59,9 +59,10 @@ class ShakeJob:
     structure
         The shaken structure.
     base
-        Name -> what it holds: interfaces of a body; joints, springs and bushings of a system. Or one of them.
+        What each base holds, by name of the base: interfaces of a body; joints, springs and bushings of a system. A
+        single name: the only base, which holds this; None: the only interface, or the ground.
     points
-        Reference points of bases, coordinates of mesh or ground.
+        Reference points of bases by name, coordinates of the mesh of a body or of the ground, (3,) [m].
     damping
         Damping of the structure.
     outputs
@@ -141,7 +142,7 @@ class ShakeResult:
     time
         Results of the shocks and transients.
     notched
-        (kind, test, direction) -> the notched input.
+        Notched inputs by (kind, test, direction).
     notes
         Notes for the report.
     """

@@ -61,9 +61,9 @@ class FlexibleLink:
     Parameters
     ----------
     body
-        Or the path of its modal file.
+        The reduced body, or the path of its modal file.
     interfaces
-        Names of interfaces, by the names of the joints of the link.
+        Name of the interface of the body at each joint of the link, by name of the joint.
     position
         Position of the mesh origin in the frame of the link, (3,) [m].
     rotation_vector

@@ -158,7 +158,7 @@ class InterfaceForceSensor:
     interface
         Name of the interface of the body.
     axes
-        "ground", or "body" for those of the body frame.
+        Axes of the components, "ground", or "body" for those of the body frame.
     """
 
     name: str

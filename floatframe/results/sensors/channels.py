@@ -48,9 +48,9 @@ class Channel:
     marker
         Marker that is observed.
     direction
-        Ground axes, (3,).
+        Direction of the motion, ground axes, (3,); it is divided by its length.
     quantity
-        "translation" or "rotation".
+        Observed motion, "translation" along the direction or "rotation" about it.
     relative_to
         Marker relative to which it is observed; None: the ground.
     rate
@@ -193,7 +193,7 @@ class StressChannel:
     component
         Component of the stress, "xx", "yy", "zz", "yz", "xz" or "xy".
     position
-        Mesh axes; the nearest kept node is used, (3,) [m].
+        Position in mesh axes, (3,) [m]; the nearest kept node is used.
     """
 
     name: str

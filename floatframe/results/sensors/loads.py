@@ -44,7 +44,7 @@ class ReactionSensor:
     of
         Name of a joint or spring-damper.
     axes
-        "ground" or "marker".
+        Axes of the components, "ground", or "marker" for those of marker A.
     """
 
     name: str

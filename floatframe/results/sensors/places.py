@@ -171,7 +171,7 @@ class PlaceSensor:
     marker
         Marker that is observed.
     quantity
-        One of PLACE_QUANTITIES.
+        "position", "velocity", "acceleration", "rotation-vector" or "angular-velocity".
     relative_to
         Marker relative to which it is observed; None: the ground.
     """
@@ -309,9 +309,9 @@ class AngleSensor:
     name
         Name of the sensor, unique in the system.
     marker_a
-        Marker A.
+        Marker A, from which the angle is counted.
     marker_b
-        Marker B.
+        Marker B, whose angle is measured.
     axis
         Direction of the axis, in the axes of marker A, (3,).
     """

@@ -197,11 +197,11 @@ class VonMisesSensor:
     body
         Name of the flexible body.
     node
-        Restricts it to this node, by the user's number.
+        User's number of a node, to which the search is restricted.
     element
-        Restricts it to this element on the surface.
+        Number of an element on the surface, to whose nodes the search is restricted.
     set
-        Restricts it to the nodes of this set.
+        Name of a set, to whose nodes the search is restricted.
     """
 
     name: str
@@ -275,7 +275,7 @@ class StrainGauge:
     body
         Name of the flexible body.
     direction
-        Mesh axes, (3,).
+        Direction of the strain, mesh axes, (3,).
     young
         Young's modulus [Pa].
     poisson
@@ -348,7 +348,7 @@ class ElongationSensor:
     position_a
         Position in mesh axes, (3,) [m], where a kept node must be, or an address such as a node number.
     position_b
-        Second of the two places, as `position_a`.
+        The other place, as `position_a`.
     tolerance
         Largest distance of nodes from positions, relative to the size of the body.
     """

@@ -31,7 +31,7 @@ class ModalSpectra:
     frequencies
         Ascending frequencies, (n_f,) [Hz].
     spectra
-        One-sided, G_kl(f) = G_lk(f)*, (n_f, n_q, n_q) [unit of q² / Hz].
+        One-sided cross spectra, G_kl(f) = G_lk(f)*, (n_f, n_q, n_q) [unit of q² / Hz].
     duration
         Duration of one pass [s].
     mean

@@ -90,15 +90,15 @@ class ForceLimit:
     Parameters
     ----------
     output
-        "base force z".
+        Name of an output that is a force of a base: "base force z".
     C
-        C of the mounting structure, about sqrt(2) [-].
+        Factor C of the mounting structure, about sqrt(2) [-].
     frequency
-        f_0 [Hz]; None: the mode with the largest effective mass in the direction.
+        Frequency f_0 of the main mode [Hz]; None: the mode with the largest effective mass in the direction.
     exponent
-        n for densities.
+        Exponent n above f_0, for densities; half of it for amplitudes.
     mass
-        M_0 in units of the model; None: that of the structure.
+        Mass M_0 in units of the model; None: that of the structure.
     name
         Name of the limit, for the report.
     """

@@ -37,11 +37,11 @@ class SpectrumRequest:
     Q
         Quality factors, each above 0.5.
     kind
-        Kind of the spectrum.
+        "acceleration", "displacement" or "pseudo-velocity".
     first
-        [Hz]; None: a tenth of the lowest mode, or 10 Hz if that is less.
+        First frequency [Hz]; None: a tenth of the lowest mode, or 10 Hz if that is less.
     last
-        [Hz]; None: twice the highest mode, 10000 Hz at most.
+        Last frequency [Hz]; None: twice the highest mode, 10000 Hz at most.
     per_octave
         Number of frequencies in an octave.
     """
@@ -82,7 +82,7 @@ class TimeTest:
     inputs
         Inputs by name, in SI [m/s², rad/s², N, N m], (n_t,) each.
     after
-        How long to go on after the end [s]; None: 10 cycles of the lowest mode, of a transient not at all.
+        Time to compute after the end of the history [s]; None: 10 cycles of the lowest mode, of a transient 0.
     spectra
         The requested shock response spectra.
     kind
@@ -90,7 +90,7 @@ class TimeTest:
     words
         Description of the history.
     synthesis
-        Synthesis, if the history was made for a spectrum.
+        The synthesis that made the history for a spectrum; None: the history was given.
     """
 
     name: str

@@ -43,13 +43,13 @@ class SineTest:
     name
         Name of the test.
     level
-        Amplitude, 0 to peak.
+        Amplitude over frequency, 0 to peak.
     directions
         Directions, one run for each; "base:x" if there are several bases.
     rate
         Octaves per minute; None: so slow that the response is steady.
     downward
-        Sweep from the last frequency to the first.
+        Whether the sweep runs from the last frequency to the first.
     """
 
     name: str
