@@ -217,7 +217,7 @@ def law_of(element: Element, placed: Placed) -> ElementLaw:
         raise ModelError(f"{where}: acts: expected one of {', '.join(ACTS)} for each of {n} markers, got {acts}")
     if law.is_opposite and (n != 2 or (acts[0] in ("force", "wrench")) != (acts[1] in ("force", "wrench"))):
         raise ModelError(f"{where}: is_opposite: expected two markers with a force each, got {n} with {acts}")
-    return replace(law, acts=acts, data=[*law.data, *(0.0 for _ in law.switches)])
+    return replace(law, acts=acts, data=np.concatenate([law.data, np.zeros(len(law.switches))]))
 
 
 def acting_ends(where: str, markers: list[MarkerData], law: ElementLaw) -> tuple[list[End], list[tuple[int, float]]]:

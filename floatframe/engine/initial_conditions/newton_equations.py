@@ -11,7 +11,11 @@ from scipy.sparse.linalg import SuperLU, splu
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.engine.kernels.model import MASS, STIFFNESS, Model
 from floatframe.engine.kernels.work import Work
-from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_matrix
+from floatframe.model.rotations import (
+    euler_parameter_product,
+    euler_parameters_of_rotation_vector,
+    rotation_matrix,
+)
 from floatframe.model.state import State
 
 __all__ = [
@@ -143,15 +147,19 @@ class NewtonFactors:
         row = np.concatenate([row[is_there], J.indices, self.n_u + G_row, self.n_u + V_row])
         column = np.concatenate([column[is_there], self.n_u + J_row, G.indices, self.n_u + V.indices])
         diagonal = np.concatenate([np.diag(block) for block in H]) if H else np.zeros(0)
-        self.of_columns, self.of_rows = balanced_scales(diagonal, abs(J), abs(G), abs(V))
-        values = self.of_rows[row] * values * self.of_columns[column]
         self.sparse: SuperLU | None = None
         if n <= DENSE:
             matrix = np.zeros((n, n))
             matrix[row, column] = values
-            *self.dense, info = dgetrf(matrix, overwrite_a=True)
+            size = np.abs(matrix)
+            parts_of_size = size[: self.n_u, self.n_u :].T, size[self.n_u :, : self.n_u], size[self.n_u :, self.n_u :]
+            self.of_columns, self.of_rows = balanced_scales(diagonal, *parts_of_size)
+            *self.dense, info = dgetrf(self.of_rows[:, None] * matrix * self.of_columns, overwrite_a=True)
             if info == 0:
                 return
+        else:
+            self.of_columns, self.of_rows = balanced_scales(diagonal, abs(J), abs(G), abs(V))
+        values = self.of_rows[row] * values * self.of_columns[column]
         self.sparse = splu(sp.csc_array((values, (row, column)), shape=(n, n)))
 
     def solve(self, forces: Array, rows: Array) -> tuple[Array, Array]:
@@ -260,8 +268,7 @@ def displaced(model: Model, state: State, x: Array) -> State:
 
 def product(p: Array, s: Array) -> Array:
     """Return the Hamilton product p * s of Euler parameters, of length one, (4,)."""
-    w = p[0] * s[0] - p[1:] @ s[1:]
-    result = np.array([w, *(p[0] * s[1:] + s[0] * p[1:] + np.cross(p[1:], s[1:]))])
+    result = euler_parameter_product(p, s)
     return result / np.linalg.norm(result)
 
 

@@ -14,7 +14,7 @@ Records that Python hands to kernels are `tabled`: `model.table` holds addresses
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import prod
 from typing import Any, NamedTuple, TypeVar
 
@@ -121,27 +121,44 @@ def stacked(declaration: Record, size: Size) -> Record:
     return type(declaration)(*arrays)
 
 
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Places of the arrays of a record in one block of memory."""
+
+    arrays: tuple[tuple[type, tuple[int, ...], int], ...]  #: number type, shape and first byte of each
+    n_words: int
+    table: IntArray  #: that of the record, for a block at address 0
+    addresses: IntArray  #: places of the addresses in the table
+
+
+@lru_cache(maxsize=256)
+def layout_of(kind: type[Record], sizes: tuple[tuple[str, int], ...]) -> Layout:
+    """Return the layout of a record; each array begins with a cache line."""
+    known = dict(sizes)
+    arrays: list[tuple[type, tuple[int, ...], int]] = []
+    table: list[int] = []
+    addresses: list[int] = []
+    n_words = 0
+    for each in declarations(kind()):
+        shape = tuple(size.of(known) if isinstance(size, Size) else size for size in each.shape)
+        arrays.append((each.dtype, shape, WORD * n_words))
+        addresses.append(len(table))
+        table += [WORD * n_words, *shape]
+        n_words += -(-prod(shape) // LINE) * LINE
+    return Layout(tuple(arrays), n_words, np.array(table, np.int64), np.array(addresses, np.int64))
+
+
 def zeros(declaration: Record, sizes: Mapping[str, int]) -> Record:
     """Return the arrays of a record, all zero, in one block of memory: addresses in it make the table at no cost."""
-    places: list[tuple[type, list[int], int]] = []  # number type, shape and first word in the block
-    n_words = 0
-    for each in declarations(declaration):
-        shape = [size.of(sizes) if isinstance(size, Size) else size for size in each.shape]
-        places.append((each.dtype, shape, n_words))
-        n_words += -(-prod(shape) // LINE) * LINE
-    block = np.zeros(n_words + LINE)
+    layout = layout_of(type(declaration), tuple(sizes.items()))
+    block = np.zeros(layout.n_words + LINE)
     address = block.__array_interface__["data"][0]
-    shift = -(address // WORD) % LINE  # words up to the first cache line
-    words: list[int] = []
-    arrays: list[Array] = []
-    for dtype, shape, first in places:
-        offset = WORD * (shift + first)
-        arrays.append(np.ndarray(shape, dtype, block, offset))
-        words.append(address + offset)
-        words += shape
-    made = grouped(declaration, iter(arrays))
+    shift = -address % (WORD * LINE)  # bytes up to the first cache line
+    arrays = (np.ndarray(shape, dtype, block, shift + first) for dtype, shape, first in layout.arrays)
+    made = grouped(declaration, arrays)
     if isinstance(made, Tabled):
-        made.table = np.array(words, np.int64)
+        made.table = layout.table.copy()
+        made.table[layout.addresses] += address + shift
     return made
 
 
