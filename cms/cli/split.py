@@ -25,6 +25,7 @@ __all__ = ["SplitRequest", "direction_of", "places_of", "split_job"]
 log = logging.getLogger(__name__)
 
 CUT_KINDS = ("rigid", "distributing")
+LISTED = 6.0  #: modes of the whole body up to this multiple of its first frequency: their damping in parts is listed
 COORDINATE = 1e-9  #: largest difference between coordinates of the same node, relative to the mesh size
 
 
@@ -127,9 +128,12 @@ def stiffness_damping(job: Job) -> StiffnessDamping | None:
     None if the job has no ratios.
 
     Ratios belong to the modes of one body. The modes of a part lie far above the first modes of the whole, so ratios of
-    the parts would damp the latter far too little. D = beta K is the same for the parts and for the whole.
+    the parts would damp the latter far too little. D = beta K is the same for the parts and for the whole, and mode k
+    of the whole has the ratio beta omega_k / 2. Ratios of the whole need D = M Phi diag(2 zeta omega) Phi^T M, which
+    couples nodes of different parts; no sum of matrices of single parts has these terms.
     """
     from cms.jobs.body_of_job import job_body
+    from cms.linear_algebra.solvers.mode_count import ModeCount
     from cms.modes.families.families import Families
     from cms.reduction.basis.damping import PerModeDamping, RayleighDamping, damping_ratios
 
@@ -138,18 +142,24 @@ def stiffness_damping(job: Job) -> StiffnessDamping | None:
         return None
     whole = job_body(job, Stages())
     with Families(whole, solver=job.reduction.solver) as families:
-        omega = float(np.sqrt(families.free_modes(1).omega2[0]))
+        first = float(families.free_modes(1).frequencies[0])
+        omega = np.sqrt(families.free_modes(ModeCount(cutoff=LISTED * first)).omega2)
     if isinstance(damping, PerModeDamping):
-        ratio = damping.ratios[0]
+        ratios = np.array([damping.ratios[min(k, len(damping.ratios) - 1)] for k in range(len(omega))])
     else:
-        ratio = float(damping_ratios(damping, np.ones(1), np.array([omega**2]), whole.units.time)[0])
+        ratios = damping_ratios(damping, np.ones(len(omega)), omega**2, whole.units.time)
+    beta = float(2 * ratios[0] / omega[0])
     hertz = omega / (2 * np.pi * whole.units.time)
-    words = (
-        f"ratios belong to modes of one body: in the parts they became stiffness damping; the first elastic mode of "
-        f"{job.body.name!r} in one piece, {hertz:.4g} Hz, keeps its ratio {ratio:g}, others get one in proportion to "
-        "their frequency"
+    listed = "; ".join(
+        f"{k}: {f:.4g} Hz, {zeta:.3g} for {wanted:.3g}"
+        for k, (f, zeta, wanted) in enumerate(zip(hertz, beta * omega / 2, ratios, strict=True), 1)
     )
-    return StiffnessDamping(float(2 * ratio / omega), words)
+    words = (
+        f"ratios belong to modes of one body: the parts have stiffness damping (beta); the first elastic "
+        f"mode of {job.body.name!r} in one piece keeps its ratio {ratios[0]:.3g}, others have one in proportion to "
+        f"their frequency (mode: frequency, ratio for the one of the job): {listed}"
+    )
+    return StiffnessDamping(beta, words)
 
 
 def mesh_of(job: Job) -> Any:

@@ -1,8 +1,10 @@
 """A body in parts, joined again: the same body as long as the cuts do not change it."""
 
+import re
+
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from typer.testing import CliRunner
 
 import cms
@@ -163,9 +165,36 @@ def test_the_first_mode_keeps_its_damping_in_parts(beam, caplog, table):
     first = float(whole.free_frequencies[0])
     wanted = 0.03 if table != "beta = 1e-5" else np.pi * 1e-5 * first
     assert_allclose(zeta[:4], wanted * f[:4] / first, rtol=2e-2)
-    told = any("ratios belong to modes of one body" in record.getMessage() for record in caplog.records)
-    assert told == (table != "beta = 1e-5")
-    assert ("keeps its ratio 0.03" in files[0].read_text()) == told
+    told = [text for text in caplog.messages if "ratios belong to modes of one body" in text]
+    assert len(told) == (table != "beta = 1e-5")
+    assert ("keeps its ratio 0.03" in files[0].read_text()) == bool(told)
+    if told:
+        modes_told = np.array(re.findall(r"(\d): ([\d.]+) Hz, ([\d.]+) for ([\d.]+)", told[0]), dtype=float)
+        assert_array_equal(modes_told[:, 0], range(1, 1 + int((np.array(whole.free_frequencies) < 6 * first).sum())))
+        assert_allclose(modes_told[:4, 1], f[:4], rtol=1e-2)
+        assert_allclose(modes_told[:4, 2], zeta[:4], rtol=2e-2)
+        asked = {"ratio": [0.03, 0.03], "ratios": [0.03, 0.5], "ramp": [0.03, 0.03]}[table.split()[0]]
+        assert_array_equal(modes_told[:2, 3], asked)
+
+
+def test_a_body_of_fewer_modes_than_are_listed_is_split(beam, caplog):
+    """Two light beams between three masses without inertia: nine momenta, of which six are those of rigid motions."""
+    job = beam(n_modes=1)
+    for table, text in (
+        ("nodes.csv", "node,x,y,z,sets\n0,0,0,0,foot\n1,1,0,0.3,\n2,2,0,0.5,bob\n3,3,0,0.4,\n4,4,0,0,tip\n"),
+        ("lines.csv", "node1,node2\n0,1\n1,2\n2,3\n3,4\n"),
+    ):
+        job.with_name(table).write_text(text)
+    masses = "".join(f'[masses.m{k}]\nnode = "{name}"\nmass = 2\n' for k, name in enumerate(("foot", "bob", "tip")))
+    text = job.read_text()
+    text = text[: text.index("[masses.bob]")] + masses + text[text.index("[load_cases") :]
+    job.write_text(text.replace("density = 7850", "density = 0") + "\n[damping]\nratio = 0.03\n")
+    split_job(SplitRequest(job, at=(1.0,), axis=(1.0, 0.0, 0.0)))
+    told = [text for text in caplog.messages if "ratios belong to modes of one body" in text]
+    with Families(job_body(read_job(job))) as families:
+        f = families.free_modes(n_modes=3).frequencies
+    listed = re.findall(r"\d: ([\d.]+) Hz", told[0])
+    assert_allclose([float(number) for number in listed], f[f < 6 * f[0]], rtol=1e-3)
 
 
 def test_damping_of_parts_is_in_the_time_unit_of_the_job(beam):
