@@ -94,6 +94,18 @@ def test_times_that_are_none_are_refused_with_their_line(tmp_path, change, words
         read_signals(written(tmp_path, rows(t, range(60))))
 
 
+def test_steps_that_differ_by_more_than_a_fifth_are_two_rates(tmp_path):
+    """30 steps of 10 ms, then 30 of 12.1 ms, which are 1.21 of them, are two rates; 11.9 ms count as uneven steps."""
+    for longer, is_refused in ((0.0121, True), (0.0119, False)):
+        t = [f"{0.01 * k if k < 30 else 0.3 + longer * (k - 30):.5f}" for k in range(60)]
+        path = written(tmp_path, rows(t, range(60)))
+        if is_refused:
+            with pytest.raises(SignalError, match=r"line 33: the step changes from 0.01 to 0.0121 s \(2 different"):
+                read_signals(path)
+        else:
+            assert_allclose(np.diff(read_signals(path).time)[[0, -1]], [0.01, longer], rtol=1e-9, atol=0)
+
+
 def test_uneven_times_may_be_meant(tmp_path):
     path = written(tmp_path, "t [s],x [mm]\n0,0\n0.5,1\n0.6,4\n2,4\n")
     assert_allclose(read_signals(path).time, [0, 0.5, 0.6, 2], rtol=1e-15, atol=0)
