@@ -43,6 +43,7 @@ from floatframe.engine.initial_conditions.initial import (
 from floatframe.engine.initial_conditions.mass_positivity import indefinite_mass_words, indefinite_masses
 from floatframe.engine.initial_conditions.newton_equations import (
     Linearized,
+    by_velocities,
     displaced,
     in_ground_axes,
     linearized,
@@ -536,13 +537,13 @@ def _tangent(model: Model, work: Work, omega: Array) -> tuple[Linearized, tuple[
     if not work.state.u.any():
         return parts, parts.H
     Omega, Omega_t = turning_matrices(model, work, omega)
-    by_both = linearized(model, work, 0.0, 1.0, 1.0)
+    C, G_v = by_velocities(model, work, parts)
     mass = linearized(model, work, 1.0, 0.0, 0.0).H
     K = []
     for i, k in enumerate(parts.H):
         u = slice(int(model.bodies.u0[i]), int(model.bodies.u0[i + 1]))
-        K.append(k + (by_both.H[i] - k) @ Omega[u, u] + mass[i] @ Omega_t[u, u] @ Omega[u, u])
-    G = parts.G + (by_both.G - parts.G) @ sp.csr_array(Omega)
+        K.append(k + C[i] @ Omega[u, u] + mass[i] @ Omega_t[u, u] @ Omega[u, u])
+    G = parts.G + G_v @ sp.csr_array(Omega)
     return Linearized(parts.H, parts.J, sp.csr_array(G), parts.V), tuple(K)
 
 

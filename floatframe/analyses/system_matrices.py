@@ -36,16 +36,17 @@ import scipy.linalg as la
 from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.engine.initial_conditions.newton_equations import linearized
+from floatframe.engine.initial_conditions.newton_equations import by_velocities, linearized
 from floatframe.engine.kernels.model import Model
 from floatframe.engine.kernels.work import Work
 from floatframe.errors import ModelError
 from floatframe.model.joints.rows import is_held, is_held_position, is_held_velocity
 from floatframe.model.rotations import tilde
 
-__all__ = ["Inputs", "Tangents", "Wrenches", "held_rows", "settled", "tangents", "turning_matrices"]
+__all__ = ["ROUNDING", "Inputs", "Tangents", "Wrenches", "held_rows", "settled", "tangents", "turning_matrices"]
 
 CANCELLED = 1e-10  #: magnitude of a sum, relative to its terms, below which it is a rounding error
+ROUNDING = 1e-13  #: rounding error of an entry of M, C or K, relative to the terms of its sum
 RANK = 1e-10  #: singular value, relative to the largest, below which a row is redundant
 SPINLESS = 1e-12  #: magnitude of a spin, relative to the angular velocity, below which it is a rounding error
 
@@ -182,10 +183,13 @@ class Wrenches:
     s_rate: Array  #: (n_w, n_s)
 
 
-def settled(result: Array, *products: tuple[Array, Array]) -> Array:
-    """Return a sum of products A B, with zeros for entries that are rounding errors of cancelled terms."""
+def settled(result: Array, *products: tuple[Array, Array], error: float = CANCELLED) -> Array:
+    """Return a sum of products A B, with zeros for entries that are rounding errors of cancelled terms.
+
+    error: largest magnitude of such an entry, relative to the sum of the magnitudes of its terms.
+    """
     size = sum(np.abs(A) @ np.abs(B) for A, B in products)
-    return np.where(np.abs(result) <= CANCELLED * size, 0.0, result)
+    return np.where(np.abs(result) <= error * size, 0.0, result)
 
 
 def sum_of_products(*products: tuple[Array, Array]) -> Array:
@@ -201,12 +205,12 @@ def held_rows(model: Model) -> np.ndarray:
 def tangents(model: Model, work: Work) -> Tangents:
     """Return M, C, K, G at the iterate in `work`; its wrenches give the geometric part of K."""
     by_position = linearized(model, work, 0.0, 0.0, 1.0)
-    by_both = linearized(model, work, 0.0, 1.0, 1.0)
+    C_of_bodies, G_of_velocities = by_velocities(model, work, by_position)
     by_acceleration = linearized(model, work, 1.0, 0.0, 0.0)
     M = la.block_diag(*by_acceleration.H)
     K = la.block_diag(*by_position.H)
-    C = la.block_diag(*by_both.H) - K
-    G, G_v = by_position.G.toarray(), by_both.G.toarray() - by_position.G.toarray()
+    C = la.block_diag(*C_of_bodies)
+    G, G_v = by_position.G.toarray(), G_of_velocities.toarray()
     J, V = by_position.J.toarray(), by_position.V.toarray()
     holds, rolls = is_held_position(model.rows.kind), is_held_velocity(model.rows.kind)
     states = np.asarray(model.states.row)

@@ -48,7 +48,7 @@ from floatframe.analyses.linear.inputs import (
 from floatframe.analyses.relative.coordinate_basis import MODE, coordinate_basis, dependent_coordinates
 from floatframe.analyses.snapshot import snapshot
 from floatframe.analyses.steady.steadiness import require_steady
-from floatframe.analyses.system_matrices import Inputs, Tangents, settled, tangents, turning_matrices
+from floatframe.analyses.system_matrices import ROUNDING, Inputs, Tangents, settled, tangents, turning_matrices
 from floatframe.engine.compiling.file_frames import motion_of_engine, small_motions_of_file
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.initial_conditions.newton_equations import linearized, set_iterate
@@ -69,7 +69,6 @@ if TYPE_CHECKING:
 __all__ = ["LinearSystem", "NamedMotions", "linearize"]
 
 RANK = 1e-10  #: singular value of the scaled rows below which a row is redundant
-ROUNDING = 1e-14  #: stiffness of motions relative to the sum of its terms, below which it is their rounding error
 NOISE = 1e-10  #: relative to the largest component of a motion; smaller ones are rounding errors
 #: motion of a joint, by that of bodies that move as far as the farthest, below which it is a state of last choice
 FAINT = 1e-6
@@ -108,57 +107,42 @@ class LinearSystem:
     ----------
     equilibrium
         The steady motion.
-    M
-        Mass, (n_z, n_z).
-    C
-        Damping with gyroscopic terms, (n_z, n_z).
-    K
-        Stiffness with geometric, centrifugal and circulatory terms, (n_z, n_z).
-    B
-        Coefficients of the equations above, (n_z, n_s).
-    L
-        Coefficients of the equations above, (n_outputs, n_z).
+    M, C, K
+        Mass, damping and stiffness, (n_z, n_z). C holds gyroscopic terms; K holds geometric, centrifugal and
+        circulatory terms.
+    B, B_rate, B_acceleration
+        Forces per input and its rates, (n_z, n_s).
+    L, L_rate, L_acceleration
+        Outputs per z and its rates, (n_outputs, n_z).
+    D, D_rate, D_acceleration
+        Outputs per input and its rates, (n_outputs, n_s).
     N
         Motions of the bodies (translation and rotation in body axes, modes) per z, (n_u, n_z).
-    inputs
-        Names of the inputs s, (n_s,).
-    outputs
-        Names of the outputs y, (n_outputs,).
-    body_names
-        Names of the bodies.
-    body_masses
-        Mass matrix of each body, (6 + n_q, 6 + n_q).
-    B_rate
-        Coefficients of the equations above, (n_z, n_s).
-    B_acceleration
-        Coefficients of the equations above, (n_z, n_s).
-    L_rate
-        Coefficients of the equations above, (n_outputs, n_z).
-    L_acceleration
-        Coefficients of the equations above, (n_outputs, n_z).
-    D
-        Coefficients of the equations above, (n_outputs, n_s).
-    D_rate
-        Coefficients of the equations above, (n_outputs, n_s).
-    D_acceleration
-        Coefficients of the equations above, (n_outputs, n_s).
     Y
         Motions of the bodies per s, in addition to those of z, (n_u, n_s).
-    input_rates
-        r, if the input is the r-th derivative of s; 0 for forces.
+    inputs
+        Names of the inputs s, (n_s,).
     input_units
         Unit of each input.
+    input_rates
+        r, if the input is the r-th derivative of s; 0 for forces.
+    outputs
+        Names of the outputs y, (n_outputs,).
     output_units
         Unit of each output.
     output_values
         Outputs in the steady motion, (n_outputs,).
     left_out
         Columns of outputs that are not linear here, with the reasons.
+    body_names
+        Names of the bodies.
+    body_masses
+        Mass matrix of each body, (6 + n_q, 6 + n_q).
     motions
         Motions that can become states, see `state_space`.
     states
-        Displacements along velocity constraints, and states of elements and user forces, the last entries of z: their
-        rows of C are those of a unit matrix, and their rows of M depend only on z''.
+        Names of the last entries of z: displacements along velocity constraints, and states of elements and user
+        forces. Their rows of C are those of a unit matrix, and their rows of M depend only on z''.
     state_units
         Unit of each state.
     coordinates
@@ -436,8 +420,7 @@ def linearize(
     roll = rolling(parts, Omega, N, by_inputs)
     require_steady(compiled, about, work, parts, N, np.eye(N.shape[1]) if roll is None else roll.S)
     D_0, D_1, D_2 = parts.full(Omega, Omega_t)
-    K_z = N.T @ D_0 @ N
-    K_z = np.where(np.abs(K_z) <= ROUNDING * (np.abs(N).T @ np.abs(D_0) @ np.abs(N)), 0.0, K_z)
+    K_z, C_z, M_z = (settled(N.T @ D @ N, (N.T, np.abs(D) @ np.abs(N)), error=ROUNDING) for D in (D_0, D_1, D_2))
     force, force_rate = parts.body_forces(by_inputs)
     moves = np.array([*(isinstance(channel, DriveMotion | BaseMotion) for channel in inputs), *[False] * n_states])
     Y, size = motions_of_inputs(small, parts, by_inputs, N, K_z, D_0, moves)
@@ -462,7 +445,7 @@ def linearize(
         "D_rate": settled(of_inputs[1] + of_motions[1] @ Y, (of_motions[1], size), (one, of_inputs[1])),
         "D_acceleration": settled(of_inputs[2] + of_motions[2] @ Y, (of_motions[2], size), (one, of_inputs[2])),
     }
-    matrices = {"M": N.T @ D_2 @ N, "C": N.T @ D_1 @ N, "K": K_z, **coefficients, "N": by_bodies}
+    matrices = {"M": M_z, "C": C_z, "K": K_z, **coefficients, "N": by_bodies}
     matrices = with_states(matrices, n_states)
     if basis is None:
         motions = named_motions(system, by_bodies, coordinate_rows(system, compiled, work, state), N, n_states)

@@ -8,10 +8,10 @@ import scipy.linalg as la
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import Summary, presented
 from floatframe.analyses.linear.linearization import LinearSystem
+from floatframe.analyses.system_matrices import ROUNDING
 
 __all__ = ["SystemModes", "system_modes"]
 
-ROUNDING = 1e-13  #: rounding error of a matrix entry, relative to the terms of its sum
 MODEL = 1e-10  #: relative error of a matrix entry, because steady motions and equilibria have about this error
 UNDAMPED = 1e-12  #: entry of the modal damping matrix, relative to the frequency, that counts as rounding error
 LOW = 1e-10  #: omega², relative to the highest one, below which modes are solved for again in their own subspace

@@ -30,6 +30,7 @@ from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.initial_conditions.initial import assembled, checked, known_of, require_numbers, start_unknowns
 from floatframe.engine.initial_conditions.newton_equations import (
     Linearized,
+    by_velocities,
     displaced,
     in_ground_axes,
     linearized,
@@ -224,14 +225,12 @@ class Equations:
         set_iterate(work, state, u_dot, trial.w)
         rate, _ = rates_of_constraints(model, work)
         mass = linearized(model, work, 1.0, 0.0, 0.0).H
-        by_both = linearized(model, work, 0.0, 1.0, 1.0)
         parts = linearized(model, work, 0.0, 0.0, 1.0)
+        by_rates, G_of_rates = by_velocities(model, work, parts)
         raise_errors_of(compiled.callbacks)
         require_numbers(compiled, work)
-        K, M = la.block_diag(*parts.H), la.block_diag(*mass)
-        C = la.block_diag(*by_both.H) - K
-        G_x = parts.G.toarray()
-        G_v = by_both.G.toarray() - G_x
+        K, C, M = (la.block_diag(*blocks) for blocks in (parts.H, by_rates, mass))
+        G_x, G_v = parts.G.toarray(), G_of_rates.toarray()
         Omega, Omega_t = turning_matrices(model, work, trial.carrier.omega)
         W = with_modal_weight(model, mass)
         f = work.bodies.residual.copy()

@@ -22,6 +22,7 @@ __all__ = [
     "Linearized",
     "NewtonFactors",
     "balanced_scales",
+    "by_velocities",
     "displaced",
     "highest_frequency",
     "in_body_axes",
@@ -39,6 +40,8 @@ __all__ = [
 DENSE = 150  #: equations up to which a dense factorisation is faster than a sparse one
 STIFF = 1e3  #: the stiffness in W is scaled so that it exceeds the mass by this factor for the softest mode
 STIFF_START = 1e6  #: the same when closing a placement: stiff modes hardly vibrate afterwards
+#: factor of velocities in the sum of K and D from which D is found: its terms are then far above the rounding of K
+FAST = 2.0**40
 MASSLESS = 10.0  #: frequency of a mode without mass, relative to the highest frequency, from its artificial mass
 
 
@@ -100,6 +103,16 @@ def linearized(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> 
     V = summed([(work.connections.V[c, :size, :size], w0, w0) for c, (size, w0) in enumerate(places)], (n_w, n_w))
     V.eliminate_zeros()
     return Linearized(tuple(H), summed(J_parts, (n_w, n_u)), summed(G_parts, (n_w, n_u)), V)
+
+
+def by_velocities(model: Model, work: Work, by_positions: Linearized) -> tuple[tuple[Array, ...], sp.csr_array]:
+    """Return the derivatives of forces (for each body, (6 + n, 6 + n)) and rows, (n_w, n_u), by velocities.
+
+    by_positions: those by positions, at the same iterate.
+    """
+    both = linearized(model, work, 0.0, FAST, 1.0)
+    D = tuple((A - B) / FAST for A, B in zip(both.H, by_positions.H, strict=True))
+    return D, sp.csr_array((both.G - by_positions.G) / FAST)
 
 
 def summed(parts: list[tuple[Array, int, int]], shape: tuple[int, int]) -> sp.csr_array:

@@ -32,7 +32,7 @@ from floatframe.engine.initial_conditions.initial import (
     start_unknowns,
     with_compatible_velocities,
 )
-from floatframe.engine.initial_conditions.newton_equations import linearized, set_iterate
+from floatframe.engine.initial_conditions.newton_equations import by_velocities, linearized, set_iterate
 from floatframe.engine.kernels.model import Model
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.engine.open_equations.configuration import Configurations
@@ -324,12 +324,12 @@ class Equations:
         v, a = vector("v", v, self.n_v), vector("a", a, self.n_v)
         _, own = self.at(t, x, v, a)  # leaves w_0 in the working arrays
         by_x = linearized(self.model, self.work, 0.0, 0.0, 1.0)
-        by_both = linearized(self.model, self.work, 0.0, 1.0, 1.0)
+        by_v, rows_by_v = by_velocities(self.model, self.work, by_x)
         turn, holds = self.turning(x), self.structure.holds
-        K, C = la.block_diag(*by_x.H), la.block_diag(*by_both.H) - la.block_diag(*by_x.H)
+        K, C = la.block_diag(*by_x.H), la.block_diag(*by_v)
         J = by_x.J.toarray()
         if (~holds).any():  # dw_0 = -C⁺ G_v dv
-            G_v = (by_both.G - by_x.G).toarray()[~holds]
+            G_v = rows_by_v.toarray()[~holds]
             C = C + J.T @ np.linalg.pinv(by_x.V.toarray()[~holds]) @ G_v
         K = turn @ K @ turn.T + self.turned_forces(own)
         if len(self.work.state.w):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from floatframe import (
     GROUND,
@@ -24,6 +24,7 @@ from floatframe import (
     system_modes,
 )
 from floatframe.model.rotations import euler_parameters, rotation_exp
+from tests.floatframe.other_units import SI, in_units
 
 A = rotation_exp(np.array([0.4, -0.7, 0.3]))
 PLACE = np.array([3.0, -2.0, 5.0])
@@ -129,6 +130,45 @@ def test_a_free_body_has_six_motions_that_cost_nothing(has_damper):
     assert len(modes.eigenvalues) == 7
     assert np.linalg.matrix_rank(modes.shapes[:, :6], tol=1e-6) == 6
     assert modes.is_stable
+
+
+def free_sledge(A, place, *, damping, along):
+    """Return a sledge on a rail, held across it by stiff springs and dampers, and along it by a spring or by nothing.
+
+    The frame of the body, the rail and the springs have different axes.
+    """
+    B, offset = rotation_exp(np.array([1.1, 0.3, -0.8])), np.array([0.3, -0.7, 0.2])
+    at = place + B @ offset
+    body = RigidBody("sledge", 2.0, np.diag([1.0, 1.5, 2.0]), position=place, orientation=euler_parameters(B))
+    on_ground = Marker(GROUND, position=at, triad=A)
+    on_body = Marker("sledge", position=offset, triad=B.T @ A)
+    rail = PrismaticJoint("rail", on_ground, on_body, axis=(1, 0, 0))
+    across = Bushing("across", on_ground, on_body, stiffness=np.array([along, 1e6, 2e6, 0, 0, 0]),
+                     damping=damping * np.array([0.0, 1, 2, 0, 0, 0]))  # fmt: skip
+    aside = Marker(GROUND, position=at + 0.5 * A @ np.array([0, 0.6, 0.8]))
+    spring = SpringDamper("spring", aside, Marker("sledge", position=offset), 1e6, 3.0 * damping, free_length=0.5)
+    return System([body], [rail], [across, spring])
+
+
+@pytest.mark.parametrize("damping", [0.0, 1.0])
+@pytest.mark.parametrize("turn", [0.4, 1.7, 2.9])
+@pytest.mark.parametrize("unit", [{}, {"length": 1e3, "time": 1e3}, {"length": 1e-3, "mass": 1e3}])
+def test_a_motion_across_all_springs_neither_grows_nor_decays(unit, turn, damping):
+    """Stiffness and damping along the rail are sums of large terms that cancel."""
+    A_R = rotation_exp(np.array([turn, -0.7 * turn, 0.3]))
+    system = in_units(free_sledge(A_R, 3.0 * PLACE, damping=damping, along=0.0), replace(SI, name="other", **unit))
+    modes = system_modes(linearize(system, static_equilibrium(system), inputs=(), outputs=()))
+    assert_array_equal(modes.eigenvalues, 0.0)
+    assert modes.is_stable
+
+
+@pytest.mark.parametrize("turn", [0.4, 1.7, 2.9])
+def test_a_soft_spring_along_a_stiff_guide_keeps_its_frequency(turn):
+    """Of 1e-10 of the stiffness across: far above rounding, below what other sums take for it."""
+    A_R = rotation_exp(np.array([turn, -0.7 * turn, 0.3]))
+    system = free_sledge(A_R, np.zeros(3), damping=0.0, along=1e-4)
+    modes = system_modes(linearize(system, static_equilibrium(system), inputs=(), outputs=()))
+    assert_allclose(modes.natural_frequencies, np.sqrt(1e-4 / 2.0) / (2 * np.pi), rtol=1e-3)
 
 
 @pytest.mark.parametrize("k_stiff", [1e3, 1e6, 1e9, 1e11])
