@@ -40,13 +40,13 @@ class NamedStateSpace:
     Parameters
     ----------
     A
-        Matrix of the state space, (n_x, n_x).
+        Rates per state, (n_x, n_x).
     B
-        Matrix of the state space, (n_x, n_inputs).
+        Rates per input, (n_x, n_inputs).
     C
-        Matrix of the state space, (n_outputs, n_x).
+        Outputs per state, (n_outputs, n_x).
     D
-        Matrix of the state space, (n_outputs, n_inputs).
+        Outputs per input, (n_outputs, n_inputs).
     states
         Names of the states.
     state_units

@@ -44,10 +44,8 @@ class Bushing:
     ----------
     name
         Name of the force, unique in the system.
-    marker_a
-        Marker A; a body, or its name, is attached where the other marker is.
-    marker_b
-        Marker B; a body, or its name, is attached where the other marker is.
+    marker_a, marker_b
+        The two markers; a body, or its name, is attached where the other marker is.
     stiffness
         Stiffness K, symmetric, (6, 6) [N/m, N, N m], or its diagonal (6,).
     damping

@@ -56,10 +56,8 @@ class RevoluteJoint:
     ----------
     name
         Name of the joint, unique in the system.
-    marker_a
-        Marker A; a body, or its name, is attached where the other marker is.
-    marker_b
-        Marker B; a body, or its name, is attached where the other marker is.
+    marker_a, marker_b
+        The two markers; a body, or its name, is attached where the other marker is.
     axis
         Direction of the axis, in the axes of marker A, (3,).
     axis_b
@@ -106,10 +104,8 @@ class PrismaticJoint:
     ----------
     name
         Name of the joint, unique in the system.
-    marker_a
-        Marker A; a body, or its name, is attached where the other marker is.
-    marker_b
-        Marker B; a body, or its name, is attached where the other marker is.
+    marker_a, marker_b
+        The two markers; a body, or its name, is attached where the other marker is.
     axis
         Direction of the axis, in the axes of marker A, (3,).
     motions
@@ -159,10 +155,8 @@ class ScrewJoint:
     ----------
     name
         Name of the joint, unique in the system.
-    marker_a
-        Marker A; a body, or its name, is attached where the other marker is.
-    marker_b
-        Marker B; a body, or its name, is attached where the other marker is.
+    marker_a, marker_b
+        The two markers; a body, or its name, is attached where the other marker is.
     axis
         Direction of the axis, in the axes of marker A, (3,).
     axis_b
@@ -233,10 +227,8 @@ class CylindricalJoint:
     ----------
     name
         Name of the joint, unique in the system.
-    marker_a
-        Marker A; a body, or its name, is attached where the other marker is.
-    marker_b
-        Marker B; a body, or its name, is attached where the other marker is.
+    marker_a, marker_b
+        The two markers; a body, or its name, is attached where the other marker is.
     axis
         Direction of the axis, in the axes of marker A, (3,).
     axis_b
@@ -285,10 +277,8 @@ class SphericalJoint:
     ----------
     name
         Name of the joint, unique in the system.
-    marker_a
-        Marker A; a body, or its name, is attached where the other marker is.
-    marker_b
-        Marker B; a body, or its name, is attached where the other marker is.
+    marker_a, marker_b
+        The two markers; a body, or its name, is attached where the other marker is.
     """
 
     name: str
@@ -319,10 +309,8 @@ class PlanarJoint:
     ----------
     name
         Name of the joint, unique in the system.
-    marker_a
-        Marker A; a body, or its name, is attached where the other marker is.
-    marker_b
-        Marker B; a body, or its name, is attached where the other marker is.
+    marker_a, marker_b
+        The two markers; a body, or its name, is attached where the other marker is.
     axis
         Normal, in the axes of marker A.
     axis_b

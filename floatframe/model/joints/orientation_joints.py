@@ -45,10 +45,8 @@ class FixedJoint:
     ----------
     name
         Name of the joint, unique in the system.
-    marker_a
-        Marker A; a body, or its name, is attached where the other marker is.
-    marker_b
-        Marker B; a body, or its name, is attached where the other marker is.
+    marker_a, marker_b
+        The two markers; a body, or its name, is attached where the other marker is.
     rotation
         Fixed rotation R_AB from marker axes B to A, (3, 3); None: as assembled.
     """
@@ -86,10 +84,8 @@ class ConstantOrientation:
     ----------
     name
         Name of the joint, unique in the system.
-    marker_a
-        Marker A; a body, or its name, is attached where the other marker is.
-    marker_b
-        Marker B; a body, or its name, is attached where the other marker is.
+    marker_a, marker_b
+        The two markers; a body, or its name, is attached where the other marker is.
     rotation
         Fixed rotation R_AB from marker axes B to A, (3, 3); None: as assembled.
     """
@@ -128,10 +124,8 @@ class UniversalJoint:
     ----------
     name
         Name of the joint, unique in the system.
-    marker_a
-        Marker A; a body, or its name, is attached where the other marker is.
-    marker_b
-        Marker B; a body, or its name, is attached where the other marker is.
+    marker_a, marker_b
+        The two markers; a body, or its name, is attached where the other marker is.
     axis
         Direction of the axis, in the axes of marker A, (3,).
     axis_b
@@ -190,10 +184,8 @@ class ConstantVelocityJoint:
     ----------
     name
         Name of the joint, unique in the system.
-    marker_a
-        Marker A; a body, or its name, is attached where the other marker is.
-    marker_b
-        Marker B; a body, or its name, is attached where the other marker is.
+    marker_a, marker_b
+        The two markers; a body, or its name, is attached where the other marker is.
     axis
         Shaft of A, in the axes of marker A, (3,).
     axis_b

@@ -34,10 +34,8 @@ class PointOnLine:
     ----------
     name
         Name of the joint, unique in the system.
-    marker_a
-        Marker A; a body, or its name, is attached where the other marker is.
-    marker_b
-        Marker B; a body, or its name, is attached where the other marker is.
+    marker_a, marker_b
+        The two markers; a body, or its name, is attached where the other marker is.
     axis
         Direction of the axis, in the axes of marker A, (3,).
     motions
@@ -79,10 +77,8 @@ class PointOnPlane:
     ----------
     name
         Name of the joint, unique in the system.
-    marker_a
-        Marker A; a body, or its name, is attached where the other marker is.
-    marker_b
-        Marker B; a body, or its name, is attached where the other marker is.
+    marker_a, marker_b
+        The two markers; a body, or its name, is attached where the other marker is.
     axis
         Normal, in the axes of marker A.
     motions
@@ -124,10 +120,8 @@ class DistanceJoint:
     ----------
     name
         Name of the joint, unique in the system.
-    marker_a
-        Marker A; a body, or its name, is attached where the other marker is.
-    marker_b
-        Marker B; a body, or its name, is attached where the other marker is.
+    marker_a, marker_b
+        The two markers; a body, or its name, is attached where the other marker is.
     distance
         [m]; None: as assembled.
     motions
