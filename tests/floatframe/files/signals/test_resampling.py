@@ -43,6 +43,14 @@ def test_from_the_new_nyquist_frequency_on_nothing_is_left(above):
     assert_allclose(found.values[inner], np.sin(2 * np.pi * 200 * found.time)[inner], rtol=0, atol=3e-4)
 
 
+def test_the_filter_is_as_long_as_kaisers_formula_asks():
+    """(80 - 7.95) / (2.285 pi 0.1) + 1 is 101.4; the next odd number of taps is 103, 51 on each side of a sample."""
+    impulse = Signal("a", t, (np.arange(len(t)) == 2001).astype(float), "m/s^2")
+    found, _ = resampled(impulse, RATE / 2)
+    reached = 2 * np.flatnonzero(np.abs(found.values) > 1e-9)
+    assert [reached.min(), reached.max()] == [2001 - 51, 2001 + 51]
+
+
 @pytest.mark.parametrize("rate", [500.0, 333.3, 2000.0, 6000.0])
 def test_new_samples_reach_the_last_old_time_and_not_beyond(rate):
     found, _ = resampled(sines(), rate)
