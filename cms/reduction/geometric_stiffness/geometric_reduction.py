@@ -150,15 +150,25 @@ def elastic_part(body: FEBody, u: Array, mass: MassLoads, Phi: Array) -> Array:
     if not len(asked):
         return K
     forces = model.internal_forces(u_mesh, nodes=asked) - model.mass_forces(mass)
-    on_followers = np.where(np.isin(dofs[:, 0], nodes)[:, None], forces, 0.0)
-    K = K + link_work(T, dofs, body.dofs, on_followers, Phi)
-    return K + mean_nodes_part(body, forces, Phi) if body.mean_nodes else K
+    return K + followers_work(body, forces, Phi)
+
+
+def followers_work(body: FEBody, forces: Array, Phi: Array) -> Array:
+    """Return the work of forces on the mesh dofs, (n_mesh_dof, k), on the second-order motion of followers, (k, n, n).
+
+    Followers are nodes that move with a leader (rigid links) or with the mean of others.
+    """
+    work = link_work(body.to_mesh.matrix, body.to_mesh.dofs, body.dofs, forces, Phi)
+    return work + mean_nodes_part(body, forces, Phi) if body.mean_nodes else work
 
 
 def mean_nodes_part(body: FEBody, forces: Array, Phi: Array) -> Array:
     """Return the work of forces on the mesh dofs on the second-order motion of nodes that follow a mean, (k, n, n).
 
-    To second order the node moves as the mean of its members; its own followers move by their levers in addition.
+    To second order the node moves (1) as the mean of its members, (2) its own followers move by their levers in
+    addition, and (3) by the linear mean of the second-order motion of members that follow leaders: the forces act on
+    the members. In the matrix to the mesh these links look like levers from the leaders to the node, which is right for
+    its translation only; their work is taken out.
     """
     K = np.zeros((forces.shape[1], Phi.shape[1], Phi.shape[1]))
     six = np.stack([np.zeros(6, np.int64), np.arange(6)], axis=1)
@@ -169,11 +179,16 @@ def mean_nodes_part(body: FEBody, forces: Array, Phi: Array) -> Array:
         spread = np.linalg.eigvalsh(np.einsum("i,ia,ib->ab", weights, x, x))
         if not spread[1] > COLLINEAR * spread[2]:  # their mean has no rotation
             continue
-        v = rows_times(translation_rows(body, mean.members), Phi).reshape(len(points), 3, -1)
-        gamma = mean_second_order(points, weights, mean.reference, v)
-        K += np.einsum("cj,ckl->jkl", mean.follows.T @ forces, gamma, optimize=True)
-        motion = np.einsum("cma,mak->ck", mean_motion(points, weights, mean.reference).reshape(6, -1, 3), v)
-        K += link_work(mean.follows, dofs, six, forces, motion)
+        rows = translation_rows(body, mean.members)
+        v = rows_times(rows, Phi)
+        gamma = mean_second_order(points, weights, mean.reference, v.reshape(len(points), 3, -1))
+        F = mean.follows.T @ forces
+        K += np.einsum("cj,ckl->jkl", F, gamma, optimize=True)  # (1)
+        A = mean_motion(points, weights, mean.reference)
+        K += link_work(mean.follows, dofs, six, forces, A @ v)  # (2)
+        of_rows = np.stack(np.divmod(np.arange(3 * len(points)), 3), axis=1)
+        K += link_work(rows, of_rows, body.dofs, A.T @ F, Phi)  # (3)
+        K -= link_work(sp.csr_array(mean.follows @ sp.csr_array(A @ rows)), dofs, body.dofs, forces, Phi)
     return K
 
 

@@ -67,11 +67,16 @@ def read_deck(path: str | Path, *, program: str | None = None) -> Deck:
 
 
 def _note_means_of_followers(deck: Deck) -> None:
-    """Note the mean motions whose members follow other nodes: their second order is not known exactly."""
+    """Note the mean motions whose members follow another mean: their second order is not known exactly."""
     sets = deck.mesh.node_sets
-    followers = {int(node) for link in deck.rigid for node in sets[link.followers]}
-    followers |= {int(node) for coupling in deck.couplings for node in sets[coupling.node]}
+    followers = {int(node) for coupling in deck.couplings for node in sets[coupling.node]}
+    n_found = -1
+    while n_found < len(followers):  # rigid links pass a mean on
+        n_found = len(followers)
+        for link in deck.rigid:
+            if followers.intersection(sets[link.node].tolist()):
+                followers.update(sets[link.followers].tolist())
     for coupling in deck.couplings:
         if any(followers.intersection(sets[group].tolist()) for group, _ in coupling.members):
-            why = "its members follow other nodes: the geometric stiffness takes their mean as linear in part"
+            why = "its members follow another mean: the geometric stiffness takes their mean as linear in part"
             deck.ledger.note(coupling.name, why)

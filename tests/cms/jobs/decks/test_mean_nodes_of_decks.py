@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 import cms
 from cms.assessment.quality.of_body.second_order import turned_loads
-from cms.reduction.geometric_stiffness.geometric_reduction import mean_nodes_part
+from cms.reduction.geometric_stiffness.geometric_reduction import followers_work, mean_nodes_part
 from fe_models.body.weld import weld
 from tests.cms.jobs.decks.nastran_bodies import body_of
 
@@ -74,6 +74,55 @@ def test_forces_work_on_the_second_order_of_the_nearest_rotation(tmp_path):
 
     h, e = 1e-4, np.eye(3)
     found = mean_nodes_part(body, f, Phi)[0]
+    expected = [[(work(h * (a + b)) - work(h * (a - b)) - work(h * (b - a)) + work(-h * (a + b))) / (4 * h**2)
+                 for a in e] for b in e]  # fmt: skip
+    assert_allclose(found, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
+
+
+def test_the_mean_of_followers_of_two_leaders_has_their_second_order(tmp_path):
+    """Second differences of the work at node 53 and its follower 55, of a mean of a solid's node and rigid followers.
+
+    Members 51 and 52 turn with leader 40, members 61 and 62 with leader 60; the mean turns as in the test above.
+    """
+    places = {40: (2.5, 0.9, 0.3), 51: (3.2, 1.1, 0.2), 52: (2.9, 0.3, 0.4), 60: (-0.2, 0.4, 0.1),
+              61: (-0.4, 0.9, 0.5), 62: (-0.3, 0.2, -0.6), 53: (1.1, 1.3, 0.7), 55: (1.4, 1.5, 0.2)}  # fmt: skip
+    links = "".join(f"GRID,{k},,{x},{y},{z}\n" for k, (x, y, z) in places.items())
+    links += "RBE2,66,40,123,9,10,11\nRBE2,67,40,123456,51,52\nRBE2,68,60,123,1,4,5\nRBE2,69,60,123456,61,62\n"
+    links += "RBE3,77,,53,123456,1.,123,51,61\n,2.,123,52,3\n,.5,123,62\nRBE2,70,53,123456,55\n"
+    links += "".join(f"CONM2,{k + 100},{k},,{k}.\n" for k in (51, 52, 61, 62, 53, 55))
+    body, deck = body_of(tmp_path, BLOCK + links, is_coupled=True)
+    assert not any("takes their mean as linear" in row[2] for row in deck.ledger.rows())
+    places = {k: np.array(x) for k, x in (places | {3: np.add(POINTS[2], (0.3, 0.2, -0.1))}).items()}
+    node = {k: int(np.flatnonzero(np.linalg.norm(body.nodes - x, axis=1) < 1e-9)[-1]) for k, x in places.items()}
+    rng = np.random.default_rng(5)
+    Phi = rng.normal(size=(body.n_dof, 3))
+    mesh, at_mesh = body.to_mesh.dofs, body.mesh_displacement(Phi)
+    force = {k: rng.normal(size=6) for k in (53, 55)}
+    f = np.zeros((len(mesh), 1))
+    for k, six in force.items():
+        for c in range(6):
+            f[(mesh == (node[k], c)).all(axis=1)] = six[c]
+    six_of = {k: np.stack([Phi[(body.dofs == (node[k], c)).all(axis=1)][0] for c in range(6)]) for k in (40, 60)}
+    of_solid = np.stack([at_mesh[(mesh == (node[3], c)).all(axis=1)][0] for c in range(3)])
+    weights = np.array([1, 1, 2, 2, 0.5]) / 6.5
+    x = np.array([places[k] for k in (51, 61, 52, 3, 62)])
+    center = weights @ x
+
+    def led(k, leader, q):
+        motion = six_of[leader] @ q
+        turn = Rotation.from_rotvec(motion[3:]).as_matrix()
+        return places[leader] + motion[:3] + turn @ (places[k] - places[leader])
+
+    def work(q):
+        moved = np.array([led(51, 40, q), led(61, 60, q), led(52, 40, q), places[3] + of_solid @ q, led(62, 60, q)])
+        now = weights @ moved
+        U, _, Vt = np.linalg.svd(np.einsum("i,ia,ib->ab", weights, moved - now, x - center))
+        R = U @ np.diag([1, 1, np.linalg.det(U @ Vt)]) @ Vt
+        theta = Rotation.from_matrix(R).as_rotvec()
+        return sum(six @ np.concatenate([now + R @ (places[k] - center), theta]) for k, six in force.items())
+
+    h, e = 1e-4, np.eye(3)
+    found = followers_work(body, f, Phi)[0]
     expected = [[(work(h * (a + b)) - work(h * (a - b)) - work(h * (b - a)) + work(-h * (a + b))) / (4 * h**2)
                  for a in e] for b in e]  # fmt: skip
     assert_allclose(found, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
