@@ -10,7 +10,7 @@ from fe_models.files.bulk_data.cards import Card, real_of
 from fe_models.files.decks.deck import Coupling, DeckMass, Load, RigidGroup
 from fe_models.files.decks.equations import Row, solved_equations
 from fe_models.files.decks.nastran.model import ALL, NastranModel, components_of, numbers_in, range_at
-from fe_models.files.decks.nastran.springs import read_springs, scalar_ends, springs_to_ground
+from fe_models.files.decks.nastran.springs import read_springs, scalar_ends, skip_scalar_points, springs_to_ground
 from fe_models.files.decks.nastran.supports import in_basic, make_supports, selected_sets
 from fe_models.foundation.arrays import Array
 from fe_models.meshes.cell_shapes import CELL_SHAPES
@@ -24,6 +24,7 @@ _FACED = {"CTETRA": ("tetra", 4), "CPENTA": ("wedge", 6), "CHEXA": ("hexahedron"
 
 def read_attached(model: NastranModel) -> None:
     """Read masses, springs, rigid elements, constraints, supports and loads of grid points."""
+    skip_scalar_points(model)
     for card in model.of("CONM2"):
         _mass(model, card)
     _scalar_masses(model)

@@ -8,7 +8,7 @@ from fe_models.files.decks.nastran.model import ALL, ALONG, NastranModel
 from fe_models.files.decks.spring_axes import as_triad, axes_along
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
 
-__all__ = ["read_springs", "scalar_ends", "springs_to_ground"]
+__all__ = ["read_springs", "scalar_ends", "skip_scalar_points", "springs_to_ground"]
 
 
 def read_springs(model: NastranModel) -> None:
@@ -64,6 +64,30 @@ def scalar_ends(model: NastranModel, card: Card) -> list[tuple[int, int] | None]
         else:
             return None
     return ends
+
+
+def skip_scalar_points(model: NastranModel) -> None:
+    """Note and remove elements between scalar points: no grid point moves them, so they are no part of the body."""
+    why = "between scalar points, which no grid point moves: no part of the body"
+    for kind in ("CELAS", "CDAMP", "CMASS"):
+        for name in (f"{kind}1", f"{kind}2"):
+            between = [card for card in model.of(name) if _is_between_scalar_points(model, card)]
+            if between:
+                model.cards[name] = [card for card in model.cards[name] if card not in between]
+                model.ledger.note(name, why, count=len(between))
+        for card in model.of(f"{kind}3", f"{kind}4"):
+            grids = [card.integer(k) for k in (3, 4) if card.integer(k, 0) in model.points.positions]
+            if grids:
+                model.ledger.refuse(card.name, f"names grid point {grids[0]}; expected scalar points")
+            else:
+                model.ledger.note(card.name, why)
+
+
+def _is_between_scalar_points(model: NastranModel, card: Card) -> bool:
+    """Whether both ends of a scalar element are scalar points (component 0 or blank) or ground, and one is a point."""
+    numbers = [card.integer(k, 0) for k in (3, 5)]
+    are_scalar = all((card.text(k) or "0") == "0" for k in (4, 6))
+    return any(numbers) and are_scalar and not any(number in model.points.positions for number in numbers)
 
 
 def _ground(model: NastranModel, card: Card, node: int, components: tuple[int, ...], what: str) -> None:

@@ -169,6 +169,10 @@ READ: dict[str, tuple[str, dict[str, str | None]]] = {
         + "PDAMP,11,1.+3,12,2.+3,13,3.+3,14,4.+3",
         {"PID1": None, "B1": "5.", "PID2": "21", "B2": "6.", "PID3": "31", "B3": "7.", "PID4": "41", "B4": "8."},
     ),
+    **{
+        f"{kind}{k}": (BAR + f"\nSPOINT,901,902\n{kind}{k},7,9,901,902", {"EID": None, "S1": "2", "S2": "1"})
+        for kind in ("CELAS", "CDAMP", "CMASS") for k in (3, 4)
+    },
     "CMASS1": (
         BAR + "\nPMASS,9,2.,10,3.\nCMASS1,7,9,2,1\nCMASS1,8,9,2,2\nCMASS1,9,9,2,3",
         {"EID": None, "PID": "10", "G1": "1", "C1": "2", "G2": "1", "C2": None},

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import eigh
 from scipy.ndimage import label
 from scipy.sparse import coo_array
@@ -256,6 +256,23 @@ def test_scalar_elements_add_between_the_same_components(tmp_path):
     assert_allclose(u @ body.D @ u, 7 * d[1] ** 2, rtol=1e-9)
 
 
+def test_a_chain_of_scalar_points_is_no_part_of_the_body(tmp_path):
+    """Masses, springs and dampers between scalar points and the ground: the deck without them has the same matrices."""
+    text = PAIR.format(x="1.", y="0.") + SECTION + MATERIAL
+    chain = "SPOINT,901,902\nCELAS1,11,5,901,,902\nCELAS2,12,1.,901,0,902,0\nCELAS3,13,5,901,902\nCELAS4,14,2.,901\n"
+    chain += "CDAMP1,21,5,901\nCDAMP2,22,1.,,,902\nCDAMP3,23,5,901,902\nCDAMP4,24,2.,,902\nPELAS,5,1.+6\nPDAMP,5,2.\n"
+    chain += "CMASS1,31,5,901\nCMASS2,32,1.,902\nCMASS3,33,5,901,902\nCMASS4,34,2.,901\nPMASS,5,3.\n"
+    plain, _ = body_of(tmp_path, text)
+    body, deck = body_of(tmp_path, text + chain)
+    deck.ledger.require_whole()
+    for found, expected in ((body.K, plain.K), (body.M, plain.M)):
+        assert_array_equal(found.toarray(), expected.toarray())
+    assert body.D is None
+    assert not deck.supports
+    named = {name for name, count, why in deck.ledger.rows() if "between scalar points" in why and count == "1"}
+    assert named == {f"{kind}{k}" for kind in ("CELAS", "CDAMP", "CMASS") for k in (1, 2, 3, 4)}
+
+
 def test_springs_between_points_apart_along_their_direction_balance(tmp_path):
     """CELAS between points 1 m apart along its own direction, in axes that are turned in the plane."""
     text = PAIR.replace("1.,0.,0.", "1.,0.,0.,5").replace("{x},{y},0.", "1.8,.6,0.,5") + SECTION + MATERIAL
@@ -279,6 +296,10 @@ def test_springs_between_points_apart_along_their_direction_balance(tmp_path):
         ("1.", "0.", "CMASS2,11,5.,2,1", "another mass along each axis"),
         ("1.", "0.", "CMASS2,11,5.,2,1,3,1", "between two points"),
         ("1.", "0.", "CBUSH,11,77,2,3,,,,0", "names PBUSH 77, which is not defined"),
+        ("1.", "0.", "SPOINT,901\nCELAS2,11,5.,2,1,901", "to a scalar point"),
+        ("1.", "0.", "SPOINT,901\nCMASS2,11,5.,2,1,901", "at a scalar point"),
+        ("1.", "0.", "SPOINT,901\nCELAS4,11,5.,2,901", "names grid point 2; expected scalar points"),
+        ("1.", "0.", "SPOINT,901\nMPC,1,901,0,1.,2,1,1.", "of scalar points"),
     ],
 )
 def test_scalar_elements_that_do_not_balance_are_refused(tmp_path, x, y, card, why):
