@@ -42,18 +42,19 @@ def rigid_and_in(points, *more):
     return np.array([u.ravel() for u in (*rigid, *more)])
 
 
-def test_nodes_of_a_plane_stay_in_one(tmp_path):
+@pytest.mark.parametrize("size", [1.0, 1e-3, 1e3])
+def test_nodes_of_a_plane_stay_in_one(tmp_path, size):
     """Four of seven equations' worth: rigid motions and all motions within the plane pass, one across it does not."""
     rng = np.random.default_rng(3)
     points = np.c_[rng.uniform(-1, 1, (6, 2)), np.zeros(6)]
     points[2] = 2 * points[1] - points[0]  # the first three on one line
-    points = points @ TURN.T
+    points = size * points @ TURN.T
     deck = deck_of(tmp_path, points, "PLANE, 101, 102, 103, 104,\n105, 106")
     A = matrix(deck, range(101, 107))
     assert A.shape[0] == 3
     assert np.linalg.matrix_rank(A) == 3
     within = [rng.normal(size=(6, 2)) @ TURN.T[:2] for _ in range(3)]
-    assert_allclose(A @ rigid_and_in(points, *within).T, 0, atol=1e-13)
+    assert_allclose(A @ rigid_and_in(points, *within).T, 0, atol=1e-13 * max(size, 1))
     across = np.zeros((6, 3))
     across[4] = TURN[:, 2]
     assert abs(A @ across.ravel()).max() > 0.1

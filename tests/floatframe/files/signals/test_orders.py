@@ -103,6 +103,16 @@ def test_standing_and_slow_parts_are_left_out_and_said():
     assert speed.max() > 20
 
 
+def test_a_rotation_that_is_never_slow_has_no_note_of_left_out_parts():
+    """A steady rotation, which is used from the first sample to the last one; one slow sample at the end is said."""
+    angle = 70.0 * t
+    orders = order_map(Signal("a", t, np.sin(3 * angle), ""), angle, max_order=5, resolution=0.25)
+    assert not any("where the rotation is faster" in note for note in orders.notes)
+    slow = np.append(angle[:-2], [angle[-3]] * 2)
+    orders = order_map(Signal("a", t, np.sin(3 * slow), ""), slow, max_order=5, resolution=0.25)
+    assert any("where the rotation is faster" in note for note in orders.notes)
+
+
 def test_a_waterfall_shows_a_line_where_it_is():
     speed = np.full(len(t), 70.0)
     found = frequency_map(Signal("a", t, 2.0 * np.sin(2 * np.pi * 64 * t), "N"), speed, n_segment=1024)

@@ -24,6 +24,7 @@ def test_what_lies_below_the_new_nyquist_frequency_stays(rate):
     expected = np.sin(2 * np.pi * 40 * found.time) + (0.5 * np.sin(2 * np.pi * 600 * found.time) if keeps_high else 0)
     assert_allclose(found.values[100:-100], expected[100:-100], rtol=0, atol=0.02 if keeps_high else 2e-4)
     assert_allclose(np.diff(found.time), 1 / rate, rtol=1e-9, atol=0)
+    assert_allclose([report.rate_before, report.rate_after], [RATE, rate], rtol=1e-9, atol=0)
     part = 0.0 if keeps_high else 0.25 / 1.25
     assert_allclose(report.above_nyquist, part, rtol=2e-3, atol=1e-12)
     rms = np.sqrt(0.5 * (1.25 if keeps_high else 1.0))
