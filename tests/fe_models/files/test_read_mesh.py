@@ -86,6 +86,17 @@ def test_reading_returns_the_nastran_deck_meshio_wrote(kind, tmp_path):
     assert_array_equal(read.nodes, mesh.nodes)
 
 
+def test_numbers_behind_the_nodes_of_an_element_are_dropped_and_counted(tmp_path):
+    """CalculiX reads the nodes of an element and drops what follows on the line; two of three elements have more."""
+    points = np.vstack([np.zeros(3), np.eye(3), -np.eye(3)[2], [1.0, 1.0, 1.0]])
+    text = "*NODE\n" + "".join(f"{k}, {x}, {y}, {z}\n" for k, (x, y, z) in enumerate(points, start=1))
+    path = tmp_path / "more.inp"
+    path.write_text(text + "*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4, 7, 8\n2, 2, 1, 3, 5\n3, 2, 3, 4, 6, 9\n")
+    mesh = read_mesh(path)
+    assert_array_equal(mesh.cells["tetra"], [[0, 1, 2, 3], [1, 0, 2, 4], [1, 2, 3, 5]])
+    assert any(note.startswith("2 tetra elements have more numbers on their line") for note in mesh.notes)
+
+
 def test_digest_is_the_sha256_of_the_file(tmp_path):
     path = write(tmp_path / "box.vtu", meshio_mesh(faced_box("tetra")))
     assert read_mesh(path).digest == sha256(path.read_bytes()).hexdigest()

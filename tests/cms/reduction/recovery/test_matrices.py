@@ -2,15 +2,18 @@
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 from numpy.testing import assert_allclose
 
 import cms
 from cms.errors import RecoveryError
+from cms.modes.families.families import Families
 from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.frames import frame_condition
 from cms.reduction.frame_conversion import rigid_mass
 from cms.reduction.recovery.load_columns import loads_of_body, loads_of_model, on_coordinates
+from cms.reduction.recovery.matrices import residual_response
 from fe_models.body.fe_body import FEBody
 from fe_models.body.mass_loads import MassLoads
 from tests.bodies import STEEL
@@ -100,6 +103,22 @@ def test_a_body_that_accelerates_steadily_has_the_stress_of_inertia_relief(modes
     z, acceleration = statics(body, p)
     exact = stress_rows(full(), supported(full(), balanced))[:, 0]
     found = table.values(z, z_ddot=acceleration, p=p)[table.rows("stress")]
+    assert_allclose(found, exact, rtol=0, atol=SOLVE * np.abs(exact).max())
+
+
+def test_the_residual_response_is_static_in_mean_axes_without_the_modes():
+    """K x + M Psi a = F with (M Psi)ᵀ x = 0, by one factorisation of both; then without the modal response."""
+    body = full()
+    F = np.random.default_rng(7).normal(size=(body.n_dof, 2))
+    with Families(body) as families:
+        modes = families.free_modes(8)
+        condition = frame_condition(body, cms.TisserandFrame())
+        found = residual_response(families, condition, modes.Phi, np.diag(modes.omega2), F)
+    M_Psi = body.M @ geometric_rigid_modes(body)
+    scale = np.abs(body.K).max() / np.abs(M_Psi).max()
+    both = sp.block_array([[body.K, sp.csc_array(scale * M_Psi)], [sp.csc_array(scale * M_Psi.T), None]], format="csc")
+    exact = spla.splu(both).solve(np.vstack([F, np.zeros((6, 2))]))[: body.n_dof]
+    exact = exact - modes.Phi @ ((modes.Phi.T @ F) / modes.omega2[:, None])
     assert_allclose(found, exact, rtol=0, atol=SOLVE * np.abs(exact).max())
 
 
