@@ -323,7 +323,8 @@ def steady_rotation(
             parts, K = _tangent(resting, work, omega)
             raise_errors_of(compiled.callbacks)
             require_numbers(compiled, work)
-            W = with_modal_weight(model, linearized(resting, work, 1.0, 0.0, 0.0).H)
+            mass = linearized(resting, work, 1.0, 0.0, 0.0).H
+            W = with_modal_weight(model, mass)
             forces, gaps = work.bodies.residual.copy(), work.connections.g.copy()
             slows = 0.0
             if runs_down:
@@ -339,11 +340,14 @@ def steady_rotation(
                 W, abs(parts.J).T @ np.where(holds, 0.0, noise)
             )  # springs relax to zero force
             error = 0.0 if is_nothing else size / scale_of_forces
+            # steps no longer reduce what remains, and it is not more than rounding
+            is_rounding = 0.5 * last < size <= size_of(W, rounding_of_inertia(model, mass, state, omega, center))
+            is_balanced = error <= tolerance or is_rounding
             is_closed = bool((np.abs(gaps) <= CLOSED * compiled.gap_sizes + noise)[holds].all())
             told = tolerance * np.abs(w[~states.own]).max(initial=0.0) + noise
             is_told = bool((np.abs(gaps) <= told)[~holds & ~states.own].all())
             is_steady = slows <= SLOWER * float(np.linalg.norm(omega)) / (2 * np.pi)
-            if error <= tolerance and is_closed and is_told and is_steady and states.are_at_rest(tolerance):
+            if is_balanced and is_closed and is_told and is_steady and states.are_at_rest(tolerance):
                 _require_rotation(compiled, work, omega)
                 require_off_stops(system, w)
                 notes = notes_at(system, work, state, u_dot, w)
@@ -359,7 +363,7 @@ def steady_rotation(
                 tau = 0.1 * compiled.length / max(at_first / np.sqrt(_total_mass(W)), STANDSTILL)
             elif not by_newton:
                 # below the tolerance, it is rounding
-                fall = last / max(size, np.finfo(float).tiny) if error > tolerance else np.inf
+                fall = last / max(size, np.finfo(float).tiny) if not is_balanced else np.inf
                 tau *= min(max(fall, LEAST_GROWTH), FASTEST_GROWTH) if fall > STANDING else max(fall, 0.1)
             last = size
             ds = None
@@ -576,6 +580,16 @@ def rounding_of(compiled: CompiledSystem, parts: Linearized, state: State) -> Ar
         q = slice(int(compiled.model.bodies.q0[i]), int(compiled.model.bodies.q0[i + 1]))
         reach[u0 + 6 : compiled.model.bodies.u0[i + 1]] = np.abs(state.q[q])
     return np.asarray(ROUNDING * (abs(parts.G) @ reach))
+
+
+def rounding_of_inertia(model: Model, mass: tuple[Array, ...], state: State, omega: Array, center: Array) -> Array:
+    """Return the inertia forces of a rotation due to rounding of positions, (n_u,); large far from the origin."""
+    forces = np.zeros(len(state.u))
+    for i, block in enumerate(mass):
+        u = slice(int(model.bodies.u0[i]), int(model.bodies.u0[i + 1]))
+        error = ROUNDING * (np.abs(state.r[i]).max() + np.abs(center).max())
+        forces[u] = float(omega @ omega) * error * np.abs(block[:, :3]).sum(axis=1)
+    return forces
 
 
 def _total_mass(W: tuple[Array, ...]) -> float:

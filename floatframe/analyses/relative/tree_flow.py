@@ -84,10 +84,12 @@ class TreeFlow:
         slopes = self.slopes(work, state)
         set_iterate(work, state, u_dot, w)
         joints = self.placed(work)
-        if slopes is None:
-            ds, mu = newton_step(self.model, work, self.tree, joints, 1 / tau, 0.0, 1.0)
-        else:
+        if slopes is not None:
             ds, mu = self.turning_step(work, tau, *slopes)
+        elif len(self.model.states.row):  # coordinates that only states hold have no stiffness to eliminate them by
+            ds, mu = self.dense_step(work, tau, self.matrix(work, 0.0, 0.0, 1.0))
+        else:
+            ds, mu = newton_step(self.model, work, self.tree, joints, 1 / tau, 0.0, 1.0)
         dw = np.zeros(len(w))
         dw[self.tree.kept_row >= 0] = mu
         is_mode = self.tree.mode >= 0
@@ -118,16 +120,22 @@ class TreeFlow:
 
     def turning_step(self, work: Work, tau: float, S: Array, S_dot: Array) -> tuple[Array, Array]:
         """Return the changes of coordinates and of loop-closing wrenches in a steady rotation, by dense matrices."""
+        n_s = len(S)
+        K, CK, M = (self.matrix(work, *weights) for weights in ((0.0, 0.0, 1.0), (0.0, 1.0, 1.0), (1.0, 0.0, 0.0)))
+        K[:, :n_s] += (CK - K)[:, :n_s] @ S + M[:, :n_s] @ S_dot
+        return self.dense_step(work, tau, K)
+
+    def matrix(self, work: Work, c_m: float, c_d: float, c_k: float) -> Array:
+        """Return the dense matrix of step (2) for weights of accelerations, rates and positions, without M/tau."""
         from floatframe.engine.tree.kernels.entry import newton_matrix
 
-        n_s = len(S)
-        K, CK, M = (
-            newton_matrix(self.model, work, self.tree, self.joints, *weights)
-            for weights in ((0.0, 0.0, 1.0), (0.0, 1.0, 1.0), (1.0, 0.0, 0.0))
-        )
+        return newton_matrix(self.model, work, self.tree, self.joints, c_m, c_d, c_k)
+
+    def dense_step(self, work: Work, tau: float, K: Array) -> tuple[Array, Array]:
+        """Return the changes of coordinates and of loop-closing wrenches by a dense matrix; nan if it is singular."""
+        n_s = len(self.tree.slot)
         right = -np.concatenate([self.joints.residual, work.connections.g[self.tree.kept_row >= 0]])
-        K[:, :n_s] += (CK - K)[:, :n_s] @ S + M[:, :n_s] @ S_dot
-        K[:n_s, :n_s] += M[:n_s, :n_s] / tau
+        K[:n_s, :n_s] += self.matrix(work, 1.0, 0.0, 0.0)[:n_s, :n_s] / tau
         try:
             solution = np.linalg.solve(K, right)
         except np.linalg.LinAlgError:

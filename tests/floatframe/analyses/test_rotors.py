@@ -142,6 +142,23 @@ def test_a_rotor_that_runs_down_slowly_turns_steadily():
         steady_rotation(disc(offset=1e-1, damping=20.0), (0, 0, 60.0))
 
 
+@pytest.mark.parametrize("mm", [1.0, 1e-3])
+@pytest.mark.parametrize("speed", [17.3, 46.2, 178.19, 640.0])
+def test_a_small_unbalance_far_from_the_origin_turns_steadily(speed, mm):
+    """|x| = m e W²/|k - m W²| of e = 0.1 µm, 60 m away and turned: inertia forces have the rounding of places."""
+    R, place, e = rotation_exp(np.array([0.4, -0.7, 0.3])), np.array([30.0, -20.0, 50.0]) / mm, 1e-7 / mm
+    J = R @ np.diag([0.1, 0.1, 0.2]) @ R.T / mm**2
+    body = RigidBody("disc", 10.0, J, position=place, center_of_mass=e * R[:, 0])
+    plane = PlanarJoint("plane", Marker(GROUND, position=place), Marker("disc"), axis=R[:, 2])
+    across = np.array([1.0, 1, 0, 0, 0, 0])
+    bearing = Bushing("bearing", Marker(GROUND, position=place, triad=R), Marker("disc"), 10.0 * OMEGA**2 * across)
+    about = steady_rotation(System([body], [plane], [bearing]), speed * R[:, 2], center=place)
+    x = e * speed**2 / abs(OMEGA**2 - speed**2)
+    atol = 4 * np.finfo(float).eps * np.abs(place).max()
+    assert_allclose(np.linalg.norm(about.state.r[0] - place), x, rtol=1e-6, atol=atol)
+    assert about.residual <= 1e-6
+
+
 @pytest.mark.parametrize("formulation", ["absolute", "relative"])
 def test_a_mass_held_by_an_observer_and_its_feedback_comes_to_rest(formulation):
     """m x'' = u + f, u = -K z, z' = (A - B K - L C) z + L x: the flow without velocities leads away from the rest."""
@@ -159,6 +176,31 @@ def test_a_mass_held_by_an_observer_and_its_feedback_comes_to_rest(formulation):
     system = System([RigidBody("b", m, np.eye(3))], [rail], [Gravity((f / m, 0, 0))], elements=[feedback])
     found = static_equilibrium(system, formulation=formulation)
     assert_allclose(found.state.r[0, 0], expected[0], rtol=1e-7)
+
+
+@pytest.mark.parametrize("formulation", ["absolute", "relative"])
+def test_a_coordinate_that_states_alone_hold_comes_to_rest(formulation):
+    """Poles of feedback and observer as drawn at random, on a turned rail away from the origin; statics of the loop.
+
+    In joint coordinates, long steps were lost in rounding and counted as rest, 5 % away.
+    """
+    m, f = 0.14851687, -7.3850724
+    poles, observer = (-1.37821785, -2.03753833), (-7.46085066, -7.17296216)
+    A, B, C = np.array([[0, 1.0], [0, 0]]), np.array([[0], [1 / m]]), np.array([[1.0, 0]])
+    K = np.array([[m * poles[0] * poles[1], -m * sum(poles)]])
+    L = np.array([[-sum(observer)], [observer[0] * observer[1]]])
+    own = A - B @ K - L @ C
+    expected = np.linalg.solve(np.block([[A, -B @ K], [L @ C, own]]), [0, -f / m, 0, 0])
+    rates = {f"z{i}": f"({own[i, 0]:.17g})*z0 + ({own[i, 1]:.17g})*z1 + ({L[i, 0]:.17g})*b_x" for i in range(2)}
+    R, place = rotation_exp(np.array([0.4, -0.7, 0.3])), np.array([3.0, -2.0, 5.0])
+    ends = {"g": Marker(GROUND, position=place, triad=R), "b": Marker("b", triad=R)}
+    push = {"b_Fx": f"-({K[0, 0]:.17g})*z0 - ({K[0, 1]:.17g})*z1"}
+    feedback = ExpressionElement("feedback", ends, push, {"z0": 0.0, "z1": 0.0}, rates)
+    rail = PrismaticJoint("rail", Marker(GROUND, position=place), Marker("b"), axis=R[:, 0])
+    body = RigidBody("b", m, m * np.eye(3), position=place)
+    system = System([body], [rail], [Gravity(f / m * R[:, 0])], elements=[feedback])
+    found = static_equilibrium(system, formulation=formulation)
+    assert_allclose((found.state.r[0] - place) @ R[:, 0], expected[0], rtol=1e-7)
 
 
 def test_a_number_of_a_tensor_that_was_turned_may_vary():
