@@ -132,7 +132,7 @@ class Layout:
 
 
 @lru_cache(maxsize=256)
-def layout_of(kind: type[Record], sizes: tuple[tuple[str, int], ...]) -> Layout:
+def layout_of(kind: type[Any], sizes: tuple[tuple[str, int], ...]) -> Layout:
     """Return the layout of a record; each array begins with a cache line."""
     known = dict(sizes)
     arrays: list[tuple[type, tuple[int, ...], int]] = []
