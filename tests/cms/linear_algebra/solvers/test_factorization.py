@@ -241,7 +241,7 @@ def held():
 @both
 @pytest.mark.parametrize("way", ["close", "drop"])
 def test_freed_factors_leave_no_memory_behind(solver, way):
-    n = 22
+    n = 17
     D = sp.csc_array(chain(n, ends_held=True))
     E = sp.eye_array(n, format="csc")
     A = sp.csc_array(sp.kron(sp.kron(D, E), E) + sp.kron(sp.kron(E, D), E) + sp.kron(sp.kron(E, E), D))
