@@ -427,7 +427,8 @@ class BaseParameters:
     @property
     def without_effect(self) -> tuple[str, ...]:
         """Names of parameters without any effect."""
-        return tuple(name for name, is_used in zip(self.form.names, self.B.any(axis=0), strict=True) if not is_used)
+        is_used = np.any(self.B, axis=0).tolist()
+        return tuple(name for name, used in zip(self.form.names, is_used, strict=True) if not used)
 
     def values(self, phi: Array) -> Array:
         """Return beta, (n_base,), from parameters, (p,)."""
