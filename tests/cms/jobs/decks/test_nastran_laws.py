@@ -256,6 +256,31 @@ def test_scalar_elements_add_between_the_same_components(tmp_path):
     assert_allclose(u @ body.D @ u, 7 * d[1] ** 2, rtol=1e-9)
 
 
+def test_the_modulus_follows_from_shear_modulus_and_poissons_ratio(tmp_path):
+    """E = 2 G (1 + NU): the same bars from G and NU as from E and NU."""
+    text = PAIR.format(x="1.", y="0.") + "RBE2,9,2,123456,3\n" + SECTION
+    given, _ = body_of(tmp_path, text + "MAT1,1,2.6+11,,.3,7800.\n")
+    blank, _ = body_of(tmp_path, text + "MAT1,1,,1.+11,.3,7800.\n")
+    assert_allclose(blank.K.toarray(), given.K.toarray(), rtol=1e-12, atol=1e-12 * abs(given.K).max())
+
+
+def test_a_turned_section_with_an_offset_is_its_principal_one(tmp_path):
+    """I12 turns the principal axes by a; the bar with these axes for orientation and the same offsets is the same."""
+    a, I_1, I_2 = 0.35, 4e-6, 1e-6
+    c, s = float(np.cos(a)), float(np.sin(a))
+    I1, I2, I12 = c * c * I_1 + s * s * I_2, s * s * I_1 + c * c * I_2, c * s * (I_1 - I_2)
+    bodies = []
+    for moments, v in (((I1, I2, I12), (0.0, 1.0, 0.0)), ((I_1, I_2, 0.0), (0.0, c, s))):
+        text = "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,4,,2.,.5,.3\n"
+        text += "CBAR,2,1,2,4,0.,1.,0.\nPBAR,1,1,1.-3,2.-6,1.-6,3.-6\n"
+        text += f"CBAR,1,2,1,2,{','.join(repr(x) for x in v)}\n,,,0.,.07,-.04,0.,.07,-.04\n"
+        text += f"PBAR,2,1,1.-3,{moments[0]!r},{moments[1]!r},3.-6\n,,,,,,,,\n,,,{moments[2]!r}\n"
+        bodies.append(body_of(tmp_path, text + "MAT1,1,7.+10,,.3,2700.\nPARAM,COUPMASS,1\n")[0])
+    for name in ("K", "M"):
+        turned, principal = (getattr(body, name).toarray() for body in bodies)
+        assert_allclose(turned, principal, rtol=0, atol=1e-10 * np.abs(principal).max())
+
+
 def test_a_chain_of_scalar_points_is_no_part_of_the_body(tmp_path):
     """Masses, springs and dampers between scalar points and the ground: the deck without them has the same matrices."""
     text = PAIR.format(x="1.", y="0.") + SECTION + MATERIAL

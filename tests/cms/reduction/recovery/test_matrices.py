@@ -13,7 +13,7 @@ from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.frames import frame_condition
 from cms.reduction.frame_conversion import rigid_mass
 from cms.reduction.recovery.load_columns import loads_of_body, loads_of_model, on_coordinates
-from cms.reduction.recovery.matrices import residual_response
+from cms.reduction.recovery.matrices import recovery_of_model, residual_response
 from fe_models.body.fe_body import FEBody
 from fe_models.body.mass_loads import MassLoads
 from tests.bodies import STEEL
@@ -120,6 +120,21 @@ def test_the_residual_response_is_static_in_mean_axes_without_the_modes():
     exact = spla.splu(both).solve(np.vstack([F, np.zeros((6, 2))]))[: body.n_dof]
     exact = exact - modes.Phi @ ((modes.Phi.T @ F) / modes.omega2[:, None])
     assert_allclose(found, exact, rtol=0, atol=SOLVE * np.abs(exact).max())
+
+
+def test_tables_over_combinations_of_modes_are_those_over_modes_combined():
+    body, request = reduced("normal"), cms.RecoveryRequest("all", ROWS, loads_at=(20,))
+    Z = np.random.default_rng(8).normal(size=(body.n_q, 3))
+    condition = frame_condition(full(), cms.TisserandFrame())
+    with Families(full()) as families:
+        Phi = families.free_modes(body.n_q).Phi
+        whole, combined = (
+            recovery_of_model(families, Phi, condition, body, request, over=over)["all"] for over in (None, Z)
+        )
+    assert_allclose(combined.static, whole.static, rtol=0, atol=SOLVE * np.abs(whole.static).max())
+    for k, rows in enumerate(whole.dynamic):
+        expected = np.hstack([rows[:, :6], rows[:, 6:] @ Z])
+        assert_allclose(combined.dynamic[k], expected, rtol=0, atol=SOLVE * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("frame", ["turned", "nodal"])

@@ -133,6 +133,16 @@ def test_a_torque_map_drives_through_its_gear_and_takes_power_by_its_efficiency(
     assert_allclose(seen["power in"] - seen["power lost"], motor * 50, rtol=1e-13)
 
 
+def test_a_torque_map_without_efficiencies_loses_no_power():
+    given = {"speeds": [0, 100], "throttles": [0, 1], "torques": [[0, 80], [-10, 60]], "ratio": 4.0}
+    law = TorqueMap("engine", A, B, throttle=0.5, **given).law(placed(np.array([marker_motion([0, 0, 0])] * 2)))
+    x = np.array([marker_motion([0, 0, 0]), marker_motion([0, 0, 0], omega=[0, 0, 12.5])])
+    _, _, seen = evaluate(law, 0.0, x, np.zeros(0))
+    motor = (40 + 25) / 2  # the motor turns at 50
+    assert_allclose([seen[key] for key in ("efficiency", "power in", "power lost", "power out")],
+                    [1.0, motor * 50, 0.0, motor * 50], rtol=1e-13, atol=0)  # fmt: skip
+
+
 @pytest.mark.parametrize("drive", list(every_drive()), ids=lambda drive: type(drive).__name__)
 def test_the_tangent_of_a_drive_is_exact(drive):
     system = turned(drive, omega=3.0)
