@@ -8,6 +8,7 @@ from pyyeti import psd as pyyeti_psd
 from floatframe import SignalError
 from floatframe.files.signals import (
     WINDOWS,
+    Signal,
     amplitude_spectrum,
     band_edges,
     octave_levels,
@@ -15,6 +16,7 @@ from floatframe.files.signals import (
     transfer_estimate,
     window_corrections,
 )
+from floatframe.files.signals.analysis import SpectrumRequest, as_psd
 from floatframe.files.signals.octaves import nominal_frequency
 
 RATE = 1024.0
@@ -191,3 +193,12 @@ def test_eight_segments_fit_into_records_of_any_length(overlap):
     """Odd segments overlap by half a sample less than asked for: seven of them fitted in every other record."""
     for n_t in range(300, 340):
         assert psd(noise(n_t), RATE, overlap=overlap).n_averages == 8
+
+
+@pytest.mark.parametrize("resolution", [0.25, 1.0, 4.0])
+def test_lines_have_the_requested_spacing(resolution):
+    time = np.arange(8000) / RATE
+    signal = Signal("a", time, np.sin(300 * time), "N")
+    found = as_psd(signal, SpectrumRequest(resolution=resolution))
+    assert_allclose(found.resolution, resolution, rtol=1e-12, atol=0)
+    assert_allclose(np.diff(found.frequencies), resolution, rtol=1e-9, atol=0)
