@@ -83,6 +83,20 @@ def test_an_rms_is_met_by_clipping():
     assert kept.notches == ()
 
 
+def test_a_notch_names_the_output_that_there_would_be_without_it():
+    """Amplitudes or densities of the run, at the frequency of the largest depth, and their ratio to the limit in dB."""
+    sine = notched_sine(MODEL, SINE, [ResponseLimit("mass acceleration z", 5.0)])
+    density = notched_random(MODEL, RANDOM, [ResponseLimit("mass acceleration z", 0.02)])
+    for found, own, tenfold, limit in (
+        (sine, SINE.sizes, 20, 5 * G), (density, RANDOM.density, 10, 0.02 * G**2)
+    ):  # fmt: skip
+        notch = found.notches[0]
+        at = np.flatnonzero(found.frequencies == notch.deepest)
+        assert_allclose(notch.unnotched, np.abs(own[at, ACCELERATION]), rtol=1e-12)
+        assert_allclose(notch.limit, limit, rtol=1e-12)
+        assert_allclose(notch.depth, tenfold * np.log10(notch.unnotched / limit), rtol=1e-9)
+
+
 def test_a_density_limit_in_g_is_one_of_the_density():
     found = notched_random(MODEL, RANDOM, [ResponseLimit("mass acceleration z", 0.02)])
     assert_allclose(found.sizes[:, ACCELERATION].max(), 0.02 * G**2, rtol=1e-12)
