@@ -25,6 +25,7 @@ from floatframe import (
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.initial import consistent_motion
 from floatframe.model.functions.time_functions import harmonic, polynomial_of_time
+from floatframe.model.rotations import euler_parameters, rotation_exp
 from floatframe.results.coordinate_elements import coupler_motion
 from tests.floatframe.finite_differences import assert_tangent_is_exact
 from tests.floatframe.model.joints.examples import coupled_pairs, three_bodies, wheels
@@ -122,6 +123,32 @@ def test_a_coupler_whose_constant_moves_starts_with_the_force_of_its_acceleratio
     start = consistent_motion(system)
     found = start.u_dot[[5, 11]]
     assert_allclose(found, [(T + lam) / J_a, r * lam / J_b], rtol=1e-9)
+
+
+def test_a_coupler_on_a_turntable_starts_with_the_force_of_its_centripetal_acceleration():
+    """A block slides out on a table that turns with W and turns a pulley on the axle, s = r phi.
+
+    (m + J/r²) s'' = m s W², so that the coupler pulls with -J/r² s'', also in the turned axes of the table.
+    """
+    W, u, at, r, m, J = 7.0, 0.6, 0.8, 0.05, 2.0, 0.01
+    R, place = rotation_exp(np.array([0.4, -0.7, 0.3])), np.array([3.0, -2.0, 5.0])
+    x, y, z = R.T
+    turned = euler_parameters(R)
+    block = RigidBody("block", m, 0.02 * np.eye(3), position=place + at * x, orientation=turned,
+                      velocity=u * x + at * W * y, omega_B=(0, 0, W))  # fmt: skip
+    table = RigidBody("table", 3.0, np.eye(3), position=place, orientation=turned, omega_B=(0, 0, W))
+    pulley = RigidBody("pulley", 1.0, J * np.eye(3), position=place, orientation=turned, omega_B=(0, 0, W + u / r))
+    joints = [
+        RevoluteJoint("axle", Marker(GROUND, position=place), Marker("table"), axis=z,
+                      motions={"angle": polynomial_of_time([0.0, W])}),
+        PrismaticJoint("guide", Marker("table"), Marker("block"), axis=(1, 0, 0)),
+        RevoluteJoint("hub", Marker("table"), Marker("pulley"), axis=(0, 0, 1)),
+        CoordinateCoupler("rope", [(JointCoordinate("guide", "distance"), 1.0), (JointCoordinate("hub", "angle"), -r)]),
+    ]  # fmt: skip
+    start = consistent_motion(System([block, table, pulley], joints))
+    s_ddot = m * at * W**2 / (m + J / r**2)
+    assert_allclose(start.u_dot[:3], (s_ddot - at * W**2) * x + 2 * W * u * y, rtol=0, atol=1e-9 * at * W**2)
+    assert_allclose(start.u_dot[12:18], [0, 0, 0, 0, 0, s_ddot / r], rtol=0, atol=1e-9 * s_ddot / r)
 
 
 def test_a_coupler_that_repeats_joints_is_named():
