@@ -391,7 +391,7 @@ def steady_rotation(
         return FlowFailure(iteration, has_stood, error, state, tuple(W), forces)
 
     found, tried = followed(state, w), ""
-    if isinstance(found, FlowFailure) and flow is None and not states.own.any():
+    if isinstance(found, FlowFailure) and not states.own.any():
         led, is_end = led_by_loads(compiled, work, omega, center, state, w)
         if is_end:
             again = followed(led.state, led.w)
