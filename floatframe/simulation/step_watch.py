@@ -22,9 +22,9 @@ It works for second-order methods, with fixed steps and with an error tolerance:
 (4) After that, windows of `WINDOW` steps are repeated with half steps. The distance between windows grows. The errors
     of all steps are summed; steps between two windows get the mean error of both.
 (5) Position errors are relative to the longest displacement of any body from its start. Rotation errors are relative to
-    the largest rotation; where that is below `SMALL_TURN`, to the displacement over the length of the system. Windows
-    also count the errors of speeds, relative to twice the largest speed (a vibration moves by two amplitudes). Errors a
-    of place and b of speed combine to sqrt(a² + b²), since they turn into one another.
+    the largest rotation; where that and its error together are below `SMALL_TURN`, to the displacement over the length
+    of the system. Windows also count the errors of speeds, relative to twice the largest speed (a vibration moves by
+    two amplitudes). Errors a of place and b of speed combine to sqrt(a² + b²), since they turn into one another.
 (6) The first step is compared alone, with two half steps of the same damping, where accelerations change much in it.
     A stiff spring with a damper settles before the comparisons of (1), while this step may be wrong by the whole sag.
     While companions run, so are steps in which a force jumps, and the ones after them, in runs without events.
@@ -569,14 +569,14 @@ class StepWatch:
         """Return the relative errors of position and rotation of each body, with those of a companion, (n_b, 2)."""
         compiled = compiled_system(system)
         least = np.array([REST_LENGTH * compiled.length, REST_ANGLE])
-        size = self.size.copy()
-        if size[1, 0] < SMALL_TURN * min(size[0, 0] / compiled.length, 1.0):
-            size[1] = np.maximum(size[1], size[0] / compiled.length)
-        moves = size[:, 0] > least
-        total = self.total
+        size, total = self.size.copy(), self.total
         if found is not None:
             total = total.copy()
             total[:, :, 0] += found
+        turn = size[1, 0] + total[:, 1, 0].max()  # as far as it may be without the errors
+        if turn < SMALL_TURN * min(size[0, 0] / compiled.length, 1.0):
+            size[1] = np.maximum(size[1], size[0] / compiled.length)
+        moves = size[:, 0] > least
         parts = total / np.where(size > 0.0, size, np.inf)
         return np.where(moves, np.linalg.norm(parts, axis=2), 0.0)
 
