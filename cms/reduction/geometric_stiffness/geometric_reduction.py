@@ -158,7 +158,8 @@ def followers_work(body: FEBody, forces: Array, Phi: Array) -> Array:
 
     Followers are nodes that move with a leader (rigid links) or with the mean of others.
     """
-    work = link_work(body.to_mesh.matrix, body.to_mesh.dofs, body.dofs, forces, Phi)
+    assert body.recovery is not None  # it says who follows whom
+    work = link_work(body.recovery.matrix, body.recovery.dofs, body.dofs, forces, Phi)
     return work + mean_nodes_part(body, forces, Phi) if body.mean_nodes else work
 
 

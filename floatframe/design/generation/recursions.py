@@ -9,7 +9,6 @@ the first is fixed and carries nothing, and through a marker that moves with mod
 through A E in one node if A contains more than one angle.
 """
 
-from collections import defaultdict
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from types import FunctionType, SimpleNamespace
@@ -21,7 +20,7 @@ from numpy import cross
 from floatframe.design.generation.elastic import MarkerPlace, MarkerRates, ModalForces, ModalMoments
 from floatframe.design.generation.graph import Graph, Scalar, Terms, terms
 from floatframe.design.generation.links import Link, TreeTerms
-from floatframe.engine.kernels.records import zeros
+from floatframe.engine.kernels.records import Size, zeros
 from floatframe.engine.tree.recursion import entry, newton_euler
 from floatframe.engine.tree.recursion.nodes import FIXED, ROTATION, SCREW, NodeWork
 
@@ -131,7 +130,8 @@ class Recursion:
 
     def arguments(self, v: Terms, a: Terms, gravity: Terms) -> tuple[Any, Any, None, Any]:
         """Return arguments of kernels: nodes and working arrays."""
-        sizes = defaultdict(int, {"nodes": len(self.links), "rates": len(v)})
+        names = {size.name for each in NodeWork() for size in each.shape if isinstance(size, Size)}
+        sizes = dict.fromkeys(sorted(names), 0) | {"nodes": len(self.links), "rates": len(v)}
         arrays: Any = (self.zeros(*each.shape) for each in zeros(NodeWork(), sizes))
         given: Any = {"x": self.x, "v": v, "a": a, "gravity": gravity}
         work = NodeWork(*arrays)._replace(A=self.nodes.A.copy(), rho=self.nodes.r.copy(), R_own=self.ones(), **given)

@@ -1,5 +1,6 @@
 """Budgets of memory: sizes in words, the forecast, and jobs that are held to one."""
 
+import gc
 import re
 import tracemalloc
 from dataclasses import replace
@@ -61,11 +62,19 @@ def test_the_working_memory_of_fronts_is_what_the_factorisation_holds(threads, m
     fronts = analyse(A)
     said = 8 * blocks_of(fronts).n_working(threads, on_disk=True)
     CholeskyFactor(A, fronts=fronts, on_disk=True).close()  # what is kept for all factorisations is there
-    tracemalloc.start()
-    CholeskyFactor(A, fronts=fronts, on_disk=True).close()
-    held = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
+    held = min(traced_peak(lambda: CholeskyFactor(A, fronts=fronts, on_disk=True).close()) for _ in range(3))
     assert 0.8 * held < said < 1.1 * held
+
+
+def traced_peak(function):
+    """Return the largest memory held in a call; other work of the process may add to it."""
+    gc.collect()
+    tracemalloc.start()
+    try:
+        function()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
 
 
 @pytest.fixture
