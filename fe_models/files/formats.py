@@ -24,7 +24,8 @@ FORMATS = (
         reads=True,
         key="cms job",
         tried="decks of MSC Nastran 2020",
-        lost="smeared layers, RBE1, scalar points, contact, external superelements, fluids: each listed with its count",
+        lost="smeared layers, RBE1, scalar points that grid points move, contact, external superelements, fluids: each "
+        "listed with its count",
     ),
     FileFormat(
         "CDB",

@@ -191,8 +191,9 @@ def solve(H: tuple[Array, ...], parts: Linearized, forces: Array, rows: Array) -
 def balanced_scales(diagonal: Array, J: Any, G: Any, V: Any) -> tuple[Array, Array]:
     """Return scales of the unknowns (y, w) and of the equations for which stiffnesses and rows have size one.
 
-    The stiffness of an unknown y is its diagonal in H plus that of the springs, whose rows V w = -G y give J G/V.
-    Without the springs, bodies that only springs hold would be scaled by the rounding errors in H.
+    The stiffness of an unknown y is the size of its diagonal in H plus that of the springs, whose rows V w = -G y give
+    J G/V, unless that is rounding. Without the springs, bodies that only springs hold would be scaled by the rounding
+    errors in H.
 
     Parameters
     ----------
@@ -202,7 +203,9 @@ def balanced_scales(diagonal: Array, J: Any, G: Any, V: Any) -> tuple[Array, Arr
         Magnitudes of the other matrices, dense or sparse, (n_w, n_u) and (n_w, n_w).
     """
     by_law = V.diagonal()
-    stiffness = np.maximum(diagonal, 0.0) + (1 / np.where(by_law > 0, by_law, np.inf)) @ (J * G)
+    springs = (1 / np.where(by_law > 0, by_law, np.inf)) @ (J * G)
+    noise = np.finfo(float).eps * max(springs.max(initial=0.0), np.abs(diagonal).max(initial=0.0))
+    stiffness = np.abs(diagonal) + np.where(springs > noise, springs, 0.0)
     of_y = 1 / np.sqrt(np.where(stiffness > 0, stiffness, 1.0))
     of_w = J @ of_y
     of_w = 1 / np.where(of_w > 0, of_w, 1.0)

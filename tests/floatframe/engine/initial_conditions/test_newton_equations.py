@@ -24,3 +24,10 @@ def test_masses_and_springs_add_up_and_rows_without_springs_add_nothing():
     J = G = np.array([[1.0], [lever]])
     of_columns, _ = balanced_scales(np.array([mass]), J, k * G, np.diag([1.0, 0.0]))
     assert_allclose(of_columns[0], 1 / np.sqrt(mass + k), rtol=1e-14)
+
+
+def test_rounding_of_rows_is_no_spring_and_a_softened_unknown_keeps_its_size():
+    """A load has made the first stiffness negative; the row of a spring elsewhere holds rounding at both unknowns."""
+    J, G, V = np.array([[1e-10, 1e-10]]), np.array([[1e-10, 1e-10]]), np.eye(1)
+    of_columns, _ = balanced_scales(np.array([-4e-3, 0.0]), J, G, V)
+    assert_allclose(of_columns[:2], [1 / np.sqrt(4e-3), 1.0], rtol=1e-12)
