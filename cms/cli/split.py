@@ -25,7 +25,7 @@ __all__ = ["SplitRequest", "direction_of", "places_of", "split_job"]
 log = logging.getLogger(__name__)
 
 CUT_KINDS = ("rigid", "distributing")
-LISTED = 6.0  #: modes of the whole body up to this multiple of its first frequency: their damping in parts is listed
+LISTED = 6.0  #: highest frequency, over the first one of the whole body, up to which damping in parts is listed
 COORDINATE = 1e-9  #: largest difference between coordinates of the same node, relative to the mesh size
 
 
@@ -156,8 +156,8 @@ def stiffness_damping(job: Job) -> StiffnessDamping | None:
     )
     words = (
         f"ratios belong to modes of one body: the parts have stiffness damping (beta); the first elastic "
-        f"mode of {job.body.name!r} in one piece keeps its ratio {ratios[0]:.3g}, others have one in proportion to "
-        f"their frequency (mode: frequency, ratio for the one of the job): {listed}"
+        f"mode of {job.body.name!r} in one piece keeps its ratio {ratios[0]:.3g}, the ratios of others are "
+        f"proportional to their frequency (mode: frequency, ratio in parts for ratio of the job): {listed}"
     )
     return StiffnessDamping(beta, words)
 

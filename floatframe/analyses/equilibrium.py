@@ -340,7 +340,7 @@ def steady_rotation(
                 W, abs(parts.J).T @ np.where(holds, 0.0, noise)
             )  # springs relax to zero force
             error = 0.0 if is_nothing else size / scale_of_forces
-            # steps no longer reduce what remains, and it is not more than rounding
+            # steps no longer reduce the unbalanced forces, and these are not larger than rounding errors
             is_rounding = 0.5 * last < size <= size_of(W, rounding_of_inertia(model, mass, state, omega, center))
             is_balanced = error <= tolerance or is_rounding
             is_closed = bool((np.abs(gaps) <= CLOSED * compiled.gap_sizes + noise)[holds].all())

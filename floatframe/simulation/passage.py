@@ -35,7 +35,8 @@ Values = Callable[[Rows], Array]
 def direct_values(system: System, event: Event) -> Values | None:
     """Return a function from rows of results to the watched value of an event, (n_times,); None if a sensor is needed.
 
-    A time; an angle of a joint between rigid bodies, which every run counts. Both to rounding what the sensor gives.
+    The value is a time, or an angle of a joint between rigid bodies, which every run counts. It agrees with that of the
+    sensor to rounding.
     """
     if event.at is not None:
         return lambda rows: rows.t

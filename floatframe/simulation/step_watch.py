@@ -85,7 +85,8 @@ STEP_LIMIT = 0.03  #: relative error above which a run is reported
 SHORT_LIMIT = 0.01
 REST_LENGTH = 1e-7  #: displacement over the length of the system below which the system is at rest
 REST_ANGLE = 1e-6  #: rotation below which the system is at rest [rad]
-SMALL_TURN = 1e-3  #: rotation below which errors of rotation do not count in a motion as long as the system [rad]
+#: rotation with its error below which errors of rotation do not count in a motion as long as the system [rad]
+SMALL_TURN = 1e-3
 FAR_TURN = 1.0  #: rotation of a flexible body in a step above which double steps say nothing [rad]
 LIGHT = 0.9  #: rho_inf at least of companions with half steps from the start of a run
 FULL_TURN = 3.0  #: rotation above which errors are relative to a whole turn [rad]
@@ -573,8 +574,8 @@ class StepWatch:
         if found is not None:
             total = total.copy()
             total[:, :, 0] += found
-        turn = size[1, 0] + total[:, 1, 0].max()  # as far as it may be without the errors
-        if turn < SMALL_TURN * min(size[0, 0] / compiled.length, 1.0):
+        largest_turn = size[1, 0] + total[:, 1, 0].max()  # that the exact motion may have
+        if largest_turn < SMALL_TURN * min(size[0, 0] / compiled.length, 1.0):
             size[1] = np.maximum(size[1], size[0] / compiled.length)
         moves = size[:, 0] > least
         parts = total / np.where(size > 0.0, size, np.inf)

@@ -87,7 +87,8 @@ class TreeFlow:
         if slopes is not None:
             ds, mu = self.turning_step(work, tau, *slopes)
         elif len(self.model.states.row):  # coordinates that only states hold have no stiffness to eliminate them by
-            ds, mu = self.dense_step(work, tau, self.matrix(work, 0.0, 0.0, 1.0))
+            M, K = self.matrix(work, 1.0, 0.0, 0.0), self.matrix(work, 0.0, 0.0, 1.0)
+            ds, mu = self.dense_step(work, tau, M, K)
         else:
             ds, mu = newton_step(self.model, work, self.tree, joints, 1 / tau, 0.0, 1.0)
         dw = np.zeros(len(w))
@@ -123,7 +124,7 @@ class TreeFlow:
         n_s = len(S)
         K, CK, M = (self.matrix(work, *weights) for weights in ((0.0, 0.0, 1.0), (0.0, 1.0, 1.0), (1.0, 0.0, 0.0)))
         K[:, :n_s] += (CK - K)[:, :n_s] @ S + M[:, :n_s] @ S_dot
-        return self.dense_step(work, tau, K)
+        return self.dense_step(work, tau, M, K)
 
     def matrix(self, work: Work, c_m: float, c_d: float, c_k: float) -> Array:
         """Return the dense matrix of step (2) for weights of accelerations, rates and positions, without M/tau."""
@@ -131,11 +132,11 @@ class TreeFlow:
 
         return newton_matrix(self.model, work, self.tree, self.joints, c_m, c_d, c_k)
 
-    def dense_step(self, work: Work, tau: float, K: Array) -> tuple[Array, Array]:
-        """Return the changes of coordinates and of loop-closing wrenches by a dense matrix; nan if it is singular."""
+    def dense_step(self, work: Work, tau: float, M: Array, K: Array) -> tuple[Array, Array]:
+        """Return the changes of coordinates and of loop-closing wrenches by K + M/tau; nan if that is singular."""
         n_s = len(self.tree.slot)
         right = -np.concatenate([self.joints.residual, work.connections.g[self.tree.kept_row >= 0]])
-        K[:n_s, :n_s] += self.matrix(work, 1.0, 0.0, 0.0)[:n_s, :n_s] / tau
+        K[:n_s, :n_s] += M[:n_s, :n_s] / tau
         try:
             solution = np.linalg.solve(K, right)
         except np.linalg.LinAlgError:

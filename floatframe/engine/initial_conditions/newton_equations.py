@@ -164,9 +164,8 @@ class NewtonFactors:
         if n <= DENSE:
             matrix = np.zeros((n, n))
             matrix[row, column] = values
-            size = np.abs(matrix)
-            parts_of_size = size[: self.n_u, self.n_u :].T, size[self.n_u :, : self.n_u], size[self.n_u :, self.n_u :]
-            self.of_columns, self.of_rows = balanced_scales(diagonal, *parts_of_size)
+            size, y, w = np.abs(matrix), slice(self.n_u), slice(self.n_u, n)
+            self.of_columns, self.of_rows = balanced_scales(diagonal, size[y, w].T, size[w, y], size[w, w])
             *self.dense, info = dgetrf(self.of_rows[:, None] * matrix * self.of_columns, overwrite_a=True)
             if info == 0:
                 return
@@ -282,15 +281,10 @@ def displaced(model: Model, state: State, x: Array) -> State:
     for i in range(len(model.bodies.kind)):
         u0, u1 = model.bodies.u0[i], model.bodies.u0[i + 1]
         r[i] += x[u0 : u0 + 3]
-        p[i] = product(p[i], euler_parameters_of_rotation_vector(x[u0 + 3 : u0 + 6]))
+        turned = euler_parameter_product(p[i], euler_parameters_of_rotation_vector(x[u0 + 3 : u0 + 6]))
+        p[i] = turned / np.linalg.norm(turned)
         q[model.bodies.q0[i] : model.bodies.q0[i + 1]] += x[u0 + 6 : u1]
     return State(r, p, q, state.u)
-
-
-def product(p: Array, s: Array) -> Array:
-    """Return the Hamilton product p * s of Euler parameters, of length one, (4,)."""
-    result = euler_parameter_product(p, s)
-    return result / np.linalg.norm(result)
 
 
 def in_ground_axes(model: Model, state: State, y: Array) -> Array:

@@ -10,7 +10,7 @@ from floatframe.engine.initial_conditions.newton_equations import balanced_scale
 
 @pytest.mark.parametrize("made", [np.asarray, sp.csr_array], ids=["dense", "sparse"])
 def test_a_body_on_springs_has_the_scale_of_their_stiffness(made):
-    """Two springs, in whose rows V w = -G y the unknown is the force or a half of it; H holds rounding alone."""
+    """Two springs with rows V w = -G y; the second has half its force as unknown. H holds only rounding errors."""
     k = np.array([4e6, 9e2])
     J, G, V = np.diag([1.0, 2.0]), np.diag(k), np.diag([1.0, 2.0])
     for noise in (0.0, 1e-9, -1e-9):
@@ -27,7 +27,7 @@ def test_masses_and_springs_add_up_and_rows_without_springs_add_nothing():
 
 
 def test_rounding_of_rows_is_no_spring_and_a_softened_unknown_keeps_its_size():
-    """A load has made the first stiffness negative; the row of a spring elsewhere holds rounding at both unknowns."""
+    """A load has made the first stiffness negative. The spring acts on other unknowns; its row holds rounding here."""
     J, G, V = np.array([[1e-10, 1e-10]]), np.array([[1e-10, 1e-10]]), np.eye(1)
     of_columns, _ = balanced_scales(np.array([-4e-3, 0.0]), J, G, V)
     assert_allclose(of_columns[:2], [1 / np.sqrt(4e-3), 1.0], rtol=1e-12)

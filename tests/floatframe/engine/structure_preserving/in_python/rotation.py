@@ -6,8 +6,13 @@ Formulas: `floatframe.engine.structure_preserving.kernels.markers`.
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.engine.initial_conditions.newton_equations import product
-from floatframe.model.rotations import cross, dot, euler_parameters_of_rotation_vector, tilde
+from floatframe.model.rotations import (
+    cross,
+    dot,
+    euler_parameter_product,
+    euler_parameters_of_rotation_vector,
+    tilde,
+)
 
 
 def cayley(theta: Array) -> Array:
@@ -18,7 +23,8 @@ def cayley(theta: Array) -> Array:
 
 def cayley_parameters(p: Array, theta: Array) -> Array:
     """Return the Euler parameters of R(p) cay(theta), (4,)."""
-    return product(p, np.array([1.0, *(0.5 * theta)]) / np.sqrt(1 + 0.25 * theta @ theta))
+    made = euler_parameter_product(p, np.array([1.0, *(0.5 * theta)]))
+    return made / np.linalg.norm(made)
 
 
 def relative_cayley(theta_0: Array, theta_1: Array) -> Array:
