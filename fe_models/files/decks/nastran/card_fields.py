@@ -29,6 +29,7 @@ CARDS: dict[str, str] = {
     "PSOLID": "PID MID CORDM~ IN~ STRESS~ ISOP~ FCTN=SMECH",
     "PLSOLID": "PID MID STR~",
     "PSHELL": "PID MID1 T MID2 12I/T**3 MID3 TS/T NSM Z1~ Z2~ MID4",
+    "PLPLANE": "PID MID CID STR~ T",
     "PCOMP": "PID Z0 NSM SB~ FT~ TREF~ GE^ LAM MID T THETA SOUT~ ...",
     "PCOMPG": "PID Z0 NSM SB~ FT~ TREF~ GE^ LAM GPLYID~ MID T THETA SOUT~ - - - ...",
     "PBAR": "PID MID A I1 I2 J NSM - C1~ C2~ D1~ D2~ E1~ E2~ F1~ F2~ K1 K2 I12",
@@ -105,7 +106,7 @@ HARMLESS = frozenset(
 #: properties and materials that no element read here can name: elements that do are refused by their own name
 UNNAMED = frozenset(
     "MAT3 MAT9 MAT10 MAT11 MATF MATG MATHE MATORT MATEP PACABS PACBAR PAABSF PAXISYM PBCOMP PBEAM3 "
-    "PBEND PBUSH2D PCOHE PCONEAX PFAST PLPLANE PSEAM PSHEAR PRAC2D PRAC3D PWELD PSHLN1 PSHLN2 "
+    "PBEND PBUSH2D PCOHE PCONEAX PFAST PSEAM PSHEAR PRAC2D PRAC3D PWELD PSHLN1 PSHLN2 "
     "PSLDN1".split()
 )
 #: cards that change another card in nonlinear analyses, or over frequency: that card is taken as it stands

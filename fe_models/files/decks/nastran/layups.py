@@ -1,4 +1,7 @@
-"""Shells of layers of Nastran, PCOMP with materials MAT8, and shells of given stiffness, PSHELL with MAT2 or MID4."""
+"""Shells of Nastran whose stiffness is not that of one isotropic plate.
+
+Layers (PCOMP with MAT8), given stiffness (PSHELL with MAT2 or MID4), and plane strain (PLPLANE, PSHELL with MID2 = -1).
+"""
 
 from dataclasses import replace
 
@@ -7,7 +10,7 @@ import numpy as np
 from fe_models.errors import MeshError
 from fe_models.files.bulk_data.cards import Card
 from fe_models.files.decks.deck import DeckLayer, DeckMaterial, ShellSection
-from fe_models.files.decks.nastran.model import NastranModel
+from fe_models.files.decks.nastran.model import ALONG, NastranModel
 from fe_models.foundation.arrays import Array
 
 __all__ = [
@@ -15,6 +18,7 @@ __all__ = [
     "layers_of_card",
     "needs_matrices",
     "orthotropic_shells",
+    "plane_strain_shells",
     "sheet_material",
     "stiffness_shells",
 ]
@@ -100,6 +104,53 @@ def orthotropic_shells(
     """Take shells of a PSHELL of MAT8: one layer of its material, laid as that of a PCOMP."""
     layers = (DeckLayer(section.material, section.thickness),)
     _laid_shells(model, known, cards, offset_field, replace(section, material="", layers=layers))
+
+
+def plane_strain_shells(model: NastranModel, known: Card, cards: list[Card], offset_field: dict[str, int]) -> None:
+    """Take membranes of a PLPLANE, or of a PSHELL with MID2 = -1: a planar body without strain across its plane.
+
+    eps_z = 0 gives sigma_z = nu (sigma_x + sigma_y). In the plane the material is then a sheet in plane stress with
+    E' = E/(1 - nu²), nu' = nu/(1 - nu), and G as before. The body is a slice of thickness T, 1 where it is blank.
+    """
+    pid, is_plplane = known.text(1), known.name == "PLPLANE"
+    name = known.text(2)
+    material = model.materials.get(name)
+    why = ""
+    if model.plane is None:
+        why = "plane strain: only where the deck holds all points in a plane"
+    elif material is None or not isinstance(material.young, float) or not isinstance(material.poisson, float):
+        why = f"plane strain: material {name} is not known here, or not isotropic (MAT1, MATHP)"
+    elif not is_plplane and known.text(6):
+        why = "MID2 = -1, plane strain, with MID3: a membrane has no transverse shear"
+    elif is_plplane and known.integer(3, 0) < 0:
+        why = f"CID = {known.text(3)}: axes of a body of revolution"
+    elif is_plplane and np.abs(model.system(known, known.integer(3, 0), np.zeros(3))[model.plane, :2]).max() > ALONG:
+        why = "CID: its x-y plane is not that of the deck"
+    if why:
+        model.ledger.refuse(known.name, f"property {pid}: {why}", count=len(cards))
+        return
+    assert material is not None
+    assert model.plane is not None
+    E, nu = material.young, material.poisson
+    assert isinstance(E, float)
+    assert isinstance(nu, float)
+    made, young = f"{name}_plane_strain", E / (1 - nu**2)
+    sheet = DeckMaterial(made, (young,) * 3, (nu / (1 - nu), 0.0, 0.0), material.density, (E / (2 * (1 + nu)),) * 3)
+    model.materials[made] = sheet
+    T = known.real(5, 1.0) if is_plplane else known.real(3)
+    added = 0.0 if is_plplane else known.real(8, 0.0) * model.wtmass
+    offsets: dict[float, list[Card]] = {}
+    for card in cards:
+        offsets.setdefault(card.real(offset_field[card.name], 0.0), []).append(card)
+    x, y, z = (float(v) for v in np.eye(3)[model.plane - 1])
+    for offset, mine in offsets.items():
+        group = f"pid_{pid}" if len(offsets) == 1 else f"pid_{pid}_offset_{offset:g}"
+        for card in mine:
+            model.elements[card.integer(1)] = (card.name, group)
+        layers = (DeckLayer(made, T),)
+        model.shells.append(ShellSection(group, "", T, offset, added, layers=layers, direction=(x, y, z)))
+    why = f"plane strain: a slice of thickness {T:g}; stress across the plane, nu (sx + sy), is not in its results"
+    model.ledger.note(known.name, why, count=len(cards))
 
 
 def needs_matrices(model: NastranModel, known: Card) -> bool:

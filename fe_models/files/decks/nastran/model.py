@@ -31,7 +31,7 @@ __all__ = ["ALL", "ALONG", "PROPERTIES", "NastranModel"]
 ALL = (0, 1, 2, 3, 4, 5)
 ALONG = 1e-9  #: a vector is along a line if its part across is smaller than this, relative to its length
 #: properties of solids, shells, bars and beams, which share one range of numbers
-PROPERTIES = ("PSOLID", "PLSOLID", "PSHELL", "PCOMP", "PCOMPG", "PBAR", "PBARL", "PBEAM", "PBEAML")
+PROPERTIES = ("PSOLID", "PLSOLID", "PSHELL", "PLPLANE", "PCOMP", "PCOMPG", "PBAR", "PBARL", "PBEAM", "PBEAML")
 
 
 @dataclass

@@ -11,6 +11,7 @@ from fe_models.files.decks.nastran.layups import (
     layered_shells,
     needs_matrices,
     orthotropic_shells,
+    plane_strain_shells,
     sheet_material,
     stiffness_shells,
 )
@@ -158,6 +159,9 @@ def _shells(model: NastranModel, known: Card, cards: list[Card]) -> None:
     if known.name in ("PCOMP", "PCOMPG"):
         layered_shells(model, known, cards, _OFFSET_FIELD)
         return
+    if known.name == "PLPLANE":
+        plane_strain_shells(model, known, cards, _OFFSET_FIELD)
+        return
     if known.name != "PSHELL":
         model.ledger.refuse(cards[0].name, f"property {pid} is {known.name}", count=len(cards))
         return
@@ -167,6 +171,9 @@ def _shells(model: NastranModel, known: Card, cards: list[Card]) -> None:
         return
     thickness = known.real(3)
     cards = [card for card in cards if _has_thickness(model, card, thickness)]
+    if known.text(4) == "-1":
+        plane_strain_shells(model, known, cards, _OFFSET_FIELD)
+        return
     added = known.real(8, 0.0) * model.wtmass
     if not known.text(6):
         why = "MID3 is blank, rigid in transverse shear there: here 5/6 G t"

@@ -69,6 +69,9 @@ READ: dict[str, tuple[str, dict[str, str | None]]] = {
         {"PID": None, "MID1": None, "T": ".06", "MID2": "2", "12I/T**3": "1.5", "MID3": "2", "TS/T": ".5", "NSM": "3.",
          "MID4": "4"},
     ),
+    "PLPLANE": (
+        "CTRIA3,1,9,1,3,4\nPLPLANE,9,1\nSPC1,1,345,1,3,4", {"PID": None, "MID": "2", "CID": "7", "T": ".1"}
+    ),
     "PCOMP": (LAID, {"PID": None, "Z0": "0.", "NSM": "2.", "LAM": "SYM", "MID": "2", "T": ".04", "THETA": "45."}),
     "PCOMPG": (
         "CQUAD4,1,1,1,2,3,4,20.\nPCOMPG,1,-.03,1.,,,,,\n,1,3,.02,30.,,,,\n,2,1,.03,",
