@@ -1,5 +1,6 @@
 from .assembly.planar import planar as planar
 from .body.beam_line import BeamLine as BeamLine
+from .body.couplings.couplings import check_overlap as check_overlap
 from .body.couplings.couplings import couple as couple
 from .body.fe_body import FEBody as FEBody
 from .body.fe_body import Interface as Interface
@@ -47,7 +48,6 @@ from .elements.shells.shell_property import ShellProperty as ShellProperty
 from .elements.shells.shell_property import StiffnessProperty as StiffnessProperty
 from .elements.shells.shell_property import symmetric as symmetric
 from .elements.solids.body import solid_body as solid_body
-from .elements.solids.interfaces import check_overlap as check_overlap
 from .elements.solids.interfaces import distributing_interface as distributing_interface
 from .elements.solids.interfaces import nodes_interface as nodes_interface
 from .elements.solids.interfaces import rigid_interface as rigid_interface

@@ -46,7 +46,7 @@ class ShellError(FeModelsError, ValueError):
     """A shell model is impossible: a cell has no thickness or area or is warped too much, or a node is unknown."""
 
 
-class InterfaceError(FeModelsError, ValueError):
+class InterfaceError(BodyError):
     """An interface selects no nodes, too few nodes, or nodes of another interface."""
 
 

@@ -85,8 +85,8 @@ def body_with_its_interfaces(job: Job, stages: Stages) -> FEBody:
 
 def interfaces_on(job: Job, geometry: "Mesh | NodeCloud") -> tuple[Interface, ...]:
     """Return the interfaces of the job, on a solid mesh or on nodes of unknown elements."""
+    from fe_models.body.couplings.couplings import check_overlap
     from fe_models.elements.beams.interfaces import node_interface
-    from fe_models.elements.solids.interfaces import check_overlap
     from fe_models.meshes.boundary import facet_weights
     from fe_models.meshes.mesh import Mesh
     from fe_models.meshes.selections import selected_facets

@@ -43,7 +43,7 @@ def materials_of(job: Job) -> "AnyMaterial | dict[str, AnyMaterial]":
 
 def interfaces_of(job: Job, mesh: "Mesh") -> tuple[Interface, ...]:
     """Return the interfaces of the job on this mesh; no two may share a node."""
-    from fe_models.elements.solids.interfaces import check_overlap
+    from fe_models.body.couplings.couplings import check_overlap
 
     interfaces = tuple(interface_of(name, section, mesh) for name, section in job.interfaces.items())
     check_overlap(interfaces, numbers=mesh.node_numbers)

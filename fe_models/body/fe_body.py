@@ -475,10 +475,10 @@ class FEBody:
 
     def require_coupled(self) -> None:
         """Raise `BodyError` unless every interface has its boundary dofs."""
-        if not self.is_coupled:
-            missing = ", ".join(interface.name for interface in self.interfaces if interface.dofs is None)
+        missing = [interface.name for interface in self.interfaces if interface.dofs is None]
+        if missing:
             raise BodyError(
-                f"body {self.name!r}: interfaces {missing} have no boundary dofs yet; call cms.couple(body)"
+                f"body {self.name!r}: interfaces {', '.join(missing)} have no boundary dofs yet; call cms.couple(body)"
             )
 
     def mesh_displacement(self, u: Any) -> Any:

@@ -17,7 +17,6 @@ __all__ = [
     "Material",
     "OrthotropicMaterial",
     "assign_materials",
-    "isotropic_tensor",
     "material_words",
     "require_isotropic",
 ]
@@ -84,7 +83,9 @@ class Material:
     @property
     def stiffness(self) -> Array:
         """Matrix that maps strain to stress, (6, 6) [Pa], rows xx yy zz yz xz xy, engineering shear strains."""
-        return isotropic_tensor(self.lam, self.mu)
+        C = np.diag([2 * self.mu] * 3 + [self.mu] * 3)
+        C[:3, :3] += self.lam
+        return C
 
 
 @dataclass(frozen=True)
@@ -238,13 +239,6 @@ def _set_axes_and_density(where: str, material: "OrthotropicMaterial | Anisotrop
 
 
 AnyMaterial = Material | OrthotropicMaterial | AnisotropicMaterial
-
-
-def isotropic_tensor(lam: float, mu: float) -> Array:
-    """Return the matrix that maps strain to stress, (6, 6) [Pa], rows xx yy zz yz xz xy, engineering shear strains."""
-    C = np.diag([2 * mu, 2 * mu, 2 * mu, mu, mu, mu])
-    C[:3, :3] += lam
-    return np.asarray(C)
 
 
 def material_words(material: AnyMaterial) -> str:

@@ -17,7 +17,6 @@ __all__ = [
     "boundary_nodes",
     "boundary_owners",
     "boundary_triangles",
-    "face_triangles",
     "facet_weights",
     "first_of_equal_rows",
 ]
@@ -124,12 +123,7 @@ def boundary_triangles(mesh: Mesh) -> IntArray:
     mesh
         A solid mesh.
     """
-    return face_triangles(boundary_facets(mesh))
-
-
-def face_triangles(faces: Mapping[str, IntArray]) -> IntArray:
-    """Return flat triangles over the nodes of faces, (n_tri, 3), with the orientation of the faces."""
-    parts = [nodes[:, np.array(_TRIANGLES[kind])].reshape(-1, 3) for kind, nodes in faces.items()]
+    parts = [nodes[:, np.array(_TRIANGLES[kind])].reshape(-1, 3) for kind, nodes in boundary_facets(mesh).items()]
     return np.concatenate(parts) if parts else np.zeros((0, 3), np.int64)
 
 

@@ -8,7 +8,7 @@ import pytest
 from tests.cms.path_of_a_job import functions_called
 from tests.root import ROOT
 
-MOST_FUNCTIONS = 524
+MOST_FUNCTIONS = 514
 MOST_FILES = 88
 
 

@@ -7,7 +7,9 @@ satisfy the constraints have positive energy. Eliminating the members instead wo
 members.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,11 +18,12 @@ from fe_models.body.couplings.coupling_on_ranks import spread_extension
 from fe_models.body.couplings.submatrix import principal_block
 from fe_models.body.fe_body import MULTIPLIER, FEBody, Interface, Recovery
 from fe_models.body.rigid_motion import rigid_motion_of_points
+from fe_models.errors import InterfaceError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 
-__all__ = ["couple", "mean_motion"]
+__all__ = ["check_overlap", "couple", "mean_motion", "require_spread"]
 
 #: ratio of smallest to largest radius of the members about their line, below which they count as collinear
 RANK_TOLERANCE = 1e-6
@@ -44,17 +47,20 @@ def couple(body: FEBody) -> FEBody:
     """
     if body.recovery is not None and body.interfaces and body.is_coupled:
         raise BodyError(f"body {body.name!r}: is coupled already")
-    _refuse_overlap(body)
+    check_overlap(body.interfaces, numbers=body.numbering.nodes)
     todo = [interface for interface in body.interfaces if interface.dofs is None]
     rigid = [interface for interface in todo if interface.kind == "rigid"]
     distributing = [interface for interface in todo if interface.kind == "distributing"]
     _require_dofs(body, todo)
+    has_rotation = body.dofs[body.dofs[:, 1] >= 3, 0]
     for interface in (*rigid, *distributing):
-        _require_spread(body, interface)
-    dofs_of_node = _DofTable(body)
+        # one node with rotations carries all six motions of a rigid interface
+        if interface.kind == "distributing" or not np.isin(interface.nodes, has_rotation).any():
+            weights = interface.weights if interface.kind == "distributing" else np.ones(len(interface.nodes))
+            require_spread(interface.name, interface.kind, body.nodes[interface.nodes], np.asarray(weights))
 
     # order of the new dofs: kept mesh dofs | reference nodes | multipliers
-    slaves = [dofs_of_node.all_of(interface.nodes) for interface in rigid]
+    slaves = [_dofs_of(body, interface.nodes) for interface in rigid]
     is_kept = np.ones(body.n_dof, dtype=bool)
     for slave in slaves:
         is_kept[slave] = False
@@ -83,9 +89,7 @@ def couple(body: FEBody) -> FEBody:
     new_index = np.full(body.n_dof, -1, np.int64)
     new_index[keep] = np.arange(len(keep))
     constraints = (
-        _multiplier_rows(
-            body, distributing, dofs_of_node, new_index, first_reference + 6 * len(rigid), first_multiplier, n_new
-        )
+        _multiplier_rows(body, distributing, new_index, first_reference + 6 * len(rigid), first_multiplier, n_new)
         if distributing
         else None
     )
@@ -95,7 +99,7 @@ def couple(body: FEBody) -> FEBody:
     boundary = {interface.name: first_reference + 6 * k + np.arange(6) for k, interface in enumerate(references)}
     for interface in todo:
         if interface.kind == "nodes":
-            boundary[interface.name] = new_index[dofs_of_node.all_of(interface.nodes)]
+            boundary[interface.name] = new_index[_dofs_of(body, interface.nodes)]
     interfaces = tuple(
         replace(
             interface, dofs=boundary.get(interface.name, None if interface.dofs is None else new_index[interface.dofs])
@@ -147,37 +151,13 @@ def mean_motion(points: Array, weights: Array, reference: Array) -> Array:
     return np.linalg.solve(N, weighted.reshape(-1, 6).T)
 
 
-@dataclass(frozen=True, eq=False)
-class _Positions:
-    """Rows of each node in the dof table: order[start[node]:start[node + 1]], sorted by component."""
-
-    order: IntArray
-    start: IntArray
-
-
-class _DofTable:
-    """Look-up of the dofs of given nodes, by node and component."""
-
-    def __init__(self, body: FEBody) -> None:
-        order = np.lexsort((body.dofs[:, 1], body.dofs[:, 0]))
-        self.positions = _Positions(order, np.searchsorted(body.dofs[order, 0], np.arange(len(body.nodes) + 1)))
-        self.body = body
-
-    def all_of(self, nodes: IntArray) -> IntArray:
-        """Return all dofs of these nodes, node by node in component order."""
-        order, start = self.positions.order, self.positions.start
-        return np.concatenate([order[start[node] : start[node + 1]] for node in nodes])
-
-    def translations_of(self, nodes: IntArray, where: str) -> IntArray:
-        """Return the three translational dofs of each node, (3 n,), node-major."""
-        dofs = self.all_of(nodes)
-        dofs = dofs[(self.body.dofs[dofs, 1] >= 0) & (self.body.dofs[dofs, 1] < 3)]
-        if len(dofs) != 3 * len(nodes):
-            raise BodyError(
-                f"{where}: expected three translational dofs at every member node, got {len(dofs)} "
-                f"at {len(nodes)} nodes"
-            )
-        return dofs
+def _dofs_of(body: FEBody, nodes: IntArray) -> IntArray:
+    """Return all dofs of these nodes, node by node in component order."""
+    place = np.full(len(body.nodes), -1)
+    place[nodes] = np.arange(len(nodes))
+    at = place[body.dofs[:, 0]]
+    own = np.flatnonzero(at >= 0)
+    return own[np.lexsort((body.dofs[own, 1], at[own]))]
 
 
 def _rigid_rows(body: FEBody, interface: Interface, slaves: IntArray) -> Array:
@@ -248,7 +228,6 @@ def _reference_entries(
 def _multiplier_rows(
     body: FEBody,
     distributing: list[Interface],
-    dofs_of_node: _DofTable,
     new_index: IntArray,
     first_reference: int,
     first_multiplier: int,
@@ -262,7 +241,13 @@ def _multiplier_rows(
     rows, columns, values = [], [], []
     for k, interface in enumerate(distributing):
         where = f"body {body.name!r}: interface {interface.name!r}"
-        members = dofs_of_node.translations_of(interface.nodes, where)
+        members = _dofs_of(body, interface.nodes)
+        members = members[(body.dofs[members, 1] >= 0) & (body.dofs[members, 1] < 3)]
+        if len(members) != 3 * len(interface.nodes):
+            raise BodyError(
+                f"{where}: expected three translational dofs at every member node, got {len(members)} at "
+                f"{len(interface.nodes)} nodes"
+            )
         if (new_index[members] < 0).any():
             raise BodyError(f"{where}: shares nodes with a rigid interface")
         points = body.nodes[interface.nodes]
@@ -282,16 +267,29 @@ def _multiplier_rows(
     return sp.csc_array(C + C.T)
 
 
-def _refuse_overlap(body: FEBody) -> None:
-    owner: dict[int, str] = {}
-    for interface in body.interfaces:
-        shared = [owner[node] for node in interface.nodes.tolist() if node in owner]
-        if shared:
-            raise BodyError(
-                f"body {body.name!r}: interfaces {shared[0]!r} and {interface.name!r} share "
-                f"{shared.count(shared[0])} nodes; a node can belong to one interface only"
-            )
-        owner.update(dict.fromkeys(interface.nodes.tolist(), interface.name))
+def check_overlap(interfaces: Sequence[Interface], *, numbers: IntArray | None = None) -> None:
+    """Raise `InterfaceError` if two interfaces have the same name or share nodes; the message names pairs and counts.
+
+    Parameters
+    ----------
+    interfaces
+        All interfaces of one body.
+    numbers
+        The user's numbers of the nodes for the message, (n_nodes,); None or empty: the message uses indices.
+    """
+    shared = []
+    for first, second in combinations(interfaces, 2):
+        if first.name == second.name:
+            raise InterfaceError(f"interfaces: two are named {first.name!r}; give each its own name")
+        common = np.intersect1d(first.nodes, second.nodes)
+        if common.size:
+            node = common[0] if numbers is None or not numbers.size else numbers[common[0]]
+            shared.append(f"{first.name!r} and {second.name!r} share {common.size} nodes (first node {node})")
+    if shared:
+        raise InterfaceError(
+            f"interfaces: {'; '.join(shared)}; a node can follow only one interface: make the "
+            f"selections smaller, or join the two interfaces to one"
+        )
 
 
 def _require_dofs(body: FEBody, interfaces: list[Interface]) -> None:
@@ -307,18 +305,21 @@ def _require_dofs(body: FEBody, interfaces: list[Interface]) -> None:
             )
 
 
-def _require_spread(body: FEBody, interface: Interface) -> None:
-    """Raise `BodyError` if the members lie at one point or on one line, so that a rotation about it moves nothing."""
-    where = f"body {body.name!r}: interface {interface.name!r}"
-    has_rotation = np.isin(interface.nodes, body.dofs[body.dofs[:, 1] >= 3, 0]).any()
-    if interface.kind == "rigid" and has_rotation:
-        return  # one node with rotations carries all six motions
-    weights = np.asarray(interface.weights) if interface.kind == "distributing" else np.ones(len(interface.nodes))
-    used = interface.nodes[weights > 0]
-    points = body.nodes[used]
-    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    if len(used) < 3 or spread[1] <= RANK_TOLERANCE * spread[0]:
-        raise BodyError(
-            f"{where}: kind {interface.kind!r} needs at least 3 member nodes that are not on one line, got "
-            f"{len(used)}{' on one line' if len(used) > 2 else ''}; select more nodes or take kind 'nodes'"
+def require_spread(name: str, kind: str, positions: Array, weights: Array) -> None:
+    """Raise `InterfaceError` unless the weighted points span a plane, that is two radii of gyration above zero."""
+    where = f"interface {name!r}: {kind}"
+    weighted = positions[weights > 0]
+    if len(weighted) < 3:
+        raise InterfaceError(
+            f"{where}: expected at least 3 nodes that are not on one line, got {len(weighted)}; a "
+            f"single node carries no rotation: use kind 'nodes', or select more"
+        )
+    w = weights[weights > 0] / weights.sum()
+    radii = np.linalg.svd(np.sqrt(w)[:, None] * (weighted - w @ weighted), compute_uv=False)
+    if radii[0] == 0:
+        raise InterfaceError(f"{where}: its {len(weighted)} nodes are all at one place; merge coincident nodes")
+    if radii[1] <= RANK_TOLERANCE * radii[0]:
+        raise InterfaceError(
+            f"{where}: its {len(weighted)} nodes lie on one line (widths {radii[1]:.2g} and "
+            f"{radii[0]:.2g}), so the rotation about it is free; select nodes beside the line"
         )

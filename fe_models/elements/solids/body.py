@@ -18,12 +18,12 @@ from fe_models.elements.solids.assembly import Progress, assemble, expand_scalar
 from fe_models.elements.solids.assembly_on_ranks import SpreadMesh, assemble_on_ranks
 from fe_models.elements.solids.elements import INTEGRATIONS, MASSES, reference_element
 from fe_models.elements.solids.geometric import (
-    internal_forces,
+    integrated_cells,
     projected_geometric_stiffness,
     spread_geometric_stiffness,
 )
-from fe_models.elements.solids.incompatible import KIND
-from fe_models.elements.solids.stress import nodal_stress, stiffest_at_nodes
+from fe_models.elements.solids.incompatible import KIND, brick_chunks, brick_stiffness
+from fe_models.elements.solids.stress import nodal_stress
 from fe_models.foundation.arrays import Array, IntArray, frozen_int
 from fe_models.foundation.errors import BodyError
 from fe_models.foundation.ranks.product import RowsProduct
@@ -114,8 +114,18 @@ class SolidModel:
 
     @cached_property
     def of_node(self) -> IntArray:
-        """Material whose stress each node shows: that of the stiffest adjoining element, (n_nodes,)."""
-        return frozen_int(stiffest_at_nodes(self.mesh, self.materials, self.of_cell))
+        """Material whose stress each node shows: the first with the largest modulus among its elements, (n_nodes,).
+
+        Stress jumps where materials meet, and one value per node can show one side only. The stiffer side usually has
+        the larger stress, and a fixed choice keeps the stress linear in the displacement.
+        """
+        order = np.argsort([-material.E for material in self.materials], kind="stable")
+        rank = np.empty(len(order), np.int64)
+        rank[order] = np.arange(len(order))
+        best = np.full(len(self.mesh.nodes), len(order) - 1, np.int64)
+        for kind, cells in self.mesh.cells.items():
+            np.minimum.at(best, cells.ravel(), np.repeat(rank[self.of_cell[kind]], cells.shape[1]))
+        return frozen_int(order[best])
 
     def mass_gram(self, u: Any) -> Array:
         """Return ∫ a aᵀ dm with a = [1, c, u_x, u_y, u_z], (4 + 3 k, 4 + 3 k), exact; u is (3 n_nodes, k)."""
@@ -146,17 +156,35 @@ class SolidModel:
         return np.asarray(self.M_s @ loads.at(self.mesh.nodes).reshape(len(self.mesh.nodes), -1)).reshape(-1, loads.k)
 
     def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
-        """Return ∫ sigma grad N dV of the columns u, (3 n_nodes, k) [N]; if `nodes` are given, only there."""
-        require_rows("internal_forces", u, 3 * len(self.mesh.nodes))
-        return internal_forces(
-            self.mesh,
-            self.materials,
-            self.of_cell,
-            u,
-            nodes=nodes,
-            incompatible=self.incompatible,
-            integration=self.integration,
-        )
+        """Return ∫ sigma grad N dV of the columns u, (3 n_nodes, k) [N], at the points of the geometric stiffness.
+
+        If `nodes` are given, the forces at other nodes are zero.
+        """
+        from fe_models.elements.solids.geometric_kernels import add_internal_forces
+
+        mesh = self.mesh
+        require_rows("internal_forces", u, 3 * len(mesh.nodes))
+        fields = np.ascontiguousarray(u).reshape(len(mesh.nodes), 3, -1)
+        forces = np.zeros(fields.shape)
+        tensors = np.array([material.stiffness for material in self.materials])
+        wanted = np.full(len(mesh.nodes), nodes is None)
+        if nodes is not None:
+            wanted[nodes[nodes < len(wanted)]] = True
+        for kind in mesh.cells:
+            if self.incompatible and kind == KIND:
+                own = wanted[mesh.cells[kind]].any(axis=1)
+                cells, of_cells = mesh.cells[kind][own], tensors[self.of_cell[kind][own]]
+                for rows, dofs in brick_chunks(cells):
+                    K = brick_stiffness(mesh.nodes[cells[rows]], of_cells[rows])
+                    np.add.at(forces.reshape(3 * len(mesh.nodes), -1), dofs, K @ np.asarray(u)[dofs])
+                continue
+            for cells, material, table in integrated_cells(mesh, kind, self.of_cell, self.integration):
+                own = wanted[cells].any(axis=1)
+                add_internal_forces(
+                    mesh.nodes, cells[own], material[own], tensors, table.gradients, table.weights, fields, forces
+                )
+        forces[~wanted] = 0.0
+        return forces.reshape(3 * len(mesh.nodes), -1)
 
     def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Any) -> Array:
         """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), of the states u, (3 n_nodes, k); only their stress counts.
@@ -237,7 +265,9 @@ def solid_body(
     MeshError
         If there is no solid cell, a node belongs to no solid cell, or an element is inverted.
     """
-    rule_words = _rule_words(integration, mass)
+    for what, value, choices in (("integration", integration, INTEGRATIONS), ("mass", mass, MASSES)):
+        if value not in choices:
+            raise BodyError(f"solid_body: {what}: unknown {quoted(value)}{nearest(value, choices)}")
     mesh = as_mesh(mesh)
     used, of_cell = assign_materials(mesh, materials)
     rules: dict[str, Any] = {"incompatible": incompatible_modes, "integration": integration, "mass": mass}
@@ -259,7 +289,7 @@ def solid_body(
         node_volumes=node_volumes(mesh),
         element_model=SolidModel(mesh, used, of_cell, M_s, incompatible_modes, integration, parts),
         numbering=solid_numbering(mesh),
-        provenance=provenance(mesh, used, of_cell, incompatible_modes=incompatible_modes) | rule_words,
+        provenance=provenance(mesh, used, of_cell, rules),
     )
 
 
@@ -283,24 +313,22 @@ def scalar_mass_gram(M_s: sp.csr_array, nodes: Array, u: Array) -> Array:
         def multiply(block: Array) -> Array:
             return np.concatenate(list(pool.map(lambda part: part @ block, parts)))
 
-        return gram_by_products(multiply, nodes, u.reshape(len(nodes), -1), width_of_gram(len(nodes)))
+        return gram_by_products(multiply, nodes, u.reshape(len(nodes), -1), len(nodes))
 
 
-def width_of_gram(n_nodes: int) -> int:
-    """Return how many columns are multiplied by M_s at a time."""
-    return max(16, int(GRAM_BYTES / (8 * n_nodes)))
-
-
-def gram_by_products(multiply: Callable[[Array], Array], nodes: Array, columns: Array, width: int) -> Array:
-    """Return Aᵀ M_s A with A = [1, X, columns] from products x -> M_s x of `width` columns at a time.
+def gram_by_products(multiply: Callable[[Array], Array], nodes: Array, columns: Array, n_rows: int) -> Array:
+    """Return Aᵀ M_s A with A = [1, X, columns] from products x -> M_s x of a few columns at a time.
 
     Parameters
     ----------
     nodes, columns
         Rows of X and of u_x, u_y, u_z for all nodes. On one of several ranks: for its own nodes; the results of all
         ranks are then summed.
+    n_rows
+        Number of rows of M_s, on all ranks.
     """
     n_nodes, k = columns.shape
+    width = max(16, int(GRAM_BYTES / (8 * n_rows)))
     linear = np.hstack([np.ones((n_nodes, 1)), nodes])
     gram = np.zeros((4 + k, 4 + k))
     first = linear.T @ multiply(linear)
@@ -327,16 +355,15 @@ def spread_mass_gram(M_s: SpreadMatrix, nodes: Array, u: Any) -> Array:
     columns, places = spread_columns(layout, u), spread_columns(M_s.layout, nodes)
     if not columns.layout.is_like(layout):
         raise BodyError(f"mass_gram: u, {columns.shape}: its rows are distributed differently from those of M_s")
-    width = width_of_gram(len(nodes))
-    return np.asarray(np.sum(M_s.layout.ask(gram_here, M_s.key, places.part, columns.part, width), axis=0))
+    return np.asarray(np.sum(M_s.layout.ask(gram_here, M_s.key, places.part, columns.part, len(nodes)), axis=0))
 
 
-def gram_here(ranks: Ranks, key: str, nodes: Part, u: Part, width: int) -> Array:
+def gram_here(ranks: Ranks, key: str, nodes: Part, u: Part, n_rows: int) -> Array:
     """Return the contribution of this rank's rows to Aᵀ M_s A."""
     product: RowsProduct = ranks.store[key]
     own = own_part(ranks, u)
     columns = np.ascontiguousarray(own).reshape(product.n_own, 3 * own.shape[1])
-    return gram_by_products(product.__matmul__, own_part(ranks, nodes), columns, width)
+    return gram_by_products(product.__matmul__, own_part(ranks, nodes), columns, n_rows)
 
 
 def node_volumes(mesh: Mesh) -> Array:
@@ -357,9 +384,9 @@ def node_volumes(mesh: Mesh) -> Array:
 
 
 def provenance(
-    mesh: Mesh, materials: tuple[AnyMaterial, ...], of_cell: Mapping[str, IntArray], *, incompatible_modes: bool
+    mesh: Mesh, materials: tuple[AnyMaterial, ...], of_cell: Mapping[str, IntArray], rules: Mapping[str, Any]
 ) -> dict[str, str]:
-    """Return the origin of the body: mesh, digest, elements, materials and the version of scikit-fem."""
+    """Return the origin of the body: mesh, digest, elements, materials, version of scikit-fem, and unusual rules."""
     record = {"mesh": mesh.source, "mesh sha256": mesh.digest, "nodes": str(len(mesh.nodes))}
     record |= {f"file {path}": digest for path, digest in mesh.included.items()}
     record |= dict(mesh.origin)
@@ -370,8 +397,10 @@ def provenance(
     if len(materials) > 1:
         record["stress where materials meet"] = 'of the stiffest; of each with stress_points = "borders"'
     record["scikit-fem"] = version("scikit-fem")
-    if incompatible_modes and len(mesh.cells.get(KIND, ())):
+    if rules["incompatible"] and len(mesh.cells.get(KIND, ())):
         record[f"cells {KIND} with"] = "incompatible modes"
+    record["integration of the stiffness"] = rules["integration"] if rules["integration"] != "full" else ""
+    record["mass of the cells"] = rules["mass"] if rules["mass"] != "consistent" else ""
     return {key: value for key, value in record.items() if value}
 
 

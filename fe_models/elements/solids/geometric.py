@@ -17,7 +17,7 @@ import scipy.sparse as sp
 from fe_models.body.material import AnyMaterial
 from fe_models.elements.solids.assembly_on_ranks import MeshPart, SpreadMesh
 from fe_models.elements.solids.elements import ShapeTable, reference_element
-from fe_models.elements.solids.incompatible import KIND, brick_chunks, brick_operators, brick_stiffness, gradient_stress
+from fe_models.elements.solids.incompatible import KIND, brick_chunks, brick_operators, gradient_stress
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
 from fe_models.foundation.ranks.product import Halo
@@ -32,7 +32,7 @@ from fe_models.meshes.mesh import Mesh
 
 __all__ = [
     "MANY_COLUMNS",
-    "internal_forces",
+    "integrated_cells",
     "projected_geometric_stiffness",
     "scalar_geometric_matrices",
     "sparse_geometric_stiffness",
@@ -200,42 +200,6 @@ def _of_bricks(nodes: Array, cells: IntArray, tensors: Array, u: Array, Phi: Arr
         for j in range(len(K)):
             K[j] += H.reshape(-1, n).T @ (sigma[..., j] @ H).reshape(-1, n)
     return (K + K.transpose(0, 2, 1)) / 2
-
-
-def internal_forces(
-    mesh: Mesh,
-    materials: tuple[AnyMaterial, ...],
-    of_cell: Mapping[str, IntArray],
-    u: Array,
-    *,
-    nodes: IntArray | None = None,
-    incompatible: bool = False,
-    integration: str = "full",
-) -> Array:
-    """Return ∫ sigma grad N dV at the points of the geometric stiffness, (3 n_nodes, k); zero except at `nodes`."""
-    from fe_models.elements.solids.geometric_kernels import add_internal_forces
-
-    fields = np.ascontiguousarray(u).reshape(len(mesh.nodes), 3, -1)
-    forces = np.zeros(fields.shape)
-    tensors = np.array([material.stiffness for material in materials])
-    wanted = np.ones(len(mesh.nodes), dtype=bool)
-    if nodes is not None:
-        wanted[:] = False
-        wanted[nodes[nodes < len(wanted)]] = True
-    for kind in mesh.cells:
-        if incompatible and kind == KIND:
-            own = wanted[mesh.cells[kind]].any(axis=1)
-            for rows, dofs in brick_chunks(mesh.cells[kind][own]):
-                K = brick_stiffness(mesh.nodes[mesh.cells[kind][own][rows]], tensors[of_cell[kind][own][rows]])
-                np.add.at(forces.reshape(3 * len(mesh.nodes), -1), dofs, K @ np.asarray(u)[dofs])
-            continue
-        for cells, material, table in integrated_cells(mesh, kind, of_cell, integration):
-            own = wanted[cells].any(axis=1)
-            add_internal_forces(
-                mesh.nodes, cells[own], material[own], tensors, table.gradients, table.weights, fields, forces
-            )
-    forces[~wanted] = 0.0
-    return forces.reshape(3 * len(mesh.nodes), -1)
 
 
 def integrated_cells(

@@ -1,13 +1,12 @@
 """Interfaces of a meshed body at selected nodes: rigid, distributing, or with the dofs of every node."""
 
-from collections.abc import Callable, Sequence
-from itertools import combinations
+from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fe_models.body.couplings.couplings import RANK_TOLERANCE
+from fe_models.body.couplings.couplings import require_spread
 from fe_models.body.fe_body import Interface
 from fe_models.errors import InterfaceError
 from fe_models.foundation.arrays import Array, IntArray
@@ -16,7 +15,7 @@ from fe_models.meshes.mesh import Mesh
 from fe_models.meshes.objects.as_mesh import selectable
 from fe_models.meshes.selections import Selection, selected_facets
 
-__all__ = ["check_overlap", "distributing_interface", "nodes_interface", "rigid_interface"]
+__all__ = ["distributing_interface", "nodes_interface", "rigid_interface"]
 
 Chosen = TypeVar("Chosen")
 
@@ -52,7 +51,7 @@ def rigid_interface(
     """
     mesh = selectable(mesh)
     nodes = _chosen(name, lambda: selection.members(mesh))
-    _require_spread(name, "rigid", mesh.nodes[nodes], np.ones(len(nodes)))
+    require_spread(name, "rigid", mesh.nodes[nodes], np.ones(len(nodes)))
     return _interface(mesh, name, "rigid", nodes, selection, reference, triad)
 
 
@@ -97,7 +96,7 @@ def distributing_interface(
             f"interface {name!r}: the facets are so curved that nodes have negative weights; refine the mesh"
         )
     member_weights = np.maximum(weights[nodes], 0.0)
-    _require_spread(name, "distributing", mesh.nodes[nodes], member_weights)
+    require_spread(name, "distributing", mesh.nodes[nodes], member_weights)
     return _interface(mesh, name, "distributing", nodes, selection, reference, triad, member_weights)
 
 
@@ -125,57 +124,12 @@ def nodes_interface(
     return _interface(mesh, name, "nodes", _chosen(name, lambda: selection.members(mesh)), selection, reference, triad)
 
 
-def check_overlap(interfaces: Sequence[Interface], *, numbers: IntArray | None = None) -> None:
-    """Raise `InterfaceError` if two interfaces have the same name or share nodes; the message names pairs and counts.
-
-    Parameters
-    ----------
-    interfaces
-        All interfaces of one body.
-    numbers
-        The user's numbers of the nodes for the message, (n_nodes,); None or empty: the message uses indices.
-    """
-    shared = []
-    for first, second in combinations(interfaces, 2):
-        if first.name == second.name:
-            raise InterfaceError(f"interfaces: two are named {first.name!r}; give each its own name")
-        common = np.intersect1d(first.nodes, second.nodes)
-        if common.size:
-            node = common[0] if numbers is None or not numbers.size else numbers[common[0]]
-            shared.append(f"{first.name!r} and {second.name!r} share {common.size} nodes (first node {node})")
-    if shared:
-        raise InterfaceError(
-            f"interfaces: {'; '.join(shared)}; a node can follow only one interface: make the "
-            f"selections smaller, or join the two interfaces to one"
-        )
-
-
 def _chosen(name: str, choose: Callable[[], Chosen]) -> Chosen:
     """Return what a selection chooses; its error names the interface."""
     try:
         return choose()
     except InterfaceError as error:
         raise InterfaceError(f"interface {name!r}: {error}") from None
-
-
-def _require_spread(name: str, kind: str, positions: Array, weights: Array) -> None:
-    """Raise `InterfaceError` unless the weighted points span a plane, that is two radii of gyration above zero."""
-    where = f"interface {name!r}: {kind}"
-    weighted = positions[weights > 0]
-    if len(weighted) < 3:
-        raise InterfaceError(
-            f"{where}: expected at least 3 nodes that are not on one line, got {len(weighted)}; a "
-            f"single node carries no rotation: use kind 'nodes', or select more"
-        )
-    w = weights[weights > 0] / weights.sum()
-    radii = np.linalg.svd(np.sqrt(w)[:, None] * (weighted - w @ weighted), compute_uv=False)
-    if radii[0] == 0:
-        raise InterfaceError(f"{where}: its {len(weighted)} nodes are all at one place; merge coincident nodes")
-    if radii[1] <= RANK_TOLERANCE * radii[0]:
-        raise InterfaceError(
-            f"{where}: its {len(weighted)} nodes lie on one line (widths {radii[1]:.2g} and "
-            f"{radii[0]:.2g}), so the rotation about it is free; select nodes beside the line"
-        )
 
 
 def _interface(

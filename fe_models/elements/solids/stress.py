@@ -13,7 +13,7 @@ from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.threads import n_threads
 from fe_models.meshes.mesh import Mesh
 
-__all__ = ["nodal_stress", "stiffest_at_nodes"]
+__all__ = ["nodal_stress"]
 
 
 def nodal_stress(
@@ -40,7 +40,7 @@ def nodal_stress(
     of_cell
         Index of the material of each cell, (n_cells,), by cell type.
     of_node
-        Index of the material whose stress each node shows, (n_nodes,); see `stiffest_at_nodes`.
+        Index of the material whose stress each node shows, (n_nodes,); see `SolidModel.of_node`.
     u
         Displacement columns, dof 3 i + c is component c of node i, (3 n_nodes, k).
     nodes
@@ -119,18 +119,3 @@ def add_brick_stress(nodes: Array, cells: IntArray, tensors: Array, shows: Array
         sigma = gradient_stress(B @ u[dofs][:, None], tensors[rows])[:, :, VOIGT]
         at_nodes = np.einsum("ap,npsk,n->nask", to_nodes, sigma, volumes.sum(axis=1), optimize=True)
         np.add.at(stress, cells[rows][shows[rows]], at_nodes[shows[rows]])
-
-
-def stiffest_at_nodes(mesh: Mesh, materials: tuple[AnyMaterial, ...], of_cell: Mapping[str, IntArray]) -> IntArray:
-    """Return for each node the material with the largest modulus among its elements, (n_nodes,); ties take the first.
-
-    Stress jumps where materials meet, and one value per node can show one side only. The stiffer side usually has the
-    larger stress, and a fixed choice keeps the stress linear in the displacement.
-    """
-    order = np.argsort([-material.E for material in materials], kind="stable")
-    rank = np.empty(len(materials), np.int64)
-    rank[order] = np.arange(len(materials))
-    best = np.full(len(mesh.nodes), len(materials), np.int64)
-    for kind, cells in mesh.cells.items():
-        np.minimum.at(best, cells.ravel(), np.repeat(rank[of_cell[kind]], cells.shape[1]))
-    return order[np.minimum(best, len(materials) - 1)]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from fe_models.body.couplings.couplings import couple
+from fe_models.body.couplings.couplings import check_overlap, couple
 from fe_models.body.fe_body import Interface
 from fe_models.body.kept_nodes import keep_nodes
 from fe_models.body.weld import weld
@@ -16,7 +16,6 @@ from fe_models.elements.beams.sections import Rectangle
 from fe_models.elements.shells.body import shell_body
 from fe_models.elements.shells.shell_property import ShellProperty
 from fe_models.elements.solids.body import solid_body
-from fe_models.elements.solids.interfaces import check_overlap
 from fe_models.errors import BodyError, InterfaceError, MeshError
 from fe_models.files.matrices.given import body_from_matrices
 from fe_models.files.tables import read_tables

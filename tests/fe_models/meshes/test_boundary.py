@@ -7,13 +7,12 @@ from fe_models.meshes.boundary import (
     area_centroid,
     boundary_facets,
     boundary_triangles,
-    face_triangles,
     facet_weights,
     first_of_equal_rows,
 )
 from fe_models.meshes.cell_shapes import CELL_SHAPES, cell_jacobians, quadrature, shape_values
 from fe_models.meshes.mesh import Mesh
-from tests.fe_models.small_meshes import SOLID_TYPES, faced_box
+from tests.fe_models.small_meshes import SOLID_TYPES, cell_mesh, faced_box
 
 ROUNDOFF = 1e-12
 BOX_AREA = 2 * (2 * 1 + 2 * 1.5 + 1 * 1.5)
@@ -99,16 +98,15 @@ def test_boundary_of_a_mixed_mesh_hides_the_facets_between_cell_types():
     assert_allclose(enclosed_volume(mesh.nodes, boundary_triangles(mesh)), 2.0, rtol=100 * ROUNDOFF, atol=0)
 
 
-@pytest.mark.parametrize("kind", ["triangle", "triangle6", "quad", "quad8", "quad9"])
-def test_drawing_triangles_cover_a_flat_face_once(kind):
-    shape = CELL_SHAPES[kind]
-    nodes = np.column_stack([shape.nodes, np.zeros(len(shape.nodes))])
-    triangles = face_triangles({kind: np.arange(len(shape.nodes))[None]})
-    a, b, c = (nodes[triangles[:, k]] for k in range(3))
-    areas = np.cross(b - a, c - a)[:, 2] / 2
-    assert (areas > 0).all()
-    assert_allclose(areas.sum(), 0.5 if kind.startswith("tri") else 1.0, rtol=ROUNDOFF, atol=0)
-    assert_array_equal(np.unique(triangles), np.arange(len(shape.nodes)))
+@pytest.mark.parametrize("kind", SOLID_TYPES)
+def test_drawing_triangles_cover_the_flat_faces_of_a_cell_once(kind):
+    mesh = cell_mesh(kind)
+    triangles, facets = boundary_triangles(mesh), boundary_facets(mesh)
+    a, b, c = (mesh.nodes[triangles[:, k]] for k in range(3))
+    areas = np.cross(b - a, c - a) / 2
+    assert (np.einsum("td,td->t", areas, a - mesh.nodes.mean(axis=0)) > 0).all()
+    assert_allclose(np.linalg.norm(areas, axis=1).sum(), area_centroid(mesh.nodes, facets)[0], rtol=ROUNDOFF, atol=0)
+    assert_array_equal(np.unique(triangles), np.unique(np.concatenate([rows.ravel() for rows in facets.values()])))
 
 
 def test_corners_of_flat_quadratic_triangles_weigh_nothing_and_middles_a_third():
