@@ -32,6 +32,8 @@ BEAM = "CBEAM,1,1,1,2,.1,.2,1.\nPBEAM,1,1,2.-3,3.-6,1.-6,,2.-6,.5"
 SHELL_3, SHELL_4 = "CTRIA3,1,1,1,2,3,,.02\nPSHELL,1,1,.05,1,,1,,2.", "CQUAD4,1,1,1,2,3,4,,.02\nPSHELL,1,1,.05,1,,1,,2."
 LAID = "CQUAD4,1,1,1,2,3,4,20.\nPCOMP,1,-.03,1.,,,,,\n,3,.02,30.,,1,.03,"
 FRAME = "CBAR,1,1,1,2,.1,.2,1.\nCBAR,2,1,3,4,.1,.2,1.\nPBAR,1,1,2.-3,3.-6,1.-6,2.-6\nRBE2,99,2,123456,3\n"
+WELD = "CTRIA3,1,1,1,2,3\nCTRIA3,2,1,5,6,7\nPSHELL,1,1,.05,1,,1\nGRID,33,,1.4,.4,.1\nGRID,34,,1.4,.4,.9\n"
+WELD += "GRID,35,,1.3,.4,.5\nCWELD,9,9,35,ELEMID,,,,7\n,1,2\nPWELD,9,1,.3"
 TWO = "CBAR,1,1,1,2,.1,.2,1.\nCBAR,2,1,9,4,.1,.2,1.\nPBAR,1,1,2.-3,3.-6,1.-6,2.-6\n"
 TWO += "GRID,9,,2.,0.,.1\nGRID,10,,2.,0.,.1\n"
 
@@ -68,6 +70,10 @@ READ: dict[str, tuple[str, dict[str, str | None]]] = {
         SHELL_4,
         {"PID": None, "MID1": None, "T": ".06", "MID2": "2", "12I/T**3": "1.5", "MID3": "2", "TS/T": ".5", "NSM": "3.",
          "MID4": "4"},
+    ),
+    "CWELD": (WELD, {"EWID": None, "PWID": None, "GS": "1", "TYPE": "ALIGN", "GA": "33", "GB": "34", "SPTYP": None}),
+    "PWELD": (
+        WELD, {"PID": None, "MID": "2", "D": ".25", "TYPE": "SPOT", "LDMIN": "4.", "LDMAX": ".5"}
     ),
     "PLPLANE": (
         "CTRIA3,1,9,1,3,4\nPLPLANE,9,1\nSPC1,1,345,1,3,4", {"PID": None, "MID": "2", "CID": "7", "T": ".1"}
@@ -324,7 +330,7 @@ def test_every_field_changes_the_body_or_is_refused(tmp_path, name):
 
 
 @pytest.mark.parametrize(
-    "card", ["RSSCON,5,ELEM,1,2", "BGSET,1,1,2", "CWELD,1,2", "NEWCARD,1", "MATT1,1,5", "DMIG,K2,0,6,1"]
+    "card", ["RSSCON,5,ELEM,1,2", "BGSET,1,1,2", "CFAST,1,2", "NEWCARD,1", "MATT1,1,5", "DMIG,K2,0,6,1"]
 )
 def test_a_card_that_is_neither_read_nor_harmless_is_refused_by_name(tmp_path, card):
     assert f"1 {card.split(',')[0]}: this card is not known here" in model_of(tmp_path, f"{BAR}\n{card}")
