@@ -54,6 +54,7 @@ CARDS: dict[str, str] = {
     "CBUSH1D": "EID PID GA GB CID", "PBUSH1D": "PID K C M - SA~ SE~ ...^",
     "CGAP": "EID PID GA GB GO/X1~ X2~ X3~ CID", "PGAP": "PID U0 F0~ KA KB KT MU1 MU2~ TMAX~ MAR~ TRMIN~",
     "CWELD": "EWID PWID GS TYPE GA GB SPTYP MCID~ ...", "PWELD": "PID MID D - - MSET~ - TYPE LDMIN LDMAX",
+    "CSHEAR": "EID PID G1 G2 G3 G4", "PSHEAR": "PID MID T NSM F1 F2",
     "CELAS1": "EID PID G1 C1 G2 C2", "CELAS2": "EID K G1 C1 G2 C2 GE^ S~",
     "PELAS": "PID1 K1 GE1^ S1~ PID2 K2 GE2^ S2~",
     "CDAMP1": "EID PID G1 C1 G2 C2", "CDAMP2": "EID B G1 C1 G2 C2",
@@ -116,7 +117,7 @@ NOMINAL = {
     "PELAST": "the constant stiffness of its PELAS is taken",
     "PBUSHT": "the constants of its PBUSH are taken",
     "PDAMPT": "the constant damping of its PDAMP is taken",
-    "MDLPRM": "parameters of the program are not looked at",
+    "MDLPRM": "parameters of the program are not looked at, except SHEARP",
 }
 
 

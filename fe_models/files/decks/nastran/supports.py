@@ -10,7 +10,8 @@ __all__ = ["hold_points", "in_basic", "make_supports", "selected_sets"]
 
 MOST_AXES = 50  #: largest number of different axes of supports; each becomes an interface of the job
 AXES_DIGITS = 7  #: digits in which equal axes agree
-JOINING = ("CROD", "CTUBE")  #: further elements that must lie in the plane of a planar deck
+#: further elements that must lie in the plane of a planar deck -> grid points
+JOINING = {"CROD": 2, "CTUBE": 2, "CSHEAR": 4, "CBEND": 2}
 
 
 def hold_points(model: NastranModel, *, find_plane: bool = True) -> None:
@@ -53,7 +54,7 @@ def _find_plane(model: NastranModel) -> None:
     points: set[int] = set()
     for name in (*ELEMENT_TYPES, *JOINING):
         for card in model.cards.get(name, ()):
-            widest = max(ELEMENT_TYPES.get(name, {2: ""}))
+            widest = JOINING[name] if name in JOINING else max(ELEMENT_TYPES[name])
             words = [card.text(k) for k in range(3, 3 + widest)]
             points |= {int(word) for word in words if word.isdigit() and int(word) in model.points.positions}
     for normal in range(3):

@@ -103,3 +103,15 @@ def tip_flexibility(body):
     """Return the motions of GB by loads there, (6, 6), along the axes of the bar; GA is held."""
     T = np.kron(np.eye(2), axes_of(GB - GA, V))
     return T @ np.linalg.inv(condensed(body, (GA, GB))[6:, 6:]) @ T.T
+
+
+def added_matrices(tmp_path, text, further, points):
+    """Return what further cards add to K and M of a deck, by the six components of the nodes at points."""
+    parts = []
+    for name, whole in (("with", text + further), ("without", text)):
+        folder = tmp_path / name
+        folder.mkdir(parents=True)
+        body, _ = body_of(folder, whole, is_coupled=True)
+        at = dofs_of(body, points)
+        parts.append([matrix.toarray()[np.ix_(at, at)] for matrix in (body.K, body.M)])
+    return [ours - theirs for ours, theirs in zip(*parts, strict=True)]
