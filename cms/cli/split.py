@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,9 +16,10 @@ from cms.errors import JobError
 from cms.jobs.job import Job, read_job
 from cms.jobs.reduction_table import FRAMES, named_interfaces
 from fe_models.foundation.paths import replace_file
-from fe_models.foundation.stages import Stages
+from fe_models.foundation.units import UNIT_SYSTEMS
 
 if TYPE_CHECKING:
+    from cms.jobs.part_damping import PartsDamping
     from fe_models.meshes.split import Cut
 
 __all__ = ["SplitRequest", "direction_of", "places_of", "split_job"]
@@ -25,7 +27,6 @@ __all__ = ["SplitRequest", "direction_of", "places_of", "split_job"]
 log = logging.getLogger(__name__)
 
 CUT_KINDS = ("rigid", "distributing")
-LISTED = 6.0  #: highest frequency, over the first one of the whole body, up to which damping in parts is listed
 COORDINATE = 1e-9  #: largest difference between coordinates of the same node, relative to the mesh size
 
 
@@ -75,6 +76,7 @@ def split_job(request: SplitRequest) -> list[Path]:
     """
     import tomlkit
 
+    from cms.reduction.basis.strain_damping import strain_damping_bytes
     from fe_models.meshes.split import split_mesh
 
     job = read_job(request.job)
@@ -89,8 +91,7 @@ def split_job(request: SplitRequest) -> list[Path]:
     split = split_mesh(mesh, request.n, at=request.at, axis=request.axis)
     names_of_cuts = [cut.name for cut in split.cuts]
     homes = homes_of(job, mesh, split.parts, names_of_cuts)
-    stiff = stiffness_damping(job)
-    files: dict[Path, str] = {}
+    documents = []
     for k, part in enumerate(split.parts):
         document = tomlkit.parse(request.job.read_text(encoding="utf-8-sig"))
         edit_job(
@@ -99,67 +100,88 @@ def split_job(request: SplitRequest) -> list[Path]:
             cuts=[split.cuts[j] for j in (k - 1, k) if 0 <= j < len(split.cuts)],
             inside=[name for name, home in homes.items() if home == k],
         )  # fmt: skip
-        if stiff is not None:
+        documents.append(document)
+    damping = parts_damping(job, [text_without_damping(document, job) for document in documents], split.parts)
+    files: dict[Path, bytes] = {}
+    dampings: dict[Path, bytes] = {}
+    for k, document in enumerate(documents, 1):
+        if damping is not None:
+            path = folder / f"part_{k}_damping.npz"
             table = tomlkit.table()
-            table.add(tomlkit.comment(stiff.words))
-            table["beta"] = stiff.beta
+            table.add(tomlkit.comment(description_of(damping, job)))
+            table["file"] = path.name
             document["damping"] = table
-        files[folder / f"part_{k + 1}.toml"] = tomlkit.dumps(document)
-    files[folder / "system.toml"] = system_text(job, len(split.parts))
-    if stiff is not None:
-        log.warning("damping: %s", stiff.words)
+            dampings[path] = strain_damping_bytes(damping.parts[k - 1])
+        files[folder / f"part_{k}.toml"] = tomlkit.dumps(document).encode()
+    files[folder / "system.toml"] = system_text(job, len(split.parts)).encode()
+    if damping is not None:
+        log.warning("damping: %s", description_of(damping, job))
     folder.mkdir(parents=True, exist_ok=True)
-    for path, text in files.items():
-        replace_file(path, text.encode())
+    for path, content in {**dampings, **files}.items():
+        replace_file(path, content)
     return list(files)
 
 
-@dataclass(frozen=True)
-class StiffnessDamping:
-    """Damping of the parts, in place of modal damping ratios of the whole body."""
+def text_without_damping(document: Any, job: Job) -> str:
+    """Return the job of a part with absolute paths and without damping."""
+    import tomlkit
 
-    beta: float  #: D = beta K, in the unit of time of the job
-    words: str
+    copy = tomlkit.parse(tomlkit.dumps(document))
+    copy.pop("damping", None)
+    for key in ("mesh", "nodes", "lines"):
+        if key in copy["body"]:
+            copy["body"][key] = os.path.abspath(getattr(job.body, key))
+    return tomlkit.dumps(copy)
 
 
-def stiffness_damping(job: Job) -> StiffnessDamping | None:
-    """Return D = beta K with the damping ratio of the first elastic mode of the whole body.
+def parts_damping(job: Job, texts: list[str], parts: "tuple[Any, ...]") -> "PartsDamping | None":
+    """Return the damping with which the body in parts keeps the damping ratios of a job; None if the job has none.
 
-    None if the job has no ratios.
-
-    Ratios belong to the modes of one body. The modes of a part lie far above the first modes of the whole, so ratios of
-    the parts would damp the latter far too little. D = beta K is the same for the parts and for the whole, and mode k
-    of the whole has the ratio beta omega_k / 2. Ratios of the whole need D = M Phi diag(2 zeta omega) Phi^T M, which
-    couples nodes of different parts; no sum of matrices of single parts has these terms.
+    Parameters
+    ----------
+    texts
+        Jobs of the parts without damping, with absolute paths.
+    parts
+        Meshes of the parts.
     """
-    from cms.jobs.body_of_job import job_body
-    from cms.linear_algebra.solvers.mode_count import ModeCount
-    from cms.modes.families.families import Families
+    from cms.jobs.body_of_job import is_of_mesh, job_body
+    from cms.jobs.part_damping import damping_of_parts
     from cms.reduction.basis.damping import PerModeDamping, RayleighDamping, damping_ratios
+    from cms.reduction.basis.strain_damping import StrainDamping
 
     damping = None if job.damping is None else job.damping.damping
-    if damping is None or isinstance(damping, RayleighDamping):
+    if damping is None or isinstance(damping, RayleighDamping | StrainDamping):
         return None
-    whole = job_body(job, Stages())
-    with Families(whole, solver=job.reduction.solver) as families:
-        first = float(families.free_modes(1).frequencies[0])
-        omega = np.sqrt(families.free_modes(ModeCount(cutoff=LISTED * first)).omega2)
-    if isinstance(damping, PerModeDamping):
-        ratios = np.array([damping.ratios[min(k, len(damping.ratios) - 1)] for k in range(len(omega))])
-    else:
-        ratios = damping_ratios(damping, np.ones(len(omega)), omega**2, whole.units.time)
-    beta = float(2 * ratios[0] / omega[0])
-    hertz = omega / (2 * np.pi * whole.units.time)
+    bodies = []
+    with TemporaryDirectory() as folder:
+        for text, mesh in zip(texts, parts, strict=True):
+            path = Path(folder) / "part.toml"
+            path.write_text(text, encoding="utf-8")
+            part = read_job(path)
+            bodies.append(job_body(part, mesh=mesh if is_of_mesh(part) else None))
+
+    def ratios(omega2: np.ndarray) -> np.ndarray:
+        if isinstance(damping, PerModeDamping):
+            return np.array([damping.ratios[min(k, len(damping.ratios) - 1)] for k in range(len(omega2))])
+        return damping_ratios(damping, np.ones(len(omega2)), omega2, bodies[0].units.time)
+
+    held = job.reduction.at if job.reduction.frame == "nodal" else None
+    return damping_of_parts(bodies, ratios, held=held, solver=job.reduction.solver)
+
+
+def description_of(found: "PartsDamping", job: Job) -> str:
+    """Return the ratios of the modes of the whole body in parts."""
+    second = UNIT_SYSTEMS[job.body.units].time
     listed = "; ".join(
-        f"{k}: {f:.4g} Hz, {zeta:.3g} for {wanted:.3g}"
-        for k, (f, zeta, wanted) in enumerate(zip(hertz, beta * omega / 2, ratios, strict=True), 1)
+        f"{k}: {mode.frequency / second:.4g} Hz, {mode.ratio:.3g} for {mode.wanted:.3g}"
+        for k, mode in enumerate(found.modes, 1)
     )
-    words = (
-        f"ratios belong to modes of one body: the parts have stiffness damping (beta); the first elastic "
-        f"mode of {job.body.name!r} in one piece keeps its ratio {ratios[0]:.3g}, the ratios of others are "
-        f"proportional to their frequency (mode: frequency, ratio in parts for ratio of the job): {listed}"
+    kept = "all these modes" if found.n_exact == len(found.modes) else f"the first {found.n_exact} modes"
+    others = "" if found.n_exact == len(found.modes) else ", others are too alike in the parts: fewer parts keep more"
+    return (
+        f"ratios belong to modes of one body: the parts have dampings of their own, with which {kept} of "
+        f"{job.body.name!r} keep theirs{others} (mode: frequency, ratio in parts for ratio of the job): {listed}"
     )
-    return StiffnessDamping(beta, words)
 
 
 def mesh_of(job: Job) -> Any:

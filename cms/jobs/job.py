@@ -432,7 +432,7 @@ class Job(Table):
     recovery: dict[str, RecoverySection] = Field({}, description="tables [recovery.NAME] with rows")
     reduction: ReductionSection = Field(description="a table [reduction] with set and n_modes or cutoff")
     damping: DampingSection | None = Field(
-        None, description="a table [damping] with ratio, ratios, ramp, or alpha and beta"
+        None, description="a table [damping] with ratio, ratios, ramp, alpha and beta, or file"
     )
 
     @property

@@ -22,6 +22,7 @@ from cms.reduction.basis.damping import (
     RampDamping,
     RayleighDamping,
 )
+from cms.reduction.basis.strain_damping import StrainDamping, read_strain_damping
 from fe_models.foundation.arrays import MOTION_COMPONENTS
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.tasks.task_map import WorkerError
@@ -412,7 +413,7 @@ def ramp_steps(value: Any) -> tuple[tuple[float, float], ...]:
 
 
 class DampingSection(Table):
-    """[damping]: ratios of the modes, or Rayleigh damping."""
+    """[damping]: ratios of the modes, Rayleigh damping, or that of a part of a body."""
 
     ratio: Ratio | None = Field(None, description="a number, 0 to 1, of critical damping (0.01 is 1 %)")
     ratios: Annotated[tuple[float, ...], BeforeValidator(ratio_list, json_schema_input_type=Any)] | None = Field(
@@ -424,20 +425,30 @@ class DampingSection(Table):
     above: Ratio | None = Field(None, description="a number, 0 to 1, the ratio above the last step of the ramp")
     alpha: Coefficient | None = Field(None, description="a number, 0 or more, of D = alpha M + beta K")
     beta: Coefficient | None = Field(None, description="a number, 0 or more, of D = alpha M + beta K")
+    file: Path | None = Field(
+        None, description="the path of the damping of a part, which cms split writes, relative to the job"
+    )
+
+    @field_validator("file", mode="before")
+    @classmethod
+    def _file_beside_the_job(cls, value: Any, info: ValidationInfo) -> Path:
+        return NeighbourSection._beside_the_job(value, info)
 
     @model_validator(mode="after")
     def _one_kind(self) -> "DampingSection":
-        given = [key for key in ("ratio", "ratios", "ramp", "alpha", "beta") if getattr(self, key) is not None]
+        given = [key for key in ("ratio", "ratios", "ramp", "alpha", "beta", "file") if getattr(self, key) is not None]
         if len({"rayleigh" if key in ("alpha", "beta") else key for key in given}) != 1:
             got = " and ".join(given) or "none of them"
-            raise ValueError(f"expected either ratio, ratios, ramp, or alpha and beta; got {got}")
+            raise ValueError(f"expected either ratio, ratios, ramp, alpha and beta, or file; got {got}")
         if self.above is not None and self.ramp is None:
             raise ValueError(f"above belongs to ramp; got {given[0]}")
         return self
 
     @property
-    def damping(self) -> Damping:
+    def damping(self) -> Damping | StrainDamping:
         """The damping that the table describes."""
+        if self.file is not None:
+            return read_strain_damping(self.file)
         if self.ratio is not None:
             return ModalDamping(self.ratio)
         if self.ratios is not None:

@@ -26,6 +26,7 @@ from cms.reduction.basis.node_motion import (
     translation_rows,
     weighted_rigid_modes,
 )
+from cms.reduction.basis.strain_damping import StrainDamping
 from cms.reduction.basis.stress_modes import nodal_stress_modes, point_stress_modes
 from cms.reduction.geometric_stiffness.geometric_reduction import stiffness_of_states
 from cms.reduction.geometric_stiffness.quadratic_modes import quadratic_modes
@@ -66,7 +67,7 @@ def reduce(
     modes: ModeSet,
     *,
     frame: Frame | HeldFrame | None = None,
-    damping: Damping | None = None,
+    damping: Damping | StrainDamping | None = None,
     stress: bool = True,
     geometric: bool | UnitStates | None = None,
     quadratic: bool = False,
@@ -170,7 +171,7 @@ def assembled(
     *,
     kept: IntArray,
     moments: Moments,
-    damping: Damping | None = None,
+    damping: Damping | StrainDamping | None = None,
 ) -> ReducedBody:
     """Return the reduced body of a finished basis at the kept nodes, without stress and second-order terms.
 
@@ -339,20 +340,22 @@ def reduced_interface(
     )
 
 
-def reduced_damping(body: FEBody, finished: FinishedBasis, damping: Damping | None) -> Array:
-    """Return D* = Phiᵀ D Phi plus the modal or Rayleigh damping, (n_q, n_q) [1/s]."""
+def reduced_damping(body: FEBody, finished: FinishedBasis, damping: Damping | StrainDamping | None) -> Array:
+    """Return D* = Phiᵀ D Phi plus the modal or Rayleigh damping, or that of strain patterns, (n_q, n_q) [1/s]."""
     D = np.zeros_like(finished.K)
     if body.D is not None:
         Phi = in_memory(finished.Phi)
         D += Phi.T @ (body.D @ Phi)
         D = (D + D.T) / 2
-    if damping is not None:
+    if isinstance(damping, StrainDamping):
+        D += damping.reduced(body, finished.Phi, finished.K)
+    elif damping is not None:
         D += modal_damping(damping, finished.M, finished.K, second=body.units.time)
     return D
 
 
 def reduction_provenance(
-    body: FEBody, modes: ModeSet, finished: FinishedBasis, damping: Damping | None
+    body: FEBody, modes: ModeSet, finished: FinishedBasis, damping: Damping | StrainDamping | None
 ) -> Mapping[str, str]:
     """Return the sources of the reduced body, and the versions of the programs."""
     versions = {f"version {name}": metadata.version(name) for name in ("numpy", "scipy")}

@@ -4,17 +4,19 @@ import re
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+import scipy.linalg as la
+from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
 import cms
 from cms.cli.app import app
 from cms.cli.split import SplitRequest, split_job
-from cms.errors import JobError
+from cms.errors import CmsError, JobError
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
 from cms.modes.families.families import Families
 from cms.pipeline import reduce_job
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from floatframe import GeneralizedAlpha, integrate, linearize, static_equilibrium, system_modes
 from floatframe.files.system_file.read_system import read_system
 from floatframe.results.place_motion import interface_motion
@@ -147,37 +149,138 @@ def test_a_beam_of_stiffened_parts_spins_up_as_the_whole_one(beam):
     assert_allclose(tips[1], tips[0], rtol=0, atol=2e-4)
 
 
-@pytest.mark.parametrize(
-    "table", ["ratio = 0.03", "ratios = [0.03, 0.5]", "ramp = [[2000, 0.03]]\nabove = 0.2", "beta = 1e-5"]
-)
-def test_the_first_mode_keeps_its_damping_in_parts(beam, caplog, table):
-    """In one piece D = beta K has the same modes: ratio beta omega / 2, of which the first is what was asked for."""
-    job = beam(n_modes=8)
+def with_damping(job, table, frame="tisserand"):
+    """The mast without its bob, with a damping table."""
     text = job.read_text()
     text = text[: text.index("[masses.bob]")] + text[text.index("[load_cases") :]
+    if frame == "tisserand":
+        text = text.replace('frame = "nodal"\nat = "foot"', 'frame = "tisserand"')
     job.write_text(text + f"\n[damping]\n{table}\n")
-    files = split_job(SplitRequest(job, 3))
+    return job
+
+
+def told_modes(caplog):
+    """Mode, frequency [Hz], ratio in parts and ratio of the job, and the number of modes that keep it."""
+    (told,) = [text for text in caplog.messages if "ratios belong to modes of one body" in text]
+    rows = np.array(re.findall(r"(\d+): ([\d.e+]+) Hz, ([\d.e-]+) for ([\d.e-]+)", told), dtype=float)
+    first = re.search(r"with which the first (\d+) modes", told)
+    return rows, len(rows) if first is None else int(first[1])
+
+
+def modes_in_parts(files, held=False):
+    """Frequencies and damping ratios of the joined parts, free or with the foot on the ground."""
+    if held:
+        files[-1].write_text(
+            files[-1].read_text()
+            + '\n[joints.foot]\ntype = "fixed"\nbody_a = "ground"\nbody_b = "mast_1"\nmarker_b = "foot"\n'
+        )
     system = reduced_parts(files)
     modes = system_modes(linearize(system, static_equilibrium(system)))
-    elastic = np.asarray(modes.frequencies) > 1.0
-    f, zeta = np.asarray(modes.frequencies)[elastic], np.asarray(modes.damping_ratios)[elastic]
+    f, zeta = np.asarray(modes.frequencies), np.asarray(modes.damping_ratios)
+    elastic = f > 1.0
+    return f[elastic], zeta[elastic]
+
+
+@pytest.mark.parametrize("frame", ["tisserand", "nodal"])
+@pytest.mark.parametrize(
+    ("table", "wanted"),
+    [
+        ("ratio = 0.03", [0.03] * 6),
+        ("ratios = [0.03, 0.02, 0.04, 0.03]", [0.03, 0.02, 0.04, 0.03, 0.03, 0.03]),
+        ("ramp = [[2000, 0.03]]\nabove = 0.2", [0.03] * 6),
+    ],
+)
+def test_modes_of_the_whole_keep_their_damping_ratios_in_parts(beam, caplog, table, wanted, frame):
+    """Of the same modes as the whole body's, free in mean axes, clamped where a nodal frame is attached."""
+    job = with_damping(beam(n_modes=14), table, frame)
+    files = split_job(SplitRequest(job, 3))
+    f, zeta = modes_in_parts(files, held=frame == "nodal")
     whole = reduce_job(read_job(job))
-    first = float(whole.free_frequencies[0])
-    wanted = 0.03 if table != "beta = 1e-5" else np.pi * 1e-5 * first
-    assert_allclose(zeta[:4], wanted * f[:4] / first, rtol=2e-2)
-    told = [text for text in caplog.messages if "ratios belong to modes of one body" in text]
-    assert len(told) == (table != "beta = 1e-5")
-    assert ("keeps its ratio 0.03" in files[0].read_text()) == bool(told)
-    if told:
-        modes_told = np.array(re.findall(r"(\d): ([\d.]+) Hz, ([\d.]+) for ([\d.]+)", told[0]), dtype=float)
-        assert_array_equal(modes_told[:, 0], range(1, 1 + int((np.array(whole.free_frequencies) < 6 * first).sum())))
-        assert_allclose(modes_told[:4, 1], f[:4], rtol=1e-2)
-        assert_allclose(modes_told[:4, 2], zeta[:4], rtol=2e-2)
-        asked = {"ratio": [0.03, 0.03], "ratios": [0.03, 0.5], "ramp": [0.03, 0.03]}[table.split()[0]]
-        assert_array_equal(modes_told[:2, 3], asked)
+    omega = np.sqrt(np.diag(whole.K))
+    assert_allclose(f[:6], omega[:6] / (2 * np.pi), rtol=1e-2)  # damping couples modes, which shifts |s|
+    assert_allclose(np.diag(whole.D)[:6] / (2 * omega[:6]), wanted, rtol=1e-12)  # what the job asks for
+    told, n_kept = told_modes(caplog)
+    assert n_kept >= 4
+    assert_allclose(zeta[:n_kept], wanted[:n_kept], rtol=5e-3)
+    assert_allclose(told[:6, 3], wanted, rtol=1e-2)
+    assert_allclose(told[:6, 2], zeta[:6], rtol=3e-2)
+    assert_allclose(told[:6, 1], omega[:6] / (2 * np.pi), rtol=3e-3)  # of the whole with 14 modes
 
 
-def test_a_body_of_fewer_modes_than_are_listed_is_split(beam, caplog):
+def test_the_error_of_the_ratios_in_parts_falls_with_more_modes(beam):
+    errors = []
+    for n_modes in (2, 6, 14):
+        files = split_job(SplitRequest(with_damping(beam(n_modes=n_modes), "ratio = 0.03"), 3))
+        _, zeta = modes_in_parts(files)
+        errors.append(np.abs(zeta[:4] / 0.03 - 1).max())
+    assert errors[0] > 4 * errors[1] > 16 * errors[2]
+    assert errors[2] < 1e-4
+
+
+def test_damping_of_a_part_is_semidefinite_and_leaves_rigid_motion_free(beam):
+    files = split_job(SplitRequest(with_damping(beam(n_modes=8), "ratio = 0.03"), 3))
+    for path in files[:-1]:
+        damping, body = read_job(path).damping.damping, job_body(read_job(path))
+        moved = rigid_motion_of_dofs(body.nodes, body.dofs, body.nodes.mean(axis=0))
+        size = np.abs(damping.forces).T @ np.abs(moved)
+        assert_allclose(damping.forces.T @ moved / size, 0, atol=1e-10)
+        reduced = reduce_job(read_job(path))
+        ratio = la.eigvalsh(reduced.D, reduced.K)  # beta and more, in every strain
+        assert ratio[0] > damping.beta * (1 - 1e-9)
+        assert ratio[-1] < 2.1 * 4 * damping.beta * 20
+
+
+def test_dampers_of_a_part_add_to_the_ratios(beam, caplog):
+    spring = (
+        '[springs.s]\nnodes = ["foot", "third"]\nstiffness = [0, 0, 0, 0, 0, 0]\ndamping = [0, 300, 300, 0, 0, 0]\n'
+    )
+    found = {}
+    for name, ratio in (("damper", 0), ("both", 0.03)):
+        job = with_damping(beam(n_modes=14, bob=3), f"ratio = {ratio}")
+        job.with_name("nodes.csv").write_text(job.with_name("nodes.csv").read_text().replace("bob", "third"))
+        job.write_text(job.read_text().replace("[load_cases.weight]", spring + "[load_cases.weight]"))
+        found[name] = modes_in_parts(split_job(SplitRequest(job, 3)))[1][:5]
+    assert found["damper"].max() > 1e-3
+    assert_allclose(found["both"], 0.03 + found["damper"], rtol=1e-2)
+
+
+def test_rayleigh_damping_of_the_whole_is_that_of_the_parts(beam, caplog):
+    job = with_damping(beam(n_modes=14), "beta = 1e-5")
+    files = split_job(SplitRequest(job, 3))
+    f, zeta = modes_in_parts(files)
+    assert_allclose(zeta[:4], np.pi * 1e-5 * f[:4], rtol=1e-3)
+    assert not [text for text in caplog.messages if "ratios" in text]
+    assert "beta = 1e-5" in files[0].read_text()
+
+
+def test_ratios_that_parts_cannot_have_are_told(beam, caplog):
+    """Twelve parts of one element each have too few strains: the first modes keep their ratios, others have more."""
+    job = with_damping(beam(n_modes=8), "ratio = 0.03")
+    files = split_job(SplitRequest(job, 12))
+    told, n_kept = told_modes(caplog)
+    _, zeta = modes_in_parts(files)
+    assert 1 <= n_kept < len(told)
+    assert_allclose(zeta[:n_kept], 0.03, rtol=1e-2)
+    assert_allclose(zeta[: len(told)], told[:, 2], rtol=5e-2)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda text: text.replace("at = [0.3", "at = [0.45"), "belongs to another body than 'mast_1': it has 18 dofs"),
+        (lambda text: text.replace("part_1_damping", "part_3_damping"), "belongs to another body than 'mast_1'"),
+        (lambda text: text.replace("part_1_damping.npz", "part_1.toml"), "expected a file that cms split wrote"),
+        (lambda text: text.replace("part_1_damping", "part_9_damping"), "no such file"),
+    ],
+)  # fmt: skip
+def test_damping_of_another_part_is_refused(beam, change, message):
+    part = split_job(SplitRequest(with_damping(beam(n_modes=8), "ratio = 0.03"), at=(0.3, 0.9), axis=(1, 0, 0)))[0]
+    part.write_text(change(part.read_text()))
+    with pytest.raises(CmsError, match=message):
+        reduce_job(read_job(part))
+
+
+def test_a_light_body_of_few_modes_is_split(beam, caplog):
     """Two light beams between three masses without inertia: nine momenta, of which six are those of rigid motions."""
     job = beam(n_modes=1)
     for table, text in (
@@ -188,18 +291,18 @@ def test_a_body_of_fewer_modes_than_are_listed_is_split(beam, caplog):
     masses = "".join(f'[masses.m{k}]\nnode = "{name}"\nmass = 2\n' for k, name in enumerate(("foot", "bob", "tip")))
     text = job.read_text()
     text = text[: text.index("[masses.bob]")] + masses + text[text.index("[load_cases") :]
+    text = text.replace('frame = "nodal"\nat = "foot"', 'frame = "tisserand"')
     job.write_text(text.replace("density = 7850", "density = 0") + "\n[damping]\nratio = 0.03\n")
     split_job(SplitRequest(job, at=(1.0,), axis=(1.0, 0.0, 0.0)))
-    told = [text for text in caplog.messages if "ratios belong to modes of one body" in text]
     with Families(job_body(read_job(job))) as families:
         f = families.free_modes(n_modes=3).frequencies
-    listed = re.findall(r"\d: ([\d.]+) Hz", told[0])
-    assert_allclose([float(number) for number in listed], f[f < 6 * f[0]], rtol=1e-3)
+    told, _ = told_modes(caplog)
+    assert_allclose(told[:, 1], f, rtol=1e-3)
 
 
 def test_damping_of_parts_is_in_the_time_unit_of_the_job(beam):
     """The same beam in m-kg-s and in mm-kg-ms; limits of a ramp are in Hz in both."""
-    beta, words = [], []
+    dampings, words = [], []
     for units in ("m-kg-s", "mm-kg-ms"):
         job = beam(n_modes=8)
         text = job.read_text()
@@ -216,11 +319,12 @@ def test_damping_of_parts_is_in_the_time_unit_of_the_job(beam):
                 text = text.replace(si, mm)
         job.write_text(f"{text}\n[damping]\nramp = [[5, 0.2]]\nabove = 0.03\n")
         part = split_job(SplitRequest(job, 3, folder=job.with_name(units)))[0]
-        beta.append(read_job(part).damping.damping.beta)
+        dampings.append(read_job(part).damping.damping)
         words += [line for line in part.read_text().splitlines() if "ratios belong to modes of one body" in line]
-    assert_allclose(beta[1], 1e3 * beta[0], rtol=1e-6)
+    assert_allclose(dampings[1].beta, 1e3 * dampings[0].beta, rtol=1e-6)
+    assert_allclose(dampings[1].coefficients.max(), 1e3 * dampings[0].coefficients.max(), rtol=1e-3)
     assert words[0] == words[1]
-    assert "keeps its ratio 0.03" in words[0]
+    assert "for 0.03" in words[0]
 
 
 SOLID = """

@@ -33,6 +33,7 @@ from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.damping import Damping, damping_of_words, modal_damping
 from cms.reduction.basis.finishing import SUSPECT_ENERGY, FinishedBasis
 from cms.reduction.basis.frames import Frame, FrameCondition, HeldFrame, frame_condition
+from cms.reduction.basis.strain_damping import StrainDamping
 from cms.reduction.basis.stress_modes import nodal_stress_modes, point_stress_modes
 from cms.reduction.geometric_stiffness.geometric_reduction import stiffness_of_states
 from cms.reduction.geometric_stiffness.quadratic_modes import force_stiffness
@@ -63,7 +64,7 @@ OF_ORIGIN = ("full dofs", "mode set", "mode set columns", "mode set n_modes", "m
 class ReductionOptions:
     """The options of `reduce` in the job of a file, which say what the file should hold."""
 
-    damping: Damping | None = None
+    damping: Damping | StrainDamping | None = None
     frame: Frame | HeldFrame | None = None
     stress: bool = True
     geometric: bool | tuple[str, ...] = False  #: whether there is geometric stiffness, or the loaded interfaces
@@ -341,7 +342,8 @@ def wanted_damping(case: Case) -> tuple[Array | None, str]:
     """Return the damping matrix that the file should have, and a description of its origin; None if it is unknown."""
     reduced, options = case.reduced, case.options
     told = reduced.provenance.get("damping", "none")
-    damping, words = damping_of_words(told), f"provenance: {told}"
+    damping: Damping | StrainDamping | None = damping_of_words(told)
+    words = f"provenance: {told}"
     if CONVERTED in reduced.provenance:
         if options is None:
             return None, ""
@@ -349,7 +351,7 @@ def wanted_damping(case: Case) -> tuple[Array | None, str]:
         if asked == told:
             return carried_damping(case, options.damping, options.frame), f"the job: {asked}, carried to this frame"
         # the conversion replaced all damping by that of the new modes
-        return None if damping is None else modal_damping(
+        return None if damping is None or isinstance(damping, StrainDamping) else modal_damping(
             damping, reduced.M, reduced.K, second=reduced.units.time
         ), words
     if options is not None:
@@ -359,7 +361,7 @@ def wanted_damping(case: Case) -> tuple[Array | None, str]:
     return reduced_damping(case.body, case.finished, damping), words
 
 
-def carried_damping(case: Case, damping: Damping | None, frame: Frame | HeldFrame | None) -> Array:
+def carried_damping(case: Case, damping: Damping | StrainDamping | None, frame: Frame | HeldFrame | None) -> Array:
     """Return Tᵀ D T, D over the modes in the frame of the job; Phi_job T = Phi up to rigid motion."""
     old = frame or named_frame(replace(case.reduced.frame, kind="tisserand", at=""))
     finished = finished_in(case.body, case.basis, old)

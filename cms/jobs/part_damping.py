@@ -1,0 +1,303 @@
+"""Damping of the parts of a body, with which the body in parts keeps the damping ratios of its modes.
+
+Ratios need D = M Phi diag(2 zeta omega) Phiᵀ M, which couples nodes of different parts. A part can only damp its own
+strain. Phi_p are the modes of the whole body in part p. H_p = Lambda^-1/2 Phi_pᵀ K_p Phi_p Lambda^-1/2 has the sum 1
+over the parts. With H_p = R_pᵀ R_p, the columns of S_p = Phi_p Lambda^-1/2 R_p⁺ are patterns of unit energy, and
+
+    D_p = beta K_p + K_p S_p (Y_p - beta) S_pᵀ K_p
+    phi_iᵀ D phi_j = omega_i omega_j (Σ_p R_pᵀ Y_p R_p)_ij,    wanted: diag(c), c_k = 2 zeta_k / omega_k
+
+so matrices Y_p, symmetric, with eigenvalues from beta to `MOST` max(c), are sought with (Σ_p R_pᵀ Y_p R_p)_kk = c_k.
+Beside the patterns the strain of a part is damped by beta, half of the smallest c.
+
+(1) condense each part to its cuts and its lowest modes with fixed cuts (Craig-Bampton), and join the parts
+(2) modes of the joined body, held where its nodal frame is attached, and their wanted ratios
+(3) H_p and R_p
+(4) start: Y_p = Z Zᵀ, Z = R_p⁺ᵀ diag(sqrt(c)) R_pᵀ, is exact with all terms i, j, but can be large where the strains of
+    modes are alike in a part; its eigenvalues are clipped to the bounds
+(5) accelerated projected gradients for the terms i = i
+(6) if there is no solution, the strains of some modes are too alike in all parts: go on without the highest mode, from
+    the best Y_p so far
+(7) ratios of the joined body: complex eigenvalues with all its coordinates
+(8) damping couples these modes with higher ones, which takes up to some percent from their ratios: correct c, fit again
+
+The bound keeps the damping of the strain of any part below `MOST` times that which the mode with the largest c needs.
+Without it, the solution damps the modes above those wanted so strongly that they hold the lower ones and change their
+ratios.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg as la
+
+from cms.modes.families.families import Families
+from cms.reduction.basis.strain_damping import StrainDamping
+from fe_models.body.fe_body import MULTIPLIER, FEBody, Interface
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.meshes.split import cut_name
+
+__all__ = ["ModeInParts", "PartsDamping", "damping_of_parts"]
+
+BAND = 6.0  #: highest frequency, over the first one of the whole body, up to which modes keep their ratios
+FEWEST_MODES, MOST_MODES = 6, 12  #: smallest and largest number of these modes
+FIXED_MODES = 30  #: modes with fixed cuts of each part
+MOST = 2.0  #: largest damping of the strain of a part, over the largest one that a mode needs
+LEAST = 0.5  #: damping of the strain beside the patterns, over the smallest one that a mode needs
+EXACT = 1e-4  #: largest relative error of a modal damping
+ROUNDS = 6  #: largest number of corrections by the ratios of the joined body
+STEPS = 3000  #: largest number of gradient steps
+PATIENCE = 300  #: gradient steps after which the error must have fallen by a tenth
+SMALL = 0.01  #: damping of a mode, over the largest one, below which its error is relative to this
+N_RIGID = 6  #: dofs of an interface that can hold a frame
+SAME_MOTION = 1e-8  #: momentum of a rigid-body motion beside those of others, relative
+SAME_STRAIN = 1e-10  #: smallest share of the energy of a pattern in a part, over the largest one
+NO_MASS = 1e-12  #: smallest 1/omega² of a mode, over the largest one
+
+
+@dataclass(frozen=True)
+class ModeInParts:
+    """A mode of the whole body and its damping in parts."""
+
+    frequency: float  #: of the body in parts, undamped [1/time]
+    wanted: float  #: damping ratio of the job
+    ratio: float  #: damping ratio of the joined parts
+
+
+@dataclass(frozen=True)
+class PartsDamping:
+    """Damping of each part, and the modes up to `BAND` times the first one, 6 to 12."""
+
+    parts: tuple[StrainDamping, ...]
+    modes: tuple[ModeInParts, ...]
+    n_exact: int  #: number of modes, from the first one, whose damping phi_kᵀ D phi_k is that of the job
+
+
+@dataclass(frozen=True, eq=False)
+class JoinedParts:
+    """Parts condensed to their cuts and fixed modes, and joined."""
+
+    columns: tuple[Array, ...]  #: displacements of each part, (n_dof, n_p)
+    stiffness: tuple[Array, ...]  #: of each part over its columns, (n_p, n_p)
+    places: tuple[IntArray, ...]  #: coordinate of the joined body of each column, (n_p,)
+    M: Array  #: of the joined body, (n, n)
+    K: Array  #: (n, n)
+    rigid: Array  #: rigid-body motions, (n, 6)
+    held: IntArray  #: coordinates that the frame of the whole body holds; empty: it is free
+    softest: float  #: omega² of the lowest mode with fixed cuts
+
+    def shares(self, p: int, omega: Array, Phi: Array) -> Array:
+        """Return H_p of modes, (k, k); diagonal: share of part p in the strain energy of each mode."""
+        phi = Phi[self.places[p]] / omega
+        return np.asarray(phi.T @ self.stiffness[p] @ phi)
+
+
+def damping_of_parts(
+    bodies: Sequence[FEBody],
+    ratios: Callable[[Array], Array],
+    *,
+    held: str | None = None,
+    solver: str | None = None,
+) -> PartsDamping | None:
+    """Return the damping of the parts of a body, or None if all ratios are zero.
+
+    Parameters
+    ----------
+    bodies
+        The coupled parts; cut k is an interface of parts k and k + 1.
+    ratios
+        Damping ratios of the modes, from their ω² [1/time²].
+    held
+        Interface to which the frame of the whole body is attached; None, or one of more than six dofs: free modes.
+    solver
+        Name of the solver.
+    """
+    at = [interface for body in bodies for interface in body.interfaces if interface.name == held]
+    is_held = bool(at) and len(dofs_of(at[0])) <= N_RIGID
+    joined = joined_parts(bodies, held if is_held else None, solver)  # (1)
+    omega, Phi = modes_of(joined)  # (2)
+    n = min(max(int(np.count_nonzero(omega <= BAND * omega[0])), FEWEST_MODES), MOST_MODES, len(omega))
+    c = 2 * ratios(omega**2)[:n] / omega[:n]
+    if not c.any():
+        return None
+    R = [root(joined.shares(p, omega[:n], Phi[:, :n])) for p in range(len(bodies))]  # (3)
+    X = [Phi[place, :n] / omega[:n] @ la.pinv(r) for place, r in zip(joined.places, R, strict=True)]  # S_p
+    G = [x.T @ k @ Phi[place] for x, k, place in zip(X, joined.stiffness, joined.places, strict=True)]
+
+    def ratios_with(Y: Sequence[Array]) -> Array:  # (7)
+        D = least * np.diag(omega**2) + sum(g.T @ (y - least * np.eye(len(y))) @ g for g, y in zip(G, Y, strict=True))
+        return complex_ratios(omega, D, n)
+
+    least, most = LEAST * float(c.min()), MOST * float(c.max())
+    Y, n_exact = [clipped(y, least, most) for y in exact_start(R, c)], n + 1  # (4)
+    error = np.inf
+    while error > EXACT and n_exact > 1:
+        n_exact -= 1  # (6)
+        Y, error = fitted(R, c, Y, n_exact, least, most)  # (5)
+    wanted, found, target = c * omega[:n] / 2, ratios_with(Y), c
+    for _ in range(ROUNDS):  # (8)
+        target = np.where(np.arange(n) < n_exact, target * wanted / np.maximum(found, wanted / 2), target)
+        better, _ = fitted(R, target, Y, n_exact, least, most)
+        ratio = ratios_with(better)
+        if worst(ratio, wanted, n_exact) >= worst(found, wanted, n_exact):
+            break
+        Y, found = better, ratio
+    parts = []
+    for body, columns, x, y in zip(bodies, joined.columns, X, Y, strict=True):
+        d, Z = la.eigh(y)
+        parts.append(StrainDamping.of_body(body, least, np.maximum(d - least, 0.0), body.K @ (columns @ (x @ Z))))
+    modes = tuple(
+        ModeInParts(float(w / (2 * np.pi)), float(a), float(b))
+        for w, a, b in zip(omega[:n], wanted, found, strict=True)
+    )
+    return PartsDamping(tuple(parts), modes, n_exact)
+
+
+def worst(found: Array, wanted: Array, n: int) -> float:
+    """Return the largest relative error of the first n ratios."""
+    return float(np.abs(found[:n] - wanted[:n]).max() / wanted[:n].max())
+
+
+def joined_parts(bodies: Sequence[FEBody], held: str | None, solver: str | None) -> JoinedParts:
+    """Condense each part to its cuts, the held interface and its fixed modes, and join the parts at the cuts."""
+    center = np.mean([body.nodes.mean(axis=0) for body in bodies], axis=0)
+    columns, stiffness, masses, places, motions, omega2 = [], [], [], [], [], []
+    place_of: dict[str, IntArray] = {}  # coordinates of the joined body, by interface
+    n = 0
+    for k, body in enumerate(bodies, start=1):
+        wanted = {cut_name(k - 1), cut_name(k), held}
+        part = replace(
+            body, interfaces=tuple(each for each in body.interfaces if each.name in wanted), load_cases=()
+        )  # other interfaces are ordinary nodes
+        with Families(part, announce=False, solver=solver) as families:
+            fixed = families.fixed_modes(min(FIXED_MODES, n_fixed_modes(part, families.h)))
+            V = np.hstack([families.Psi_C, fixed.Phi])
+            stiffness.append(la.block_diag(families.S, np.diag(fixed.omega2)))
+            motion = np.zeros((V.shape[1], 6))
+            motion[: len(families.h)] = rigid_motion_of_dofs(part.nodes, part.dofs[families.h], center)
+        columns.append(V)
+        omega2 += fixed.omega2.tolist()
+        masses.append(V.T @ (part.M @ V))
+        motions.append(motion)
+        place = np.full(V.shape[1], -1, np.int64)
+        first = np.cumsum([0, *(len(dofs_of(each)) for each in part.interfaces)])
+        for each, begin, end in zip(part.interfaces, first[:-1], first[1:], strict=True):
+            place[begin:end] = place_of.get(each.name, -1)
+        new = np.flatnonzero(place < 0)
+        place[new] = n + np.arange(len(new))
+        n += len(new)
+        place_of |= {
+            each.name: place[begin:end] for each, begin, end in zip(part.interfaces, first[:-1], first[1:], strict=True)
+        }
+        places.append(place)
+    M, K, rigid = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, 6))
+    for m, k_part, place, motion in zip(masses, stiffness, places, motions, strict=True):
+        M[np.ix_(place, place)] += m
+        K[np.ix_(place, place)] += k_part
+        rigid[place] = motion
+    at_rest = np.zeros(0, np.int64) if held is None else place_of[held]
+    return JoinedParts(tuple(columns), tuple(stiffness), tuple(places), M, K, rigid, at_rest, min(omega2))
+
+
+def dofs_of(interface: Interface) -> IntArray:
+    """Return the boundary dofs of an interface of a coupled body."""
+    return np.zeros(0, np.int64) if interface.dofs is None else interface.dofs
+
+
+def n_fixed_modes(body: FEBody, h: IntArray) -> int:
+    """Return the number of modes with mass when the dofs h are held, or a smaller number above `FIXED_MODES`."""
+    i = np.setdiff1d(np.arange(body.n_dof), h)
+    n = len(i) - 2 * int((body.dofs[:, 1] == MULTIPLIER).sum())
+    mass = body.M.diagonal()[i]
+    has_mass = i[mass > 0]
+    if len(has_mass) > 4 * FIXED_MODES:
+        return n
+    s = 1 / np.sqrt(mass[mass > 0])
+    M = body.M[has_mass][:, has_mass].toarray()
+    return max(0, min(n, int(np.linalg.matrix_rank(s[:, None] * M * s, hermitian=True))))
+
+
+def modes_of(joined: JoinedParts) -> tuple[Array, Array]:
+    """Return omega, ascending, (k,), and shapes with Phiᵀ M Phi = 1, (n, k), of the elastic modes with mass.
+
+    They are found among the motions without momentum, Psi_Rᵀ M x = 0. The coordinates are scaled to a unit diagonal of
+    K + omega² M, where omega belongs to the softest fixed mode.
+    """
+    n = len(joined.K)
+    moving = np.setdiff1d(np.arange(n), joined.held)
+    s = 1 / np.sqrt(np.maximum(joined.K.diagonal(), 0.0) + joined.softest * joined.M.diagonal())[moving]
+    M, K = (s[:, None] * A[np.ix_(moving, moving)] * s for A in (joined.M, joined.K))
+    Q = np.eye(len(moving))
+    if not len(joined.held):
+        momenta = M @ (joined.rigid[moving] / s[:, None])
+        size = np.linalg.norm(momenta, axis=0)
+        momenta = momenta[:, size > 0] / size[size > 0]  # a planar body has three
+        U, singular, _ = la.svd(momenta)
+        Q = U[:, np.count_nonzero(singular > SAME_MOTION * singular[0]) :]
+    inverse, X = la.eigh(Q.T @ M @ Q, Q.T @ K @ Q)  # 1 / omega²
+    inverse, X = inverse[::-1], X[:, ::-1]
+    has_mass = inverse > NO_MASS * inverse[0]
+    Phi = np.zeros((n, int(has_mass.sum())))
+    Phi[moving] = s[:, None] * (Q @ X[:, has_mass]) / np.sqrt(inverse[has_mass])
+    return 1 / np.sqrt(inverse[has_mass]), Phi
+
+
+def root(H: Array) -> Array:
+    """Return R with Rᵀ R = H, (r, k), without directions of no energy."""
+    e, V = la.eigh((H + H.T) / 2)
+    some = e > SAME_STRAIN * e[-1]
+    return np.asarray(np.sqrt(e[some])[:, None] * V[:, some].T)
+
+
+def exact_start(R: Sequence[Array], c: Array) -> list[Array]:
+    """Return Y_p = Z Zᵀ with Σ_p R_pᵀ Y_p R_p = diag(c)."""
+    roots = [la.pinv(r).T @ (np.sqrt(c)[:, None] * r.T) for r in R]
+    return [Z @ Z.T for Z in roots]
+
+
+def clipped(Y: Array, least: float, most: float) -> Array:
+    """Return the nearest matrix with eigenvalues within the bounds."""
+    d, Z = la.eigh((Y + Y.T) / 2)
+    return np.asarray((Z * np.clip(d, least, most)) @ Z.T)
+
+
+def fitted(
+    R: Sequence[Array], c: Array, Y: list[Array], n_exact: int, least: float, most: float
+) -> tuple[list[Array], float]:
+    """Return matrices near Y with eigenvalues within bounds and (Σ_p R_pᵀ Y_p R_p)_kk = c_k for k < n_exact.
+
+    Also return the largest relative error of these modes; it is relative to a share `SMALL` of the largest c where c_k
+    is smaller. The gradient step is 1/L, L the largest eigenvalue of the map from errors to gradients to errors.
+    """
+    scale = np.maximum(c, SMALL * c.max())[:n_exact]
+    columns = [r[:, :n_exact] / np.sqrt(scale) for r in R]
+    wanted = c[:n_exact] / scale
+    L = float(la.eigvalsh(sum((r.T @ r) ** 2 for r in columns))[-1])
+
+    def errors(Ys: Sequence[Array]) -> Array:
+        return np.asarray(sum(np.sum(r * (y @ r), axis=0) for r, y in zip(columns, Ys, strict=True)) - wanted)
+
+    ahead, t, checked = Y, 1.0, np.inf
+    for step in range(STEPS):
+        if step % PATIENCE == 0:
+            error = float(np.abs(errors(Y)).max())
+            if error <= EXACT or error > 0.9 * checked:
+                return Y, error
+            checked = error
+        e = errors(ahead)
+        new = [clipped(y - (r * e) @ r.T / L, least, most) for y, r in zip(ahead, columns, strict=True)]
+        t_new = (1 + np.sqrt(1 + 4 * t * t)) / 2
+        ahead = [a + (t - 1) / t_new * (a - b) for a, b in zip(new, Y, strict=True)]
+        Y, t = new, t_new
+    return Y, float(np.abs(errors(Y)).max())
+
+
+def complex_ratios(omega: Array, D: Array, n: int) -> Array:
+    """Return the damping ratio of the first n modes of x'' + D x' + omega² x = 0, each by its largest share, (n,)."""
+    k = len(omega)
+    s, V = la.eig(np.block([[np.zeros((k, k)), np.diag(omega)], [-np.diag(omega), -D]]))
+    shares = np.abs(V[:k]) ** 2 / np.sum(np.abs(V) ** 2, axis=0)
+    own = shares[:n].argmax(axis=1)
+    return np.asarray(-s[own].real / np.abs(s[own]))
