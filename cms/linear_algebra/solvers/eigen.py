@@ -22,7 +22,7 @@ from fe_models.foundation.solver import Solver
 from fe_models.foundation.tall.columns import combine, frozen_columns, in_memory, of_this_process
 from fe_models.foundation.threads import one_blas_thread
 
-__all__ = ["EigenResult", "FactorMismatchError", "eigenmodes", "orientation", "turn"]
+__all__ = ["EigenResult", "FactorMismatchError", "eigenmodes", "no_modes", "orientation", "turn"]
 
 
 SMALL = 300  #: number of dofs up to which dense matrices are faster
@@ -55,6 +55,12 @@ class EigenResult:
     def __post_init__(self) -> None:
         for name in ("omega2", "frequencies", "Phi", "residuals"):
             object.__setattr__(self, name, frozen_columns(getattr(self, name)))
+
+
+def no_modes(n_dof: int) -> EigenResult:
+    """Return an empty result, for a request of no modes."""
+    none: Array = np.zeros(0)
+    return EigenResult(none, none, np.zeros((n_dof, 0)), none, 0, "none asked for", is_proven=False)
 
 
 def eigenmodes(

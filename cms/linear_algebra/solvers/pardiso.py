@@ -47,9 +47,13 @@ def mkl_runtime() -> ctypes.CDLL | None:
     """Return the loaded library; None if it is not available (other processors, macOS, not installed)."""
     # its threads release the processor immediately, because NumPy and our own threads need it between two solves
     os.environ.setdefault("KMP_BLOCKTIME", "0")
-    path = installed_mkl()
-    if path is not None:  # found in its package; pypardiso would search all of sys.prefix, which takes a second or more
-        os.environ.setdefault("PYPARDISO_MKL_RT", path)
+    try:  # the library of the installed package `mkl`; pypardiso would search all of sys.prefix for a second or more
+        files = distribution("mkl").files or []
+    except PackageNotFoundError:
+        files = []
+    paths = [Path(str(file.locate())) for file in files if "mkl_rt" in file.name and not file.name.endswith(".lib")]
+    for path in [path for path in paths if path.is_file()][:1]:
+        os.environ.setdefault("PYPARDISO_MKL_RT", str(path))
     try:
         from pypardiso import PyPardisoSolver
 
@@ -61,16 +65,6 @@ def mkl_runtime() -> ctypes.CDLL | None:
 def missing_pardiso() -> str:
     """Describe the missing parts of PARDISO here; "" if it can be used."""
     return "" if mkl_runtime() is not None else "needs MKL, which is not installed; pip install pypardiso (x86-64 only)"
-
-
-def installed_mkl() -> str | None:
-    """Return the path of the runtime library in the installed package `mkl`, if there is one."""
-    try:
-        files = distribution("mkl").files or []
-    except PackageNotFoundError:
-        return None
-    paths = [Path(str(file.locate())) for file in files if "mkl_rt" in file.name and not file.name.endswith(".lib")]
-    return next((str(path) for path in paths if path.is_file()), None)
 
 
 class PardisoFactor:

@@ -20,7 +20,7 @@ from fe_models.foundation.tall.columns import combine, inner, put, subtract
 
 __all__ = [
     "ArrayBasis", "ArraySpace", "ModeRequest", "Modes", "ShiftInverted", "TallBasis", "TallProduct", "TallSpace",
-    "dealt", "measured_residual", "refined_modes",
+    "measured_residual", "refined_modes",
 ]  # fmt: skip
 
 RESTART_ROWS = 65536  #: number of rows transformed at a time, which avoids a second basis in memory
@@ -103,12 +103,12 @@ class ArraySpace:
     """Columns are arrays of this process."""
 
     def __init__(self, n: int, numbering: IntArray | None = None) -> None:
-        """Columns with n rows; numbering: numbers of the rows that assign random values to them; None: row order."""
-        self.n, self.numbering = n, numbering
+        """Columns with n rows; row r of random columns takes value numbering[r]; None: row order."""
+        self.n, self.numbering = n, slice(None) if numbering is None else numbering
 
     def random(self, generator: np.random.Generator, k: int) -> Array:
         """Return columns of normally distributed numbers, (n, k)."""
-        return dealt(generator.standard_normal((k, self.n)).T, self.numbering)
+        return generator.standard_normal((k, self.n))[:, self.numbering].T
 
     product = SymmetricProduct
 
@@ -119,11 +119,6 @@ class ArraySpace:
     def solver(self, factorization: Inverse) -> Callable[[Array], Array]:
         """Return the function that solves for columns with a factorisation, in the memory order of the factor."""
         return factorization.solve
-
-
-def dealt(X: Array, numbering: IntArray | None) -> Array:
-    """Return row numbering[r] of X at each row r, (n, k), in the memory order of X."""
-    return X if numbering is None else X.T[:, numbering].T
 
 
 # the operator ---------------------------------------------------------------------------------------------------------

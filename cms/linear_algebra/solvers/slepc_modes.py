@@ -11,7 +11,7 @@ from cms.linear_algebra.solvers.factorization import Factorization, Matrix, lowe
 from cms.linear_algebra.solvers.inverse import Inverse
 from cms.linear_algebra.solvers.petsc.factor import CHUNK, PetscFactor, communicator, rows_here, solved_rows
 from cms.linear_algebra.solvers.petsc.libraries import petsc, slepc
-from cms.linear_algebra.solvers.shift_inverted import ArrayBasis, ModeRequest, Modes, ShiftInverted, dealt
+from cms.linear_algebra.solvers.shift_inverted import ArrayBasis, ModeRequest, Modes, ShiftInverted
 from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
 from fe_models.body.couplings.submatrix import spread_block
 from fe_models.foundation.arrays import Array, IntArray
@@ -79,7 +79,7 @@ class RankSpace:
 
     def __init__(self, factor: PetscFactor, numbering: IntArray | None = None) -> None:
         """Distribute columns like the rows of the factor; numbering: as for `ArraySpace`."""
-        self.numbering = numbering
+        self.numbering = slice(None) if numbering is None else numbering
         self.factor, self.ranks, self.rows, self.n = factor, factor.ranks, factor.rows, factor.n
         self.layout = RowLayout(factor.ranks, np.arange(factor.n), factor.rows)
 
@@ -95,7 +95,7 @@ class RankSpace:
 
     def random(self, generator: np.random.Generator, k: int) -> SpreadColumns:
         """Return columns of normally distributed numbers, (n, k), equal to those of a single process."""
-        return spread_columns(self.layout, dealt(generator.standard_normal((k, self.n)).T, self.numbering))
+        return spread_columns(self.layout, generator.standard_normal((k, self.n))[:, self.numbering].T)
 
     def basis(self, capacity: int) -> RankBasis:
         """Allocate memory for `capacity` columns."""

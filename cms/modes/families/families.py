@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from cms.errors import BodyError, ModeSetError
-from cms.linear_algebra.solvers.eigen import EigenResult
+from cms.linear_algebra.solvers.eigen import EigenResult, no_modes
 from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
 from cms.linear_algebra.solvers.registry import solver_of
-from cms.modes.families.fixed_interface import FixedInterfaceBody, fix_interfaces
+from cms.modes.families.fixed_interface import FixedInterfaceBody, fix_interfaces, fixed_interface_modes
 from cms.modes.families.flexibility import BoundaryConditions, CondensedBody, Flexibility
 from cms.modes.families.interface_cost import large_interfaces
 from cms.modes.families.rigid_modes import determinate_partition, independent_rigid_modes
@@ -26,7 +26,7 @@ from cms.modes.families.static_modes import (
     residual_attachment_modes,
     unrestrained_attachment_modes,
 )
-from cms.modes.families.vibration_modes import elastic_modes, fixed_interface_modes, no_modes
+from cms.modes.families.vibration_modes import elastic_modes
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, IntArray
 from fe_models.foundation.ranks.spread_matrix import largest_entry
@@ -57,7 +57,7 @@ class Families:
     def __init__(
         self, body: FEBody, *, announce: bool = True, solver: str | Solver | None = None, to_disk: bool = False
     ) -> None:
-        """Prepare the families of a coupled body, without any computation.
+        """Find the rigid-body modes and held dofs of a coupled body; families are computed when they are first used.
 
         Parameters
         ----------
@@ -74,7 +74,7 @@ class Families:
         Raises
         ------
         BodyError
-            If the interfaces of the body have no boundary dofs yet.
+            If the interfaces of the body have no boundary dofs yet, or no dof is a displacement.
         FactorizationError
             If the solver is unknown or not installed.
         """
@@ -86,6 +86,11 @@ class Families:
         self._fixed: FixedInterfaceBody | None = None
         self._modes: dict[bytes, list[_Found]] = {}
         self._flexibilities: dict[bytes, Flexibility] = {}
+        #: independent rigid-body modes about the mean of the nodes, (n_dof, n_r), and their components, (n_r,)
+        self.Psi_R, self.rigid_components = independent_rigid_modes(body)
+        #: determinate dofs R, ascending, (n_r,), and those in the interior if B leaves a rigid-body motion free
+        self.r, self.interior_r = determinate_partition(body, self.Psi_R)
+        self.h = np.concatenate([body.b, self.interior_r])  #: held dofs: B, then the interior dofs of R, (n_h,)
 
     def __enter__(self) -> "Families":
         return self
@@ -105,33 +110,10 @@ class Families:
 
     # -- Partition -------------------------------------------------------------------------------------------------
 
-    @property
-    def Psi_R(self) -> Array:
-        """Independent rigid-body modes about the mean of the nodes, (n_dof, n_r)."""
-        return self._rigid[0]
-
-    @cached_property
-    def _rigid(self) -> tuple[Array, IntArray]:
-        return independent_rigid_modes(self.body)
-
-    @cached_property
-    def _partition(self) -> tuple[IntArray, IntArray]:
-        return determinate_partition(self.body, self.Psi_R)
-
-    @property
-    def r(self) -> IntArray:
-        """Determinate dofs R, (n_r,), ascending; some are interior dofs if B leaves a rigid-body motion free."""
-        return self._partition[0]
-
     @cached_property
     def e(self) -> IntArray:
         """Excess boundary dofs E = B without R, in the order of `body.b`, (n_e,)."""
         return self.body.b[~np.isin(self.body.b, self.r)]
-
-    @property
-    def h(self) -> IntArray:
-        """Held dofs: B, then the interior dofs of R, (n_h,)."""
-        return np.concatenate([self.body.b, self._partition[1]])
 
     @property
     def fixed(self) -> FixedInterfaceBody:
@@ -142,7 +124,7 @@ class Families:
             raise ModeSetError(f"families of body {self.body.name!r}: closed; make new ones")
         for words in large_interfaces(self.body) if self._announces else ():
             log.warning(words)
-        self._fixed = fix_interfaces(self.body, self._partition[1], solver=self.solver)
+        self._fixed = fix_interfaces(self.body, self.interior_r, solver=self.solver)
         return self._fixed
 
     def adopt(self, fixed: FixedInterfaceBody) -> None:
@@ -253,14 +235,10 @@ class Families:
 
     # -- Labels ----------------------------------------------------------------------------------------------------
 
-    def rigid_labels(self, family: str) -> tuple[str, ...]:
-        """Return a label for each rigid-body mode, such as 'rigid-body rx'."""
-        return tuple(f"{family} {MOTION_COMPONENTS[k]}" for k in self._rigid[1])
-
     def held_names(self, family: str) -> tuple[list[str], list[str]]:
         """Return a label and a group for each held dof."""
         labels, groups = boundary_names(self.body, family)
-        for node, component in self.body.dofs[self._partition[1]]:
+        for node, component in self.body.dofs[self.interior_r]:
             labels.append(f"{family} node {self.body.numbering.called(node)} {MOTION_COMPONENTS[component]}")
             groups.append(f"{family} determinate")
         return labels, groups

@@ -1,12 +1,14 @@
-"""The body with all boundary dofs held; its interior stiffness is factorised once and used for many columns."""
+"""The body with all boundary dofs held: its interior stiffness, factorised once for many columns, and its modes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from cms.errors import BodyError, EigenError, FactorizationError, ModeSetError
+from cms.linear_algebra.solvers.eigen import EigenResult, eigenmodes, no_modes
 from cms.linear_algebra.solvers.factorization import EmptyFactor, Factorization, factorize, matrix_of
+from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.linear_algebra.solvers.registry import solver_of
 from cms.modes.families.mechanism import WITHIN_ROUNDING, moving_nodes
 from fe_models.body.couplings.submatrix import PrincipalBlock, nearby_order, principal_block
@@ -14,7 +16,7 @@ from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.solver import Solver
 
-__all__ = ["FixedInterfaceBody", "fix_interfaces"]
+__all__ = ["FixedInterfaceBody", "fix_interfaces", "fixed_interface_modes"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,10 +87,18 @@ def fix_interfaces(
     return FixedInterfaceBody(body, i, b, factorization)
 
 
+def fixed_interface_modes(fixed: FixedInterfaceBody, wanted: ModeCount) -> EigenResult:
+    """Return vibration modes with all boundary dofs held, K_II phi = omega² M_II phi, over all dofs (n_dof, k)."""
+    if not len(fixed.i):  # every dof belongs to an interface
+        return no_modes(fixed.body.n_dof)
+    blocks = PrincipalBlock(fixed.body.K, fixed.i), PrincipalBlock(fixed.body.M, fixed.i)
+    numbering = np.searchsorted(np.sort(fixed.i), fixed.i)
+    modes = eigenmodes(*blocks, wanted, factorization=fixed.factorization, numbering=numbering)
+    return replace(modes, Phi=blocks[0].expanded(modes.Phi))
+
+
 def _mechanism_message(body: FEBody, i: IntArray, K_ii: sp.csc_array, M_ii: sp.csc_array, solver: Solver) -> str:
     """Describe which nodes move without energy while the interfaces are held."""
-    from cms.linear_algebra.solvers.eigen import eigenmodes
-
     start = f"body {body.name!r}: with all interfaces held its stiffness is singular"
     try:
         modes = eigenmodes(K_ii, M_ii, n_modes=min(7, len(i) - 1), solver=solver)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.body.fe_body import FEBody, Interface
+from fe_models.body.fe_body import FEBody
 
 __all__ = ["ReductionCost", "interface_reduction_size", "large_interfaces", "reduction_cost"]
 
@@ -60,33 +60,25 @@ def reduction_cost(body: FEBody, n_columns: int, *, stress: bool = True, n_const
 
 def interface_reduction_size(body: FEBody, interface_modes: int) -> int:
     """Return the number of constraint modes that remain if interfaces of kind "nodes" keep this number of modes."""
-    return sum(
-        min(n_b, 6 + interface_modes) if interface.kind == "nodes" else n_b
-        for interface in body.interfaces
-        if (n_b := n_boundary(interface))
-    )
+    sizes = [(interface.kind, len(interface.dofs)) for interface in body.interfaces if interface.dofs is not None]
+    return sum(min(n_b, 6 + interface_modes) if kind == "nodes" else n_b for kind, n_b in sizes)
 
 
 def large_interfaces(body: FEBody) -> list[str]:
     """Describe the cost of interfaces with very many boundary dofs, and cheaper options, one text for each."""
-    large = [interface for interface in body.interfaces if n_boundary(interface) >= MANY]
+    large = [each for each in body.interfaces if each.dofs is not None and len(each.dofs) >= MANY]
     if not large:
         return []
     whole = reduction_cost(body, len(body.b)).description
     fewer = reduction_cost(body, interface_reduction_size(body, PROPOSED), n_constraint_modes=len(body.b)).description
     return [
         f"body {body.name!r}: interface {interface.name!r} of {len(interface.nodes)} nodes has "
-        f"{n_boundary(interface)} boundary dofs: as many static solves and modes of the body. With all of them: "
+        f"{len(np.asarray(interface.dofs))} boundary dofs: as many static solves and modes of the body. With all of them: "
         f"{whole}. Consider interface reduction: interface_modes = {PROPOSED} in [reduction] "
         f"(with_characteristic_modes) keeps its rigid motions and its softest modes: {fewer}; kind rigid or "
         "distributing has 6"
         for interface in large
     ]
-
-
-def n_boundary(interface: Interface) -> int:
-    """Return the number of boundary dofs of an interface."""
-    return 0 if interface.dofs is None else len(interface.dofs)
 
 
 def operations_per_second() -> float:

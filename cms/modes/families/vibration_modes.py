@@ -1,4 +1,4 @@
-"""Vibration modes of a body under the boundary conditions of the classical mode sets (docs/theory.md §2)."""
+"""Vibration modes of a body whose interfaces are free, loaded, or partly held (docs/theory.md §2)."""
 
 from dataclasses import replace
 
@@ -8,26 +8,13 @@ from cms.errors import EigenError
 from cms.linear_algebra.solvers.eigen import EigenResult, FactorMismatchError, counting_shift, eigenmodes
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.linear_algebra.solvers.shift_inverted import ModeRequest
-from cms.modes.families.fixed_interface import FixedInterfaceBody
 from cms.modes.families.flexibility import Flexibility
 from cms.modes.families.mechanism import rounding_of_energy, without_energy
-from fe_models.body.couplings.submatrix import PrincipalBlock
-from fe_models.foundation.arrays import Array
 
-__all__ = ["elastic_modes", "fixed_interface_modes", "no_modes"]
+__all__ = ["elastic_modes"]
 
 #: rounding of a body's energy over the energy of a mode that its neighbours alone hold, above which omega² is lost
 LOST = 2e-3
-
-
-def fixed_interface_modes(fixed: FixedInterfaceBody, wanted: ModeCount) -> EigenResult:
-    """Return vibration modes with all boundary dofs held, K_II phi = omega² M_II phi, over all dofs (n_dof, k)."""
-    if not len(fixed.i):  # every dof belongs to an interface
-        return no_modes(fixed.body.n_dof)
-    blocks = PrincipalBlock(fixed.body.K, fixed.i), PrincipalBlock(fixed.body.M, fixed.i)
-    numbering = np.searchsorted(np.sort(fixed.i), fixed.i)
-    modes = eigenmodes(*blocks, wanted, factorization=fixed.factorization, numbering=numbering)
-    return replace(modes, Phi=blocks[0].expanded(modes.Phi))
 
 
 def elastic_modes(flexibility: Flexibility, wanted: ModeCount) -> EigenResult:
@@ -90,9 +77,3 @@ def _proven(flexibility: Flexibility, modes: EigenResult, asked: ModeCount) -> E
             f"{n_below}; ask for more modes"
         )
     return replace(modes, is_proven=True)
-
-
-def no_modes(n_dof: int) -> EigenResult:
-    """Return an empty result, for a request of no modes."""
-    none: Array = np.zeros(0)
-    return EigenResult(none, none, np.zeros((n_dof, 0)), none, 0, "none asked for", is_proven=False)

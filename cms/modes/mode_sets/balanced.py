@@ -15,7 +15,7 @@ from cms.modes.families.families import Families, body_of, families_of
 from cms.modes.families.receptance import boundary_scale
 from cms.modes.families.static_modes import boundary_names
 from cms.modes.mode_set import ModeSet
-from cms.modes.mode_sets.blocks import mode_set, require_interfaces, rigid_block, static_block
+from cms.modes.mode_sets.blocks import Block, mode_set, require_interfaces, rigid_block
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.tall.columns import combine
@@ -257,7 +257,7 @@ def balanced_truncation(
         if n_modes is None:
             left = 1 - np.cumsum(sigma) / sigma.sum()
             n_modes = min(n, sides * (int(np.argmax(left <= (tolerance or 0.0))) + 1))
-        columns = static_block(
+        columns = Block(
             combine(rich.Phi, system.T[:, :n_modes]),
             [f"balanced {k + 1}" for k in range(n_modes)],
             ["balanced"] * n_modes,

@@ -13,7 +13,7 @@ from cms.modes.families.families import Families
 from cms.modes.families.static_modes import boundary_names
 from cms.modes.mode_set import ModeSet
 from fe_models.body.fe_body import FEBody
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
 from fe_models.foundation.ranks.spread_columns import spread_beside
 from fe_models.foundation.tall.columns import beside
 
@@ -25,7 +25,6 @@ __all__ = [
     "mode_set",
     "require_interfaces",
     "rigid_block",
-    "static_block",
     "vibration_block",
 ]
 
@@ -35,30 +34,25 @@ class Block:
     """Named columns of one family."""
 
     columns: Array  #: (n_dof, k)
-    labels: tuple[str, ...]  #: (k,)
-    groups: tuple[str, ...]  #: (k,)
-    frequencies: Array  #: (k,), NaN for static columns
-
-
-def static_block(columns: Array, labels: Sequence[str], groups: Sequence[str]) -> Block:
-    """Return static columns."""
-    return Block(columns, tuple(labels), tuple(groups), np.full(columns.shape[1], np.nan))
+    labels: Sequence[str]  #: (k,)
+    groups: Sequence[str]  #: (k,)
+    frequencies: Array | None = None  #: (k,); None for static columns
 
 
 def boundary_block(body: FEBody, columns: Array, family: str) -> Block:
     """Return the static columns of a family, one for each boundary dof."""
-    return static_block(columns, *boundary_names(body, family))
+    return Block(columns, *boundary_names(body, family))
 
 
 def constraint_block(families: Families) -> Block:
     """Return the constraint modes."""
-    return static_block(families.Psi_C, *families.held_names("constraint"))
+    return Block(families.Psi_C, *families.held_names("constraint"))
 
 
 def rigid_block(families: Families, columns: Array, family: str) -> Block:
     """Return the columns of a family, one for each rigid-body mode."""
-    labels = families.rigid_labels(family)
-    return static_block(columns, labels, [family] * len(labels))
+    labels = [f"{family} {MOTION_COMPONENTS[k]}" for k in families.rigid_components]
+    return Block(columns, labels, [family] * len(labels))
 
 
 def vibration_block(kind: str, modes: EigenResult, columns: Array | None = None) -> Block:
@@ -66,9 +60,9 @@ def vibration_block(kind: str, modes: EigenResult, columns: Array | None = None)
     n = len(modes.frequencies)
     return Block(
         modes.Phi if columns is None else columns,
-        tuple(f"{kind} {k + 1}" for k in range(n)),
-        (kind,) * n,
-        np.asarray(modes.frequencies),
+        [f"{kind} {k + 1}" for k in range(n)],
+        [kind] * n,
+        modes.frequencies,
     )
 
 
@@ -99,7 +93,7 @@ def mode_set(
         name,
         whole,
         tuple(label for block in blocks for label in block.labels),
-        np.concatenate([block.frequencies for block in blocks]),
+        np.concatenate([np.full(len(b.labels), np.nan) if b.frequencies is None else b.frequencies for b in blocks]),
         {**recorded, **(options or {})},
         tuple(group for block in blocks for group in block.groups),
         data or {},

@@ -21,7 +21,6 @@ from cms.modes.mode_sets.blocks import (
     mode_set,
     require_interfaces,
     rigid_block,
-    static_block,
     vibration_block,
 )
 from fe_models.body.fe_body import FEBody, Interface
@@ -81,7 +80,7 @@ def attachment(
         labels, groups = (np.array(each, dtype=object)[families.free.e] for each in names)
         blocks = [
             rigid_block(families, families.Psi_R, "rigid-body"),
-            static_block(families.Psi_A, labels.tolist(), groups.tolist()),
+            Block(families.Psi_A, labels.tolist(), groups.tolist()),
             vibration_block("determinate-interface", modes),
         ]
         held = ", ".join(label.removeprefix("held ") for label in held_words(families))

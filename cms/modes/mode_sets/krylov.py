@@ -16,7 +16,7 @@ from cms.modes.centrifugal import CENTRIFUGAL
 from cms.modes.families.families import Families, body_of, families_of
 from cms.modes.families.receptance import boundary_scale, largest_error, receptance_of_pencil
 from cms.modes.mode_set import ModeSet
-from cms.modes.mode_sets.blocks import mode_set, require_interfaces, rigid_block, static_block
+from cms.modes.mode_sets.blocks import Block, mode_set, require_interfaces, rigid_block
 from fe_models.body.couplings.submatrix import PrincipalBlock
 from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.foundation.arrays import Array
@@ -297,7 +297,7 @@ def _mode_set(
     }
     if len(history) > 1:
         options["estimated transfer-function error"] = f"{largest_error(history[-1], history[-2]):.3g}"
-    columns = static_block(span.columns.X[:, :n_kept], span.labels[:n_kept], span.groups[:n_kept])
+    columns = Block(span.columns.X[:, :n_kept], span.labels[:n_kept], span.groups[:n_kept])
     rigid = rigid_block(families, families.Psi_R, "rigid-body")
     modes = mode_set("krylov", families, [rigid, columns], options=options)
     # columns not counted by n_modes; smaller sets of this kind contain them too

@@ -6,13 +6,12 @@ from multiprocessing import current_process
 import numpy as np
 
 from cms.errors import FactorizationError, ModeSetError
-from cms.linear_algebra.solvers.eigen import EigenResult
+from cms.linear_algebra.solvers.eigen import EigenResult, no_modes
 from cms.linear_algebra.solvers.factorization import Factorization
 from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
 from cms.linear_algebra.substructures.modes import Interior, MultilevelResult, multilevel_modes
 from cms.modes.families.families import Families, families_of
 from cms.modes.families.fixed_interface import FixedInterfaceBody
-from cms.modes.families.vibration_modes import no_modes
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets.blocks import (
     checked_modes,
