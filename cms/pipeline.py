@@ -21,7 +21,7 @@ from cms.body.reduced_body import ReducedBody
 from cms.errors import MemoryBudgetError
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import Job, read_job
-from cms.jobs.parts_of_job import frame_of, moving_frame_of
+from cms.jobs.parts_of_job import frame_of
 from cms.linear_algebra.memory.budget import ReductionShape, columns_within, solver_within
 from cms.linear_algebra.memory.size import memory_bytes, resident_bytes
 from cms.linear_algebra.solvers.registry import solver_of
@@ -31,9 +31,9 @@ from fe_models.foundation.solver import Solver
 from fe_models.foundation.stages import Stages
 
 if TYPE_CHECKING:
+    from cms.modes.families.cost import Asked
     from cms.modes.families.families import Families
     from cms.modes.mode_set import ModeSet
-    from cms.reduction.geometric_stiffness.room_for_stiffness import Asked
     from cms.reduction.geometric_stiffness.unit_states import UnitStates
 
 __all__ = ["Plan", "budget_of", "expected_columns", "reduce_job", "reduced", "states_of_job"]
@@ -78,7 +78,7 @@ def reduce_job(
     >>> body = cms.reduce_job("rod.toml")                                          # doctest: +SKIP
     >>> cms.write(body, "rod.h5")                                                  # doctest: +SKIP
     """
-    from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
+    from cms.jobs.parts_of_job import job_mode_set, reduction_of
     from cms.modes.families.families import Families
 
     job = job if isinstance(job, Job) else read_job(Path(job))  # (1)
@@ -107,7 +107,7 @@ def states_of_job(job: Job, families: "Families") -> "UnitStates":
     asked = job.reduction.geometric_stiffness
     return unit_states(
         families,
-        frame=moving_frame_of(job),
+        frame=frame_of(job),
         spread=job.reduction.spread_loads is not False,
         interfaces=asked if isinstance(asked, list) else None,
     )
@@ -176,8 +176,20 @@ class Plan:
             If the geometric stiffness is requested, but the elements do not know it, an interface is unknown, or the
             memory of this machine does not suffice.
         """
+        from cms.modes.families.cost import require_room_for_stiffness, stiffness_words
+        from cms.reduction.geometric_stiffness.unit_states import loaded_interfaces, require_geometric_stiffness
+
         plan = replace(cls.of_stiffness(job, body), solver=solver)
-        plan.check_stiffness(min(expected_columns(job, body), body.n_dof))  # the mode set refuses a job with more modes
+        n_columns = min(expected_columns(job, body), body.n_dof)  # the mode set refuses a job with more modes
+        words = plan.left_out(n_columns)
+        if plan.is_requested:
+            require_geometric_stiffness(body)
+            if isinstance(plan.asked, list):
+                loaded_interfaces(body, plan.asked)
+            require_room_for_stiffness(body, n_columns, plan.asked)
+            words = stiffness_words(body, n_columns, plan.asked)
+        if words:
+            log.warning("body %r: %s", body.name, words)
         if budget is None:
             return plan
         n_modes = job.reduction.n_modes if isinstance(job.reduction.n_modes, int) else GUESSED_MODES
@@ -199,24 +211,9 @@ class Plan:
 
     def left_out(self, n_modes: int) -> str:
         """Return a note that an optional geometric stiffness is left out because it is large, or ""."""
-        from cms.reduction.geometric_stiffness.room_for_stiffness import left_out_words
+        from cms.modes.families.cost import left_out_words
 
         return left_out_words(self.body, n_modes) if self.is_optional else ""
-
-    def check_stiffness(self, n_modes: int) -> None:
-        """Refuse a geometric stiffness that cannot be made, and log what it costs if it is large or left out."""
-        from cms.reduction.geometric_stiffness.room_for_stiffness import require_room_for_stiffness, stiffness_words
-        from cms.reduction.geometric_stiffness.unit_states import loaded_interfaces, require_geometric_stiffness
-
-        words = self.left_out(n_modes)
-        if self.is_requested:
-            require_geometric_stiffness(self.body)
-            if isinstance(self.asked, list):
-                loaded_interfaces(self.body, self.asked)
-            require_room_for_stiffness(self.body, n_modes, self.asked)
-            words = stiffness_words(self.body, n_modes, self.asked)
-        if words:
-            log.warning("body %r: %s", self.body.name, words)
 
 
 def budget_of(job: Job, solver: str | Solver | None, memory: str | float | None) -> float | None:
@@ -244,7 +241,7 @@ def budget_of(job: Job, solver: str | Solver | None, memory: str | float | None)
 
 def expected_columns(job: Job, body: FEBody) -> int:
     """Return a lower bound of the number of columns of the mode set of a job, before the set is made."""
-    from cms.modes.families.interface_cost import interface_reduction_size
+    from cms.modes.families.cost import interface_reduction_size
     from cms.modes.mode_sets import INTERFACE_SETS
 
     found = len(body.b)

@@ -1,17 +1,30 @@
-"""A mode set: displacement columns that span a reduction basis, each with a description of its origin."""
+"""A mode set: displacement columns that span a reduction basis, each with a description of its origin.
 
-from collections.abc import Mapping
+The functions that make mode sets (`cms/modes/mode_sets`) assemble them from blocks of columns of one family.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Any, Protocol
 
 import numpy as np
 
 from cms.errors import ModeSetError
-from fe_models.foundation.arrays import Array, frozen
+from cms.linear_algebra.solvers.eigen import EigenResult
+from cms.linear_algebra.solvers.mode_count import ModeCount
+from cms.modes.families.families import Families
+from cms.modes.families.static_modes import boundary_names
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, frozen
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.tall.columns import are_finite, frozen_columns
+from fe_models.foundation.ranks.spread_columns import spread_beside
+from fe_models.foundation.tall.columns import are_finite, beside, frozen_columns
 
-__all__ = ["ModeSet"]
+__all__ = [
+    "Block", "ModeSet", "boundary_block", "checked_modes", "constraint_block", "mode_set", "require_interfaces",
+    "rigid_block", "vibration_block",
+]  # fmt: skip
 
 
 @presented
@@ -66,3 +79,135 @@ class ModeSet:
     def is_static(self) -> np.ndarray:
         """Whether each column is static, (n_columns,) bool."""
         return np.isnan(self.frequencies)
+
+
+# blocks of columns of one family -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Named columns of one family."""
+
+    columns: Array  #: (n_dof, k)
+    labels: Sequence[str]  #: (k,)
+    groups: Sequence[str]  #: (k,)
+    frequencies: Array | None = None  #: (k,); None for static columns
+
+
+def boundary_block(body: FEBody, columns: Array, family: str) -> Block:
+    """Return the static columns of a family, one for each boundary dof."""
+    return Block(columns, *boundary_names(body, family))
+
+
+def constraint_block(families: Families) -> Block:
+    """Return the constraint modes."""
+    return Block(families.Psi_C, *families.held_names("constraint"))
+
+
+def rigid_block(families: Families, columns: Array, family: str) -> Block:
+    """Return the columns of a family, one for each rigid-body mode."""
+    labels = [f"{family} {MOTION_COMPONENTS[k]}" for k in families.rigid_components]
+    return Block(columns, labels, [family] * len(labels))
+
+
+def vibration_block(kind: str, modes: EigenResult, columns: Array | None = None) -> Block:
+    """Return a block of vibration modes, or of columns made from them, one for each mode."""
+    n = len(modes.frequencies)
+    return Block(
+        modes.Phi if columns is None else columns,
+        [f"{kind} {k + 1}" for k in range(n)],
+        [kind] * n,
+        modes.frequencies,
+    )
+
+
+def mode_set(
+    name: str,
+    families: Families,
+    blocks: Sequence[Block],
+    *,
+    modes: EigenResult | None = None,
+    wanted: ModeCount | None = None,
+    options: Mapping[str, str] | None = None,
+    data: Mapping[str, Array] | None = None,
+) -> ModeSet:
+    """Assemble blocks to a mode set, and record the requested options and the solver used."""
+    recorded = {"solver": families.fixed.factorization.description}
+    if modes is not None:
+        recorded |= {"n_modes": str(len(modes.frequencies))}
+        if len(modes.frequencies):
+            recorded |= {"verified": str(modes.is_proven), "eigensolver": modes.method}
+    if wanted is not None and wanted.cutoff is not None:
+        recorded["cutoff"] = repr(float(wanted.cutoff))
+    columns, layout = [block.columns for block in blocks], families.body.layout
+    if layout is not None:  # columns of a distributed body are distributed, also where none of the blocks is
+        whole: Any = spread_beside(layout, *columns)
+    else:
+        whole = beside(*columns) if len(columns) > 1 else columns[0]
+    return ModeSet(
+        name,
+        whole,
+        tuple(label for block in blocks for label in block.labels),
+        np.concatenate([np.full(len(b.labels), np.nan) if b.frequencies is None else b.frequencies for b in blocks]),
+        {**recorded, **(options or {})},
+        tuple(group for block in blocks for group in block.groups),
+        data or {},
+    )
+
+
+# checks common to all mode sets with vibration modes: how many modes are wanted, and whether that is possible ---------
+
+
+class Finder(Protocol):
+    """A method of `Families` that computes vibration modes."""
+
+    def __call__(self, n_modes: ModeCount) -> EigenResult: ...
+
+
+def require_interfaces(name: str, body: FEBody) -> None:
+    """Raise `ModeSetError` if the body has no interface but the set consists of interface modes."""
+    if len(body.b) == 0:
+        raise ModeSetError(f"{name}: body {body.name!r} has no interface; give it at least one, or take free modes")
+
+
+def checked_modes(
+    name: str,
+    kind: str,
+    find: Finder,
+    body: FEBody,
+    wanted: ModeCount,
+) -> EigenResult:
+    """Compute the modes that a set requests.
+
+    Parameters
+    ----------
+    name
+        Name of the set, for messages.
+    kind
+        Kind of modes, for messages, such as "fixed-interface".
+    find
+        Computes modes by number or cutoff.
+    wanted
+        Number of modes, or cutoff.
+
+    Raises
+    ------
+    ModeSetError
+        If there are fewer dofs than modes, or no mode lies below the cutoff.
+    """
+    n_i, cutoff = body.n_dof - len(body.b), wanted.cutoff
+    is_fixed = kind == "fixed-interface"
+    if wanted.n is not None and wanted.n > (n_i if is_fixed else body.n_dof):
+        raise ModeSetError(
+            f"{name}: n_modes = {wanted.n}, but body {body.name!r} has {n_i} interior dofs"
+            + (f"; choose 0 <= n_modes <= {n_i}" if is_fixed else f" and {body.n_dof} in all; choose fewer")
+        )
+    modes = find(wanted)
+    if cutoff is not None and not len(modes.frequencies) and (n_i or not is_fixed):
+        first = find(ModeCount(1)).frequencies[0]
+        in_hertz = f"{cutoff / body.units.time:g} Hz, {first / body.units.time:.6g} Hz"
+        raise ModeSetError(
+            f"{name}: cutoff = {cutoff:g} lies below the first {kind} mode of body {body.name!r}, at {first:.6g} "
+            f"({in_hertz}); choose a higher cutoff, or n_modes = 0"
+        )
+    return modes

@@ -12,6 +12,11 @@ import numpy as np
 from cms.body.invariants import NEGATIVITY, Moments, NodalSums, moments_from_gram
 from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.errors import BodyError, ModeSetError
+from cms.modes.families.cost import (
+    chosen_words,
+    left_out_words,
+    require_room_for_stiffness,
+)
 from cms.modes.families.families import Families, body_of
 from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.modes.mode_set import ModeSet
@@ -30,11 +35,6 @@ from cms.reduction.basis.strain_damping import StrainDamping
 from cms.reduction.basis.stress_modes import nodal_stress_modes, point_stress_modes
 from cms.reduction.geometric_stiffness.geometric_reduction import stiffness_of_states
 from cms.reduction.geometric_stiffness.quadratic_modes import quadratic_modes
-from cms.reduction.geometric_stiffness.room_for_stiffness import (
-    chosen_words,
-    left_out_words,
-    require_room_for_stiffness,
-)
 from cms.reduction.geometric_stiffness.unit_states import (
     UnitStates,
     has_geometric_stiffness,
@@ -91,7 +91,7 @@ def reduce(
     geometric
         Whether to add the geometric stiffness of the unit loads (`cms.GeometricStiffness`). With it, a multibody system
         stiffens the body by its spin, accelerations and interface loads. Default: True if the elements are known and it
-        needs at most 2 GB (`cms.reduction.geometric_stiffness.room_for_stiffness`); a warning and the provenance say if
+        needs at most 2 GB (`cms.modes.families.cost`); a warning and the provenance say if
         it is left out. It costs a factorisation, unless `source` brings one, the static solution of 12 + 6 n_interfaces
         loads, and one pass over the elements. Alternatively, the static states of the unit loads in this frame
         (`unit_states`), which need no further factorisation.
@@ -326,17 +326,17 @@ def reduced_interface(
     body: FEBody, interface: Interface, Phi: Array, frame: BodyFrame, index_of: IntArray
 ) -> ReducedInterface:
     """Return the motion of an interface with the modes: of its reference node, or the mean motion of its nodes."""
-    motion, reference, has_rotation = reference_motion(body, interface)
-    Psi = rows_times(motion, Phi)
+    motion = reference_motion(body, interface)
+    Psi = rows_times(motion.rows, Phi)
     R = frame.axes.T
     return ReducedInterface(
         interface.name,
         interface.kind,
-        position=R @ (reference - frame.origin),
+        position=R @ (motion.point - frame.origin),
         triad=R @ interface.triad,
         Psi=np.concatenate([R @ Psi[:3], R @ Psi[3:]]),
         members=index_of[interface.nodes],
-        has_rotation=has_rotation,
+        has_rotation=motion.has_rotation,
     )
 
 

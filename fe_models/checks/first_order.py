@@ -25,7 +25,7 @@ from fe_models.foundation.arrays import Array, IntArray
 from fe_models.meshes.boundary import boundary_nodes
 from fe_models.meshes.connectivity import facet_pairs
 from fe_models.meshes.mesh import Mesh, drop_unused_nodes
-from fe_models.meshes.quadratic_mesh import FIRST_ORDER, quadratic_mesh, tetrahedra_of
+from fe_models.meshes.quadratic_mesh import quadratic_mesh, tetrahedra_of
 
 __all__ = ["PROVENANCE", "FirstOrderError", "first_order_error"]
 
@@ -76,26 +76,18 @@ class FirstOrderError:
 
 def first_order_error(
     mesh: Mesh, materials: AnyMaterial | Mapping[str, AnyMaterial] | None = None, *, incompatible_modes: bool = False
-) -> FirstOrderError | None:
+) -> FirstOrderError:
     """Measure how much too high the lowest frequencies are because cells are of first order.
 
     Parameters
     ----------
     mesh
-        Solid cells without errors in the mesh report.
+        Cells of first order only, without errors in the mesh report.
     materials
         As for `solid_body`; None: a material with nu = 0.3.
     incompatible_modes
         Whether eight-node bricks have incompatible modes.
-
-    Returns
-    -------
-    FirstOrderError | None
-        None if no cell is of first order, or all are bricks with incompatible modes.
     """
-    kinds = tuple(kind for kind, cells in mesh.cells.items() if len(cells))
-    if not set(kinds) <= set(FIRST_ORDER) or (incompatible_modes and kinds == ("hexahedron",)):
-        return None
     given, of_cell = assign_materials(mesh, STEEL if materials is None else materials)
     piece, chosen = piece_of(mesh)  # (1)
     number = np.concatenate([of_cell[kind] for kind in mesh.cells])[chosen]
@@ -110,7 +102,7 @@ def first_order_error(
     K, M_s = assemble(finer, given, by_type(finer, number))
     second = coarse.improved(K, expand_scalar_mass(M_s), finer.nodes, P)
     error = np.sqrt(coarse.omega2[:N_MODES] / second[:N_MODES]).max() - 1  # (4)
-    return FirstOrderError(float(max(error, 0.0)), len(chosen), len(chosen) == mesh.n_cells, kinds)
+    return FirstOrderError(float(max(error, 0.0)), len(chosen), len(chosen) == mesh.n_cells, tuple(piece.cells))
 
 
 class LowestModes:

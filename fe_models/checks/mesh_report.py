@@ -22,6 +22,7 @@ from fe_models.meshes.cell_shapes import CELL_SHAPES, cell_jacobians, quadrature
 from fe_models.meshes.connectivity import Connectivity, coincident_nodes, connectivity
 from fe_models.meshes.mesh import Mesh, used_nodes
 from fe_models.meshes.objects.as_mesh import as_mesh
+from fe_models.meshes.quadratic_mesh import FIRST_ORDER
 
 __all__ = ["CellGeometry", "MeshReport", "cell_geometry", "face_angles", "report_mesh"]
 
@@ -274,7 +275,14 @@ def _first_order(
     incompatible_modes: bool,
     findings: list[Finding],
 ) -> FirstOrderError | None:
-    """Return the error due to first-order cells; None also if cells are too bad to be raised to second order."""
+    """Return the error due to first-order cells.
+
+    None if some cells are of second order, if all are bricks with incompatible modes, or if cells are too bad to be
+    raised to second order.
+    """
+    kinds = {kind for kind, cells in mesh.cells.items() if len(cells)}
+    if not kinds <= set(FIRST_ORDER) or (incompatible_modes and kinds == {"hexahedron"}):
+        return None
     if UNMEASURABLE & {finding.kind for finding in findings if finding.is_error}:
         return None
     try:

@@ -11,6 +11,7 @@ import os
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -146,6 +147,7 @@ def write_sealed_file(path: Path, kind: Kind, fill: Callable[[Any], None], *, pa
     sync_folder(path.parent)
 
 
+@dataclass(eq=False)
 class Manifest:
     """Writes attributes and datasets into a file, and finally the digest over all of them.
 
@@ -153,9 +155,8 @@ class Manifest:
     depend on the layout of HDF5. It therefore survives repacking, and equal digests mean equal contents.
     """
 
-    def __init__(self, file: Any) -> None:
-        self.file = file
-        self.lines: list[str] = []
+    file: Any  #: an open `h5py.File`
+    lines: list[str] = field(default_factory=list)  #: of the manifest, one for each attribute and dataset
 
     def attributes(self, path: str, values: Mapping[str, Attribute]) -> None:
         """Write the attributes of a group, which is created if it does not exist."""

@@ -95,7 +95,7 @@ def read_parametric(path: Path, error: type[Exception], changes: Mapping[str, An
     changes = dict(changes or {})
     set_outside = {name: changes.pop(name) for name in list(changes) if name in given}
     resolver = Resolver(Path(path), error, {**given, **set_outside}, frozenset(set_outside), origins)
-    if given or uses_repeat(content):
+    if given or any(location[-1] == "repeat" for location in locations(content)):
         content, origins = resolver.table(content, (), (), {}), resolver.resolved
         require_usable(content, Path(path), error)
     values = {name: resolver.parameter(name) for name in given}
@@ -239,13 +239,6 @@ def relocated(value: Any, folder: Path) -> Any:
 
 
 # Steps 2 to 4: parameters, repeat, expressions -----------------------------------------------------------------------
-
-
-def uses_repeat(value: Any) -> bool:
-    """Whether a table anywhere in the content is repeated."""
-    if isinstance(value, dict):
-        return "repeat" in value or any(uses_repeat(inner) for inner in value.values())
-    return isinstance(value, list) and any(uses_repeat(inner) for inner in value)
 
 
 @dataclass(eq=False)

@@ -62,6 +62,8 @@ def write_sealed(content: Content, path: str | os.PathLike[str]) -> None:
     ModalFileError
         If the file cannot be written (no folder, no permission, disk full). An existing file is unchanged.
     """
+    import h5py
+
     path = Path(path)
     kind = Kind(content.format, content.version, ModalFileError, "")
     try:
@@ -70,7 +72,9 @@ def write_sealed(content: Content, path: str | os.PathLike[str]) -> None:
             whole = path.resolve()  # resolve a link, so that it remains a link
             write_sealed_file(whole, kind, lambda file: fill(file, content), part=part_of(whole))
             return
-        image = hdf5_image(content)
+        image = io.BytesIO()
+        with h5py.File(image, "w", userblock_size=SEAL_SIZE, libver=("v108", "v108")) as file:  # readable by every tool
+            fill(file, content)
         seal = seal_of(image, kind)
         with image.getbuffer() as data:
             replace_file(path, seal, data[SEAL_SIZE:])
@@ -99,16 +103,6 @@ def read_sealed(path: str | os.PathLike[str], kind: Kind) -> Content:
         if isinstance(stated, int) and stated > kind.version:
             raise newer(path, kind, stated)
         return Content(kind.format, int(stated or 0), *walk(file, path, kind))
-
-
-def hdf5_image(content: Content) -> io.BytesIO:
-    """Return the HDF5 file in memory, with space for the seal. Its 1.8 layout is readable by every tool."""
-    import h5py
-
-    image = io.BytesIO()
-    with h5py.File(image, "w", userblock_size=SEAL_SIZE, libver=("v108", "v108")) as file:
-        fill(file, content)
-    return image
 
 
 def fill(file: Any, content: Content) -> None:

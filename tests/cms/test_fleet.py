@@ -126,7 +126,7 @@ def test_a_job_that_fails_takes_no_other_along(jobs):
 
 
 def test_warnings_of_a_job_are_told_once_with_its_row(jobs, monkeypatch, caplog):
-    monkeypatch.setattr("cms.modes.families.interface_cost.MANY", 3)
+    monkeypatch.setattr("cms.modes.families.cost.MANY", 3)
     rows = reduce_fleet(jobs[:2], workers=1)
     assert [len(row.notes) for row in rows] == [1, 1]
     assert "interface 'foot' of 1 nodes has 6 boundary dofs" in rows[0].notes[0]

@@ -14,8 +14,7 @@ from cms.linear_algebra.solvers.eigen import EigenResult
 from cms.modes.families.families import Families, body_of, families_of
 from cms.modes.families.receptance import boundary_scale
 from cms.modes.families.static_modes import boundary_names
-from cms.modes.mode_set import ModeSet
-from cms.modes.mode_sets.blocks import Block, mode_set, require_interfaces, rigid_block
+from cms.modes.mode_set import Block, ModeSet, mode_set, require_interfaces, rigid_block
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.tall.columns import combine

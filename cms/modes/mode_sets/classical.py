@@ -12,9 +12,9 @@ from cms.modes.families.families import Families, families_of
 from cms.modes.families.flexibility import BoundaryConditions
 from cms.modes.families.interface_loads import InterfaceLoad, boundary_load
 from cms.modes.families.static_modes import boundary_names
-from cms.modes.mode_set import ModeSet
-from cms.modes.mode_sets.blocks import (
+from cms.modes.mode_set import (
     Block,
+    ModeSet,
     boundary_block,
     checked_modes,
     constraint_block,

@@ -8,9 +8,9 @@ import scipy.linalg as la
 from cms.linear_algebra.solvers.eigen import EigenResult
 from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
 from cms.modes.families.families import Families, families_of
-from cms.modes.mode_set import ModeSet
-from cms.modes.mode_sets.blocks import (
+from cms.modes.mode_set import (
     Block,
+    ModeSet,
     boundary_block,
     checked_modes,
     constraint_block,

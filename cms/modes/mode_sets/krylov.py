@@ -15,8 +15,7 @@ from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
 from cms.modes.centrifugal import CENTRIFUGAL
 from cms.modes.families.families import Families, body_of, families_of
 from cms.modes.families.receptance import boundary_scale, largest_error, receptance_of_pencil
-from cms.modes.mode_set import ModeSet
-from cms.modes.mode_sets.blocks import Block, mode_set, require_interfaces, rigid_block
+from cms.modes.mode_set import Block, ModeSet, mode_set, require_interfaces, rigid_block
 from fe_models.body.couplings.submatrix import PrincipalBlock
 from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.foundation.arrays import Array

@@ -12,8 +12,8 @@ from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
 from cms.linear_algebra.substructures.modes import Interior, MultilevelResult, multilevel_modes
 from cms.modes.families.families import Families, families_of
 from cms.modes.families.fixed_interface import FixedInterfaceBody
-from cms.modes.mode_set import ModeSet
-from cms.modes.mode_sets.blocks import (
+from cms.modes.mode_set import (
+    ModeSet,
     checked_modes,
     constraint_block,
     mode_set,

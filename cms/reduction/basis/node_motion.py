@@ -1,5 +1,7 @@
 """Motion of nodes and interfaces, whether their dofs are in the body or only in its mesh."""
 
+from typing import NamedTuple
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -12,9 +14,9 @@ from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.tall.columns import in_memory
 
 __all__ = [
+    "ReferenceMotion",
     "are_spread",
     "interface_node_motion",
-    "is_mean",
     "kept_points",
     "node_motion",
     "node_weights",
@@ -51,45 +53,35 @@ def interface_node_motion(body: FEBody, interface: Interface) -> sp.csr_array | 
     return sp.csr_array(sp.csr_array(transport) @ motion)
 
 
-def reference_motion(body: FEBody, interface: Interface) -> tuple[sp.csr_array, Array, bool]:
-    """Return the motion of the reference point of an interface as rows over the dofs of the body.
+class ReferenceMotion(NamedTuple):
+    """The motion of the reference point of an interface."""
+
+    rows: sp.csr_array  #: translation and rotation of the point over the dofs of the body, mesh axes, (6, n_dof)
+    point: Array  #: position of the point, (3,) [m]
+    has_rotation: bool = True  #: whether the motion includes a rotation; otherwise rows 3-5 are zero
+    is_mean: bool = False  #: whether the point is no node of the body and follows the mean of several members
+
+
+def reference_motion(body: FEBody, interface: Interface) -> ReferenceMotion:
+    """Return the motion of the reference point of an interface.
 
     It is the motion of the reference node, or of a member with six components that moves it rigidly, or else the
     weighted mean motion of the members. If the members are collinear, it is their mean translation.
-
-    Returns
-    -------
-    motion
-        Translation and rotation of the point, mesh axes, (6, n_dof).
-    point
-        Position of the point, (3,) [m].
-    has_rotation
-        Whether the motion includes a rotation; otherwise rows 3-5 are zero.
     """
     dofs = interface.dofs
     if dofs is None:
         raise BodyError(f"body {body.name!r}: interface {interface.name!r} is not coupled; call cms.couple(body)")
-    if has_reference_node(body, interface):
-        motion = sp.csr_array((np.ones(6), (np.arange(6), dofs)), shape=(6, body.n_dof))
-        return motion, body.nodes[body.dofs[dofs[0], 0]], True
+    if len(dofs) == 6 and len(np.unique(body.dofs[dofs, 0])) == 1:
+        rows = sp.csr_array((np.ones(6), (np.arange(6), dofs)), shape=(6, body.n_dof))
+        return ReferenceMotion(rows, body.nodes[body.dofs[dofs[0], 0]])
     carried = interface_node_motion(body, interface)
     if carried is not None:
-        return carried, interface.reference, True
+        return ReferenceMotion(carried, interface.reference)
     points, weights = body.nodes[interface.nodes], np.asarray(interface.weights)
     has_rotation = are_spread(points)
     mean = mean_motion(points, weights, interface.reference) if has_rotation else mean_translation(weights)
-    return sp.csr_array(sp.csr_array(mean) @ translation_rows(body, interface.nodes)), interface.reference, has_rotation
-
-
-def is_mean(body: FEBody, interface: Interface) -> bool:
-    """Return whether the reference point is not a node of the body and follows several members."""
-    return not has_reference_node(body, interface) and interface_node_motion(body, interface) is None
-
-
-def has_reference_node(body: FEBody, interface: Interface) -> bool:
-    """Return whether the six boundary dofs of the interface belong to one node."""
-    dofs = np.asarray(interface.dofs)
-    return len(dofs) == 6 and len(np.unique(body.dofs[dofs, 0])) == 1
+    rows = sp.csr_array(sp.csr_array(mean) @ translation_rows(body, interface.nodes))
+    return ReferenceMotion(rows, interface.reference, has_rotation, is_mean=True)
 
 
 def translation_rows(body: FEBody, nodes: IntArray) -> sp.csr_array:

@@ -16,7 +16,7 @@ from cms.body.geometric_stiffness import GeometricStiffness, stiffness_of_loads
 from cms.modes.families.families import Families, body_of
 from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.frames import FrameCondition
-from cms.reduction.basis.node_motion import is_mean, reference_motion, translation_rows
+from cms.reduction.basis.node_motion import reference_motion, translation_rows
 from cms.reduction.geometric_stiffness.unit_states import UnitStates, states_of, turned_rigid_work
 from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.fe_body import FEBody, Interface
@@ -26,7 +26,6 @@ from fe_models.foundation.tall.columns import beside, rows_times
 
 __all__ = [
     "elastic_part",
-    "followers",
     "link_work",
     "mean_second_order",
     "reduced_geometric_stiffness",
@@ -144,7 +143,7 @@ def elastic_part(body: FEBody, u: Array, mass: MassLoads, Phi: Array) -> Array:
     if body.recovery is None:
         return K
     T, dofs = body.recovery.matrix, body.recovery.dofs
-    nodes = followers(T, dofs, body.dofs)
+    nodes = dofs[_levers(T, dofs, body.dofs).row, 0]  # their translation follows a rotation
     of_means = [dofs[np.unique(mean.follows.tocoo().row), 0] for mean in body.mean_nodes]
     asked = np.unique(np.concatenate([nodes, *of_means]))
     if not len(asked):
@@ -229,15 +228,15 @@ def mean_part(body: FEBody, on_dofs: Array, Phi: Array, axes: Array, is_loaded: 
     loaded = [interface for interface, is_own in zip(body.interfaces, is_loaded, strict=True) if is_own]
     for number, interface in enumerate(loaded):
         own = slice(12 + 6 * number, 18 + 6 * number)
-        motion, _, turns = reference_motion(body, interface)
         if interface.kind == "distributing":
             continue
-        if is_mean(body, interface):
-            gamma = members_second_order(body, interface, Phi, turns)
+        motion = reference_motion(body, interface)
+        if motion.is_mean:
+            gamma = members_second_order(body, interface, Phi, motion.has_rotation)
             work[own] += np.einsum("cj,ckl->jkl", turn, gamma, optimize=True)
         else:
             six = np.stack([np.zeros(6, np.int64), np.arange(6)], axis=1)
-            work[own] += link_work(motion, six, body.dofs, np.asarray(turn, np.float64), Phi)
+            work[own] += link_work(motion.rows, six, body.dofs, np.asarray(turn, np.float64), Phi)
     return work
 
 
@@ -247,8 +246,7 @@ def distributing_part(body: FEBody, on_dofs: Array, Phi: Array) -> Array:
     work = np.zeros((on_dofs.shape[1], n, n))
     for interface in body.interfaces:
         if interface.kind == "distributing":
-            _, _, turns = reference_motion(body, interface)
-            gamma = members_second_order(body, interface, Phi, turns)
+            gamma = members_second_order(body, interface, Phi, reference_motion(body, interface).has_rotation)
             work += np.einsum("cj,ckl->jkl", on_dofs[np.asarray(interface.dofs)], gamma, optimize=True)
     return work
 
@@ -265,12 +263,6 @@ def members_second_order(body: FEBody, interface: Interface, Phi: Array, turns: 
 # In a recovery u_mesh = T u, the rotation columns hold the lever of every follower: u_s = u + B theta with B = -a~. If
 # theta is a rotation vector, the follower also moves by ½ theta × (B theta). Forces on followers do work on this
 # motion.
-
-
-def followers(T: sp.csr_array, row_dofs: IntArray, column_dofs: IntArray) -> IntArray:
-    """Return the nodes whose translation follows a rotation, given (node, component) of the rows and columns of T."""
-    entries = _levers(T, row_dofs, column_dofs)
-    return np.unique(row_dofs[entries.row, 0]).astype(np.int64)
 
 
 def link_work(T: sp.csr_array, row_dofs: IntArray, column_dofs: IntArray, forces: Array, Phi: Array) -> Array:

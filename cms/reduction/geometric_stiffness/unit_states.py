@@ -58,7 +58,7 @@ def unit_loads(
     turn = np.kron(np.eye(2), frame.axes)
     chosen = is_loaded or (True,) * len(body.interfaces)
     columns = [
-        reference_motion(body, interface)[0].T @ turn
+        reference_motion(body, interface).rows.T @ turn
         for interface, is_chosen in zip(body.interfaces, chosen, strict=True)
         if is_chosen
     ]

@@ -167,7 +167,7 @@ def loads_of_model(body: FEBody, frame: BodyFrame, request: RecoveryRequest) -> 
         forces.append(np.asarray(on_mesh if body.recovery is None else body.recovery.matrix.T @ on_mesh))
     for interface in body.interfaces:
         columns.add(tuple(f"{interface.name} {word}" for word in WRENCH), (FORCE,) * 3 + (MOMENT,) * 3, at=True)
-        forces.append(np.asarray(reference_motion(body, interface)[0].T @ turn))
+        forces.append(np.asarray(reference_motion(body, interface).rows.T @ turn))
     for case in body.load_cases:
         columns.add((f"load case {case.name}",), ((0.0, 0.0, 0.0),))
         forces.append(np.asarray(case.f)[:, None])

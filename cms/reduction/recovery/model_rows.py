@@ -76,9 +76,9 @@ def motion_block(body: FEBody, rows: Rows) -> Block:
     for at in rows.at:
         interface = places.interface(at)
         if interface is not None:
-            matrix, point, has_rotation = reference_motion(body, interface)
-            n = 6 if has_rotation else 3
-            add("interface", -1, interface.name, sp.csr_array(matrix[:n]), range(n), point)
+            motion = reference_motion(body, interface)
+            n = 6 if motion.has_rotation else 3
+            add("interface", -1, interface.name, sp.csr_array(motion.rows[:n]), range(n), motion.point)
             continue
         for node in places.nodes(at).tolist():
             matrix, components = node_rows(body, node)

@@ -160,7 +160,7 @@ class SolidModel:
 
         If `nodes` are given, the forces at other nodes are zero.
         """
-        from fe_models.elements.solids.geometric_kernels import add_internal_forces
+        from fe_models.elements.solids.stress_kernels import add_internal_forces
 
         mesh = self.mesh
         require_rows("internal_forces", u, 3 * len(mesh.nodes))

@@ -96,7 +96,7 @@ def scalar_geometric_matrices(
     parts
         The cells with their quadrature.
     """
-    from fe_models.elements.solids.geometric_kernels import write_scalar_matrices
+    from fe_models.elements.solids.stress_kernels import write_scalar_matrices
 
     n_nodes = len(nodes)
     states = np.ascontiguousarray(u).reshape(n_nodes, 3, -1)
@@ -237,7 +237,7 @@ def _pairs_of(
     nodes: Array, cells: IntArray, material: IntArray, tensors: Array, table: ShapeTable, states: Array, columns: Array
 ) -> Array:
     """Return the sum over the points of these cells, (n_states, n_pairs)."""
-    from fe_models.elements.solids.geometric_kernels import stress_and_products
+    from fe_models.elements.solids.stress_kernels import stress_and_products
 
     n_states, n = states.shape[2], columns.shape[2]
     n_points, n_pairs = len(table.weights), n * (n + 1) // 2

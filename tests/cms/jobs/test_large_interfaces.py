@@ -10,9 +10,8 @@ import pytest
 from cms.cli.info import print_body
 from cms.errors import BodyError, ModeSetError
 from cms.jobs.job import read_job
-from cms.modes.families import families, interface_cost
+from cms.modes.families import cost, families
 from cms.pipeline import expected_columns, reduce_job
-from cms.reduction.geometric_stiffness import room_for_stiffness
 from tests.bodies import box_mesh
 
 JOB = """
@@ -42,7 +41,7 @@ def job(tmp_path, monkeypatch):
     meshio.Mesh(np.asarray(mesh.nodes), {kind: np.asarray(rows) for kind, rows in mesh.cells.items()}).write(
         tmp_path / "block.vtu"
     )
-    monkeypatch.setattr(interface_cost, "MANY", 45)
+    monkeypatch.setattr(cost, "MANY", 45)
 
     def made(lines=""):
         path = tmp_path / "block.toml"
@@ -75,14 +74,14 @@ def test_who_reduces_the_interface_is_told_nothing(job, caplog):
 
 
 def test_geometric_stiffness_without_room_is_refused_before_the_work(job, monkeypatch):
-    monkeypatch.setattr(room_for_stiffness, "machine_memory", lambda: 1e6)
+    monkeypatch.setattr(cost, "machine_memory", lambda: 1e6)
     monkeypatch.setattr(families, "fix_interfaces", lambda *_, **__: pytest.fail("worked before it looked"))
     with pytest.raises(BodyError, match=r"over about 53 modes.*interface_modes = 20 in \[reduction\]"):
         reduce_job(job("geometric_stiffness = true\n"))
 
 
 def test_geometric_stiffness_that_is_very_large_is_left_out_with_a_note(job, monkeypatch, caplog, capsys):
-    monkeypatch.setattr(room_for_stiffness, "UNASKED", 8.0 * 30 * 40**2)
+    monkeypatch.setattr(cost, "UNASKED", 8.0 * 30 * 40**2)
     with caplog.at_level(logging.WARNING):
         body = reduce_job(job())
     assert body.geometric is None
@@ -113,13 +112,13 @@ def test_columns_are_counted_before_they_are_made(job):
 
 
 def test_what_a_large_geometric_stiffness_costs_is_told_before_the_work(job, monkeypatch, caplog):
-    monkeypatch.setattr(room_for_stiffness, "UNASKED", 8.0 * 24 * 40**2)
+    monkeypatch.setattr(cost, "UNASKED", 8.0 * 24 * 40**2)
     told = []
     fix = families.fix_interfaces
     monkeypatch.setattr(
         families, "fix_interfaces", lambda *given, **names: told.append(caplog.text) or fix(*given, **names)
     )
-    monkeypatch.setattr(interface_cost, "MANY", 10_000)
+    monkeypatch.setattr(cost, "MANY", 10_000)
     left_out = r"left out: 30 unit loads over 53 modes would be .*interface_modes = 20 in \[reduction\] leaves about 34"
     for lines, words in (
         ("", left_out),
@@ -136,15 +135,15 @@ def test_what_a_large_geometric_stiffness_costs_is_told_before_the_work(job, mon
 def test_columns_are_announced_up_to_the_dofs_of_the_body(job, monkeypatch, caplog):
     """The block has 75 nodes, of which 15 move with a reference node: 60 x 3 + 6 dofs."""
     size = 8.0 * 30 * 186**2
-    monkeypatch.setattr(room_for_stiffness, "machine_memory", lambda: room_for_stiffness.HELD * size)
-    monkeypatch.setattr(interface_cost, "MANY", 10_000)
+    monkeypatch.setattr(cost, "machine_memory", lambda: cost.HELD * size)
+    monkeypatch.setattr(cost, "MANY", 10_000)
     for unasked, lines, told in (
         (size, "", ""),
         (size, "geometric_stiffness = true\n", ""),
         (size - 1, "", "left out: 30 unit loads over 186 modes"),
         (size - 1, "geometric_stiffness = true\n", "of 30 unit loads over about 186 modes"),
     ):
-        monkeypatch.setattr(room_for_stiffness, "UNASKED", unasked)
+        monkeypatch.setattr(cost, "UNASKED", unasked)
         caplog.clear()
         asked = job(lines)
         asked = asked.model_copy(update={"reduction": asked.reduction.model_copy(update={"n_modes": 5000})})

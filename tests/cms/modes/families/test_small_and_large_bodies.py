@@ -12,7 +12,7 @@ import cms
 import fe_models as fm
 from cms.errors import BodyError, ModeSetError
 from cms.modes.families import families, interface_cost
-from cms.modes.families.interface_cost import interface_reduction_size, large_interfaces, reduction_cost
+from cms.modes.families.cost import interface_reduction_size, large_interfaces, reduction_cost
 from tests.bodies import box_mesh, distorted
 from tests.fe_models.small_shells import SI, STEEL
 

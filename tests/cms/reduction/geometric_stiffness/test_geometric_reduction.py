@@ -62,7 +62,7 @@ def turned_on_dofs(body, loads, condition, tilde):
     result = np.zeros(loads.on_dofs.T.shape)
     rest = np.array(loads.on_dofs)
     for number, interface in enumerate(body.interfaces):
-        motion = reference_motion(body, interface)[0]
+        motion = reference_motion(body, interface).rows
         own = np.kron(np.eye(2), condition.frame.axes)
         rest[:, 12 + 6 * number : 18 + 6 * number] -= motion.T @ own
         result[12 + 6 * number : 18 + 6 * number] += (motion.T @ (six @ own)).T

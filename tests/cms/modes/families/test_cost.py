@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose
 
 import cms
 from cms.errors import BodyError
-from cms.reduction.geometric_stiffness import room_for_stiffness
-from cms.reduction.geometric_stiffness.room_for_stiffness import stiffness_bytes
+from cms.modes.families import cost
+from cms.modes.families.cost import stiffness_bytes
 from cms.reduction.geometric_stiffness.unit_states import unit_states
 from fe_models.elements.solids.body import solid_body
 from fe_models.elements.solids.interfaces import nodes_interface, rigid_interface
@@ -38,7 +38,7 @@ def test_an_interface_of_many_nodes_has_six_unit_loads_as_others_have(body, mode
 
 
 def test_one_that_is_very_large_is_made_where_it_is_asked_for_only(body, modes, monkeypatch, caplog):
-    monkeypatch.setattr(room_for_stiffness, "UNASKED", stiffness_bytes(body, modes.columns.shape[1]) - 1)
+    monkeypatch.setattr(cost, "UNASKED", stiffness_bytes(body, modes.columns.shape[1]) - 1)
     with caplog.at_level(logging.WARNING):
         found = cms.reduce(body, modes)
     assert found.geometric is None
@@ -53,7 +53,7 @@ def test_one_that_is_very_large_is_made_where_it_is_asked_for_only(body, modes, 
 
 
 def test_one_without_room_is_refused_before_the_work(body, modes, monkeypatch):
-    monkeypatch.setattr(room_for_stiffness, "machine_memory", lambda: 1e6)
+    monkeypatch.setattr(cost, "machine_memory", lambda: 1e6)
     with pytest.raises(BodyError, match=r"has 0.001 GB\. .*geometric_stiffness = \[.left.\] has the loads"):
         cms.reduce(body, modes, geometric=True)
 
