@@ -18,7 +18,7 @@ from cms.linear_algebra.solvers.shift_inverted import (
     refined_modes,
 )
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.tall.columns import combine, combined, inner, subtract
+from fe_models.foundation.tall.columns import combine, combine_in_place, combined, inner, put, subtract
 
 __all__ = ["BlockLanczos", "DenseSearch", "KrylovSearch", "RitzPairs"]
 
@@ -68,7 +68,7 @@ class BlockLanczos:
         self.n_solves = 0
         self.m = 0  # number of columns of V that are in T
         self.capacity = min(capacity, self.n)  #: number of columns that V can hold before a restart
-        self._basis = space.basis(self.capacity + block)
+        self._columns = space.empty(self.capacity + block)  # V, then the next block
         self._T = np.zeros((self.capacity + block, self.capacity + block))
         self._random = np.random.default_rng(0)
         self._M_next = self._start()  # M V_{j+1}; V_{j+1} itself is stored after V
@@ -78,12 +78,12 @@ class BlockLanczos:
     @property
     def V(self) -> Any:
         """The basis, (n, m)."""
-        return self._basis.columns(0, self.m)
+        return self._columns[:, : self.m]
 
     @property
     def V_and_next(self) -> Any:
         """The basis and the next block, (n, m + b)."""
-        return self._basis.columns(0, self.m + self._M_next.shape[1])
+        return self._columns[:, : self.m + self._M_next.shape[1]]
 
     @property
     def is_exhausted(self) -> bool:
@@ -97,8 +97,8 @@ class BlockLanczos:
             size = self.capacity + self.block
             T = np.zeros((size, size))
             T[: self.m, : self.m] = self._T[: self.m, : self.m]
-            self._basis.grow(size, self.V_and_next.shape[1])
-            self._T = T
+            old, self._columns, self._T = self.V_and_next, self.space.empty(size), T
+            put(old, self._columns[:, : old.shape[1]])
 
     def advance(self) -> None:
         """Add the next block to the basis."""
@@ -110,7 +110,7 @@ class BlockLanczos:
         W = self.solve(M_new)  # (1)
         A = inner(M_new, W)  # (2)
         near = np.concatenate([self._R[:, self._coupled :].T, A])
-        subtract(W, self._basis.columns(self._coupled, self.m), near)
+        subtract(W, self._columns[:, self._coupled : self.m], near)
         C, R, M_next = self._append(W, np.linalg.norm(near, axis=0).max())  # (3), (4)
         C[self._coupled :] += near  # (5)
         self._T[:last, block] = C
@@ -137,8 +137,9 @@ class BlockLanczos:
     def restart(self, ritz: RitzPairs, keep: int) -> None:
         """Keep only the span of the leading Ritz vectors; the next block stays."""
         S = ritz.S[:, :keep]
-        self._basis.turn(self.m, S)
-        self._basis.put(keep, self._basis.columns(self.m, self.m + len(self._R)))
+        combine_in_place(self.V, S)
+        b = len(self._R)
+        put(self._columns[:, self.m : self.m + b], self._columns[:, keep : keep + b])
         self._T[: self.m, : self.m] = 0.0
         self._T[np.arange(keep), np.arange(keep)] = ritz.theta[:keep]
         self._R = self._R @ S
@@ -188,7 +189,7 @@ class BlockLanczos:
                     R_sum = U @ R_sum
                 break
             M_W = self.M @ W
-        self._basis.put(self.m, W)
+        put(W, self._columns[:, self.m : self.m + W.shape[1]])
         return C_sum, R_sum, M_W
 
 

@@ -16,14 +16,13 @@ from cms.linear_algebra.solvers.inverse import Inverse
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.tall.columns import combine, inner, put, subtract
+from fe_models.foundation.tall.columns import combine, inner, subtract
 
 __all__ = [
-    "ArrayBasis", "ArraySpace", "ModeRequest", "Modes", "ShiftInverted", "TallBasis", "TallProduct", "TallSpace",
-    "measured_residual", "refined_modes",
+    "ArraySpace", "ModeRequest", "Modes", "ShiftInverted", "TallProduct", "TallSpace", "measured_residual",
+    "refined_modes",
 ]  # fmt: skip
 
-RESTART_ROWS = 65536  #: number of rows transformed at a time, which avoids a second basis in memory
 SAMPLES = 4  #: number of columns for a common measurement of all residuals
 
 
@@ -37,22 +36,6 @@ class TallProduct(Protocol):
         """Return A x, (n, k)."""
 
 
-class TallBasis(Protocol):
-    """A growing number of columns in their own memory."""
-
-    def columns(self, first: int, last: int) -> Any:
-        """Return some columns, (n, last - first); they change together with the basis."""
-
-    def put(self, first: int, X: Any) -> None:
-        """Write columns, starting at index `first`."""
-
-    def turn(self, m: int, C: Array) -> None:
-        """Replace the first k columns by V C, where V are the first m columns and C is (m, k)."""
-
-    def grow(self, capacity: int, m: int) -> None:
-        """Allocate memory for more columns; the first m columns stay."""
-
-
 class TallSpace(Protocol):
     """The columns of an iteration: their start, their storage, and the maps between them."""
 
@@ -61,42 +44,14 @@ class TallSpace(Protocol):
     def random(self, generator: np.random.Generator, k: int) -> Any:
         """Return columns of normally distributed numbers, (n, k)."""
 
-    def basis(self, capacity: int) -> TallBasis:
-        """Allocate memory for `capacity` columns."""
+    def empty(self, k: int) -> Any:
+        """Return columns to be filled, (n, k)."""
 
     def product(self, A: Any) -> TallProduct:
         """Return the product with a symmetric matrix, (n, n)."""
 
     def solver(self, factorization: Inverse) -> Callable[[Any], Any]:
         """Return the function that solves for columns with a factorisation."""
-
-
-class ArrayBasis:
-    """The basis, stored column by column."""
-
-    def __init__(self, n: int, capacity: int) -> None:
-        self.rows = np.empty((capacity, n))
-
-    def columns(self, first: int, last: int) -> Array:
-        """Return a view."""
-        return self.rows[first:last].T
-
-    def put(self, first: int, X: Array) -> None:
-        """Write columns, starting at index `first`."""
-        put(X, self.columns(first, first + X.shape[1]))
-
-    def turn(self, m: int, C: Array) -> None:
-        """Replace the first k columns by V C, where V are the first m columns."""
-        C_t, n = np.ascontiguousarray(C.T), self.rows.shape[1]
-        for first in range(0, n, RESTART_ROWS):
-            part = slice(first, first + RESTART_ROWS)
-            self.rows[: len(C_t), part] = C_t @ self.rows[:m, part]
-
-    def grow(self, capacity: int, m: int) -> None:
-        """Allocate memory for more columns; the first m columns stay."""
-        rows = np.empty((capacity, self.rows.shape[1]))
-        rows[:m] = self.rows[:m]
-        self.rows = rows
 
 
 class ArraySpace:
@@ -112,9 +67,9 @@ class ArraySpace:
 
     product = SymmetricProduct
 
-    def basis(self, capacity: int) -> ArrayBasis:
-        """Allocate memory for `capacity` columns."""
-        return ArrayBasis(self.n, capacity)
+    def empty(self, k: int) -> Array:
+        """Return columns to be filled, (n, k), stored column by column."""
+        return np.empty((self.n, k), order="F")
 
     def solver(self, factorization: Inverse) -> Callable[[Array], Array]:
         """Return the function that solves for columns with a factorisation, in the memory order of the factor."""

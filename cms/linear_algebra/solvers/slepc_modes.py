@@ -11,7 +11,7 @@ from cms.linear_algebra.solvers.factorization import Factorization, Matrix, lowe
 from cms.linear_algebra.solvers.inverse import Inverse
 from cms.linear_algebra.solvers.petsc.factor import CHUNK, PetscFactor, communicator, rows_here, solved_rows
 from cms.linear_algebra.solvers.petsc.libraries import petsc, slepc
-from cms.linear_algebra.solvers.shift_inverted import ArrayBasis, ModeRequest, Modes, ShiftInverted
+from cms.linear_algebra.solvers.shift_inverted import ModeRequest, Modes, ShiftInverted
 from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
 from fe_models.body.couplings.submatrix import spread_block
 from fe_models.foundation.arrays import Array, IntArray
@@ -19,7 +19,7 @@ from fe_models.foundation.ranks.product import RowsProduct
 from fe_models.foundation.ranks.ranks import Ranks
 from fe_models.foundation.ranks.row_layout import RowLayout, new_key
 from fe_models.foundation.ranks.rows import Rows, collected, spread
-from fe_models.foundation.ranks.spread_columns import Part, SpreadColumns, own_part, spread_columns
+from fe_models.foundation.ranks.spread_columns import Part, SpreadColumns, own_part, spread_columns, spread_parts
 from fe_models.foundation.ranks.trim import give_back
 
 __all__ = ["RankSpace", "SlepcSearch", "search_on_ranks"]
@@ -29,31 +29,6 @@ __all__ = ["RankSpace", "SlepcSearch", "search_on_ranks"]
 # Rank 0 runs the iteration and decides. All ranks perform operations on columns with their own rows at once. The rows
 # are distributed like those of the factor, so solves need no redistribution, and no array as long as the body passes
 # through rank 0.
-
-
-class RankBasis:
-    """A growing number of distributed columns."""
-
-    def __init__(self, space: "RankSpace", capacity: int) -> None:
-        self.layout, self.key = space.layout, new_key()
-        self.layout.ask(basis_here, self.key, space.rows, capacity)
-        self.layout.free_with(self, self.key)
-
-    def columns(self, first: int, last: int) -> SpreadColumns:
-        """Return some columns, (n, last - first)."""
-        return SpreadColumns(self.layout, Part(self.key, first, last), self)
-
-    def put(self, first: int, X: SpreadColumns) -> None:
-        """Write columns, starting at index `first`."""
-        self.layout.ask(put_here, self.key, first, X.part)
-
-    def turn(self, m: int, C: Array) -> None:
-        """Replace the first k columns by V C, where V are the first m columns."""
-        self.layout.ask(turn_here, self.key, m, C)
-
-    def grow(self, capacity: int, m: int) -> None:
-        """Allocate memory for more columns; the first m columns stay."""
-        self.layout.ask(grow_here, self.key, capacity, m)
 
 
 class RankProduct:
@@ -97,9 +72,9 @@ class RankSpace:
         """Return columns of normally distributed numbers, (n, k), equal to those of a single process."""
         return spread_columns(self.layout, generator.standard_normal((k, self.n))[:, self.numbering].T)
 
-    def basis(self, capacity: int) -> RankBasis:
-        """Allocate memory for `capacity` columns."""
-        return RankBasis(self, capacity)
+    def empty(self, k: int) -> SpreadColumns:
+        """Return columns to be filled, (n, k)."""
+        return spread_parts(self.layout, k, ())
 
     def has_rows_of(self, A: Matrix) -> bool:
         """Return whether the rows of a matrix are distributed like those of the columns."""
@@ -139,26 +114,6 @@ def rows_kept_here(ranks: Ranks, key: str, function: Callable[..., Any], *argume
 def give_back_here(ranks: Ranks) -> None:
     """Return freed memory to the system."""
     give_back()
-
-
-def basis_here(ranks: Ranks, key: str, rows: Rows, capacity: int) -> None:
-    """Allocate this rank's rows of a basis."""
-    ranks.store[key] = ArrayBasis(rows.count(ranks.rank), capacity)
-
-
-def put_here(ranks: Ranks, key: str, first: int, X: Part) -> None:
-    """Write this rank's rows of columns into a basis."""
-    ranks.store[key].put(first, own_part(ranks, X))
-
-
-def turn_here(ranks: Ranks, key: str, m: int, C: Array) -> None:
-    """Transform this rank's rows of a basis."""
-    ranks.store[key].turn(m, C)
-
-
-def grow_here(ranks: Ranks, key: str, capacity: int, m: int) -> None:
-    """Allocate memory for more columns."""
-    ranks.store[key].grow(capacity, m)
 
 
 def product_here(ranks: Ranks, key: str, rows: Rows) -> None:

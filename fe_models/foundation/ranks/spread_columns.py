@@ -182,11 +182,8 @@ def named(arguments: tuple[Any, ...]) -> tuple[Any, ...]:
 
 def own_part(ranks: Ranks, part: Part) -> Array:
     """Return this rank's rows of some columns, (n_own, k), a view."""
-    kept = ranks.store[part.key]
-    if isinstance(kept, np.ndarray):
-        return kept[:, part.first : part.last]
-    columns: Array = kept.columns(part.first, part.last)  # columns of a basis that grows
-    return columns
+    kept: Array = ranks.store[part.key]
+    return kept[:, part.first : part.last]
 
 
 def owned(ranks: Ranks, arguments: tuple[Any, ...]) -> list[Any]:

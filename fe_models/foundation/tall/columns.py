@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
 
 __all__ = [
-    "Columns", "are_finite", "beside", "combine", "combined", "copied", "dots", "elsewhere", "frozen_columns",
-    "in_memory", "inner", "of_this_process", "ordered", "put", "rows_times", "squares", "subtract",
+    "Columns", "are_finite", "beside", "combine", "combine_in_place", "combined", "copied", "dots", "elsewhere",
+    "frozen_columns", "in_memory", "inner", "of_this_process", "ordered", "put", "rows_times", "squares", "subtract",
 ]  # fmt: skip
 
 SMALL = 20_000  #: rows below which threads cost more than they save
@@ -123,12 +123,20 @@ def combine(X: Any, C: Array, *, order: Literal["C", "F"] | None = None) -> Any:
     return result
 
 
+def combine_in_place(X: Any, C: Array) -> None:
+    """Replace the first m columns of X, (n, k), by X C, (n, m)."""
+    if (far := elsewhere(X)) is not None:
+        far.on_rows(combine_in_place, X, C)
+        return
+    _by_rows(lambda some: np.copyto(X[some, : C.shape[1]], X[some] @ C), X, height=SLICE)
+
+
 def combined(X: Any, C: Array) -> Any:
     """Return X C, (n, m), in the memory of X, (n, k), which is overwritten; a new array if m is much smaller than k."""
     k, m = C.shape
     if elsewhere(X) is not None or not m or not k // 2 <= m <= k:
         return combine(X, C)
-    _by_rows(lambda some: np.copyto(X[some, :m], X[some] @ C), X, height=SLICE)
+    combine_in_place(X, C)
     if m == k or not X.flags.c_contiguous:
         return X[:, :m]
     whole = X.reshape(-1)  # rows are packed, so that the result is contiguous, as sparse products need it
@@ -211,8 +219,11 @@ def ordered(X: Array, order: Literal["C", "F"]) -> Array:
     return result
 
 
-def put(X: Array, target: Array) -> None:
-    """Copy X, (n, k), into an array of the same shape, in any memory order."""
+def put(X: Any, target: Any) -> None:
+    """Copy X, (n, k), into columns of the same shape, in any memory order."""
+    if (far := elsewhere(target)) is not None:
+        far.on_rows(put, far.like(X), target)
+        return
     _by_rows(lambda some: np.copyto(target[some], X[some]), X, height=SLICE)
 
 
