@@ -26,7 +26,7 @@ def measured(million):
     import fe_models
     from cms.reduction.basis.frames import TisserandFrame, frame_condition
     from cms.reduction.geometric_stiffness.geometric_reduction import reduced_geometric_stiffness, stiffness_of_states
-    from cms.reduction.geometric_stiffness.unit_states import states_of
+    from cms.reduction.geometric_stiffness.unit_states import unit_states
 
     path = rod_file(million, SIZES[million])
     warm_up()
@@ -52,7 +52,7 @@ def measured(million):
         reduced_geometric_stiffness(families, Phi, condition)
         clock("geometric stiffness")
         added = [b - a for a, b in zip(before, clock.total(), strict=True)]
-        fewer = stiffness_of_states(body, Phi, states_of(families, condition, spread=False))
+        fewer = stiffness_of_states(body, Phi, unit_states(families, frame=condition, spread=False))
         clock("(without the spread loads)")
         whole = reduced_geometric_stiffness(families, Phi, condition)
         clock("(with them again)")

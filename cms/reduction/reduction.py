@@ -39,7 +39,7 @@ from cms.reduction.geometric_stiffness.unit_states import (
     UnitStates,
     has_geometric_stiffness,
     require_geometric_stiffness,
-    states_of,
+    unit_states,
 )
 from cms.reduction.recovery.load_columns import nodes_of_loads
 from cms.reduction.recovery.matrices import recovery_of_model, unique
@@ -139,7 +139,7 @@ def reduce(
     if states is not None:
         require_states_of(body, condition.frame, states)
     elif geometric or quadratic:
-        states = states_of(source, condition)
+        states = unit_states(source, frame=condition)
     finished = finish(body, modes, condition)
     keeping = keep_nodes(body, keep) if keep else body
     if recovery and len(loaded := nodes_of_loads(body, unique(recovery))):

@@ -47,47 +47,52 @@ def implausible_units(units: Units, size: float, materials: Iterable[_Elastic]) 
         Materials with name, E and rho in its units.
     """
     materials = list(materials)
-    texts: list[tuple[bool, str]] = []
-    fitting = [u.name for u in UNIT_SYSTEMS.values() if u.name != units.name and _fits(u, size, materials)]
+    sizes, numbers = size_findings(units, size), _material_findings(units, materials)
+    if not numbers and not any(is_error for is_error, _ in sizes):
+        return [(False, f"units {units.name}: {text}") for _, text in sizes]
+    fitting = [
+        other.name
+        for other in UNIT_SYSTEMS.values()
+        if other.name != units.name
+        and SIZE[0] <= size * other.length <= SIZE[1]
+        and not _material_findings(other, materials)
+    ]
     advice = f"all numbers would fit {' or '.join(fitting)}" if fitting else "no known unit system fits all numbers"
     advice = f"{advice}; change the units or the numbers"
-    for is_error, text in size_findings(units, size):
-        texts.append((is_error, f"units {units.name}: {text}" + (f". {advice}" if is_error else "")))
+    texts = [
+        (is_error, f"units {units.name}: {text}" + (f". {advice}" if is_error else "")) for is_error, text in sizes
+    ]
+    return texts + [(is_error, f"units {units.name}: {text} {advice}") for is_error, text in numbers]
+
+
+def _material_findings(units: Units, materials: Iterable[_Elastic]) -> list[tuple[bool, str]]:
+    texts: list[tuple[bool, str]] = []
     for material in materials:
         rho = material.rho * units.to_si(mass=1, length=-3)
         E = material.E * units.to_si(mass=1, length=-1, time=-2)
         if rho and not DENSITY[0] <= rho <= DENSITY[1]:  # zero density is allowed: it stands for springs with a shape
             steel = STEEL / units.to_si(mass=1, length=-3)
-            texts.append(
-                (
-                    True,
-                    f"units {units.name}: density of {material.name!r} {material.rho:.4g} "
-                    f"{units.mass_symbol}/{units.length_symbol}³ = {rho:.4g} kg/m³; expected "
-                    f"{DENSITY[0]:g} to {DENSITY[1]:g} kg/m³ (steel in {units.name} is {steel:.4g}). "
-                    f"{advice}",
-                )
-            )
+            texts.append((
+                True,
+                f"density of {material.name!r} {material.rho:.4g} {units.mass_symbol}/{units.length_symbol}³ = "
+                f"{rho:.4g} kg/m³; expected {DENSITY[0]:g} to {DENSITY[1]:g} kg/m³ (steel in {units.name} is "
+                f"{steel:.4g}).",
+            ))  # fmt: skip
         if not MODULUS[0] <= E <= MODULUS[1]:
             steel = 2.1e11 / units.to_si(mass=1, length=-1, time=-2)
-            texts.append(
-                (
-                    True,
-                    f"units {units.name}: modulus of {material.name!r} {material.E:.4g} "
-                    f"{units.stress_symbol} = {E:.4g} Pa; expected {MODULUS[0]:g} to {MODULUS[1]:g} Pa "
-                    f"(steel in {units.name} is {steel:.4g}). {advice}",
-                )
-            )
+            texts.append((
+                True,
+                f"modulus of {material.name!r} {material.E:.4g} {units.stress_symbol} = {E:.4g} Pa; expected "
+                f"{MODULUS[0]:g} to {MODULUS[1]:g} Pa (steel in {units.name} is {steel:.4g}).",
+            ))  # fmt: skip
         elif DENSITY[0] <= rho <= DENSITY[1]:
             speed = (E / rho) ** 0.5
             if not WAVE_SPEED[0] <= speed <= WAVE_SPEED[1]:
-                texts.append(
-                    (
-                        False,
-                        f"units {units.name}: waves in {material.name!r} run at sqrt(E/rho) = {speed:.4g} "
-                        f"m/s; expected {WAVE_SPEED[0]:g} to {WAVE_SPEED[1]:g} m/s (steel: 5170): do "
-                        f"modulus and density have the same units? {advice}",
-                    )
-                )
+                texts.append((
+                    False,
+                    f"waves in {material.name!r} run at sqrt(E/rho) = {speed:.4g} m/s; expected {WAVE_SPEED[0]:g} to "
+                    f"{WAVE_SPEED[1]:g} m/s (steel: 5170): do modulus and density have the same units?",
+                ))  # fmt: skip
     return texts
 
 
@@ -194,15 +199,3 @@ def hull_volume(points: Array) -> float:
     if len(extents) < 3 or extents[2] <= FLAT * extents[0]:
         return 0.0
     return float(ConvexHull(centered).volume)
-
-
-def _fits(units: Units, size: float, materials: list[_Elastic]) -> bool:
-    is_plausible = SIZE[0] <= size * units.length <= SIZE[1]
-    for material in materials:
-        rho = material.rho * units.to_si(mass=1, length=-3)
-        E = material.E * units.to_si(mass=1, length=-1, time=-2)
-        is_plausible &= MODULUS[0] <= E <= MODULUS[1]
-        if rho:
-            is_plausible &= DENSITY[0] <= rho <= DENSITY[1]
-            is_plausible &= WAVE_SPEED[0] <= (E / rho) ** 0.5 <= WAVE_SPEED[1]
-    return is_plausible

@@ -17,7 +17,7 @@ from cms.modes.families.families import Families, body_of
 from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.frames import FrameCondition
 from cms.reduction.basis.node_motion import reference_motion, translation_rows
-from cms.reduction.geometric_stiffness.unit_states import UnitStates, states_of, turned_rigid_work
+from cms.reduction.geometric_stiffness.unit_states import UnitStates, turned_rigid_work, unit_states
 from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.mass_loads import MassLoads, rotation_work
@@ -108,7 +108,7 @@ def reduced_geometric_stiffness(body: FEBody | Families, Phi: Array, condition: 
     BodyError
         If the body has no element model with geometric stiffness.
     """
-    return stiffness_of_states(body_of(body), Phi, states_of(body, condition))
+    return stiffness_of_states(body_of(body), Phi, unit_states(body, frame=condition))
 
 
 def stiffness_of_states(body: FEBody, Phi: Array, states: UnitStates) -> GeometricStiffness:

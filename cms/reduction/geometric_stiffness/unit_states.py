@@ -19,7 +19,7 @@ from cms.errors import BodyError
 from cms.modes.families.families import Families, body_of, families_of
 from cms.modes.families.flexibility import held_factor
 from cms.modes.families.rigid_modes import geometric_rigid_modes
-from cms.reduction.basis.frames import Frame, FrameCondition, TisserandFrame, frame_condition
+from cms.reduction.basis.frames import Frame, FrameCondition, HeldFrame, TisserandFrame, frame_condition
 from cms.reduction.basis.node_motion import node_weights, reference_motion, weighted_rigid_modes
 from fe_models.body.fe_body import FEBody
 from fe_models.body.mass_loads import MassLoads
@@ -29,7 +29,7 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = [
     "UnitLoads", "UnitStates", "balanced", "has_geometric_stiffness", "loaded_interfaces",
-    "require_geometric_stiffness", "spread_forces", "states_of", "turned_rigid_work", "unit_loads", "unit_mass_loads",
+    "require_geometric_stiffness", "spread_forces", "turned_rigid_work", "unit_loads", "unit_mass_loads",
     "unit_states",
 ]  # fmt: skip
 
@@ -177,9 +177,9 @@ class UnitStates:
 
 
 def unit_states(
-    body: FEBody | Families,
+    source: FEBody | Families,
     *,
-    frame: Frame | None = None,
+    frame: Frame | HeldFrame | FrameCondition | None = None,
     spread: bool = True,
     interfaces: Sequence[str] | None = None,
 ) -> UnitStates:
@@ -190,10 +190,10 @@ def unit_states(
 
     Parameters
     ----------
-    body
+    source
         A coupled body with an element model, or its `Families`.
     frame
-        Body reference frame of the reduction; default: Tisserand (mean axis).
+        Body reference frame of the reduction, or its condition on this body; default: Tisserand (mean axis).
     spread
         Whether to include the six loads distributed over the nodes. Without them the geometric stiffness cannot be
         converted to a Buckens frame.
@@ -207,20 +207,9 @@ def unit_states(
         If the body has no element model with geometric stiffness, the frame cannot be attached, or an interface is
         unknown.
     """
-    condition = frame_condition(body_of(body), frame or TisserandFrame())
-    return states_of(body, condition, spread=spread, interfaces=interfaces)
-
-
-def states_of(
-    source: FEBody | Families,
-    condition: FrameCondition,
-    *,
-    spread: bool = True,
-    interfaces: Sequence[str] | None = None,
-) -> UnitStates:
-    """Return the static states for an evaluated frame condition."""
     body = body_of(source)
     require_geometric_stiffness(body)
+    condition = frame if isinstance(frame, FrameCondition) else frame_condition(body, frame or TisserandFrame())
     is_loaded = loaded_interfaces(body, interfaces)
     forces = spread_forces(body, condition.frame) if spread else None
     with families_of(source) as families:

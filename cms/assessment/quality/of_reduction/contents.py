@@ -37,7 +37,7 @@ from cms.reduction.basis.strain_damping import StrainDamping
 from cms.reduction.basis.stress_modes import nodal_stress_modes, point_stress_modes
 from cms.reduction.geometric_stiffness.geometric_reduction import stiffness_of_states
 from cms.reduction.geometric_stiffness.quadratic_modes import force_stiffness
-from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffness, states_of
+from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffness, unit_states
 from cms.reduction.recovery.load_columns import forces_of_loads
 from cms.reduction.recovery.matrices import recovery_of_model
 from cms.reduction.recovery.request import OF_INTERFACES, OF_MOTION, RecoveryRequest
@@ -579,7 +579,7 @@ def compare_geometric(case: Case) -> Iterator[Compared]:
         yield Compared("geometric.is_loaded", 0.0)
     loaded = [names[k] for k in file.loaded if k < len(names)]
     Z = case.by_energy
-    states = states_of(case.families, case.condition, spread=file.spread is not None, interfaces=loaded)
+    states = unit_states(case.families, frame=case.condition, spread=file.spread is not None, interfaces=loaded)
     made, own = stiffness_of_states(case.body, case.Phi @ Z, states), file.transformed(Z)
     m, L = case.reduced.moments.m, case.reach
     shape = np.abs(case.body.translations(case.Phi @ Z)).max(initial=0.0)
