@@ -78,7 +78,7 @@ def reduce_job(
     >>> body = cms.reduce_job("rod.toml")                                          # doctest: +SKIP
     >>> cms.write(body, "rod.h5")                                                  # doctest: +SKIP
     """
-    from cms.jobs.parts_of_job import job_mode_set, reduction_of
+    from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
     from cms.modes.families.families import Families
 
     job = job if isinstance(job, Job) else read_job(Path(job))  # (1)

@@ -190,7 +190,7 @@ def body_of_file(path: Path) -> "FEBody":
 
 def options_of(job: "Job", body: "FEBody", names: tuple[str, ...], loads: list[Any]) -> Mapping[str, dict[str, Any]]:
     """Return the options of every set: those of the job for its own set, and loads for sets that need them."""
-    from cms.jobs.parts_of_job import set_options
+    from cms.jobs.mode_set_of_job import set_options
     from cms.jobs.reduction_table import mode_set_options
 
     options: dict[str, dict[str, Any]] = {}

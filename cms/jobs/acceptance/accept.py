@@ -31,7 +31,8 @@ from cms.jobs.acceptance.range_of_use import custom_band, range_of_use
 from cms.jobs.body_of_job import coupled_body, solid_mesh_of, uncoupled_body
 from cms.jobs.decks.job_text import JobRequest, job_text
 from cms.jobs.job import Job, read_job
-from cms.jobs.parts_of_job import job_mode_set, materials_of, part_of_mesh, reduction_of, reduction_options
+from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
+from cms.jobs.parts_of_job import materials_of, part_of_mesh, reduction_options
 from cms.jobs.studies.mesh_convergence import mesh_convergence
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.modes.families.families import Families

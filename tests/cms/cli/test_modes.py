@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from cms.cli.app import app
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
-from cms.jobs.parts_of_job import job_mode_set
+from cms.jobs.mode_set_of_job import job_mode_set
 from cms.modes.families.interface_loads import condensed_load, point_load
 from cms.modes.mode_sets import benfield_hruda, craig_bampton
 from cms.pipeline import reduce_job

@@ -15,7 +15,8 @@ from cms.jobs.job import (
     ReductionSection,
     read_job,
 )
-from cms.jobs.parts_of_job import frame_of, load_of
+from cms.jobs.mode_set_of_job import load_of
+from cms.jobs.parts_of_job import frame_of
 from cms.reduction.basis.damping import ModalDamping, PerModeDamping, RampDamping, RayleighDamping
 from cms.reduction.basis.frames import BuckensFrame, NodalFrame
 from tests.root import ROOT

@@ -9,7 +9,7 @@ from cms.assessment.compare.mode_selection import MEASURES, select_modes
 from cms.cli.info import print_body
 from cms.jobs.body_of_job import coupled_body
 from cms.jobs.job import Job, ReductionSection
-from cms.jobs.parts_of_job import job_mode_set
+from cms.jobs.mode_set_of_job import job_mode_set
 from cms.jobs.reduction_table import MEASURE_NAMES
 from cms.modes.centrifugal import centrifugal_loads
 from cms.modes.mode_sets import assumed_modes, balanced_truncation, craig_bampton, krylov

@@ -1,0 +1,144 @@
+"""The mode set that a job requests, with its options as function arguments."""
+
+import logging
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from cms.jobs.job import Job
+from cms.jobs.reduction_table import AUTO, LoadSection, NeighbourSection, ReductionSection, mode_set_options
+from cms.linear_algebra.solvers.mode_count import ModeCount
+from cms.modes.families.families import Families, families_of
+from cms.modes.families.interface_loads import InterfaceLoad, condensed_load
+from cms.modes.mode_set import ModeSet
+from cms.modes.mode_sets import MODE_SETS
+from cms.modes.mode_sets.characteristic_modes import with_characteristic_modes
+from cms.modes.mode_sets.extra_columns import EXTRA_COLUMNS
+from fe_models.body.fe_body import MULTIPLIER, FEBody
+from fe_models.foundation.arrays import Array
+
+__all__ = ["job_mode_set", "reduction_of"]
+
+log = logging.getLogger(__name__)
+
+COUNT_KEYS = ("n_modes", "cutoff", "verify")  #: keys for the number of modes
+
+
+def job_mode_set(body: FEBody | Families, reduction: ReductionSection) -> ModeSet:
+    """Make the mode set of the table [reduction] for a coupled body.
+
+    Parameters
+    ----------
+    body
+        A coupled body, or its `Families`.
+    reduction
+        The table.
+
+    Raises
+    ------
+    CmsError, FeModelsError
+        If the set cannot be made with these options, or a neighbour cannot be read.
+    """
+    with families_of(body) as families:
+        body = families.body
+        options = set_options(body, reduction)
+        added = partial(with_additions, families, reduction)
+        if reduction.n_modes != AUTO:
+            return added(MODE_SETS[reduction.set](families, **options))
+        from cms.assessment.compare.mode_selection import select_modes
+
+        has_additions = reduction.extra or reduction.interface_modes is not None or reduction.interface_cutoff
+        return select_modes(
+            families,
+            set=reduction.set,
+            error=reduction.error or 0.0,
+            band=reduction.band or (0.0, 0.0),
+            measure=reduction.measure or "frequency",
+            options=options,
+            added=added if has_additions else None,
+        ).modes
+
+
+def reduction_of(job: Job, body: FEBody) -> ReductionSection:
+    """Return the table [reduction]; for a part of a body with at most as many modes as the part can have.
+
+    The jobs of all parts of a body have the same number of modes, but a small part may have fewer interior dofs. Each
+    multiplier of a distributing interface reduces them by one.
+    """
+    n_i = body.n_dof - len(body.b) - 2 * int((body.dofs[:, 1] == MULTIPLIER).sum())
+    asked = job.reduction.n_modes
+    if job.body.part is None or not isinstance(asked, int) or asked <= n_i:
+        return job.reduction
+    log.warning(
+        "part %d of the body: n_modes = %d, but it has %d interior dofs: it is reduced with %d modes",
+        job.body.part.number, asked, n_i, n_i,
+    )  # fmt: skip
+    return job.reduction.model_copy(update={"n_modes": n_i})
+
+
+def with_additions(families: Families, reduction: ReductionSection, modes: ModeSet) -> ModeSet:
+    """Reduce interfaces of kind "nodes" to characteristic modes, and add extra columns, as the job requests."""
+    if reduction.interface_modes is not None or reduction.interface_cutoff is not None:
+        cutoff = None if reduction.interface_cutoff is None else reduction.interface_cutoff * families.body.units.time
+        wanted = ModeCount(reduction.interface_modes, cutoff)
+        modes = with_characteristic_modes(modes, families.body, wanted, together=bool(reduction.interfaces_together))
+    for name in reduction.extra or ():
+        modes = EXTRA_COLUMNS[name](modes, families)
+    return modes
+
+
+def set_options(body: FEBody, reduction: ReductionSection) -> dict[str, Any]:
+    """Return the options of the set as function arguments, with frequencies in cycles per time unit of the body."""
+    options: dict[str, Any] = {}
+    time = body.units.time
+    is_auto = reduction.n_modes == AUTO
+    for key in mode_set_options(reduction.set):
+        value = getattr(reduction, key)
+        if value is None or key in COUNT_KEYS or (is_auto and key == "band"):
+            continue
+        if key in ("shifts", "band"):
+            options[key] = tuple(x * time for x in value)
+        elif key == "loads":
+            made = [load_of(name, section) for name, section in value.items()]
+            options["loads"] = [*options.get("loads", []), *made]
+        elif key == "neighbours":
+            options["loads"] = [*options.get("loads", []), *(neighbour_load(body, section) for section in value)]
+        else:
+            options[key] = value
+    if not is_auto and (reduction.n_modes is not None or reduction.cutoff is not None):
+        number = None if reduction.n_modes is None else int(reduction.n_modes)
+        cutoff = None if reduction.cutoff is None else reduction.cutoff * time
+        is_plain = cutoff is None and not reduction.verify
+        options["n_modes"] = number if is_plain else ModeCount(number, cutoff, bool(reduction.verify))
+    return options
+
+
+def load_of(name: str, section: LoadSection) -> InterfaceLoad:
+    """Return the load of one interface."""
+    return InterfaceLoad(
+        (name,), _matrix(section.mass, section.inertia), _matrix(section.stiffness, section.rotational_stiffness)
+    )
+
+
+def neighbour_load(body: FEBody, section: NeighbourSection) -> InterfaceLoad:
+    """Read the neighbour's job, build its body, and condense it to the shared interfaces."""
+    from cms.errors import JobError
+    from cms.jobs.body_of_job import job_body
+    from cms.jobs.job import read_job
+
+    job = read_job(section.job)
+    neighbour = job_body(job)
+    if neighbour.units != body.units:
+        raise JobError(
+            f"{section.job}: the neighbour is in units {neighbour.units.name}, body {body.name!r} in "
+            f"{body.units.name}; give both the same units"
+        )
+    return condensed_load(neighbour, section.interfaces)
+
+
+def _matrix(translation: tuple[tuple[float, ...], ...] | None, rotation: tuple[float, ...] | None) -> Array:
+    if translation is not None and len(translation) == 6:
+        return np.array(translation)
+    first = (0.0, 0.0, 0.0) if translation is None else translation[0]
+    return np.diag([*first, *(rotation or (0.0, 0.0, 0.0))])
