@@ -26,7 +26,7 @@ from fe_models.assembly.constraints import (
 )
 from fe_models.body.elimination import eliminate_dofs
 from fe_models.body.fe_body import MULTIPLIER, FEBody, MeanNode, Recovery
-from fe_models.body.mass_loads import MassLoads
+from fe_models.body.rigid_motion import MassLoads
 from fe_models.body.weld import WeldedModel, block_damping, points_side_by_side
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError

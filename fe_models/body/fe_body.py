@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_models.body.load_cases import LoadCase, check_load_cases
-from fe_models.body.mass_loads import MassLoads
+from fe_models.body.rigid_motion import MassLoads
 from fe_models.foundation.arrays import (
     Array,
     IntArray,

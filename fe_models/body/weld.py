@@ -10,8 +10,7 @@ import scipy.sparse as sp
 from fe_models.body.elimination import eliminate_dofs
 from fe_models.body.fe_body import MULTIPLIER, ElementModel, FEBody, Interface, Recovery, StressPointModel, Tie
 from fe_models.body.load_cases import LoadCase
-from fe_models.body.mass_loads import MassLoads
-from fe_models.body.rigid_motion import rigid_motion_of_points
+from fe_models.body.rigid_motion import MassLoads, rigid_motion_of_points
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
 from fe_models.meshes.numbering import numbering_side_by_side

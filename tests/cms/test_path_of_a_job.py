@@ -9,7 +9,7 @@ from tests.cms.path_of_a_job import functions_called
 from tests.root import ROOT
 
 MOST_FUNCTIONS = 490
-MOST_FILES = 82
+MOST_FILES = 80
 
 
 def test_functions_called_counts_each_function_of_the_packages_once():

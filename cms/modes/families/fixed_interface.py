@@ -10,7 +10,7 @@ from cms.linear_algebra.solvers.eigen import EigenResult, eigenmodes, no_modes
 from cms.linear_algebra.solvers.factorization import EmptyFactor, Factorization, factorize, matrix_of
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.linear_algebra.solvers.registry import solver_of
-from cms.modes.families.mechanism import WITHIN_ROUNDING, moving_nodes
+from cms.modes.families.rigid_modes import WITHIN_ROUNDING, moving_nodes
 from fe_models.body.couplings.submatrix import PrincipalBlock, nearby_order, principal_block
 from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.foundation.arrays import IntArray

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from cms.errors import BodyError, EigenError
 from cms.linear_algebra.solvers.factorization import Inertia, factorize, shifted_matrix
 from cms.modes.families.fixed_interface import FixedInterfaceBody
-from cms.modes.families.mechanism import free_motions, mechanism_words
+from cms.modes.families.rigid_modes import free_motions, mechanism_words
 from fe_models.body.couplings.coupling_on_ranks import spread_extension
 from fe_models.body.couplings.submatrix import PrincipalBlock, principal_block
 from fe_models.body.fe_body import FEBody

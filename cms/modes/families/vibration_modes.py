@@ -9,7 +9,7 @@ from cms.linear_algebra.solvers.eigen import EigenResult, FactorMismatchError, c
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.linear_algebra.solvers.shift_inverted import ModeRequest
 from cms.modes.families.flexibility import Flexibility
-from cms.modes.families.mechanism import rounding_of_energy, without_energy
+from cms.modes.families.rigid_modes import rounding_of_energy, without_energy
 
 __all__ = ["elastic_modes"]
 

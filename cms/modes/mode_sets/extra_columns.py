@@ -9,7 +9,7 @@ from cms.errors import ModeSetError
 from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
 from cms.modes.centrifugal import CENTRIFUGAL, centrifugal_loads
 from cms.modes.families.families import Families, body_of, families_of
-from cms.modes.families.mechanism import without_energy
+from cms.modes.families.rigid_modes import without_energy
 from cms.modes.mode_set import ModeSet
 from fe_models.body.fe_body import FEBody
 from fe_models.body.load_cases import LoadCase, load_columns

@@ -36,7 +36,7 @@ from cms.reduction.basis.frames import (
 )
 from cms.reduction.geometric_stiffness.unit_states import unit_mass_loads
 from fe_models.body.beam_line import BeamLine
-from fe_models.body.mass_loads import MassLoads, rotation_work
+from fe_models.body.rigid_motion import MassLoads, rotation_work
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted

@@ -18,7 +18,7 @@ from cms.linear_algebra.independent import (
     within,
 )
 from cms.linear_algebra.solvers.eigen import orientation
-from cms.modes.families.mechanism import mechanism_words, rounding_of_energy, without_energy
+from cms.modes.families.rigid_modes import mechanism_words, rounding_of_energy, without_energy
 from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.frames import FrameCondition
 from fe_models.body.fe_body import FEBody

@@ -23,7 +23,7 @@ from cms.body.geometric_stiffness import SPIN_PAIRS, GeometricStiffness, Rotated
 from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.errors import BodyError
 from cms.reduction.geometric_stiffness.unit_states import unit_mass_loads
-from fe_models.body.mass_loads import MassLoads
+from fe_models.body.rigid_motion import MassLoads
 from fe_models.foundation.arrays import Array, axial
 
 __all__ = ["converted_geometric_stiffness", "require_convertible"]

@@ -20,7 +20,7 @@ from cms.reduction.basis.node_motion import reference_motion, translation_rows
 from cms.reduction.geometric_stiffness.unit_states import UnitStates, turned_rigid_work, unit_states
 from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.fe_body import FEBody, Interface
-from fe_models.body.mass_loads import MassLoads, rotation_work
+from fe_models.body.rigid_motion import MassLoads, rotation_work
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.tall.columns import beside, rows_times
 

@@ -17,7 +17,7 @@ from cms.reduction.basis.node_motion import translation_rows
 from cms.reduction.geometric_stiffness.geometric_reduction import distributing_part, elastic_part, link_work
 from cms.reduction.geometric_stiffness.unit_states import balanced, require_geometric_stiffness, together
 from fe_models.body.fe_body import FEBody
-from fe_models.body.mass_loads import MassLoads
+from fe_models.body.rigid_motion import MassLoads
 from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["MOST_NUMBERS", "quadratic_modes"]

@@ -22,7 +22,7 @@ from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.frames import Frame, FrameCondition, HeldFrame, TisserandFrame, frame_condition
 from cms.reduction.basis.node_motion import node_weights, reference_motion, weighted_rigid_modes
 from fe_models.body.fe_body import FEBody
-from fe_models.body.mass_loads import MassLoads
+from fe_models.body.rigid_motion import MassLoads
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.tall.columns import combine, of_this_process
 from fe_models.foundation.words import nearest, quoted

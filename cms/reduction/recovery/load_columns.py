@@ -23,7 +23,7 @@ from cms.reduction.recovery.model_rows import node_rows
 from cms.reduction.recovery.places import Places
 from cms.reduction.recovery.request import RecoveryRequest
 from fe_models.body.fe_body import FEBody
-from fe_models.body.mass_loads import MassLoads
+from fe_models.body.rigid_motion import MassLoads
 from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = [

@@ -7,7 +7,7 @@ u', the strains of a section are Gamma = Rᵀ r' - e, and kappa, the axial vecto
 
 In addition, a twisted fibre at distance o from the axis becomes longer by ½ kappa_x² o². The section force n, the
 moment m and the tension n·e of the fibres do work on these second-order terms. So do loads off the axis, on the
-second-order term of the rotation of their section (`mass_loads.rotation_work`); an example is the transverse stress of
+second-order term of the rotation of their section (`rigid_motion.rotation_work`); an example is the transverse stress of
 a spinning shaft.
 
 n(s) and m(s) are the section forces of the loaded element, in equilibrium with the loads along it: n' + q = 0, m' + e ×
@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.body.mass_loads import MassLoads, rotation_work
+from fe_models.body.rigid_motion import MassLoads, rotation_work
 from fe_models.elements.beams.attachments import Spring, spring_matrix
 from fe_models.elements.beams.slices import Slices
 from fe_models.foundation.arrays import Array, axial, tilde

@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fe_models.body.mass_loads import MassLoads
+from fe_models.body.rigid_motion import MassLoads
 from fe_models.elements.beams.attachments import Spring, spring_matrix
 from fe_models.elements.beams.axes import LineGeometry
 from fe_models.elements.beams.element import end_forces_at_centroid

@@ -9,7 +9,7 @@ and b along its axes e_a, the work is
     +  Q_a [u,a·psi + ½ e_a·(theta × (theta × n))]
 
 The loads also do work on the second-order term of the rotation, through the normal and through the levers between nodes
-and middle surface (`mass_loads.rotation_work`). The nodal forces of the cell do so too. The drilling stress of quads,
+and middle surface (`rigid_motion.rotation_work`). The nodal forces of the cell do so too. The drilling stress of quads,
 which vanishes as the mesh is refined, is neglected. Q is the shear force that balances the nodal forces normal to the
 cell. These elements carry most of it through the change of M along their sides, where the strain at their centre does
 not show it.
@@ -19,7 +19,7 @@ from functools import cache
 
 import numpy as np
 
-from fe_models.body.mass_loads import MassLoads, rotation_work
+from fe_models.body.rigid_motion import MassLoads, rotation_work
 from fe_models.elements.beams.geometric import slice_couples, slice_forces
 from fe_models.elements.shells.elements import DRILLING_SHARE, STRAIN_DEGREE, ShellCells, translations
 from fe_models.elements.shells.shapes import flat_quadrature, flat_shape

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from fe_models.body.mass_loads import MassLoads
+from fe_models.body.rigid_motion import MassLoads
 from fe_models.elements.beams.geometric import slice_forces
 from fe_models.elements.shells.elements import ShellCells
 from fe_models.elements.shells.geometric import cell_geometric_stiffness

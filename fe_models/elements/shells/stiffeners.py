@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_models.body.fe_body import ElementModel, FEBody, Recovery
-from fe_models.body.mass_loads import MassLoads
+from fe_models.body.rigid_motion import MassLoads
 from fe_models.elements.beams.model import BeamModel
 from fe_models.elements.shells.model import ShellModel
 from fe_models.elements.shells.section_rotations import SectionRotations

@@ -12,8 +12,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_models.body.fe_body import FEBody, Interface
-from fe_models.body.mass_loads import MassLoads
 from fe_models.body.material import AnyMaterial, assign_materials, material_words
+from fe_models.body.rigid_motion import MassLoads
 from fe_models.elements.solids.assembly import Progress, assemble, expand_scalar_mass
 from fe_models.elements.solids.assembly_on_ranks import SpreadMesh, assemble_on_ranks
 from fe_models.elements.solids.elements import INTEGRATIONS, MASSES, reference_element

@@ -15,8 +15,8 @@ from scipy.spatial import cKDTree
 from fe_models.body.fe_body import FEBody, Interface, put_translations
 from fe_models.body.freedom import rigid_forces
 from fe_models.body.held_causes import mistake_description, support_description
-from fe_models.body.mass_loads import MassLoads
 from fe_models.body.positive_mass import DENSE, negative_mass, positive_mass
+from fe_models.body.rigid_motion import MassLoads
 from fe_models.checks.unit_check import implausible_matrices
 from fe_models.elements.solids.body import scalar_mass_gram
 from fe_models.errors import MeshError

@@ -30,7 +30,7 @@ from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.damping import RayleighDamping
 from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffness, unit_mass_loads
 from fe_models.body.fe_body import MULTIPLIER, FEBody
-from fe_models.body.mass_loads import MassLoads
+from fe_models.body.rigid_motion import MassLoads
 from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.presentation import presented
 from floatframe.errors import ModelError

@@ -27,8 +27,7 @@ from cms.body.reduced_body import ReducedBody
 from cms.body.source_columns import SourceColumns
 from cms.errors import CmsError
 from cms.modes.families.families import Families
-from cms.modes.families.mechanism import rounding_of_energy
-from cms.modes.families.rigid_modes import geometric_rigid_modes
+from cms.modes.families.rigid_modes import geometric_rigid_modes, rounding_of_energy
 from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.damping import Damping, damping_of_words, modal_damping
 from cms.reduction.basis.finishing import SUSPECT_ENERGY, FinishedBasis

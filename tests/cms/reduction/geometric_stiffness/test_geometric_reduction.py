@@ -15,8 +15,8 @@ from cms.reduction.basis.node_motion import reference_motion
 from cms.reduction.geometric_stiffness.geometric_reduction import reduced_geometric_stiffness
 from cms.reduction.geometric_stiffness.unit_states import balanced, spread_forces, unit_loads
 from fe_models.assembly.planar import planar
-from fe_models.body.mass_loads import MassLoads
 from fe_models.body.material import Material
+from fe_models.body.rigid_motion import MassLoads
 from fe_models.elements.beams.attachments import PointMass
 from fe_models.elements.beams.beam_property import BeamProperty
 from fe_models.elements.beams.body import beam_body

@@ -15,7 +15,7 @@ from cms.reduction.frame_conversion import rigid_mass
 from cms.reduction.recovery.load_columns import loads_of_body, loads_of_model, on_coordinates
 from cms.reduction.recovery.matrices import recovery_of_model, residual_response
 from fe_models.body.fe_body import FEBody
-from fe_models.body.mass_loads import MassLoads
+from fe_models.body.rigid_motion import MassLoads
 from tests.bodies import STEEL
 from tests.cms.reduction.recovery.examples import HEIGHT, LENGTH, NODES, POINT, ROWS, WIDTH, full, reduced
 

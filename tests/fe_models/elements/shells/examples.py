@@ -4,7 +4,7 @@ import numpy as np
 from numpy.testing import assert_allclose
 
 from cms.modes.families.rigid_modes import geometric_rigid_modes
-from fe_models.body.mass_loads import MassLoads
+from fe_models.body.rigid_motion import MassLoads
 from tests.fe_models.small_shells import of_nodes, solved
 
 

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import cms
 import fe_models as fm
 from cms.modes.families.rigid_modes import geometric_rigid_modes
-from fe_models.body.mass_loads import MassLoads
+from fe_models.body.rigid_motion import MassLoads
 from fe_models.elements.shells.elements import DRILLING_SHARE
 from tests.fe_models.elements.shells.examples import balanced_state, n_shell_nodes, on_dofs, shell_fields, turned_loads
 from tests.fe_models.small_shells import KINDS, SI, STEEL, of_nodes, solved

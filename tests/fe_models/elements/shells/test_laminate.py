@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 import fe_models as fm
 from cms.modes.families.rigid_modes import geometric_rigid_modes
-from fe_models.body.mass_loads import MassLoads
+from fe_models.body.rigid_motion import MassLoads
 from fe_models.elements.recovery.strain import nodal_strain
 from fe_models.elements.shells.geometric import stress_second_moments
 from fe_models.elements.shells.laminate import shell_law

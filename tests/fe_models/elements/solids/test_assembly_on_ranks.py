@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from fe_models.body.couplings.couplings import couple
-from fe_models.body.mass_loads import MassLoads
+from fe_models.body.rigid_motion import MassLoads
 from fe_models.elements.solids import assembly_on_ranks
 from fe_models.elements.solids.body import solid_body
 from fe_models.errors import MeshError

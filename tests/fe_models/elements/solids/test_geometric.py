@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from fe_models.body.mass_loads import MassLoads, rotation_work
+from fe_models.body.rigid_motion import MassLoads, rotation_work
 from fe_models.elements.beams.attachments import PointMass, Spring
 from fe_models.elements.beams.beam_property import BeamProperty
 from fe_models.elements.beams.body import beam_body

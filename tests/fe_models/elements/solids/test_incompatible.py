@@ -6,8 +6,8 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fe_models.body.mass_loads import MassLoads
 from fe_models.body.material import Material
+from fe_models.body.rigid_motion import MassLoads
 from fe_models.elements.solids.body import solid_body
 from fe_models.errors import MeshError
 from fe_models.foundation.units import unit_system
