@@ -7,8 +7,8 @@ u', the strains of a section are Gamma = Rᵀ r' - e, and kappa, the axial vecto
 
 In addition, a twisted fibre at distance o from the axis becomes longer by ½ kappa_x² o². The section force n, the
 moment m and the tension n·e of the fibres do work on these second-order terms. So do loads off the axis, on the
-second-order term of the rotation of their section (`rigid_motion.rotation_work`); an example is the transverse stress of
-a spinning shaft.
+second-order term of the rotation of their section (`rigid_motion.rotation_work`); an example is the transverse stress
+of a spinning shaft.
 
 n(s) and m(s) are the section forces of the loaded element, in equilibrium with the loads along it: n' + q = 0, m' + e ×
 n + mu = 0. The geometric stiffness is then that of the exact section forces, and its work on a rigid rotation is right

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 import cms
 import fe_models as fm
 from cms.errors import BodyError, ModeSetError
-from cms.modes.families import families, interface_cost
+from cms.modes.families import cost, families
 from cms.modes.families.cost import interface_reduction_size, large_interfaces, reduction_cost
 from tests.bodies import box_mesh, distorted
 from tests.fe_models.small_shells import SI, STEEL
@@ -66,7 +66,7 @@ def test_an_interface_of_very_many_dofs_announces_its_cost_before_the_work(monke
     left = fm.nodes_interface(mesh, "left", fm.NodeSet("left"))
     body = cms.couple(fm.solid_body(mesh, STEEL, name="block", units=SI, interfaces=[left]))
     assert large_interfaces(body) == []
-    monkeypatch.setattr(interface_cost, "MANY", 45)
+    monkeypatch.setattr(cost, "MANY", 45)
     (words,) = large_interfaces(body)
     assert "interface 'left' of 15 nodes has 45 boundary dofs" in words
     assert "interface_modes = 20" in words
