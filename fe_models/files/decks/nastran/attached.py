@@ -9,6 +9,7 @@ from fe_models.errors import BodyError, MeshError
 from fe_models.files.bulk_data.cards import Card, real_of
 from fe_models.files.decks.deck import Coupling, DeckMass, Load, RigidGroup
 from fe_models.files.decks.equations import Row, solved_equations
+from fe_models.files.decks.nastran.bends import read_bends
 from fe_models.files.decks.nastran.model import ALL, NastranModel, components_of, numbers_in, range_at
 from fe_models.files.decks.nastran.panels import read_panels
 from fe_models.files.decks.nastran.springs import read_springs, scalar_ends, skip_scalar_points, springs_to_ground
@@ -33,6 +34,7 @@ def read_attached(model: NastranModel) -> None:
     for card in model.of("CONM1"):
         _mass_matrix(model, card)
     read_springs(model)
+    read_bends(model)
     read_panels(model)
     read_welds(model)
     for card in model.of("RBE2", "RBAR"):

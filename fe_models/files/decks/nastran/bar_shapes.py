@@ -29,6 +29,7 @@ class BarShape:
     turn: float = 0.0  #: angle from the element's y axis to the first principal axis, about x [rad]
     centroid: tuple[float, float] = (0.0, 0.0)  #: from the line of the ends, along the element's y and z
     notes: tuple[str, ...] = ()
+    has_torsion: bool = True  #: False: J = 0, and the torsion constant in `keys` has no meaning
 
 
 def bar_shape(model: NastranModel, card: Card) -> BarShape | str:
@@ -50,7 +51,7 @@ def _general(
     if not (A > 0 and I1 > 0 and I2 > 0 and I1 * I2 > I12**2):
         return f"A, I1, I2 and I1 I2 - I12² must be above zero, got A = {A:g}, I1 = {I1:g}, I2 = {I2:g}, I12 = {I12:g}"
     if not J > 0:
-        return "J = 0: a beam without stiffness in torsion; only where the deck is planar"
+        return f"J = {J:g}: below zero"
     turn = 0.0
     if I12 != 0.0:
         turn = 0.5 * float(np.arctan2(2 * I12, I1 - I2))
@@ -65,16 +66,12 @@ def _general(
     return made, turn
 
 
-def _idle_torsion(model: NastranModel, I1: float, I2: float) -> float:
-    """Return a torsion constant for beams that have none: a planar body never twists them; in space there is none."""
-    return 0.0 if model.plane is None else I1 + I2
-
-
 def _pbar(model: NastranModel, card: Card) -> BarShape | str:
     A, I1, I2, J = (card.real(k, 0.0) for k in (3, 4, 5, 6))
-    J = J or _idle_torsion(model, I1, I2)
-    made = _general(A, I1, I2, card.real(19, 0.0), J, card.real(17, 0.0), card.real(18, 0.0))
-    return made if isinstance(made, str) else BarShape(made[0], card.real(7, 0.0) * model.wtmass, made[1])
+    made = _general(A, I1, I2, card.real(19, 0.0), J or I1 + I2, card.real(17, 0.0), card.real(18, 0.0))
+    if isinstance(made, str):
+        return made
+    return BarShape(made[0], card.real(7, 0.0) * model.wtmass, made[1], has_torsion=J != 0)
 
 
 def _pbeam(model: NastranModel, card: Card) -> BarShape | str:
@@ -85,7 +82,6 @@ def _pbeam(model: NastranModel, card: Card) -> BarShape | str:
         from the line of the ends, which is that of the shear centres
     """
     A, I1, I2, I12, J = (card.real(k, 0.0) for k in (3, 4, 5, 6, 7))
-    J = J or _idle_torsion(model, I1, I2)
     at = 17
     tail = [card.real(at + k, 0.0) for k in range(16)]  # (2)
     K1, K2 = (tail[k] if card.text(at + k) else 1.0 for k in (0, 1))
@@ -100,11 +96,11 @@ def _pbeam(model: NastranModel, card: Card) -> BarShape | str:
         return "added mass off the axis, or with inertia of its own (NSI, M1, M2)"
     if N_A != N_B:
         return "another offset of the neutral axis at end B than at end A (N1, N2)"
-    made = _general(A, I1, I2, I12, J, K1, K2, N_A)
+    made = _general(A, I1, I2, I12, J or I1 + I2, K1, K2, N_A)
     if isinstance(made, str):
         return made
     notes = ("warping of the section (CW) is left out",) if CW_A or CW_B else ()
-    return BarShape(made[0], card.real(8, 0.0) * model.wtmass, made[1], N_A, notes)
+    return BarShape(made[0], card.real(8, 0.0) * model.wtmass, made[1], N_A, notes, has_torsion=J != 0)
 
 
 def _library(model: NastranModel, card: Card) -> BarShape | str:

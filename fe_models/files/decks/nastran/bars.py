@@ -1,5 +1,6 @@
 """Bars and beams of Nastran: CBAR, CBEAM with orientation, offsets and released ends."""
 
+from collections import Counter
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +11,7 @@ from fe_models.files.bulk_data.cards import Card
 from fe_models.files.decks.deck import Equation, LineSection, RigidGroup
 from fe_models.files.decks.nastran.bar_shapes import bar_shape
 from fe_models.files.decks.nastran.model import NastranModel, components_of
+from fe_models.files.nastran import ELEMENT_TYPES
 from fe_models.foundation.arrays import Array
 
 __all__ = ["BARS", "OFFSETS", "line_of_ends", "orientation_of", "read_bars", "with_defaults"]
@@ -49,6 +51,8 @@ def read_bars(model: NastranModel, known: Card, cards: list[Card]) -> None:
     (2) an offset that is the same at both ends and across the bar belongs to the section; any other one makes a node
         at its end, which moves rigidly with the grid point
     (3) a released end gets a node at its end too; all motions but the released ones are those of the grid point
+    (4) J = 0 releases the rotation about the axis at the end with fewer bars and shells, so that the inertia of torsion
+        stays with the rest; a planar body never twists its bars
     """
     pid = known.text(1)
     shape = bar_shape(model, known)
@@ -60,6 +64,7 @@ def read_bars(model: NastranModel, known: Card, cards: list[Card]) -> None:
         model.ledger.refuse(known.name, f"property {pid}: {made}", count=len(cards))
         return
     material, keys = made
+    uses = None if shape.has_torsion or model.plane is not None else _uses(model)
     groups: dict[tuple[Any, ...], list[Card]] = {}
     for card in cards:
         ends = np.array([model.point(card, card.integer(k)) for k in (3, 4)])
@@ -69,6 +74,10 @@ def read_bars(model: NastranModel, known: Card, cards: list[Card]) -> None:
             model.ledger.refuse(card.name, R)
             continue
         released = [components_of(card, card.text(k) or "0") for k in (9, 10)]
+        if uses is not None:  # (4)
+            end = 0 if uses[card.integer(3)] < uses[card.integer(4)] else 1
+            end = 1 - end if min(released[end], default=3) < 3 else end
+            released[end] = tuple(sorted({*released[end], 3}))
         if any(min(each, default=3) < 3 <= max(each, default=0) for each in released):
             model.ledger.refuse(card.name, "an end with motions released along and about its axes (PA, PB)")
             continue
@@ -104,6 +113,13 @@ def read_bars(model: NastranModel, known: Card, cards: list[Card]) -> None:
         )
     for note in (*shape.notes, "inertia of torsion is that of the section; Nastran's has none"):
         model.ledger.note(cards[0].name, note, count=len(cards))
+
+
+def _uses(model: NastranModel) -> Counter[int]:
+    """Return how many bars and shells each grid point has, which may hold its rotation."""
+    names = [name for name in ELEMENT_TYPES if name in BARS or name.startswith(("CTRIA", "CQUAD"))]
+    words = [word for card in model.of(*names) for word in card.fields[2 : 2 + max(ELEMENT_TYPES[card.name])]]
+    return Counter(int(word) for word in words if word.isdigit())
 
 
 def _with_own_shear(model: NastranModel, name: str, keys: dict[str, Any]) -> tuple[str, dict[str, Any]] | str:

@@ -54,6 +54,8 @@ CARDS: dict[str, str] = {
     "CBUSH1D": "EID PID GA GB CID", "PBUSH1D": "PID K C M - SA~ SE~ ...^",
     "CGAP": "EID PID GA GB GO/X1~ X2~ X3~ CID", "PGAP": "PID U0 F0~ KA KB KT MU1 MU2~ TMAX~ MAR~ TRMIN~",
     "CWELD": "EWID PWID GS TYPE GA GB SPTYP MCID~ ...", "PWELD": "PID MID D - - MSET~ - TYPE LDMIN LDMAX",
+    "CBEND": "EID PID GA GB X1 X2 X3 GEOM",
+    "PBEND": "PID MID A/FSI I1/RM I2/T J/P RB THETAB C1~ C2~ D1~ D2~ E1~ E2~ F1~ F2~ K1 K2 NSM RC ZC DELTAN",
     "CSHEAR": "EID PID G1 G2 G3 G4", "PSHEAR": "PID MID T NSM F1 F2",
     "CELAS1": "EID PID G1 C1 G2 C2", "CELAS2": "EID K G1 C1 G2 C2 GE^ S~",
     "PELAS": "PID1 K1 GE1^ S1~ PID2 K2 GE2^ S2~",
@@ -108,7 +110,7 @@ HARMLESS = frozenset(
 #: properties and materials that no element read here can name: elements that do are refused by their own name
 UNNAMED = frozenset(
     "MAT3 MAT9 MAT10 MAT11 MATF MATG MATHE MATORT MATEP PACABS PACBAR PAABSF PAXISYM PBCOMP PBEAM3 "
-    "PBEND PBUSH2D PCOHE PCONEAX PFAST PSEAM PSHEAR PRAC2D PRAC3D PWELD PSHLN1 PSHLN2 "
+    "PBUSH2D PCOHE PCONEAX PFAST PSEAM PSHEAR PRAC2D PRAC3D PWELD PSHLN1 PSHLN2 "
     "PSLDN1".split()
 )
 #: cards that change another card in nonlinear analyses, or over frequency: that card is taken as it stands

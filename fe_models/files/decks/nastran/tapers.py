@@ -17,6 +17,7 @@ YES = ("YES", "YESA", "NO")
 FIRST = 3  #: field of the area of a PBEAM
 ALIKE = 1e-12  #: part of a size below which stations do not differ in it
 SIZES = 6  #: A, I1, I2, I12, J, NSM
+TORSION = 4  #: place of J among them
 
 
 @dataclass(frozen=True)
@@ -56,15 +57,21 @@ def cut_tapers(model: NastranModel) -> None:
     last_element = max(card.integer(1, 0) for cards in model.cards.values() for card in cards if card.name[0] == "C")
     last_property = max(card.integer(1) for card in model.of(*PROPERTIES))
     made: dict[int, list[int]] = {}  # property -> of its pieces
+    untwisted = set()  # properties without J: pieces pass a torque on, and the last one ends without it
     for pid, (card, taper) in tapers.items():
+        if card.name == "PBEAM" and not taper.sizes[:, TORSION].any() and model.plane is None:
+            untwisted.add(pid)
         made[pid] = [last_property + k for k in range(1, N_PIECES + 1)]
         last_property += N_PIECES
         for k, number in enumerate(made[pid]):
             sizes = taper.at((k + 0.5) / N_PIECES)
+            if pid in untwisted:
+                sizes[TORSION] = sizes[1] + sizes[2]
             model.cards[card.name].append(_property(card, number, sizes))
     cards = [card for card in model.of("CBEAM") if _property_number(card) not in tapers]
     for beam in beams:
-        cards += _pieces(model, beam, made[_property_number(beam)], last_element)
+        pid = _property_number(beam)
+        cards += _pieces(model, beam, made[pid], last_element, "4" if pid in untwisted else "")
         last_element += N_PIECES - 1
     model.cards["CBEAM"] = cards
     why = f"tapers: {N_PIECES} pieces of one section each, between nodes of their own"
@@ -75,8 +82,8 @@ def _property_number(beam: Card) -> int:
     return beam.integer(2, beam.integer(1))
 
 
-def _pieces(model: NastranModel, beam: Card, properties: list[int], last: int) -> list[Card]:
-    """Return the pieces of a beam, from its first to its second end."""
+def _pieces(model: NastranModel, beam: Card, properties: list[int], last: int, released: str) -> list[Card]:
+    """Return the pieces of a beam, from its first to its second end, with further motions released there."""
     ends = line_of_ends(model, beam)
     between = [ends[0] + (ends[1] - ends[0]) * k / N_PIECES for k in range(1, N_PIECES)]
     nodes = [beam.integer(3), *(model.new_point(point) for point in between), beam.integer(4)]
@@ -94,7 +101,7 @@ def _pieces(model: NastranModel, beam: Card, properties: list[int], last: int) -
             for j in OFFSETS[0]:
                 fields[j - 1] = beam.text(j)
         if k == N_PIECES - 1:
-            fields[9] = beam.text(10)
+            fields[9] = beam.text(10) + released
             for j in OFFSETS[1]:
                 fields[j - 1] = beam.text(j)
         made.append(Card("CBEAM", tuple(fields), beam.where))

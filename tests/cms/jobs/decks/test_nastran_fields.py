@@ -35,6 +35,7 @@ FRAME = "CBAR,1,1,1,2,.1,.2,1.\nCBAR,2,1,3,4,.1,.2,1.\nPBAR,1,1,2.-3,3.-6,1.-6,2
 WELD = "CTRIA3,1,1,1,2,3\nCTRIA3,2,1,5,6,7\nPSHELL,1,1,.05,1,,1\nGRID,33,,1.4,.4,.1\nGRID,34,,1.4,.4,.9\n"
 WELD += "GRID,35,,1.3,.4,.5\nCWELD,9,9,35,ELEMID,,,,7\n,1,2\nPWELD,9,1,.3"
 PANEL = FRAME + "CSHEAR,7,9,1,2,3,4\nPSHEAR,9,1,.01,1.,.5,1.2"
+ARC = "CBEND,1,9,1,2,.1,.2,1.,3\nPBEND,9,1,2.-3,3.-6,1.-6,2.-6,1.5\nCONM2,90,1,,3."
 TWO = "CBAR,1,1,1,2,.1,.2,1.\nCBAR,2,1,9,4,.1,.2,1.\nPBAR,1,1,2.-3,3.-6,1.-6,2.-6\n"
 TWO += "GRID,9,,2.,0.,.1\nGRID,10,,2.,0.,.1\n"
 
@@ -71,6 +72,14 @@ READ: dict[str, tuple[str, dict[str, str | None]]] = {
         SHELL_4,
         {"PID": None, "MID1": None, "T": ".06", "MID2": "2", "12I/T**3": "1.5", "MID3": "2", "TS/T": ".5", "NSM": "3.",
          "MID4": "4"},
+    ),
+    "CBEND": (
+        ARC, {"EID": None, "PID": None, "GA": "4", "GB": "3", "X1": ".5", "X2": ".9", "X3": ".1", "GEOM": "1"}
+    ),
+    "PBEND": (
+        ARC,
+        {"PID": None, "MID": "2", "A/FSI": "3.-3", "I1/RM": "4.-6", "I2/T": "2.-6", "J/P": "3.-6", "RB": "1.6",
+         "THETAB": None, "K1": ".5", "K2": ".5", "NSM": "1.", "RC": ".1", "ZC": ".1", "DELTAN": ".1"},
     ),
     "CSHEAR": (
         PANEL, {"EID": None, "PID": None, "G1": "4", "G2": "4", "G3": "6", "G4": "7"}

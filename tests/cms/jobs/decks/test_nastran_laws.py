@@ -53,6 +53,37 @@ def test_a_bar_with_released_ends_and_offsets(tmp_path, card, expected):
     assert_allclose(condensed(body, (GA, GB)), K, rtol=0, atol=1e-9 * abs(K).max())
 
 
+@pytest.mark.parametrize(
+    ("card", "property_", "pins"),
+    [
+        (ORIENTED, "PBAR,1,1,2.-3,3.-6,1.-6\n", (9,)),
+        (f"{ORIENTED}\n,,5", "PBAR,1,1,2.-3,3.-6,1.-6,0.\n", (9, 10)),
+        (f"{ORIENTED}\n,4,1", "PBAR,1,1,2.-3,3.-6,1.-6\n", (3, 6)),
+        (ORIENTED.replace("CBAR", "CBEAM"), "PBEAM,1,1,2.-3,3.-6,1.-6\n,,,,,,,,\n,0.,0.\n", (9,)),
+    ],
+)
+def test_a_bar_without_torsion_constant_resists_no_torque(tmp_path, card, property_, pins):
+    """J = 0, also with other released motions, and with a translation released at end B."""
+    body, _ = body_of(tmp_path, f"{GRIDS}{card}\n{property_}{MATERIAL}")
+    K = expected_bar(pins=pins)
+    assert_allclose(condensed(body, (GA, GB)), K, rtol=0, atol=1e-9 * abs(K).max())
+
+
+@pytest.mark.parametrize(("n_bars", "has_frame", "n_free"), [(1, False, 6), (2, False, 6), (3, False, 7), (3, True, 6)])
+def test_bars_without_torsion_are_a_mechanism_only_where_nothing_holds_their_rotation(
+    tmp_path, n_bars, has_frame, n_free
+):
+    """A row of three: the nodes between turn about the line without energy, unless a frame holds both."""
+    text = "".join(f"GRID,{k},,{float(k)},0.,0.\nGRID,{10 + k},,{float(k)},1.,.2\n" for k in range(1, 5))
+    text += "".join(f"CBAR,{k},1,{k},{k + 1},0.,0.,1.\n" for k in range(1, n_bars + 1))
+    text += "CBAR,12,2,2,12,0.,0.,1.\nCBAR,13,2,3,13,0.,0.,1.\nCBAR,14,2,12,13,0.,0.,1.\n" if has_frame else ""
+    body, _ = body_of(
+        tmp_path, f"{text}PBAR,1,1,2.-3,3.-6,1.-6\n{SECTION.replace('PBAR,1,', 'PBAR,2,')}{MATERIAL}", is_coupled=True
+    )
+    values = np.linalg.eigvalsh(body.K.toarray())
+    assert np.sum(values < 1e-9 * values[-1]) == n_free
+
+
 def test_offsets_along_axes_of_the_element(tmp_path):
     """OFFT = GOO: W along x, y, z of the bar between its grid points."""
     R = axes_of(GB - GA, V)

@@ -19,7 +19,10 @@ from tests.cms.jobs.decks.nastran_bodies import (
     E,
     G,
     J,
+    V,
+    axes_of,
     body_of,
+    condensed,
     tip_flexibility,
 )
 
@@ -254,10 +257,10 @@ def test_a_deck_that_holds_all_points_in_a_plane_is_planar(tmp_path):
     values = np.linalg.eigvalsh(body.K.toarray())
     assert body.n_dof == 3 * 3 + 3
     assert int(np.sum(values < 1e-9 * values[-1])) == 6
-    with pytest.raises(ValueError, match="J = 0: a beam without stiffness in torsion"):
-        body_of(tmp_path, FLAT.replace("0.1,0.,,345", "0.1,0.,,34"))
-    with pytest.raises(ValueError, match="J = 0"):  # held, but not in one plane
-        body_of(tmp_path, FLAT.replace("2.0,0.1,0.", "2.0,0.1,.3"))
+    _, deck = body_of(tmp_path, FLAT.replace("0.1,0.,,345", "0.1,0.,,34"))
+    assert deck.plane is None
+    _, deck = body_of(tmp_path, FLAT.replace("2.0,0.1,0.", "2.0,0.1,.3"))
+    assert deck.plane is None  # held, but not in one plane
 
 
 def test_membranes_are_read_where_the_deck_is_planar(tmp_path):
@@ -305,6 +308,22 @@ def test_a_tapered_beam_is_made_of_pieces(tmp_path):
     up = (body.dofs[:, 1] == 2).astype(float)
     assert_allclose(up @ body.M @ up, L * (RHO * 1.5 * A + 0.6), rtol=1e-9)
     assert any("tapers: 12 pieces" in row[2] for row in deck.ledger.rows())
+
+
+def test_a_tapered_beam_without_torsion_constant_bends_as_with_one(tmp_path):
+    found = []
+    for taper in (TAPER, TAPER.replace(",,2.-6,", ",,0.,").replace(",,6.-6,", ",,0.,")):
+        (tmp_path / str(len(found))).mkdir()
+        text = f"{GRIDS}{ORIENTED.replace('CBAR', 'CBEAM')}\n{taper}{MATERIAL}"
+        body, _ = body_of(tmp_path / str(len(found)), text)
+        T = np.kron(np.eye(4), axes_of(GB - GA, V))
+        found.append(T @ condensed(body, (GA, GB)) @ T.T)
+    twist = [3, 9]
+    assert np.abs(found[1][twist]).max() < 1e-9 * np.abs(found[1]).max()
+    assert found[0][3, 3] > 1e-4 * found[0][4, 4]
+    for K in found:
+        K[twist] = K[:, twist] = 0.0
+    assert_allclose(found[1], found[0], rtol=0, atol=1e-9 * np.abs(found[0]).max())
 
 
 def test_tapered_beams_of_the_library_keep_their_mass_pins_and_offsets(tmp_path):
