@@ -1,11 +1,13 @@
 """The functions of elements as C functions that the kernels call by their address.
 
 A function of numba is compiled behind a C function once for all elements that share it, whatever their numbers of
-markers and states. The machine code is kept beside the package, under a key that changes with all the function refers
+markers and states: by the lean compiler, or by plain numba where that does not know what the function does (a line of
+the log says so). The machine code is kept beside the package, under a key that changes with all the function refers
 to (`law_source`); one that refers to what has no such key is compiled anew in each process.
 """
 
 import ctypes
+import logging
 from collections.abc import Callable
 from types import FunctionType
 from typing import Any
@@ -15,11 +17,14 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.callbacks.law_source import digest_of
 from floatframe.engine.compiling.callbacks.user_forces import Callback
+from floatframe.engine.kernels.compiler.choice import is_lean
 from floatframe.engine.kernels.compiler.garbage import without_garbage_collection
 from floatframe.errors import ModelError
 from floatframe.model.elements.element import ElementLaw
 
 __all__ = ["called_law", "law_callbacks"]
+
+log = logging.getLogger(__name__)
 
 WHOLE, REAL = ctypes.POINTER(ctypes.c_int64), ctypes.POINTER(ctypes.c_double)
 C_FUNCTION = ctypes.CFUNCTYPE(None, WHOLE, REAL, REAL, REAL)
@@ -73,21 +78,14 @@ def callback(where: str, function: Callable[..., None], kind: str, head: tuple[i
 
 def compiled_callback(where: str, function: Any, kind: str, template: Callable[[int], FunctionType]) -> Callback:
     """Return a function of numba as a C function."""
-    from numba import cfunc, types
     from numba.core.errors import NumbaError
 
     key = id(function), template.__name__
     if key not in compiled:
         digest = digest_of(function)
-        number = types.CPointer(types.float64)
-        signature = types.void(types.CPointer(types.int64), number, number, number)
-        made = filled(template, function, 1 if digest is None else digest)
+        whole = lean_c_function(where, function, template, digest) if is_lean else None
         try:
-            try:
-                with without_garbage_collection():
-                    whole = cfunc(signature, cache=digest is not None, error_model="numpy")(made)
-            except RuntimeError:  # no folder for the cache
-                whole = cfunc(signature, error_model="numpy")(made)
+            whole = whole or c_function(filled(template, function, digest or 1), digest is not None)
         except (NumbaError, NotImplementedError) as error:
             name = "tangent" if kind == "given" else "function"
             what = "with complex numbers, " if kind == "complex" else ""
@@ -99,6 +97,38 @@ def compiled_callback(where: str, function: Any, kind: str, template: Callable[[
         compiled[key] = whole, function
     whole, _ = compiled[key]
     return Callback(where, int(whole.address or 0), whole)
+
+
+def lean_c_function(
+    where: str, function: Any, template: Callable[[int], FunctionType], digest: int | None
+) -> Any | None:  # fmt: skip
+    """Return a function of numba as a C function by the lean compiler, None if that is impossible."""
+    from floatframe.engine.kernels.compiler import law
+    from floatframe.engine.kernels.compiler.stored import compiler_key
+
+    try:
+        names = {"law": law.lean_law(function), "carray": law.block_at, "new_vector": law.new_vector}
+        made = filled(template, function, (digest or 1) ^ int(compiler_key()[:14], 16))
+        made.__globals__.update(names)
+        return c_function(made, digest is not None, pipeline_class=law.EntryCompiler)
+    except (
+        Exception
+    ) as error:  # of any kind inside numba, whose passes are not all used; plain numba tells what is wrong
+        log.info("%s: %s is compiled by plain numba: %s", where, function.__name__, str(error).strip().split("\n")[-1])
+        return None
+
+
+def c_function(made: FunctionType, is_stored: bool, **options: Any) -> Any:
+    """Return a Python function compiled as a C function of pointers; stored on disk if it may be."""
+    from numba import cfunc, types
+
+    number = types.CPointer(types.float64)
+    signature = types.void(types.CPointer(types.int64), number, number, number)
+    with without_garbage_collection():
+        try:
+            return cfunc(signature, cache=is_stored, error_model="numpy", **options)(made)
+        except RuntimeError:  # no folder for the cache
+            return cfunc(signature, error_model="numpy", **options)(made)
 
 
 def filled(template: Callable[[int], FunctionType], function: Any, digest: int) -> FunctionType:

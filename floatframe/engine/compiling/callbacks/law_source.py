@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from floatframe.engine.kernels.compiler.sources import names_of
+
 __all__ = ["digest_of"]
 
 
@@ -18,23 +20,27 @@ def digest_of(function: Any) -> int | None:
     """Return a positive key of a numba function; None if it refers to something without a key."""
     digest = hashlib.sha256()
     try:
-        add_value(digest, function, set())
+        add_value(digest, function, {})
     except NoKeyError:
         return None
     return int.from_bytes(digest.digest()[:7], "big") + 1
 
 
-def add_value(digest: Any, value: Any, seen: set[int]) -> None:
-    """Add to the key the object that a name refers to."""
+def add_value(digest: Any, value: Any, seen: dict[int, bool]) -> None:
+    """Add to the key the object that a name refers to; `seen`: functions, by whether all they name has been added."""
+    if seen.get(id(value)) is False:
+        raise NoKeyError  # it calls itself: numba cannot use such code from disk
     if id(value) in seen:
         return
     if isinstance(getattr(value, "py_func", None), FunctionType):  # of numba
-        seen.add(id(value))
         digest.update(repr(sorted(getattr(value, "targetoptions", {}).items(), key=str)).encode())
+        seen[id(value)] = False
         add_function(digest, value.py_func, seen)
+        seen[id(value)] = True
     elif isinstance(value, FunctionType):  # overloaded for numba in its module, or registered with it by name
-        seen.add(id(value))
+        seen[id(value)] = False
         add_function(digest, value, seen)
+        seen[id(value)] = True
         file = Path(value.__code__.co_filename)
         if file.is_file():
             digest.update(file.read_bytes())
@@ -52,7 +58,7 @@ def add_value(digest: Any, value: Any, seen: set[int]) -> None:
         raise NoKeyError
 
 
-def add_function(digest: Any, function: FunctionType, seen: set[int]) -> None:
+def add_function(digest: Any, function: FunctionType, seen: dict[int, bool]) -> None:
     """Add to the key the code of a function, its module, which compiled code uses, and all objects that it names."""
     digest.update(str(function.__module__).encode())
     add_code(digest, function.__code__)
@@ -68,7 +74,7 @@ def add_function(digest: Any, function: FunctionType, seen: set[int]) -> None:
             add_value(digest, value, seen)
 
 
-def add_members(digest: Any, module: ModuleType, names: list[str], seen: set[int]) -> None:
+def add_members(digest: Any, module: ModuleType, names: list[str], seen: dict[int, bool]) -> None:
     """Add to the key the parts of a module that a function may use."""
     digest.update(f"{module.__name__} {getattr(module, '__version__', '')}".encode())
     if module.__name__.split(".")[0] in ("math", "cmath", "numpy", "numba"):
@@ -77,15 +83,6 @@ def add_members(digest: Any, module: ModuleType, names: list[str], seen: set[int
         if name in vars(module):
             digest.update(name.encode())
             add_value(digest, vars(module)[name], seen)
-
-
-def names_of(code: CodeType) -> list[str]:
-    """Return the names that a code and those in it use, in a fixed order."""
-    found = list(code.co_names)
-    for each in code.co_consts:
-        if isinstance(each, CodeType):
-            found += names_of(each)
-    return list(dict.fromkeys(found))
 
 
 def add_code(digest: Any, code: CodeType) -> None:

@@ -9,11 +9,13 @@ accelerations, of each state and each multiplier (0: not known). outputs: wrench
 is seen; or the derivatives of these but for the last, row by row, by dr, dphi, dv, domega of each marker, states,
 multipliers. Of a law that asks for accelerations, da and dalpha follow on domega.
 
-The templates are filled in by `law_functions`: `law` stands for the function of the user.
+The templates are filled in by `law_functions`: `law` stands for the function of the user; with the lean compiler,
+`carray` and `new_vector` are those of `kernels/compiler/law.py`.
 """
 
 import numpy as np
 from numba import carray
+from numba.extending import register_jitable
 
 __all__ = ["complex_template", "difference_template", "given_template", "value_template"]
 
@@ -27,6 +29,12 @@ ROUNDING = 2e-15  # fraction of a number below which a step is lost in rounding
 
 def law(*arguments):
     """Placeholder for the user's function."""
+
+
+@register_jitable
+def new_vector(kind, n):
+    """Return a new vector of numbers."""
+    return np.empty(n, kind)
 
 
 def value_template(digest):
@@ -79,10 +87,10 @@ def complex_template(digest):
         own = carray(slopes_at, (n_out, n_columns))
         own[:, :] = 0.0 if digest else 1.0
         data = carray(data_at, n_data)
-        y = np.empty(o - 1 + n_z + n_lam, np.complex128)
+        y = new_vector(np.complex128, o - 1 + n_z + n_lam)
         for k in range(y.shape[0]):
             y[k] = inputs[1 + k]
-        out = np.empty(n_out + n_seen, np.complex128)
+        out = new_vector(np.complex128, n_out + n_seen)
         x = y[: o - 1].reshape((n, width))
         z, lam = y[o - 1 : o - 1 + n_z], y[o - 1 + n_z :]
         wrench, z_dot, g = out[: 6 * n].reshape((n, 6)), out[6 * n : 6 * n + n_z], out[6 * n + n_z : n_out]
@@ -131,8 +139,10 @@ def difference_template(digest):
         own[:, :] = 0.0 if digest else 1.0
         known = carray(data_at, n_data + SIZES + n_z + n_lam)
         data, sizes = known[:n_data], known[n_data:]
-        y = inputs[1:].copy()
-        out = np.empty(n_out + n_seen)
+        y = new_vector(np.float64, o - 1 + n_z + n_lam)
+        for k in range(y.shape[0]):
+            y[k] = inputs[1 + k]
+        out = new_vector(np.float64, n_out + n_seen)
         x = y[: o - 1].reshape((n, width))
         z, lam = y[o - 1 : o - 1 + n_z], y[o - 1 + n_z :]
         wrench, z_dot, g = out[: 6 * n].reshape((n, 6)), out[6 * n : 6 * n + n_z], out[6 * n + n_z : n_out]

@@ -2,7 +2,7 @@
 
 It is numba's array type with its own code for numbers and parts: no test for negative indices or for the end of a
 slice that is given, no counted references, and as argument no more than the address and the shape.
-Kernels must not index from the end.
+Kernels must not index from the end. The functions of users may: their arrays are of the type `SafeBlock`.
 """
 
 import operator
@@ -11,29 +11,46 @@ from llvmlite import ir
 from numba import types
 from numba.core.datamodel import models
 from numba.extending import lower_builtin, lower_getattr, register_model
-from numba.np.arrayobj import getitem_array_tuple, getitem_arraynd_intp, setitem_array
+from numba.np.arrayobj import (
+    array_reshape,
+    array_reshape_vararg,
+    getitem_array_tuple,
+    getitem_arraynd_intp,
+    setitem_array,
+)
 
-__all__ = ["Block", "make_block"]
+__all__ = ["Block", "SafeBlock", "make_block", "parts_of"]
 
 N_ITEMS, ITEM_SIZE, DATA, SHAPE, STRIDES = 2, 3, 4, 5, 6  # positions of fields in numba's structure of an array
 WORD = ir.IntType(64)
-BYTES = 8  # of a number
+BITS = 8  # of a byte
 
 
 class Block(types.Array):
-    """A contiguous array of numbers of eight bytes in C order."""
+    """A contiguous array of numbers in C order."""
+
+    words = "block"  #: first words of the name of the type
+    from_end = False  #: whether negative indices count from the end, and slices end within the array
 
     def __init__(self, dtype, ndim):
-        super().__init__(dtype, ndim, "C", name=f"block({dtype}, {ndim}d)")
+        super().__init__(dtype, ndim, "C", name=f"{self.words}({dtype}, {ndim}d)")
 
     def copy(self, dtype=None, ndim=None, layout=None, readonly=None):
-        """Return the type of a part, which is a block if it is contiguous."""
-        if layout in (None, "C"):
-            return Block(dtype or self.dtype, self.ndim if ndim is None else ndim)
+        """Return the type of a part, which is a block if it is contiguous; that of a new array says `readonly`."""
+        if layout in (None, "C") and readonly is None:
+            return type(self)(dtype or self.dtype, self.ndim if ndim is None else ndim)
         return super().copy(dtype, ndim, layout, readonly)
 
 
+class SafeBlock(Block):
+    """The same for functions of users: indices and slices mean what they mean in Python."""
+
+    words = "safe block"
+    from_end = True
+
+
 @register_model(Block)
+@register_model(SafeBlock)
 class BlockModel(models.ArrayModel):
     """numba's structure of an array; as an argument its address and shape."""
 
@@ -48,16 +65,16 @@ class BlockModel(models.ArrayModel):
 
     def from_argument(self, builder, value):
         """Return the structure from the parts of an argument."""
-        return assemble(builder, self.get_value_type(), value[0], value[1])
+        return assemble(builder, self._fe_type, self.get_value_type(), value[0], value[1])
 
 
-def assemble(builder, structure, data, shape):
+def assemble(builder, block, structure, data, shape):
     """Return the structure of an array from its address and shape, with strides and number of items."""
-    n = len(shape)
+    n, size = len(shape), WORD(block.dtype.bitwidth // BITS)
     known = [ir.Constant(part, ir.Undefined) for part in structure.elements]
     known[0], known[1] = (ir.Constant(part, None) for part in structure.elements[:2])
-    known[ITEM_SIZE] = WORD(BYTES)
-    strides = [ir.Constant(WORD, ir.Undefined)] * (n - 1) + [WORD(BYTES)]
+    known[ITEM_SIZE] = size
+    strides = [ir.Constant(WORD, ir.Undefined)] * (n - 1) + [size]
     known[STRIDES] = ir.Constant(structure.elements[STRIDES], strides)
     value = builder.insert_value(ir.Constant(structure, known), data, DATA)
     n_items = None
@@ -65,13 +82,13 @@ def assemble(builder, structure, data, shape):
         value = builder.insert_value(value, shape[k], (SHAPE, k))
         n_items = shape[k] if n_items is None else builder.mul(n_items, shape[k])
         if k > 0:
-            value = builder.insert_value(value, builder.mul(n_items, WORD(BYTES)), (STRIDES, k - 1))
+            value = builder.insert_value(value, builder.mul(n_items, size), (STRIDES, k - 1))
     return builder.insert_value(value, n_items, N_ITEMS)
 
 
 def make_block(context, builder, kind, data, shape):
     """Return the value of type `kind` at an address, of a shape."""
-    return assemble(builder, context.get_value_type(kind), data, shape)
+    return assemble(builder, kind, context.get_value_type(kind), data, shape)
 
 
 def shape_of(builder, block, value):
@@ -87,8 +104,24 @@ def offset_of(context, builder, block, value, kinds, indices):
             offset = builder.mul(offset, builder.extract_value(value, (SHAPE, k)))
         if k < len(kinds):
             index = context.cast(builder, indices[k], kinds[k], types.intp)
+            if block.from_end:
+                index = from_start(builder, index, builder.extract_value(value, (SHAPE, k)))
             offset = index if offset is None else builder.add(offset, index)
     return offset
+
+
+def from_start(builder, index, n):
+    """Return an index that counts from the start, for one that counts from the end if it is negative."""
+    if isinstance(index, ir.Constant) and isinstance(index.constant, int):
+        return index if index.constant >= 0 else builder.add(index, n)
+    return builder.select(builder.icmp_signed("<", index, WORD(0)), builder.add(index, n), index)
+
+
+def within(builder, bound, n):
+    """Return the bound of a slice as numba takes it: counted from the start, and between zero and the size."""
+    bound = from_start(builder, bound, n)
+    bound = builder.select(builder.icmp_signed("<", bound, WORD(0)), WORD(0), bound)
+    return builder.select(builder.icmp_signed("<", bound, n), bound, n)
 
 
 def place(builder, value, offset):
@@ -124,7 +157,11 @@ def get_part(context, builder, signature, value, kinds, indices):
     if isinstance(kinds[-1], types.SliceType):
         first, end = (builder.extract_value(indices[-1], k) for k in range(2))
         n = shape[len(kinds) - 1]
-        end = builder.select(builder.icmp_signed("<", end, n), end, n)  # a missing end is the largest integer
+        if block.from_end:
+            first, end = within(builder, first, n), within(builder, end, n)
+            end = builder.select(builder.icmp_signed("<", end, first), first, end)
+        else:
+            end = builder.select(builder.icmp_signed("<", end, n), end, n)  # a missing end is the largest integer
         rest.insert(0, builder.sub(end, first))
         kinds[-1], indices[-1] = types.intp, first
     offset = offset_of(context, builder, block, value, kinds, indices)
@@ -163,7 +200,9 @@ def set_item(context, builder, signature, arguments):
 
 @lower_builtin("array.reshape", Block, types.BaseTuple)
 def reshape(context, builder, signature, arguments):
-    """Return the same numbers in another shape; their number is not checked."""
+    """Return the same numbers in another shape; their number is checked in functions of users alone."""
+    if signature.args[0].from_end:
+        return array_reshape(context, builder, signature, arguments)
     kinds, shape = parts_of(builder, signature.args[1], arguments[1])
     shape = [context.cast(builder, n, kind, types.intp) for n, kind in zip(shape, kinds, strict=True)]
     data = builder.extract_value(arguments[0], DATA)
@@ -173,6 +212,8 @@ def reshape(context, builder, signature, arguments):
 @lower_builtin("array.reshape", Block, types.Integer)
 def flatten(context, builder, signature, arguments):
     """Return the same numbers as a vector."""
+    if signature.args[0].from_end:
+        return array_reshape_vararg(context, builder, signature, arguments)
     shape = [context.cast(builder, arguments[1], signature.args[1], types.intp)]
     data = builder.extract_value(arguments[0], DATA)
     return make_block(context, builder, signature.return_type, data, shape)

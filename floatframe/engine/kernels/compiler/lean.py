@@ -17,26 +17,28 @@ compilation. Inner functions are never called from Python and own no memory, so 
 """
 
 import types
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from llvmlite.binding import Linkage, parse_assembly, parse_bitcode
 from numba import njit
 from numba.core import cgutils
 from numba.core.bytecode import FunctionIdentity
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, compile_result
+from numba.core.compiler import CompilerBase, DefaultPassBuilder, compile_result
 from numba.core.compiler_machinery import FunctionPass, PassManager, register_pass
-from numba.core.errors import WarningsFixer  # type: ignore[attr-defined]
+from numba.core.errors import NumbaError, WarningsFixer  # type: ignore[attr-defined]
 from numba.core.funcdesc import FunctionDescriptor
 from numba.core.interpreter import Interpreter
 from numba.core.ir import Inst, Loc, Var
 from numba.core.ir_utils import build_definitions
 from numba.core.lowering import Environment
+from numba.core.registry import cpu_target
 from numba.core.rewrites.static_getitem import RewriteConstGetitems
 from numba.core.runtime.nrt import rtsys
 from numba.core.ssa import reconstruct_ssa
+from numba.core.targetconfig import ConfigStack
 from numba.core.typed_passes import (
     IRLegalization,
     NativeLowering,
@@ -50,18 +52,21 @@ from numba.core.untyped_passes import ExtractByteCode, FixupArgs, IRProcessing, 
 
 from floatframe.engine.kernels.compiler.block import Block, make_block
 from floatframe.engine.kernels.compiler.garbage import without_garbage_collection
-from floatframe.engine.kernels.compiler.lowering import KernelContext, KernelLower
+from floatframe.engine.kernels.compiler.lowering import KernelContext, KernelLower, LawContext, LawLower
 from floatframe.engine.kernels.compiler.stored import StoredCode, code_key, delete_old, read_code, write_code
 
 __all__ = [
     "ENTRY",
     "INNER",
+    "EntryCompiler",
+    "NotLeanError",
     "array_type",
     "array_value",
     "entry",
     "inner",
     "loops",
     "matrix_loops",
+    "of_law",
     "pipeline",
     "small",
     "view",
@@ -130,6 +135,18 @@ class KernelLowering(NativeLowering):
     def lowering_class(self):
         """The lowering for kernels."""
         return KernelLower
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class LawLowering(NativeLowering):
+    """Lowering of a function of a law."""
+
+    _name = "law_lowering"
+
+    @property
+    def lowering_class(self):
+        """The lowering for laws."""
+        return LawLower
 
 
 class Passes(PassManager):
@@ -338,7 +355,8 @@ def remembered_calls() -> Iterator[None]:
     known: dict = {}
 
     def get_call_type(self, context, args, kws):
-        key = self, context, tuple(args), tuple(kws.items())
+        flags = ConfigStack.top_or_none()
+        key = self, context, tuple(args), tuple(kws.items()), flags is not None and flags.nrt
         if key not in known:
             known[key] = plain(self, context, args, kws)
         return known[key]
@@ -364,15 +382,17 @@ class InnerCompiler(CompilerBase):
 
     #: LLVM attribute of the function: small code, because its loops are short
     attributes: tuple[str, ...] = ("optsize",)
+    context: ClassVar[Any] = KernelContext
+    passes: ClassVar[Sequence[type]] = INNER  #: the last ones
 
     def define_pipelines(self):
         """Return the one pipeline."""
-        return [pipeline(self.state, INNER)]
+        return [pipeline(self.state, self.passes)]
 
     def compile_extra(self, func):
         """Compile into an `InnerLibrary`, or take its code from disk (6)."""
         state = self.state
-        state.targetctx = context = KernelContext.of(state.targetctx)
+        state.targetctx = context = self.context.of(state.targetctx)
         key = code_key(func, state.args, f"{self.attributes} {state.flags}") if state.return_type is None else None
         if key is not None and (code := read_code(key)) is not None:
             library = InnerLibrary.known.get(key) or InnerLibrary.stored(context.codegen(), key, code)
@@ -445,6 +465,44 @@ class MatrixLoopCompiler(InnerCompiler):
     attributes = ("noinline",)
 
 
+class LawCompiler(InnerCompiler):
+    """The same for a function of a law, see kernels/compiler/law.py."""
+
+    attributes = ()
+    context = LawContext
+    passes = (LawLowering, NoPythonBackend)
+
+    def compile_extra(self, func):
+        """Compile as other inner functions, else as one that makes arrays."""
+        state = self.state
+        try:
+            return super().compile_extra(func)
+        except NumbaError:
+            state.typingctx.callstack._fail_cache.clear()  # what failed without counted references may work with them
+            flags = state.flags.copy()
+            flags.nrt = True
+            again = OwnerCompiler(
+                state.typingctx, cpu_target.target_context, None, state.args, state.return_type, flags, state.locals
+            )
+            return again.compile_extra(func)
+
+
+class OwnerCompiler(LawCompiler):
+    """The same for a function that makes arrays: by the passes of numba, with counted references."""
+
+    def define_pipelines(self):
+        """Return numba's pipeline."""
+        return [DefaultPassBuilder.define_nopython_pipeline(self.state)]
+
+    def compile_extra(self, func):
+        """Compile as other inner functions."""
+        return InnerCompiler.compile_extra(self, func)
+
+
+class NotLeanError(Exception):
+    """The lean compiler does not know something in a function."""
+
+
 def decorator(pipeline_class, **options):
     """Return the decorator of functions that only compiled code calls.
 
@@ -465,6 +523,7 @@ small = decorator(SmallCompiler)  #: the same for functions of a few operations
 loops = decorator(LoopCompiler)  #: the same for functions with loops over modes or matrices (5)
 matrix_loops = decorator(MatrixLoopCompiler)  #: the same for long functions with many callers
 view = decorator(LoopCompiler, _nrt=True)  #: the same for functions that return a part of an array
+of_law = decorator(LawCompiler)  #: decorator of functions of laws
 
 
 def entry(function, *, cache=True):

@@ -12,6 +12,7 @@ Kernels own no memory and raise no errors, so that here
 import operator
 from collections import defaultdict
 
+from llvmlite import ir as llvm
 from numba import types
 from numba.core import ir
 from numba.core.analysis import compute_cfg_from_blocks, compute_use_defs, must_use_alloca
@@ -21,7 +22,7 @@ from numba.core.lowering import Lower
 
 from floatframe.engine.kernels.compiler.block import Block, get_item
 
-__all__ = ["KernelContext", "KernelLower"]
+__all__ = ["KernelContext", "KernelLower", "LawContext", "LawLower"]
 
 NO_WRAP = ("nsw",)  # integers of kernels do not overflow
 OPERATIONS = {
@@ -56,6 +57,8 @@ def single_assignments(blocks):
 
 class KernelLower(Lower):
     """numba's lowering of a function, for kernels."""
+
+    operations = OPERATIONS  #: (4)
 
     def _find_singly_assigned_variable(self):
         self._singly_assigned_vars = single_assignments(self.func_ir.blocks)
@@ -119,7 +122,7 @@ class KernelLower(Lower):
         if expr.op in ("binop", "inplace_binop"):
             signature = self.fndesc.calltypes[expr]
             function = expr.fn if expr.op == "binop" else expr.immutable_fn
-            write = OPERATIONS.get((function, *signature.args))
+            write = self.operations.get((function, *signature.args))
             if write is not None:
                 x, y = (self.value_as(*each) for each in zip((expr.lhs, expr.rhs), signature.args, strict=True))
                 return self.context.cast(self.builder, write(self.builder, x, y), signature.return_type, resty)
@@ -139,6 +142,66 @@ class KernelLower(Lower):
     def value_as(self, variable, kind):
         """Return the value of a variable as one of another type."""
         return self.context.cast(self.builder, self.loadvar(variable.name), self.typeof(variable.name), kind)
+
+
+def parts(builder, x):
+    """Return the real and the imaginary part of a complex number."""
+    return builder.extract_value(x, 0), builder.extract_value(x, 1)
+
+
+def complex_number(builder, kind, real, imag):
+    """Return the complex number with these parts."""
+    return builder.insert_value(builder.insert_value(llvm.Constant(kind, llvm.Undefined), real, 0), imag, 1)
+
+
+def complex_sum(builder, x, y):
+    """Return x + y."""
+    (a, b), (c, d) = parts(builder, x), parts(builder, y)
+    return complex_number(builder, x.type, builder.fadd(a, c), builder.fadd(b, d))
+
+
+def complex_difference(builder, x, y):
+    """Return x - y."""
+    (a, b), (c, d) = parts(builder, x), parts(builder, y)
+    return complex_number(builder, x.type, builder.fsub(a, c), builder.fsub(b, d))
+
+
+def complex_product(builder, x, y):
+    """Return x y."""
+    (a, b), (c, d) = parts(builder, x), parts(builder, y)
+    real = builder.fsub(builder.fmul(a, c), builder.fmul(b, d))
+    return complex_number(builder, x.type, real, builder.fadd(builder.fmul(a, d), builder.fmul(b, c)))
+
+
+COMPLEX = types.complex128, types.complex128
+LAW_OPERATIONS = {
+    **OPERATIONS,
+    (operator.add, *COMPLEX): complex_sum,
+    (operator.sub, *COMPLEX): complex_difference,
+    (operator.mul, *COMPLEX): complex_product,
+}
+MAKES_ARRAYS = ("call", "binop", "unary")  #: expressions whose arrays may be new
+
+
+class LawLower(KernelLower):
+    """The lowering of a function of a law."""
+
+    operations = LAW_OPERATIONS
+
+    def lower_expr(self, resty, expr):
+        """Return the value of an expression; a new array is refused, because it would never be freed (1)."""
+        if expr.op in MAKES_ARRAYS and self.context.data_model_manager[resty].contains_nrt_meminfo():
+            raise NotImplementedError("an array that must be freed")
+        return super().lower_expr(resty, expr)
+
+
+class LawContext(CPUContext):
+    """numba's context of compilation, for functions of laws: errors pass through calls."""
+
+    @classmethod
+    def of(cls, context):
+        """Return the context itself."""
+        return context
 
 
 def call_of_kernel(fndesc, libraries):

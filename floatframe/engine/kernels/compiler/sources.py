@@ -13,8 +13,9 @@ import re
 import sys
 from functools import cache
 from pathlib import Path
+from types import CodeType
 
-__all__ = ["imported_modules", "source_digest", "source_files"]
+__all__ = ["imported_modules", "names_of", "source_digest", "source_files"]
 
 ROOT = Path(__file__).parents[4]  #: folder of the packages
 PACKAGES = ("cms", "fe_models", "floatframe")
@@ -109,3 +110,12 @@ def keep(record: Path, words: str) -> bool:
     except OSError:
         return False
     return True
+
+
+def names_of(code: CodeType) -> list[str]:
+    """Return the names that a code and those in it use, in a fixed order."""
+    found = list(code.co_names)
+    for each in code.co_consts:
+        if isinstance(each, CodeType):
+            found += names_of(each)
+    return list(dict.fromkeys(found))

@@ -32,7 +32,7 @@ from numba.extending import _Intrinsic
 
 from floatframe.engine.kernels.compiler.sources import PACKAGES
 
-__all__ = ["StoredCode", "code_key", "delete_old", "read_code", "write_code"]
+__all__ = ["StoredCode", "code_key", "compiler_key", "delete_old", "read_code", "write_code"]
 
 #: beside the code that numba stores: in NUMBA_CACHE_DIR if that is set
 FOLDER = Path(os.environ.get("NUMBA_CACHE_DIR") or Path(__file__).parents[3] / "__pycache__") / "inner"
@@ -144,11 +144,14 @@ def value_words(value) -> object:
         return "function", function_words(value)
     if isinstance(value, type) and is_ours(value.__module__):
         return record_words(value)
-    if isinstance(value, type | FunctionType | BuiltinFunctionType | np.ufunc):
+    module = str(getattr(value, "__module__", "")).partition(".")[0]
+    if isinstance(value, type | FunctionType | BuiltinFunctionType | np.ufunc) and module in FOREIGN:
         return "foreign", str(getattr(value, "__module__", "")), getattr(value, "__qualname__", value.__name__)
     raise UnknownKindError
 
 
+#: modules whose code does not change while the versions of Python, NumPy and numba are the same
+FOREIGN = ("builtins", "cmath", "math", "numba", "numpy", "operator", "_operator", "None")
 PLAIN = (bool, int, float, complex, str, bytes, type(Ellipsis))
 
 

@@ -34,3 +34,18 @@ def test_a_law_that_moved_to_another_module_is_compiled_anew():
     here, there = (FunctionType(stiff.__code__, {"__name__": name}) for name in ("here", "there"))
     assert digest_of(njit(here)) != digest_of(njit(there))
     assert digest_of(njit(here)) == digest_of(njit(FunctionType(stiff.__code__, {"__name__": "here"})))
+
+
+@njit
+def falling(n, x):
+    return x if n == 0 else falling(n - 1, 0.5 * x)
+
+
+@njit
+def calls_itself(t, x, z, lam, data, wrench, z_dot, g, outputs):
+    wrench[0, 0] = falling(3, x[0, 0])
+
+
+def test_a_law_that_calls_itself_is_not_stored():
+    """In another process, numba leaves its call of itself without an address."""
+    assert digest_of(calls_itself) is None

@@ -1,0 +1,110 @@
+"""Laws of elements by the lean compiler: the functions of users, and the functions that these call.
+
+A law is made by `njit`, and so are the functions that it calls, or by `register_jitable`. Here each of them is made
+again, from the same Python function, as an inner function of the lean compiler (kernels/compiler/lean.py). It means the
+same as before, hence two differences to kernels: indices may count from the end (`SafeBlock`), and errors pass through
+calls. Division by zero gives infinite numbers or NaN, as it does with NumPy.
+
+A function that makes arrays is compiled by the passes of numba, with counted references, and takes part in the rest:
+it is optimised once, with the law. Whatever else the lean compiler does not know raises an error, and the caller
+compiles the whole law by plain numba.
+"""
+
+from types import CellType, FunctionType
+from typing import Any
+
+from numba import types
+from numba.core.dispatcher import Dispatcher
+from numba.core.registry import cpu_target
+from numba.extending import intrinsic
+
+from floatframe.engine.kernels.compiler.block import SafeBlock, make_block, parts_of
+from floatframe.engine.kernels.compiler.lean import EntryCompiler, NotLeanError, of_law
+from floatframe.engine.kernels.compiler.sources import names_of
+
+__all__ = ["EntryCompiler", "block_at", "lean_law", "new_vector"]
+
+SAME = {"nopython", "nogil", "boundscheck", "error_model", "cache"}  #: options of `njit` that change no result
+
+#: inner functions by the identities of those that they replace, which are kept alive; None while one is made
+made: dict[int, tuple[Any, Any]] = {}
+
+
+def lean_law(function: Any) -> Any:
+    """Return the inner function that computes the same as a function of numba.
+
+    Raises
+    ------
+    NotLeanError
+        If the function calls itself, or has options that change its results.
+    """
+    if id(function) not in made:
+        made[id(function)] = function, None
+        try:
+            made[id(function)] = function, inner_function(function)
+        except NotLeanError:
+            del made[id(function)]
+            raise
+    _, inner = made[id(function)]
+    if inner is None:
+        raise NotLeanError(f"{function.__name__} calls itself")
+    return inner
+
+
+def inner_function(function: Any) -> Any:
+    """Return an inner function with the code of a function of numba; it calls inner functions too."""
+    plain = function
+    if isinstance(function, Dispatcher):
+        plain = function.py_func
+        options = sorted({name for name, value in function.targetoptions.items() if value} - SAME)
+        if options:
+            raise NotLeanError(f"{plain.__name__} has the options {', '.join(options)}")
+    used = names_of(plain.__code__)
+    names = {name: replaced(value) if name in used else value for name, value in plain.__globals__.items()}
+    closure = tuple(CellType(replaced(cell.cell_contents)) for cell in plain.__closure__ or ())
+    same = FunctionType(plain.__code__, names, plain.__name__, plain.__defaults__, closure)
+    same.__qualname__, same.__module__, same.__kwdefaults__ = plain.__qualname__, plain.__module__, plain.__kwdefaults__
+    return of_law(same)
+
+
+def replaced(value: Any) -> Any:
+    """Return the inner function for a function of numba; other values are unchanged."""
+    is_function = isinstance(value, Dispatcher) or (isinstance(value, FunctionType) and is_jitable(value))
+    return lean_law(value) if is_function else value
+
+
+def is_jitable(function: FunctionType) -> bool:
+    """Whether a function was decorated by `register_jitable` without options."""
+    context = cpu_target.typing_context
+    context.refresh()
+    for template in getattr(context._lookup_global(function), "templates", ()):
+        overload = getattr(template, "_overload_func", None)
+        cells = getattr(overload, "__closure__", None) or ()
+        if any(cell.cell_contents is function for cell in cells):
+            return not template._jit_options and template._inline.is_never_inline
+    return False
+
+
+@intrinsic
+def block_at(typing_context, pointer, shape):
+    """Return the array of a shape at an address, as `carray` does."""
+    block = SafeBlock(pointer.dtype, len(shape) if isinstance(shape, types.BaseTuple) else 1)
+
+    def generate(context, builder, signature, arguments):
+        kinds, sizes = parts_of(builder, signature.args[1], arguments[1])
+        sizes = [context.cast(builder, n, kind, types.intp) for n, kind in zip(sizes, kinds, strict=True)]
+        return make_block(context, builder, block, arguments[0], sizes)
+
+    return block(pointer, shape), generate
+
+
+@intrinsic
+def new_vector(typing_context, kind, n):
+    """Return a vector on the stack, where it lives until the function ends."""
+    block = SafeBlock(kind.dtype, 1)
+
+    def generate(context, builder, signature, arguments):
+        size = context.cast(builder, arguments[1], signature.args[1], types.intp)
+        return make_block(context, builder, block, builder.alloca(context.get_data_type(block.dtype), size), [size])
+
+    return block(kind, n), generate
