@@ -77,7 +77,7 @@ def split_job(request: SplitRequest) -> list[Path]:
     import tomlkit
 
     from cms.reduction.basis.strain_damping import strain_damping_bytes
-    from fe_models.meshes.split import split_mesh
+    from fe_models.meshes.split import longest_direction, split_mesh
 
     job = read_job(request.job)
     if request.kind not in CUT_KINDS:
@@ -88,7 +88,9 @@ def split_job(request: SplitRequest) -> list[Path]:
     if folder.exists() and not folder.is_dir():
         raise JobError(f"--output {folder}: this is a file; expected a folder")
     mesh = mesh_of(job)
-    split = split_mesh(mesh, request.n, at=request.at, axis=request.axis)
+    # the jobs of the parts get the axis as it is used here: a cell whose centre is at a cut must go to the same part
+    axis = longest_direction(mesh.nodes) if request.axis is None else np.array(request.axis)
+    split = split_mesh(mesh, request.n, at=request.at, axis=axis)
     names_of_cuts = [cut.name for cut in split.cuts]
     homes = homes_of(job, mesh, split.parts, names_of_cuts)
     documents = []
@@ -96,7 +98,7 @@ def split_job(request: SplitRequest) -> list[Path]:
         document = tomlkit.parse(request.job.read_text(encoding="utf-8-sig"))
         edit_job(
             document, job, part,
-            number=k + 1, request=request, folder=folder, axis=split.axis,
+            number=k + 1, request=request, folder=folder, axis=axis,
             cuts=[split.cuts[j] for j in (k - 1, k) if 0 <= j < len(split.cuts)],
             inside=[name for name, home in homes.items() if home == k],
         )  # fmt: skip
@@ -176,11 +178,14 @@ def description_of(found: "PartsDamping", job: Job) -> str:
         f"{k}: {mode.frequency / second:.4g} Hz, {mode.ratio:.3g} for {mode.wanted:.3g}"
         for k, mode in enumerate(found.modes, 1)
     )
-    kept = "all these modes" if found.n_exact == len(found.modes) else f"the first {found.n_exact} modes"
-    others = "" if found.n_exact == len(found.modes) else ", others are too alike in the parts: fewer parts keep more"
+    is_all = found.n_exact == len(found.modes)
+    kept = "all these modes" if is_all else f"the first {found.n_exact} modes"
+    support = "free" if found.held is None else f"clamped at {found.held!r}"
+    others = "" if is_all else "; others are too alike in the parts, and fewer parts keep more"
     return (
         f"ratios belong to modes of one body: the parts have dampings of their own, with which {kept} of "
-        f"{job.body.name!r} keep theirs{others} (mode: frequency, ratio in parts for ratio of the job): {listed}"
+        f"{job.body.name!r}, {support}, keep theirs{others} (mode: frequency, ratio in parts for ratio of the job): "
+        f"{listed}"
     )
 
 

@@ -43,6 +43,7 @@ __all__ = ["ModeInParts", "PartsDamping", "damping_of_parts"]
 
 BAND = 6.0  #: highest frequency, over the first one of the whole body, up to which modes keep their ratios
 FEWEST_MODES, MOST_MODES = 6, 12  #: smallest and largest number of these modes
+PAIR = 1.01  #: modes whose frequencies differ by less, relative, belong together, as the bending of a square section
 FIXED_MODES = 30  #: modes with fixed cuts of each part
 MOST = 2.0  #: largest damping of the strain of a part, over the largest one that a mode needs
 LEAST = 0.5  #: damping of the strain beside the patterns, over the smallest one that a mode needs
@@ -73,6 +74,7 @@ class PartsDamping:
     parts: tuple[StrainDamping, ...]
     modes: tuple[ModeInParts, ...]
     n_exact: int  #: number of modes, from the first one, whose damping phi_kᵀ D phi_k is that of the job
+    held: str | None  #: interface at which the modes are clamped; None: they are free
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,10 +117,13 @@ def damping_of_parts(
         Name of the solver.
     """
     at = [interface for body in bodies for interface in body.interfaces if interface.name == held]
-    is_held = bool(at) and len(dofs_of(at[0])) <= N_RIGID
-    joined = joined_parts(bodies, held if is_held else None, solver)  # (1)
+    if not at or len(dofs_of(at[0])) > N_RIGID:
+        held = None
+    joined = joined_parts(bodies, held, solver)  # (1)
     omega, Phi = modes_of(joined)  # (2)
     n = min(max(int(np.count_nonzero(omega <= BAND * omega[0])), FEWEST_MODES), MOST_MODES, len(omega))
+    while n < len(omega) and omega[n] < PAIR * omega[n - 1]:
+        n += 1
     c = 2 * ratios(omega**2)[:n] / omega[:n]
     if not c.any():
         return None
@@ -152,7 +157,7 @@ def damping_of_parts(
         ModeInParts(float(w / (2 * np.pi)), float(a), float(b))
         for w, a, b in zip(omega[:n], wanted, found, strict=True)
     )
-    return PartsDamping(tuple(parts), modes, n_exact)
+    return PartsDamping(tuple(parts), modes, n_exact, held)
 
 
 def worst(found: Array, wanted: Array, n: int) -> float:

@@ -1,6 +1,7 @@
 """A body in parts, joined again: the same body as long as the cuts do not change it."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -200,6 +201,7 @@ def test_modes_of_the_whole_keep_their_damping_ratios_in_parts(beam, caplog, tab
     assert_allclose(f[:6], omega[:6] / (2 * np.pi), rtol=1e-2)  # damping couples modes, which shifts |s|
     assert_allclose(np.diag(whole.D)[:6] / (2 * omega[:6]), wanted, rtol=1e-12)  # what the job asks for
     told, n_kept = told_modes(caplog)
+    assert ("clamped at 'foot'" if frame == "nodal" else "'mast', free,") in caplog.text
     assert n_kept >= 4
     assert_allclose(zeta[:n_kept], wanted[:n_kept], rtol=5e-3)
     assert_allclose(told[:6, 3], wanted, rtol=1e-2)
@@ -215,6 +217,19 @@ def test_the_error_of_the_ratios_in_parts_falls_with_more_modes(beam):
         errors.append(np.abs(zeta[:4] / 0.03 - 1).max())
     assert errors[0] > 4 * errors[1] > 16 * errors[2]
     assert errors[2] < 1e-4
+
+
+def test_modes_of_one_frequency_keep_their_ratios_together(beam, caplog, monkeypatch):
+    """The straight tube bends alike in two planes: its third and fourth mode are a pair."""
+    job = with_damping(beam(n_modes=8), "ratio = 0.03")
+    nodes = job.with_name("nodes.csv")
+    nodes.write_text(re.sub(r",0,[\d.]+,", ",0,0,", nodes.read_text()))
+    monkeypatch.setattr("cms.jobs.part_damping.BAND", 1.0)
+    monkeypatch.setattr("cms.jobs.part_damping.FEWEST_MODES", 3)
+    split_job(SplitRequest(job, 3))
+    told, _ = told_modes(caplog)
+    assert len(told) == 4
+    assert_allclose(told[2, 1], told[3, 1], rtol=1e-3)
 
 
 def test_damping_of_a_part_is_semidefinite_and_leaves_rigid_motion_free(beam):
@@ -362,6 +377,19 @@ def test_solid_in_parts_is_the_whole_with_rigid_sections(tmp_path):
     system = reduced_parts(split_job(SplitRequest(tmp_path / "bar.toml", 2)))
     found = np.sort(system_modes(linearize(system, static_equilibrium(system))).natural_frequencies)
     assert_allclose(found[6:11], exact, rtol=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_cells_with_their_centre_on_a_cut_are_in_the_same_part_of_split_and_job(tmp_path, seed):
+    """The damping of a part belongs to its dofs; in a turned bar the last digit of the axis decides."""
+    mesh = box_mesh(5, 1, 1, lx=1.0, ly=0.1, lz=0.12)
+    turn = la.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+    deck = write_deck(tmp_path / "bar.inp", replace(mesh, nodes=mesh.nodes @ turn.T))
+    text = SOLID.format(mesh=deck.name, cut="", n_modes=4) + "[damping]\nratio = 0.02\n"
+    (tmp_path / "bar.toml").write_text(text)
+    parts = split_job(SplitRequest(tmp_path / "bar.toml", 2))[:-1]
+    for part in parts:
+        assert reduce_job(read_job(part)).D.any()
 
 
 @pytest.mark.parametrize(
