@@ -33,6 +33,7 @@ import numpy as np
 import scipy.linalg as la
 
 from cms.modes.families.families import Families
+from cms.reduction.basis.node_motion import reference_motion
 from cms.reduction.basis.strain_damping import StrainDamping
 from fe_models.body.fe_body import MULTIPLIER, FEBody, Interface
 from fe_models.body.rigid_motion import rigid_motion_of_dofs
@@ -83,16 +84,14 @@ class JoinedParts:
 
     columns: tuple[Array, ...]  #: displacements of each part, (n_dof, n_p)
     stiffness: tuple[Array, ...]  #: of each part over its columns, (n_p, n_p)
-    places: tuple[IntArray, ...]  #: coordinate of the joined body of each column, (n_p,)
+    follows: tuple[Array, ...]  #: each part's columns by the coordinates of the joined body, (n_p, n)
     M: Array  #: of the joined body, (n, n)
     K: Array  #: (n, n)
-    rigid: Array  #: rigid-body motions, (n, 6)
-    held: IntArray  #: coordinates that the frame of the whole body holds; empty: it is free
-    softest: float  #: omega² of the lowest mode with fixed cuts
+    momenta: Array  #: M times the rigid-body motions, (n, 6); (n, 0) if the body is held
 
     def shares(self, p: int, omega: Array, Phi: Array) -> Array:
         """Return H_p of modes, (k, k); diagonal: share of part p in the strain energy of each mode."""
-        phi = Phi[self.places[p]] / omega
+        phi = self.follows[p] @ Phi / omega
         return np.asarray(phi.T @ self.stiffness[p] @ phi)
 
 
@@ -128,8 +127,8 @@ def damping_of_parts(
     if not c.any():
         return None
     R = [root(joined.shares(p, omega[:n], Phi[:, :n])) for p in range(len(bodies))]  # (3)
-    X = [Phi[place, :n] / omega[:n] @ la.pinv(r) for place, r in zip(joined.places, R, strict=True)]  # S_p
-    G = [x.T @ k @ Phi[place] for x, k, place in zip(X, joined.stiffness, joined.places, strict=True)]
+    X = [T @ (Phi[:, :n] / omega[:n]) @ la.pinv(r) for T, r in zip(joined.follows, R, strict=True)]  # S_p
+    G = [x.T @ k @ (T @ Phi) for x, k, T in zip(X, joined.stiffness, joined.follows, strict=True)]
 
     def ratios_with(Y: Sequence[Array]) -> Array:  # (7)
         D = least * np.diag(omega**2) + sum(g.T @ (y - least * np.eye(len(y))) @ g for g, y in zip(G, Y, strict=True))
@@ -166,44 +165,63 @@ def worst(found: Array, wanted: Array, n: int) -> float:
 
 
 def joined_parts(bodies: Sequence[FEBody], held: str | None, solver: str | None) -> JoinedParts:
-    """Condense each part to its cuts, the held interface and its fixed modes, and join the parts at the cuts."""
+    """Condense each part to its cuts, the held interface and its fixed modes, and join the parts at the cuts.
+
+    The coordinates of the joined body are a basis of the motions that have the same motion of the reference points at
+    each cut, and none at the held interface.
+    """
     center = np.mean([body.nodes.mean(axis=0) for body in bodies], axis=0)
-    columns, stiffness, masses, places, motions, omega2 = [], [], [], [], [], []
-    place_of: dict[str, IntArray] = {}  # coordinates of the joined body, by interface
-    n = 0
-    for k, body in enumerate(bodies, start=1):
-        wanted = {cut_name(k - 1), cut_name(k), held}
+    columns, stiffness, masses, rigid, omega2 = [], [], [], [], []
+    at: dict[str, list[tuple[int, Array]]] = {}  # parts and motions of their columns, by interface
+    for p, body in enumerate(bodies):
+        wanted = {cut_name(p), cut_name(p + 1), held}
         part = replace(
             body, interfaces=tuple(each for each in body.interfaces if each.name in wanted), load_cases=()
         )  # other interfaces are ordinary nodes
         with Families(part, announce=False, solver=solver) as families:
             fixed = families.fixed_modes(min(FIXED_MODES, n_fixed_modes(part, families.h)))
             V = np.hstack([families.Psi_C, fixed.Phi])
-            stiffness.append(la.block_diag(families.S, np.diag(fixed.omega2)))
             motion = np.zeros((V.shape[1], 6))
             motion[: len(families.h)] = rigid_motion_of_dofs(part.nodes, part.dofs[families.h], center)
         columns.append(V)
-        omega2 += fixed.omega2.tolist()
+        rigid.append(motion)
+        stiffness.append(V.T @ (part.K @ V))
         masses.append(V.T @ (part.M @ V))
-        motions.append(motion)
-        place = np.full(V.shape[1], -1, np.int64)
-        first = np.cumsum([0, *(len(dofs_of(each)) for each in part.interfaces)])
-        for each, begin, end in zip(part.interfaces, first[:-1], first[1:], strict=True):
-            place[begin:end] = place_of.get(each.name, -1)
-        new = np.flatnonzero(place < 0)
-        place[new] = n + np.arange(len(new))
-        n += len(new)
-        place_of |= {
-            each.name: place[begin:end] for each, begin, end in zip(part.interfaces, first[:-1], first[1:], strict=True)
-        }
-        places.append(place)
-    M, K, rigid = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, 6))
-    for m, k_part, place, motion in zip(masses, stiffness, places, motions, strict=True):
-        M[np.ix_(place, place)] += m
-        K[np.ix_(place, place)] += k_part
-        rigid[place] = motion
-    at_rest = np.zeros(0, np.int64) if held is None else place_of[held]
-    return JoinedParts(tuple(columns), tuple(stiffness), tuple(places), M, K, rigid, at_rest, min(omega2))
+        omega2 += fixed.omega2.tolist()
+        for each in part.interfaces:
+            at.setdefault(each.name, []).append((p, reference_motion(part, each)[0] @ V))
+    M, K, x_rigid = la.block_diag(*masses), la.block_diag(*stiffness), np.concatenate(rigid)
+    s = 1 / np.sqrt(np.maximum(K.diagonal(), 0.0) + min(omega2) * M.diagonal())
+    first = np.cumsum([0, *(V.shape[1] for V in columns)])
+    conditions = []
+    for motions in at.values():
+        rows = np.zeros((6, len(s)))
+        for sign, (p, motion) in zip((1, -1), motions, strict=False):
+            rows[:, first[p] : first[p + 1]] = sign * motion
+        rows *= s
+        size = np.linalg.norm(rows, axis=1)
+        conditions.append(rows[size > 0] / size[size > 0, None])
+    T = s[:, None] * la.null_space(np.concatenate(conditions))
+    momenta = T.T @ (M @ x_rigid) if held is None else np.zeros((T.shape[1], 0))
+    return JoinedParts(
+        tuple(columns), tuple(stiffness), tuple(np.split(T, first[1:-1])), T.T @ M @ T, T.T @ K @ T, momenta
+    )
+
+
+def modes_of(joined: JoinedParts) -> tuple[Array, Array]:
+    """Return omega, ascending, (k,), and shapes with Phiᵀ M Phi = 1, (n, k), of the elastic modes with mass.
+
+    They are found among the motions without momentum.
+    """
+    Q = np.eye(len(joined.K))
+    size = np.linalg.norm(joined.momenta, axis=0)
+    if size.any():
+        U, singular, _ = la.svd(joined.momenta[:, size > 0] / size[size > 0])
+        Q = U[:, np.count_nonzero(singular > SAME_MOTION * singular[0]) :]
+    inverse, X = la.eigh(Q.T @ joined.M @ Q, Q.T @ joined.K @ Q)  # 1 / omega²
+    inverse, X = inverse[::-1], X[:, ::-1]
+    has_mass = inverse > NO_MASS * inverse[0]
+    return 1 / np.sqrt(inverse[has_mass]), Q @ X[:, has_mass] / np.sqrt(inverse[has_mass])
 
 
 def dofs_of(interface: Interface) -> IntArray:
@@ -222,31 +240,6 @@ def n_fixed_modes(body: FEBody, h: IntArray) -> int:
     s = 1 / np.sqrt(mass[mass > 0])
     M = body.M[has_mass][:, has_mass].toarray()
     return max(0, min(n, int(np.linalg.matrix_rank(s[:, None] * M * s, hermitian=True))))
-
-
-def modes_of(joined: JoinedParts) -> tuple[Array, Array]:
-    """Return omega, ascending, (k,), and shapes with Phiᵀ M Phi = 1, (n, k), of the elastic modes with mass.
-
-    They are found among the motions without momentum, Psi_Rᵀ M x = 0. The coordinates are scaled to a unit diagonal of
-    K + omega² M, where omega belongs to the softest fixed mode.
-    """
-    n = len(joined.K)
-    moving = np.setdiff1d(np.arange(n), joined.held)
-    s = 1 / np.sqrt(np.maximum(joined.K.diagonal(), 0.0) + joined.softest * joined.M.diagonal())[moving]
-    M, K = (s[:, None] * A[np.ix_(moving, moving)] * s for A in (joined.M, joined.K))
-    Q = np.eye(len(moving))
-    if not len(joined.held):
-        momenta = M @ (joined.rigid[moving] / s[:, None])
-        size = np.linalg.norm(momenta, axis=0)
-        momenta = momenta[:, size > 0] / size[size > 0]  # a planar body has three
-        U, singular, _ = la.svd(momenta)
-        Q = U[:, np.count_nonzero(singular > SAME_MOTION * singular[0]) :]
-    inverse, X = la.eigh(Q.T @ M @ Q, Q.T @ K @ Q)  # 1 / omega²
-    inverse, X = inverse[::-1], X[:, ::-1]
-    has_mass = inverse > NO_MASS * inverse[0]
-    Phi = np.zeros((n, int(has_mass.sum())))
-    Phi[moving] = s[:, None] * (Q @ X[:, has_mass]) / np.sqrt(inverse[has_mass])
-    return 1 / np.sqrt(inverse[has_mass]), Phi
 
 
 def root(H: Array) -> Array:

@@ -219,6 +219,31 @@ def test_the_error_of_the_ratios_in_parts_falls_with_more_modes(beam):
     assert errors[2] < 1e-4
 
 
+def test_planar_parts_keep_ratios(beam, caplog):
+    """Out of the plane each part is rigid, and its cuts have no dofs of their own there."""
+    job = with_damping(beam(n_modes=14), "ratio = 0.03")
+    job.write_text(job.read_text().replace('units = "m-kg-s"', 'units = "m-kg-s"\nplane = "xz"'))
+    _, zeta = modes_in_parts(split_job(SplitRequest(job, 3)))
+    told, n_kept = told_modes(caplog)
+    assert n_kept == len(told) == 6
+    assert_allclose(zeta[:6], 0.03, rtol=2e-3)
+
+
+@pytest.mark.parametrize("cut", ["rigid", "distributing"])
+def test_turned_solid_in_unequal_parts_keeps_ratios(tmp_path, caplog, cut):
+    mesh = box_mesh(10, 1, 1, lx=1.2, ly=0.1, lz=0.12, kind="hexahedron20")
+    turn = la.qr(np.random.default_rng(4).normal(size=(3, 3)))[0]
+    deck = write_deck(tmp_path / "bar.inp", replace(mesh, nodes=mesh.nodes @ turn.T + [3, -2, 5]))
+    (tmp_path / "bar.toml").write_text(SOLID.format(mesh=deck.name, cut="", n_modes=20) + "[damping]\nratio = 0.02\n")
+    along = turn[:, 0]
+    places = tuple(np.array([0.36, 0.84]) + along @ [3, -2, 5])
+    files = split_job(SplitRequest(tmp_path / "bar.toml", at=places, axis=tuple(along), kind=cut))
+    _, zeta = modes_in_parts(files)
+    _, n_kept = told_modes(caplog)
+    assert n_kept >= 5
+    assert_allclose(zeta[:n_kept], 0.02, rtol=2e-3)
+
+
 def test_modes_of_one_frequency_keep_their_ratios_together(beam, caplog, monkeypatch):
     """The straight tube bends alike in two planes: its third and fourth mode are a pair."""
     job = with_damping(beam(n_modes=8), "ratio = 0.03")

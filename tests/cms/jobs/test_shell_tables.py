@@ -1,6 +1,7 @@
 import meshio
 import numpy as np
 import pytest
+import scipy.linalg as la
 from numpy.testing import assert_allclose
 
 from cms.cli.split import SplitRequest, split_job
@@ -274,7 +275,7 @@ def test_every_key_of_shells_is_documented():
 
 
 def test_a_shell_in_parts_has_all_its_mass_and_load(job_file):
-    path = job_file(TRAY)
+    path = job_file(TRAY + "\n[damping]\nratio = 0.02\n")
     parts = [read_job(file) for file in split_job(SplitRequest(path, at=(0.6,), axis=(1, 0, 0)))[:-1]]
     assert [set(part.shells) for part in parts] == [{"floor"}, {"floor", "wall"}]
     assert [set(part.materials) for part in parts] == [{"steel"}, {"steel", "tin"}]
@@ -284,6 +285,7 @@ def test_a_shell_in_parts_has_all_its_mass_and_load(job_file):
     assert_allclose(sum(part.moments.m for part in reduced), whole.moments.m, rtol=1e-12)
     forces = [part.frame.axes @ part.load_case("blow").force for part in (whole, *reduced)]
     assert_allclose(forces[1] + forces[2], forces[0], rtol=0, atol=1e-9 * np.abs(forces[0]).max())
+    assert all(la.eigvalsh(part.D)[0] > 0 for part in reduced)  # each part damps all of its strain
 
 
 def test_cells_without_a_thickness_are_refused_as_in_python_unless_they_are_left_out(job_file):
