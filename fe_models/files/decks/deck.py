@@ -44,6 +44,18 @@ class DeckMaterial:
     #: anisotropic: stress by strain in its axes, six rows 11 22 33 23 13 12, shear strains doubled; no other constants
     elasticity: tuple[tuple[float, ...], ...] | None = None
 
+    def in_plane_strain(self, name: str) -> "DeckMaterial | None":
+        """Return the sheet that acts in its plane as this isotropic material without strain across; None for others.
+
+        eps_z = 0 gives sigma_z = nu (sigma_x + sigma_y). In the plane the material is then a sheet in plane stress with
+        E' = E/(1 - nu²), nu' = nu/(1 - nu), and G as before.
+        """
+        E, nu = self.young, self.poisson
+        if not isinstance(E, float) or not isinstance(nu, float):
+            return None
+        G = E / (2 * (1 + nu))
+        return DeckMaterial(name, (E / (1 - nu**2),) * 3, (nu / (1 - nu), 0.0, 0.0), self.density, (G, G, G))
+
 
 @dataclass(frozen=True)
 class SolidSection:

@@ -57,7 +57,8 @@ class Draft:
     orientations: dict[str, Array | None] = field(default_factory=dict)  #: by name in upper case, (3, 3); None: unknown
     used_orientations: set[str] = field(default_factory=set)  #: names in upper case
     nodal_thickness: dict[int, float] = field(default_factory=dict)  #: of shells, by node number
-    sheets: list[str] = field(default_factory=list)  #: groups of shells that are plane stress elements (CPS)
+    sheets: list[str] = field(default_factory=list)  #: groups of shells that are plane elements (CPS, CPE)
+    strained: set[str] = field(default_factory=set)  #: those in plane strain (CPE)
     nodal_shells: set[str] = field(default_factory=set)  #: groups of shells that have their thickness from nodes alone
     solids: list[SolidSection] = field(default_factory=list)
     shells: list[ShellSection] = field(default_factory=list)

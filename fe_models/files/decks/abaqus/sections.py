@@ -1,5 +1,6 @@
 """Sections of Abaqus and CalculiX, masses and springs."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -25,9 +26,12 @@ _LINES = ("line", "line3")
 #: first letters of elements -> why they are refused
 _PLANAR = {
     "CPS": "plane stress along axes of its own (ORIENTATION)",
-    "CPE": "plane strain: a body that goes on without end across its plane; only plane stress (CPS) is a body",
+    "CPEG": "generalized plane strain: a body between planes that move",
+    "CPE": "plane strain along axes of its own (ORIENTATION), or with other unknowns than displacements",
     "CAX": "axisymmetric: a body of revolution; mesh it in space",
 }
+#: plane elements that are membranes: plane stress, and plane strain by displacements alone
+SHEETS = re.compile(r"CPS.*|CPE[34568](I|R|H|RH|IH|M|MH)?")
 ALONG = 1e-9  #: a vector is along a line if its part across is smaller than this, relative to its length
 
 
@@ -75,7 +79,7 @@ def _solid_section(here: str, block: DeckBlock, draft: Draft) -> None:
         if kind_name == "T3D2":
             _rods(name, block, draft, elements)
             continue
-        if kind_name.startswith("CPS") and kind in _SHELLS and "ORIENTATION" not in block.parameters:
+        if SHEETS.fullmatch(kind_name) and kind in _SHELLS and "ORIENTATION" not in block.parameters:
             _sheet(name, kind_name, block, draft, elements)
             continue
         rule = SOLID_RULES[draft.program].get(kind_name)
@@ -96,12 +100,15 @@ def _solid_section(here: str, block: DeckBlock, draft: Draft) -> None:
 
 
 def _sheet(name: str, kind: str, block: DeckBlock, draft: Draft, elements: IntArray) -> None:
-    """Read plane stress elements as membranes of a planar body. The default thickness is 1."""
+    """Read plane elements as membranes of a planar body. The default thickness is 1."""
     thickness = (numbers(block.lines[0])[0] if block.lines else 0.0) or 1.0
     group = draft.cell_group(name if not draft.sheets else f"{name}_{kind}", elements)
     draft.sheets.append(group)
     draft.shells.append(ShellSection(group, _material_of(block, draft), thickness))
     why = "a membrane with rotations at its nodes; the body is planar, plane = 'xy'"
+    if kind.startswith("CPE"):
+        draft.strained.add(group)
+        why += "; in plane strain, a slice: stress across the plane, nu (sx + sy), is not in its results"
     draft.ledger.note(kind, why, count=len(elements), line=block.line_number)
 
 

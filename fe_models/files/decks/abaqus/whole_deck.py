@@ -18,7 +18,7 @@ from fe_models.files.decks.abaqus.loads import read_boundary, read_load
 from fe_models.files.decks.abaqus.materials import materials_in_axes, read_material
 from fe_models.files.decks.abaqus.sections import ellipses_in_numbers, read_section
 from fe_models.files.decks.abaqus.thickness import sections_by_thickness
-from fe_models.files.decks.deck import Deck
+from fe_models.files.decks.deck import Deck, DeckLayer
 from fe_models.files.decks.ledger import Ledger
 
 __all__ = ["PROGRAMS", "read_abaqus_deck"]
@@ -158,16 +158,30 @@ def _take(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
 
 
 def _check_plane(draft: Draft) -> None:
-    """Refuse plane stress elements beside elements in space, or out of a plane across z."""
+    """Refuse plane elements beside elements in space, or out of a plane across z."""
     if not draft.sheets:
         return
     if len(draft.shells) > len(draft.sheets) or draft.solids or draft.lines or draft.rods:
-        draft.ledger.refuse("CPS", "plane elements beside elements in space", count=len(draft.sheets))
+        draft.ledger.refuse("CPS, CPE", "plane elements beside elements in space", count=len(draft.sheets))
     points = draft.mesh.coordinates[
         draft.mesh.rows_of(np.unique(np.concatenate([table[:, 1:].ravel() for _, _, table in draft.mesh.elements])))
     ]
     if np.ptp(points[:, 2]) > SAME_PLANE * max(np.ptp(points, axis=0)):
-        draft.ledger.refuse("CPS", "plane elements whose nodes do not lie in one plane across z")
+        draft.ledger.refuse("CPS, CPE", "plane elements whose nodes do not lie in one plane across z")
+
+
+def _strain_in_plane(draft: Draft) -> None:
+    """Give plane strain elements the sheet of their material that has no strain across its plane."""
+    for k, shell in enumerate(draft.shells):
+        if shell.group not in draft.strained:
+            continue
+        name = f"{shell.material}_plane_strain"
+        sheet = draft.materials[shell.material].in_plane_strain(name) if shell.material in draft.materials else None
+        if sheet is None:
+            draft.ledger.refuse("CPE", f"plane strain: material {shell.material} is not isotropic, or not there")
+            continue
+        draft.materials[name] = sheet
+        draft.shells[k] = replace(shell, material="", layers=(DeckLayer(name, shell.thickness),))
 
 
 def _finished(path: Path, draft: Draft) -> Deck:
@@ -194,6 +208,7 @@ def _finished(path: Path, draft: Draft) -> Deck:
     for k, shell in enumerate(draft.shells):
         layers = tuple(replace(each, material=spelt.get(each.material.upper(), each.material)) for each in shell.layers)
         draft.shells[k] = replace(shell, layers=layers, material="" if layers else shell.material)
+    _strain_in_plane(draft)
     names = {**mesh.node_sets, **draft.node_groups}
     blocks = []
     for block in mesh.blocks:

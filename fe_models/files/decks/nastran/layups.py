@@ -109,16 +109,16 @@ def orthotropic_shells(
 def plane_strain_shells(model: NastranModel, known: Card, cards: list[Card], offset_field: dict[str, int]) -> None:
     """Take membranes of a PLPLANE, or of a PSHELL with MID2 = -1: a planar body without strain across its plane.
 
-    eps_z = 0 gives sigma_z = nu (sigma_x + sigma_y). In the plane the material is then a sheet in plane stress with
-    E' = E/(1 - nu²), nu' = nu/(1 - nu), and G as before. The body is a slice of thickness T, 1 where it is blank.
+    The body is a slice of thickness T, 1 where it is blank; for its material see `DeckMaterial.in_plane_strain`.
     """
     pid, is_plplane = known.text(1), known.name == "PLPLANE"
     name = known.text(2)
-    material = model.materials.get(name)
+    made = f"{name}_plane_strain"
+    sheet = model.materials[name].in_plane_strain(made) if name in model.materials else None
     why = ""
     if model.plane is None:
         why = "plane strain: only where the deck holds all points in a plane"
-    elif material is None or not isinstance(material.young, float) or not isinstance(material.poisson, float):
+    elif sheet is None:
         why = f"plane strain: material {name} is not known here, or not isotropic (MAT1, MATHP)"
     elif not is_plplane and known.text(6):
         why = "MID2 = -1, plane strain, with MID3: a membrane has no transverse shear"
@@ -129,13 +129,8 @@ def plane_strain_shells(model: NastranModel, known: Card, cards: list[Card], off
     if why:
         model.ledger.refuse(known.name, f"property {pid}: {why}", count=len(cards))
         return
-    assert material is not None
+    assert sheet is not None
     assert model.plane is not None
-    E, nu = material.young, material.poisson
-    assert isinstance(E, float)
-    assert isinstance(nu, float)
-    made, young = f"{name}_plane_strain", E / (1 - nu**2)
-    sheet = DeckMaterial(made, (young,) * 3, (nu / (1 - nu), 0.0, 0.0), material.density, (E / (2 * (1 + nu)),) * 3)
     model.materials[made] = sheet
     T = known.real(5, 1.0) if is_plplane else known.real(3)
     added = 0.0 if is_plplane else known.real(8, 0.0) * model.wtmass

@@ -38,11 +38,15 @@ def planar_deck(kind="CPS", data=f"{T!r},", extra=""):
     return "\n".join([*lines, "*MATERIAL, NAME=M", "*ELASTIC", f"{E!r}, {NU!r}", "*DENSITY", f"{RHO!r},"]) + "\n"
 
 
+SLICE = E / (1 + NU) / (1 - 2 * NU) * np.array([[1 - NU, NU, 0], [NU, 1 - NU, 0], [0, 0, (1 - 2 * NU) / 2]])
+
+
+@pytest.mark.parametrize(("kind", "C"), [("CPS", C), ("CPE", SLICE)])
 @pytest.mark.parametrize(("data", "thickness"), [(f"{T!r},", T), ("", 1.0)])
-def test_plane_stress_elements_are_a_planar_body(tmp_path, data, thickness):
+def test_elements_of_plane_stress_and_plane_strain_are_planar_bodies(tmp_path, data, thickness, kind, C):
     """u = H x has the energy t A epsᵀ C eps / 2; six rigid motions, of which three are out of the plane."""
     path = tmp_path / "model.inp"
-    path.write_text(planar_deck(data=data))
+    path.write_text(planar_deck(kind, data))
     body, deck = made(path)
     assert deck.plane == 2
     H = np.array([[1e-3, 4e-4], [-7e-4, 2e-3]])
@@ -63,7 +67,9 @@ def test_plane_stress_elements_are_a_planar_body(tmp_path, data, thickness):
 @pytest.mark.parametrize(
     ("deck", "why"),
     [
-        (planar_deck("CPE"), "CPE4 .*plane strain"),
+        (planar_deck("CPEG"), "CPEG4 .*generalized plane strain"),
+        (planar_deck("CPE").replace("CPE4", "CPE4P"), "CPE4P .*other unknowns than displacements"),
+        (planar_deck("CPE").replace(f"*ELASTIC\n{E!r}, {NU!r}\n", ""), "plane strain: material M is not isotropic"),
         (planar_deck("CAX"), "CAX4 .*axisymmetric"),
         (planar_deck(extra=", ORIENTATION=O") + "*ORIENTATION, NAME=O\n1.,0.,0.,0.,1.,0.\n", "CPS4 .*ORIENTATION"),
         (planar_deck().replace("9, 5.0, 0.0", "9, 5.0, 0.0, 0.1"), "do not lie in one plane across z"),
