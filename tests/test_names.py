@@ -49,7 +49,6 @@ cms/assessment/report/html.py words
 cms/body/geometric_stiffness.py turned
 cms/body/reduced_body.py kept
 cms/cli/demo.py words
-cms/cli/split.py words
 cms/exchange/exporters/nodes.py words
 cms/exchange/programs/sid_fem.py words
 cms/jobs/acceptance/acceptance.py words
