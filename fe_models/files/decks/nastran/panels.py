@@ -72,10 +72,9 @@ def _panel(model: NastranModel, card: Card) -> str:
             stiffness = (material.young * A / lengths[k], 0.0, 0.0, 0.0, 0.0, 0.0)
             model.springs.append(DeckSpring((ends[0], ends[1]), stiffness, triad=along))
     added = (material.density or 0.0) * T + known.real(4, 0.0) * model.wtmass
-    for k in range(4):  # (4)
-        if added:
-            mass = added * (_area(plane[[k - 1, k, k - 3]]) + S) / 6
-            model.masses.append(DeckMass(model.group(card, [grids[k]]), mass))
+    for k in range(4):  # (4); a mass of zero too, so that the corners have dofs
+        mass = added * (_area(plane[[k - 1, k, k - 3]]) + S) / 6
+        model.masses.append(DeckMass(model.group(card, [grids[k]]), mass))
     why = "Garvey's panel as a spring between two points of its mean motion, rods by F1 and F2, its mass at the corners"
     model.ledger.note("CSHEAR", why)
     return ""

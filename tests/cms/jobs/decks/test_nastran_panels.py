@@ -232,3 +232,16 @@ def test_a_stringer_box_of_panels_and_rods_is_a_body(tmp_path):
     u = np.linalg.pinv(K) @ force.ravel()
     flexibility = length * 2 * (a + b) / (4 * (a * b) ** 2 * G * T)
     assert_allclose(force.ravel() @ u, flexibility, rtol=1e-9)
+
+
+def test_corners_of_a_massless_panel_alone_take_supports_loads_and_equations(tmp_path):
+    """Two corners of no other element: the deck must not take them for points that nothing uses."""
+    corners = corners_of("rectangle", 1.0)
+    text = "\n".join(
+        line for line in deck(corners, E, 1.0).split("\n") if not line.startswith(("CBAR,2", "CBAR,3", "CBAR,4"))
+    )
+    cards = "CSHEAR,9,9,1,2,3,4\nPSHEAR,9,2,.1\nMPC,1,3,1,1.,4,1,-1.\nSPC1,1,3,3\nFORCE,1,4,,1.,1.,0.,0.\n"
+    _, made = body_of(tmp_path, text + cards)
+    assert [term[:2] for equation in made.equations for term in equation.terms][-2:] == [("node_3", 0), ("node_4", 0)]
+    assert [support.nodes for support in made.supports] == ["node_3"]
+    assert [dict(load.forces) for load in made.loads] == [{"node_4": (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)}]
