@@ -1,7 +1,8 @@
 """Random legal decks of Nastran beside an assembler of this file.
 
-Two chains of bars: axes of their own at points (CD), offsets along them, released ends, a product of inertia, added
-mass, point masses off their points, a bush, springs and dampers, and a rigid link or a mean in some components.
+Two chains of bars and curved beams: axes of their own at points (CD), offsets along them, released ends, no torsion, a
+product of inertia, added mass, point masses off their points, a bush, springs and dampers, and a rigid link or a mean
+in some components.
 """
 
 from dataclasses import dataclass
@@ -12,7 +13,20 @@ from scipy.linalg import block_diag
 
 from fe_models.body.fe_body import FEBody
 from tests.campaign.verdict import ACCEPTED, REFUSED, WRONG, Verdict
-from tests.cms.jobs.decks.nastran_bodies import RHO, A, E, J, arm, axes_of, bar_stiffness, body_of, released
+from tests.cms.jobs.decks.nastran_bodies import (
+    RHO,
+    A,
+    E,
+    J,
+    along_arc,
+    arc_directions,
+    arc_flexibility,
+    arm,
+    axes_of,
+    bar_stiffness,
+    body_of,
+    released,
+)
 
 __all__ = ["Expected", "body_case", "wrong_body"]
 
@@ -67,9 +81,10 @@ class RandomDeck:
         pins = PINS[int(rng.integers(len(PINS)))] if rng.random() < 0.5 else ("", "")
         i1, i2, i12 = 3e-6, 1e-6, float(rng.choice([0.0, 0.9e-6, -1.2e-6]))
         added = float(rng.choice([0.0, 2.5]))
+        j = 0.0 if "4" not in pins[0] + pins[1] and rng.random() < 0.2 else J
         self.lines.append(f"CBAR,{number},{number},{a + 1},{b + 1},{words(v)}")
         self.lines.append(f",{pins[0]},{pins[1]},{words(W[0])},{words(W[1])}")
-        self.lines += [f"PBAR,{number},1,{A!r},{i1!r},{i2!r},{J!r},{added!r}", ",,,,,,,,", f",,,{i12!r}"]
+        self.lines += [f"PBAR,{number},1,{A!r},{i1!r},{i2!r},{j!r},{added!r}", ",,,,,,,,", f",,,{i12!r}"]
         ends = np.array([self.points[a] + self.axes[a].T @ W[0], self.points[b] + self.axes[b].T @ W[1]])
         length = float(np.linalg.norm(ends[1] - ends[0]))
         R = axes_of(ends[1] - ends[0], self.axes[a].T @ v)
@@ -77,7 +92,7 @@ class RandomDeck:
         mean, radius = (i1 + i2) / 2, np.hypot((i1 - i2) / 2, i12)
         c, s = np.cos(angle), np.sin(angle)
         turn = np.kron(np.eye(4), np.array([[1, 0, 0], [0, c, s], [0, -s, c]]))
-        K = turn.T @ bar_stiffness(length, A, mean + radius if i12 else i1, mean - radius if i12 else i2) @ turn
+        K = turn.T @ bar_stiffness(length, A, mean + radius if i12 else i1, mean - radius if i12 else i2, j) @ turn
         free = [int(letter) - 1 for letter in pins[0]] + [5 + int(letter) for letter in pins[1]]
         K = released(K, free) if free else K
         T = np.kron(np.eye(4), R) @ block_diag(arm(ends[0] - self.points[a]), arm(ends[1] - self.points[b]))
@@ -88,6 +103,41 @@ class RandomDeck:
             S = arm((ends[0] + ends[1]) / 2 + x / 2 * (ends[1] - ends[0]))[:3]
             self.M += weight * length / 2 * line * S.T @ S
         self.M[3:, 3:] += RHO * self.wtmass * (i1 + i2) * length * np.outer(R[0], R[0])
+
+    def add_bend(self, number: int, a: int, b: int) -> None:
+        """Add a CBEND of given radius, with its centroids beside the grid points."""
+        rng = self.rng
+        chord = self.points[b] - self.points[a]
+        v, along = rng.uniform(-1, 1, 3), chord / np.linalg.norm(chord)
+        RC, ZC = rng.uniform(-0.05, 0.05, 2) * (rng.random() < 0.5)
+        radius = float(np.linalg.norm(chord) * rng.uniform(0.55, 2.0))
+        half = float(np.arcsin(np.linalg.norm(chord) / 2 / radius))
+        R, added = radius + RC, float(rng.choice([0.0, 2.5]))
+        self.lines.append(f"CBEND,{number},{number},{a + 1},{b + 1},{words(v)},3")
+        self.lines += [
+            f"PBEND,{number},1,{A!r},3.-6,1.-6,{J!r},{float(R)!r}",
+            ",,,,,,,,",
+            f",.8,.7,{added!r},{words((RC, ZC))}",
+        ]
+        outward = self.axes[a].T @ v
+        outward = outward - (outward @ along) * along
+        outward = outward / np.linalg.norm(outward)
+        across = np.cross(outward, along)
+        center = (self.points[a] + self.points[b]) / 2 - radius * np.cos(half) * outward
+        start = (self.points[a] - center) / radius
+        turn = np.column_stack([start, np.cross(across, start), across])
+        ends = [center + R * arc_directions(phi, turn)[0] + ZC * across for phi in (0.0, 2 * half)]
+        K = np.linalg.inv(arc_flexibility(R, 2 * half, turn, (A, 3e-6, 1e-6, J, 0.8 * A, 0.7 * A, E), 0.3))
+        B = np.hstack([-arm(ends[1] - ends[0]), np.eye(6)])
+        B = B @ block_diag(arm(ends[0] - self.points[a]), arm(ends[1] - self.points[b]))
+        at = self.on_dofs((a, b))
+        self.K[np.ix_(at, at)] += B.T @ K @ B
+
+        def piece(phi: float) -> np.ndarray:
+            S = arm(center + R * arc_directions(phi, turn)[0] + ZC * across)[:3]
+            return (RHO * A + added) * self.wtmass * R * S.T @ S
+
+        self.M += along_arc(piece, 2 * half)
 
     def add_mass(self, number: int, k: int) -> None:
         rng = self.rng
@@ -174,7 +224,7 @@ def random_deck(seed: int) -> RandomDeck:
     deck = RandomDeck(rng)
     for k in range(deck.n - 1):
         if k + 1 != deck.first:
-            deck.add_bar(10 + k, k, k + 1)
+            (deck.add_bend if rng.random() < 0.25 else deck.add_bar)(10 + k, k, k + 1)
     for k in range(int(rng.integers(0, 3))):
         deck.add_mass(30 + k, int(rng.integers(deck.n)))
     if deck.first - 1 >= 0 and rng.random() < 0.7:

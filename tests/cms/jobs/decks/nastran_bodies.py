@@ -115,3 +115,43 @@ def added_matrices(tmp_path, text, further, points):
         at = dofs_of(body, points)
         parts.append([matrix.toarray()[np.ix_(at, at)] for matrix in (body.K, body.M)])
     return [ours - theirs for ours, theirs in zip(*parts, strict=True)]
+
+
+def arc_directions(phi, turn):
+    """Return outward, along and across directions of an arc at an angle from its start, rows.
+
+    turn: columns outward and along at the start, and across.
+    """
+    c, s = np.cos(phi), np.sin(phi)
+    return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ turn.T
+
+
+def along_arc(piece, angle, n=60):
+    """Return the integral of a function of the angle along an arc."""
+    x, weights = np.polynomial.legendre.leggauss(n)
+    return sum(w * piece(phi) for phi, w in zip((x + 1) * angle / 2, weights * angle / 2, strict=True))
+
+
+def arc_flexibility(R, angle, turn, values, nu):
+    """Return the motion of the end of an arc that is held at its start, by loads at its centroid, (6, 6).
+
+    Timoshenko, Strength of Materials II: U = ∫ (M²/(2 A E e R) - M N/(A E R) + N²/(2 A E) + V²/(2 K G A)) ds with e =
+    I1/(A R); N is tension and M decreases the curvature. Across the plane as in straight beams. values: A, I1, I2, J,
+    both shear areas, E.
+    """
+    a, i1, i2, j, s1, s2, young = values
+    shear = young / 2 / (1 + nu)
+    e = i1 / (a * R)
+    end = R * arc_directions(angle, turn)[0]
+
+    def piece(phi):
+        r, t, z = arc_directions(phi, turn)
+        to_end = end - R * r
+        N, V, W = (np.concatenate([axis, np.zeros(3)]) for axis in (t, r, z))
+        twist, across, M = (np.concatenate([np.cross(axis, to_end), axis]) for axis in (t, r, z))
+        M = -M  # about z it turns the end outward in, which increases the curvature
+        U = np.outer(M, M) / (a * young * e * R) - (np.outer(M, N) + np.outer(N, M)) / (a * young * R)
+        U = U + np.outer(N, N) / (a * young) + np.outer(V, V) / (s1 * shear) + np.outer(W, W) / (s2 * shear)
+        return (U + np.outer(twist, twist) / (shear * j) + np.outer(across, across) / (young * i2)) * R
+
+    return along_arc(piece, angle)

@@ -4,26 +4,26 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from tests.cms.jobs.decks.nastran_bodies import added_matrices, arm, body_of
+from tests.cms.jobs.decks.nastran_bodies import (
+    added_matrices,
+    along_arc,
+    arc_directions,
+    arc_flexibility,
+    arm,
+    body_of,
+)
 
 E, NU, RHO = 2.1e11, 0.28, 7800.0
 G = E / 2 / (1 + NU)
 A, I1, I2, J, K1, K2, NSM = 6e-3, 8e-6, 3e-6, 5e-6, 0.8, 0.7, 3.0
+WTMASS = 0.5
 TURN = np.linalg.qr(np.array([[1.0, 0.4, 0.2], [-0.2, 1.0, 0.5], [0.3, -0.6, 1.0]]))[0]
 TURN = TURN * np.sign(np.linalg.det(TURN))
 CENTER = np.array([3.0, -5.0, 2.0])
 
 
 def frame_at(phi):
-    """Return outward, along and across directions of an arc at an angle from its start, rows."""
-    c, s = np.cos(phi), np.sin(phi)
-    return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ TURN.T
-
-
-def along_arc(piece, angle, n=60):
-    """Return the integral of a function of the angle along an arc."""
-    x, weights = np.polynomial.legendre.leggauss(n)
-    return sum(w * piece(phi) for phi, w in zip((x + 1) * angle / 2, weights * angle / 2, strict=True))
+    return arc_directions(phi, TURN)
 
 
 def section(size=1.0, young=E):
@@ -32,27 +32,7 @@ def section(size=1.0, young=E):
 
 
 def end_flexibility(R, angle, values):
-    """Return the motion of the end of an arc that is held at its start, by loads at its centroid, (6, 6).
-
-    Timoshenko, Strength of Materials II: U = ∫ (M²/(2 A E e R) - M N/(A E R) + N²/(2 A E) + V²/(2 K G A)) ds with e =
-    I1/(A R); N is tension and M decreases the curvature. Across the plane as in straight beams.
-    """
-    a, i1, i2, j, s1, s2, young = values
-    shear = young / 2 / (1 + NU)
-    e = i1 / (a * R)
-    end = R * frame_at(angle)[0]
-
-    def piece(phi):
-        r, t, z = frame_at(phi)
-        to_end = end - R * r
-        N, V, W = (np.concatenate([axis, np.zeros(3)]) for axis in (t, r, z))
-        turn, across, M = (np.concatenate([np.cross(axis, to_end), axis]) for axis in (t, r, z))
-        M = -M  # about z it turns the end outward in, which increases the curvature
-        U = np.outer(M, M) / (a * young * e * R) - (np.outer(M, N) + np.outer(N, M)) / (a * young * R)
-        U = U + np.outer(N, N) / (a * young) + np.outer(V, V) / (s1 * shear) + np.outer(W, W) / (s2 * shear)
-        return (U + np.outer(turn, turn) / (shear * j) + np.outer(across, across) / (young * i2)) * R
-
-    return along_arc(piece, angle)
+    return arc_flexibility(R, angle, TURN, values, NU)
 
 
 def expected(R, angle, grids, ends, values):
@@ -88,6 +68,7 @@ def deck(grids, young=E, size=1.0, cd=""):
     lines += ["CORD2R,7,,0.,0.,0.,.3,.2,1.\n,1.,.1,.4", f"CBAR,1,1,1,2,{words(TURN[:, 2])},BGG"]
     lines += [f"PBAR,1,2,{1e-5 * size**2!r},{1e-9 * size**4!r},{1e-9 * size**4!r},{2e-9 * size**4!r}"]
     lines += [f"MAT1,1,{young!r},,{NU},{RHO}", f"MAT1,2,{young!r},,{NU}", "PARAM,COUPMASS,1", "CONM2,90,1,,.001"]
+    lines += [f"PARAM,WTMASS,{WTMASS}"]
     return "\n".join(lines) + "\n"
 
 
@@ -197,7 +178,7 @@ def test_each_half_of_an_arc_is_a_rigid_piece_of_its_end(tmp_path, degrees):
             r, _, z = frame_at(phi)
             move = arm(CENTER + R * r + ZC * z - grids[k])[:3]
             at = slice(6 * k, 6 * k + 6)
-            wanted[at, at] += (RHO * A + NSM) * R * weight * move.T @ move
+            wanted[at, at] += WTMASS * (RHO * A + NSM) * R * weight * move.T @ move
     assert_same(M, wanted)
 
 
