@@ -40,6 +40,8 @@ NOT_FACTORIZED = {
     -10: "the factor could not be stored",
 }
 NO_ROOM = (-2, -10)
+#: whether the user requested bitwise reproducible results in the environment before the program started
+BITWISE = bool(os.environ.get("MKL_CBWR"))
 
 
 @cache
@@ -47,13 +49,9 @@ def mkl_runtime() -> ctypes.CDLL | None:
     """Return the loaded library; None if it is not available (other processors, macOS, not installed)."""
     # its threads release the processor immediately, because NumPy and our own threads need it between two solves
     os.environ.setdefault("KMP_BLOCKTIME", "0")
-    try:  # the library of the installed package `mkl`; pypardiso would search all of sys.prefix for a second or more
-        files = distribution("mkl").files or []
-    except PackageNotFoundError:
-        files = []
-    paths = [Path(str(file.locate())) for file in files if "mkl_rt" in file.name and not file.name.endswith(".lib")]
-    for path in [path for path in paths if path.is_file()][:1]:
-        os.environ.setdefault("PYPARDISO_MKL_RT", str(path))
+    path = installed_mkl()
+    if path is not None:  # found in its package; pypardiso would search all of sys.prefix, which takes a second or more
+        os.environ.setdefault("PYPARDISO_MKL_RT", path)
     try:
         from pypardiso import PyPardisoSolver
 
@@ -65,6 +63,16 @@ def mkl_runtime() -> ctypes.CDLL | None:
 def missing_pardiso() -> str:
     """Describe the missing parts of PARDISO here; "" if it can be used."""
     return "" if mkl_runtime() is not None else "needs MKL, which is not installed; pip install pypardiso (x86-64 only)"
+
+
+def installed_mkl() -> str | None:
+    """Return the path of the runtime library in the installed package `mkl`, if there is one."""
+    try:
+        files = distribution("mkl").files or []
+    except PackageNotFoundError:
+        return None
+    paths = [Path(str(file.locate())) for file in files if "mkl_rt" in file.name and not file.name.endswith(".lib")]
+    return next((str(path) for path in paths if path.is_file()), None)
 
 
 class PardisoFactor:
@@ -81,6 +89,7 @@ class PardisoFactor:
             raise FactorizationError(f"PARDISO {missing_pardiso()}")
         self._pardiso = library["pardiso"]  # our own handle, because pypardiso's handle has its argument types attached
         self._pardiso.restype = None
+        self._n_threads = int(library.mkl_get_max_threads())
         self.n = lower.shape[0]
         # the compressed columns of the lower triangle are the compressed rows of the upper triangle that PARDISO
         # expects
@@ -102,13 +111,24 @@ class PardisoFactor:
         self.n_perturbed = 0 if definite else int(self._iparm[13])
         matched = ", scaling and matching" if self._iparm[12] else ""
         kind = "L Lᵀ" if definite else f"L D Lᵀ, Bunch-Kaufman pivots{matched}"
-        bitwise = ", bitwise repeatable" if is_bitwise() else ""
-        self.description = f"PARDISO (MKL {mkl_version()}; {kind}; no refinement; {n_threads()} threads{bitwise})"
+        bitwise = ", bitwise repeatable" if BITWISE else ""
+        self.description = f"PARDISO (MKL {mkl_version()}; {kind}; no refinement; {self._n_threads} threads{bitwise})"
 
     def _factorize(self, *, definite: bool, matching: bool) -> None:
         """Make the factor; raise `FactorizationError` if PARDISO cannot."""
         self._pt = np.zeros(64, np.int64)
-        self._iparm = settings(definite=definite, matching=matching)
+        self._iparm = np.zeros(64, np.int32)  # entries that are not set below: see [1]_
+        self._iparm[0] = 1  # use the values given here instead of defaults
+        self._iparm[1] = 2 if BITWISE else 3  # nested dissection, serial or parallel
+        self._iparm[9] = PIVOT_PERTURBATION
+        self._iparm[17] = -1  # report the number of entries of the factor
+        self._iparm[34] = 1  # 0-based
+        if matching:
+            self._iparm[10] = self._iparm[12] = 1  # scaling and matching, for multipliers with a zero diagonal
+        if not definite:
+            self._iparm[20] = 1  # Bunch-Kaufman pivots
+        if BITWISE:
+            self._iparm[33] = self._n_threads
         self.is_open = True
         error = self._call(ANALYSE_AND_FACTORIZE)
         if error:
@@ -188,34 +208,6 @@ class PardisoFactor:
         ]
         self._pardiso(*pointers, ctypes.byref(error))
         return error.value
-
-
-def settings(*, definite: bool, matching: bool) -> np.ndarray:
-    """Return iparm, (64,) int32: parallel nested dissection, no refinement, 0-based indices; other entries see [1]_."""
-    iparm = np.zeros(64, np.int32)
-    iparm[0] = 1  # use the values given here instead of defaults
-    iparm[1] = 2 if is_bitwise() else 3  # nested dissection, serial or parallel
-    iparm[9] = PIVOT_PERTURBATION
-    iparm[17] = -1  # report the number of entries of the factor
-    iparm[34] = 1  # 0-based
-    if matching:
-        iparm[10] = iparm[12] = 1  # scaling and matching, for multipliers with a zero diagonal
-    if not definite:
-        iparm[20] = 1  # Bunch-Kaufman pivots
-    if is_bitwise():
-        iparm[33] = n_threads()
-    return iparm
-
-
-def is_bitwise() -> bool:
-    """Whether the user requested bitwise reproducible results through MKL_CBWR in the environment."""
-    return bool(os.environ.get("MKL_CBWR"))
-
-
-def n_threads() -> int:
-    """Return the number of threads that the library uses."""
-    library = mkl_runtime()
-    return int(library.mkl_get_max_threads()) if library else 1
 
 
 @cache

@@ -96,9 +96,6 @@ class Families:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
         """Free the factorisation; computed families stay."""
         if self._is_open and self._fixed is not None:
             self._fixed.factorization.close()
