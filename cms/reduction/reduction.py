@@ -296,14 +296,11 @@ def gram_in_frame(gram: Array, frame: BodyFrame) -> Array:
 
 def reduced_nodal_sums(body: FEBody, Phi: Array, frame: BodyFrame) -> NodalSums | None:
     """Return weighted sums over the nodes in the frame B; None if the nodes are too few or collinear."""
-    weights = node_weights(body)
-    if not weights.any():
-        return None
-    c = (body.nodes - frame.origin) @ frame.axes
     try:
         U = inner(weighted_rigid_modes(body, frame.origin), Phi)
     except BodyError:  # nodes are collinear or have no translations, so there is no Buckens frame
         return None
+    weights, c = node_weights(body), (body.nodes - frame.origin) @ frame.axes
     return NodalSums(
         w=weights.sum(),
         S=weights @ c,

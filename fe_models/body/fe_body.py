@@ -10,6 +10,7 @@ import scipy.sparse as sp
 
 from fe_models.body.load_cases import LoadCase, check_load_cases
 from fe_models.body.rigid_motion import MassLoads
+from fe_models.errors import InterfaceError
 from fe_models.foundation.arrays import (
     Array,
     IntArray,
@@ -203,25 +204,28 @@ class Interface:
     def __post_init__(self) -> None:
         where = f"interface {self.name!r}"
         if self.kind not in INTERFACE_KINDS:
-            raise BodyError(f"{where}: unknown kind {quoted(self.kind)}{nearest(self.kind, INTERFACE_KINDS)}")
+            raise InterfaceError(f"{where}: unknown kind {quoted(self.kind)}{nearest(self.kind, INTERFACE_KINDS)}")
         object.__setattr__(self, "nodes", frozen_int(self.nodes))
         object.__setattr__(self, "reference", frozen(self.reference))
         object.__setattr__(self, "triad", frozen(self.triad))
         if self.nodes.ndim != 1 or self.nodes.size == 0:
-            raise BodyError(f"{where}: expected member nodes, got none")
+            raise InterfaceError(f"{where}: expected member nodes, got none")
         if np.unique(self.nodes).size != self.nodes.size:
-            raise BodyError(f"{where}: a member node is listed twice")
-        require_shape(f"{where}: reference", self.reference, (3,))
-        require_finite(f"{where}: reference", self.reference)
-        require_shape(f"{where}: triad", self.triad, (3, 3))
-        require_finite(f"{where}: triad", self.triad)
-        if np.abs(self.triad.T @ self.triad - np.eye(3)).max() > 1e-8 or np.linalg.det(self.triad) < 0:
-            raise BodyError(f"{where}: triad: expected orthonormal right-handed axes as columns")
+            raise InterfaceError(f"{where}: a member node is listed twice")
+        if self.reference.shape != (3,) or not np.isfinite(self.reference).all():
+            raise InterfaceError(
+                f"{where}: reference: expected three finite coordinates, got {self.reference.tolist()}"
+            )
+        T = self.triad
+        if T.shape != (3, 3) or not np.abs(T.T @ T - np.eye(3)).max() <= 1e-8 or np.linalg.det(T) < 0:
+            raise InterfaceError(
+                f"{where}: triad: expected orthonormal right-handed axes as columns (3, 3), got {T.tolist()}"
+            )
         weights = np.full(self.nodes.size, 1.0) if self.weights is None else np.asarray(self.weights, dtype=float)
         require_shape(f"{where}: weights", weights, (self.nodes.size,))
         require_finite(f"{where}: weights", weights)
         if (weights < 0).any() or weights.sum() <= 0:
-            raise BodyError(f"{where}: weights: expected no negative weight and a positive sum")
+            raise InterfaceError(f"{where}: weights: expected no negative weight and a positive sum")
         object.__setattr__(self, "weights", frozen(weights / weights.sum()))
         if self.dofs is not None:
             object.__setattr__(self, "dofs", frozen_int(self.dofs))

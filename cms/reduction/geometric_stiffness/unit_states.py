@@ -120,14 +120,11 @@ def spread_forces(body: FEBody, frame: BodyFrame) -> Array | None:
 
     None if there is no Buckens frame, because nodes are collinear or have no translations.
     """
-    weights = node_weights(body)
-    if not weights.any():
-        return None
     try:
         W_Psi_R = weighted_rigid_modes(body, frame.origin)
     except BodyError:
         return None
-    return np.asarray(W_Psi_R @ np.kron(np.eye(2), frame.axes) / weights.sum())
+    return np.asarray(W_Psi_R @ np.kron(np.eye(2), frame.axes) / node_weights(body).sum())
 
 
 def turned_rigid_work(body: FEBody, forces: Array, frame: BodyFrame) -> Array:

@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike
 from fe_models.body.fe_body import Interface
 from fe_models.errors import InterfaceError
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.errors import BodyError
 from fe_models.foundation.presentation import presented
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.selections import AnyMesh, Selection
@@ -89,12 +88,7 @@ def node_interface(
         raise InterfaceError(f"interface {name!r}: {error}") from None
     point = mesh.nodes[nodes].mean(axis=0) if reference is None else np.asarray(reference, dtype=float)
     axes = np.eye(3) if triad is None else np.asarray(triad, dtype=float)
-    try:
-        return Interface(
-            name, kind, nodes, point, triad=axes, weights=weights[nodes] if kind == "distributing" else None
-        )
-    except BodyError as error:
-        raise InterfaceError(str(error)) from None
+    return Interface(name, kind, nodes, point, triad=axes, weights=weights[nodes] if kind == "distributing" else None)
 
 
 def line_weights(mesh: LineMesh) -> Array:

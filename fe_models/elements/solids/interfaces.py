@@ -147,13 +147,4 @@ def _interface(
         point = area_centroid(mesh.nodes, facets)[1] if facets else mesh.nodes[nodes].mean(axis=0)
     else:
         point = np.asarray(reference, dtype=float)
-        if point.shape != (3,) or not np.isfinite(point).all():
-            raise InterfaceError(f"interface {name!r}: reference: expected three finite coordinates, got {reference}")
-    axes = np.eye(3) if triad is None else np.asarray(triad, dtype=float)
-    is_triad = axes.shape == (3, 3) and np.abs(axes.T @ axes - np.eye(3)).max() < 1e-8 and np.linalg.det(axes) > 0
-    if not is_triad:
-        raise InterfaceError(
-            f"interface {name!r}: triad: expected orthonormal right-handed axes as columns (3, 3), "
-            f"got {np.array2string(axes, precision=4)}"
-        )
-    return Interface(name, kind, nodes, point, triad=axes, weights=weights)
+    return Interface(name, kind, nodes, point, triad=np.eye(3) if triad is None else np.asarray(triad), weights=weights)
