@@ -36,13 +36,13 @@ from fe_models.body.fe_body import INTERFACE_KINDS
 from fe_models.body.load_cases import LOAD_CASE_KINDS
 from fe_models.files.cad.cad_units import CAD_SUFFIXES
 from fe_models.foundation.parametric_file import read_parametric
-from fe_models.foundation.paths import near_file
 from fe_models.foundation.toml_file import (
     Matrix3,
     Range,
     Table,
     Vector3,
     choice,
+    existing_file,
     is_no_number,
     kind_field,
     names,
@@ -73,16 +73,6 @@ Positive = Annotated[float, Field(gt=0)]
 
 
 ROLES = ("K", "M", "D", "dofs")  #: roles of matrix files: stiffness, mass, damping, list of rows
-
-
-def beside_the_job(value: Any, info: ValidationInfo) -> Path:
-    """Return the path of an existing file, relative to the job file."""
-    if not isinstance(value, str) or not value:
-        raise ValueError("expected the path of a file, text")
-    path = Path(info.context or ".") / value
-    if not path.is_file():
-        raise ValueError(f"no such file: {path}{near_file(path)}")
-    return path
 
 
 def node_names(value: Any) -> Any:
@@ -128,6 +118,7 @@ def elements_named(value: Any) -> tuple[Any, ...]:
     return tuple(entries)
 
 
+beside_the_job = existing_file()
 FileOfTheJob = Annotated[Path, BeforeValidator(beside_the_job)]
 Keep = Annotated[tuple[Any, ...], BeforeValidator(nodes_to_keep, json_schema_input_type=Any)]
 StressPoints = Annotated[tuple[Any, ...], BeforeValidator(elements_named, json_schema_input_type=Any)]

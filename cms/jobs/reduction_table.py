@@ -5,7 +5,7 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, StringConstraints, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Field, StringConstraints, field_validator, model_validator
 
 from cms.linear_algebra.memory.size import memory_bytes
 from cms.linear_algebra.solvers.mode_count import ModeCount
@@ -24,10 +24,9 @@ from cms.reduction.basis.damping import (
 )
 from cms.reduction.basis.strain_damping import StrainDamping, read_strain_damping
 from fe_models.foundation.arrays import MOTION_COMPONENTS
-from fe_models.foundation.paths import near_file
 from fe_models.foundation.tasks.task_map import WorkerError
 from fe_models.foundation.tasks.workers import WORKERS_HELP, checked_workers
-from fe_models.foundation.toml_file import Matrix3, Range, Table, Vector3, choice, is_no_number
+from fe_models.foundation.toml_file import Matrix3, Range, Table, Vector3, choice, existing_file, is_no_number
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = [
@@ -181,18 +180,10 @@ class LoadSection(Table):
 class NeighbourSection(Table):
     """[[reduction.neighbours]]: a neighbouring body, whose mass and stiffness are condensed to shared interfaces."""
 
-    job: Path = Field(description="the path of the neighbour's job file, relative to this one")
+    job: Annotated[Path, BeforeValidator(existing_file("job file"))] = Field(
+        description="the path of the neighbour's job file, relative to this one"
+    )
     interfaces: dict[str, str] = Field(description='a table {"our interface" = "its interface"}')
-
-    @field_validator("job", mode="before")
-    @classmethod
-    def _beside_the_job(cls, value: Any, info: ValidationInfo) -> Path:
-        if not isinstance(value, str) or not value:
-            raise ValueError("expected the path of a job file, text")
-        path = Path(info.context or ".") / value
-        if not path.is_file():
-            raise ValueError(f"no such file: {path}{near_file(path)}")
-        return path
 
     @field_validator("interfaces")
     @classmethod
@@ -273,7 +264,9 @@ class ReductionSection(Table):
     poisson: Annotated[float, Field(gt=-1, le=0.5)] | None = Field(
         None, description="a number between -1 and 0.5, Poisson's ratio"
     )
-    columns: Path | None = Field(None, description="the path of a .npy or .npz file of columns, relative to the job")
+    columns: Annotated[Path, BeforeValidator(existing_file())] | None = Field(
+        None, description="the path of a .npy or .npz file of columns, relative to the job"
+    )
     columns_over: choice("dofs", lambda: OVER) | None = Field(  # type: ignore[valid-type]
         None, description='"coupled" or "mesh": which dofs the rows of the columns are'
     )
@@ -309,11 +302,6 @@ class ReductionSection(Table):
     quadratic_modes: bool | None = Field(
         None, description="true or false: whether to add the displacement of second order of the kept nodes"
     )
-
-    @field_validator("columns", mode="before")
-    @classmethod
-    def _file_beside_the_job(cls, value: Any, info: ValidationInfo) -> Path:
-        return NeighbourSection._beside_the_job(value, info)
 
     @model_validator(mode="after")
     def _options_of_the_set(self) -> "ReductionSection":
@@ -425,14 +413,9 @@ class DampingSection(Table):
     above: Ratio | None = Field(None, description="a number, 0 to 1, the ratio above the last step of the ramp")
     alpha: Coefficient | None = Field(None, description="a number, 0 or more, of D = alpha M + beta K")
     beta: Coefficient | None = Field(None, description="a number, 0 or more, of D = alpha M + beta K")
-    file: Path | None = Field(
+    file: Annotated[Path, BeforeValidator(existing_file())] | None = Field(
         None, description="the path of the damping of a part, which cms split writes, relative to the job"
     )
-
-    @field_validator("file", mode="before")
-    @classmethod
-    def _file_beside_the_job(cls, value: Any, info: ValidationInfo) -> Path:
-        return NeighbourSection._beside_the_job(value, info)
 
     @model_validator(mode="after")
     def _one_kind(self) -> "DampingSection":

@@ -317,6 +317,26 @@ def beside(value: Any, info: ValidationInfo) -> Any:
     return Path(info.context or ".") / value if isinstance(value, str) else value
 
 
+def existing_file(what: str = "file") -> Callable[[Any, ValidationInfo], Path]:
+    """Return the validator of a path, relative to the folder of the file that names it, at which there must be a file.
+
+    Parameters
+    ----------
+    what
+        Kind of the file, for the message, such as "modal file".
+    """
+
+    def check(value: Any, info: ValidationInfo) -> Path:
+        if not isinstance(value, str) or not value:
+            raise ValueError(f"expected the path of a {what}, text")
+        path = Path(info.context or ".") / value
+        if not path.is_file():
+            raise ValueError(f"no such file: {path}{near_file(path)}")
+        return path
+
+    return check
+
+
 PathBeside = Annotated[Path, BeforeValidator(beside, json_schema_input_type=str)]
 Vector3 = Annotated[tuple[float, float, float], BeforeValidator(numbers)]
 Range = Annotated[tuple[float, float], BeforeValidator(interval)]

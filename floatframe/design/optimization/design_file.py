@@ -6,13 +6,21 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.parametric_file import read_parametric
-from fe_models.foundation.paths import near_file
 from fe_models.foundation.tasks.workers import WORKERS_HELP
-from fe_models.foundation.toml_file import Table, choice, interval, kind_field, read_toml, validated, value_of
+from fe_models.foundation.toml_file import (
+    Table,
+    choice,
+    existing_file,
+    interval,
+    kind_field,
+    read_toml,
+    validated,
+    value_of,
+)
 from floatframe.design.optimization.design import Design, DesignParameter, Quantity
 from floatframe.design.studies.study_file import (
     ANALYSES,
@@ -127,13 +135,10 @@ class ObjectiveSection(QuantitySection):
         None, description=f"one of {', '.join(GOALS)}; default: smallest"
     )
     target: float | None = Field(None, description="a number to come near to")
-    table: Path | None = Field(None, description="the path of a .csv file with columns t and value to come near to")
+    table: Annotated[Path, BeforeValidator(existing_file("table"))] | None = Field(
+        None, description="the path of a .csv file with columns t and value to come near to"
+    )
     weight: Annotated[float, Field(gt=0)] = Field(1.0, description="a number above 0")
-
-    @field_validator("table", mode="before")
-    @classmethod
-    def _beside_the_design(cls, value: Any, info: ValidationInfo) -> Path:
-        return existing(value, info, "table")
 
     @model_validator(mode="after")
     def _one_goal(self) -> "ObjectiveSection":
@@ -164,7 +169,9 @@ class DesignFile(Table):
     """An optimisation of a system."""
 
     kind: str = kind_field("optimization")
-    system: Path = Field(description="the path of a system file, relative to this file")
+    system: Annotated[Path, BeforeValidator(existing_file("system file"))] = Field(
+        description="the path of a system file, relative to this file"
+    )
     analysis: choice("analysis", lambda: (*ANALYSES, RESPONSE)) = Field(  # type: ignore[valid-type]
         "run", description=f"one of {', '.join((*ANALYSES, RESPONSE))}"
     )
@@ -197,11 +204,6 @@ class DesignFile(Table):
     objectives: dict[str, ObjectiveSection] = Field(description="tables [objectives.NAME]")
     constraints: dict[str, ConstraintSection] = Field({}, description="tables [constraints.NAME]")
 
-    @field_validator("system", mode="before")
-    @classmethod
-    def _beside_the_design(cls, value: Any, info: ValidationInfo) -> Path:
-        return existing(value, info, "system file")
-
     @model_validator(mode="after")
     def _fits(self) -> "DesignFile":
         if not self.parameters:
@@ -231,16 +233,6 @@ class DesignFile(Table):
             for name, section in sections.items():
                 section.output(f"{kind}.{name}", self.analysis)
         return self
-
-
-def existing(value: Any, info: ValidationInfo, what: str) -> Path:
-    """Return the path of a file beside the design file."""
-    if not isinstance(value, str) or not value:
-        raise ValueError(f"expected the path of a {what}, text")
-    path = Path(info.context or ".") / value
-    if not path.is_file():
-        raise ValueError(f"no such file: {path}{near_file(path)}")
-    return path
 
 
 def read_design(path: str | os.PathLike[str]) -> Design:

@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
-from fe_models.foundation.paths import near_file
 from fe_models.foundation.tasks.task_map import WorkerError
 from fe_models.foundation.tasks.workers import WORKERS_HELP, checked_workers
-from fe_models.foundation.toml_file import Table, choice, kind_field, read_toml, validated
+from fe_models.foundation.toml_file import Table, choice, existing_file, kind_field, read_toml, validated
 from floatframe.errors import SystemFileError
 
 __all__ = ["ANALYSES", "TAKES", "Output", "Parameter", "Study", "read_study", "workers_of_file"]
@@ -100,7 +99,9 @@ class StudyFile(Table):
     """A parameter study of a system."""
 
     kind: str = kind_field("sweep")
-    system: Path = Field(description="the path of a system file, relative to this file")
+    system: Annotated[Path, BeforeValidator(existing_file("system file"))] = Field(
+        description="the path of a system file, relative to this file"
+    )
     analysis: choice("analysis", lambda: ANALYSES) = Field(  # type: ignore[valid-type]
         "run", description=f"one of {', '.join(ANALYSES)}"
     )
@@ -112,16 +113,6 @@ class StudyFile(Table):
     )
     parameters: dict[str, ParameterSection] = Field(description="tables [parameters.NAME]")
     outputs: dict[str, OutputSection] = Field(description="tables [outputs.NAME]")
-
-    @field_validator("system", mode="before")
-    @classmethod
-    def _beside_the_study(cls, value: Any, info: ValidationInfo) -> Path:
-        if not isinstance(value, str) or not value:
-            raise ValueError("expected the path of a system file, text")
-        path = Path(info.context or ".") / value
-        if not path.is_file():
-            raise ValueError(f"no such file: {path}{near_file(path)}")
-        return path
 
     @model_validator(mode="after")
     def _fits(self) -> "StudyFile":

@@ -7,10 +7,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, ValidationError, ValidationInfo, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
-from fe_models.foundation.paths import near_file
-from fe_models.foundation.toml_file import Range, Table, choice, describe, kind_field, read_toml, validated
+from fe_models.foundation.toml_file import (
+    Range,
+    Table,
+    choice,
+    describe,
+    existing_file,
+    kind_field,
+    read_toml,
+    validated,
+)
 from fe_models.foundation.words import nearest, quoted
 from floatframe.durability.fatigue.criteria import CRITERIA, TENSORS
 from floatframe.durability.fatigue.history_damage import RESIDUES
@@ -221,22 +229,12 @@ Positive = Annotated[float, Field(gt=0)]
 Share = Annotated[float, Field(ge=0, lt=1)]
 
 
-def input_file(value: Any, info: ValidationInfo) -> Path:
-    """Return the path of a file that is there, relative to the fatigue file."""
-    if not isinstance(value, str) or not value:
-        raise ValueError("expected the path of a file, text")
-    path = Path(info.context or ".") / value
-    if not path.is_file():
-        raise ValueError(f"no such file: {path}{near_file(path)}")
-    return path
-
-
 def numbers(value: Any) -> Any:
     """Return a list of the file as a tuple of numbers."""
     return tuple(value) if isinstance(value, list) else value
 
 
-InputFile = Annotated[Path, BeforeValidator(input_file)]
+InputFile = Annotated[Path, BeforeValidator(existing_file())]
 Numbers = Annotated[tuple[float, ...], BeforeValidator(numbers)]
 
 

@@ -12,8 +12,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 import cms
 from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.paths import near_file
-from fe_models.foundation.toml_file import Table, Vector3, choice, kind_field, read_toml, validated
+from fe_models.foundation.toml_file import Table, Vector3, choice, existing_file, kind_field, read_toml, validated
 from floatframe.durability.shaking.loads.levels import ACCELERATIONS, OF_OUTPUT, Level, read_level
 from floatframe.durability.shaking.loads.notching import DEEPEST, ForceLimit, Limit, ResponseLimit
 from floatframe.durability.shaking.loads.pulses import DECAY, EDGE, PULSES, SHAPES, damped_sines, pulse, synthesised
@@ -42,14 +41,7 @@ def as_tuple(value: Any) -> Any:
     return tuple(as_tuple(each) for each in value) if isinstance(value, list) else value
 
 
-def file_beside(value: Any, info: ValidationInfo) -> Any:
-    """Return the path of a file relative to the shake file; `ValueError` if it does not exist."""
-    if not isinstance(value, str) or not value:
-        raise ValueError("expected the path of a file, text")
-    path = Path(info.context or ".") / value
-    if not path.is_file():
-        raise ValueError(f"no such file: {path}{near_file(path)}")
-    return path
+file_beside = existing_file()
 
 
 def rows_or_file(value: Any, info: ValidationInfo) -> Any:

@@ -2,16 +2,15 @@
 
 import logging
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from cms.body.modal_file.file import convert_units, read
 from cms.body.reduced_body import ReducedBody
 from cms.errors import CmsError
-from fe_models.foundation.paths import near_file
-from fe_models.foundation.toml_file import Matrix3, Table, Vector3
+from fe_models.foundation.toml_file import Matrix3, Table, Vector3, existing_file
 from fe_models.foundation.units import Units
 from floatframe.errors import ModelError
 from floatframe.files.system_file.keys import Count, Name, Numbers, Parameters4, Positive
@@ -50,7 +49,9 @@ class MassSection(Table):
 class BodySection(Table):
     """[bodies.NAME]: a flexible body from a modal file, or a rigid one from its mass properties."""
 
-    file: Path | None = Field(None, description="the path of a modal file, relative to the system file")
+    file: Annotated[Path, BeforeValidator(existing_file("modal file"))] | None = Field(
+        None, description="the path of a modal file, relative to the system file"
+    )
     mass: Positive | None = Field(None, description="a number above 0, the mass of a rigid body")
     inertia: Matrix3 | None = Field(None, description="the inertia tensor about the centre of mass, three rows")
     center_of_mass: Vector3 | None = Field(None, description="the centre of mass in the body frame, [x, y, z]")
@@ -79,16 +80,6 @@ class BodySection(Table):
         None, description="true: neglect inertia terms that the file of the body lacks"
     )
     shapes: list[ShapeSection] = Field([], description="tables [[bodies.NAME.shapes]], its appearance")
-
-    @field_validator("file", mode="before")
-    @classmethod
-    def _beside_the_system(cls, value: Any, info: ValidationInfo) -> Path:
-        if not isinstance(value, str) or not value:
-            raise ValueError("expected the path of a modal file, text")
-        path = Path(info.context or ".") / value
-        if not path.is_file():
-            raise ValueError(f"no such file: {path}{near_file(path)}")
-        return path
 
     @model_validator(mode="after")
     def _one_kind(self) -> "BodySection":

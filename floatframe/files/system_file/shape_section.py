@@ -2,12 +2,11 @@
 
 from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
-from fe_models.foundation.paths import near_file
-from fe_models.foundation.toml_file import Table, Vector3, choice
+from fe_models.foundation.toml_file import Table, Vector3, choice, existing_file
 from floatframe.files.system_file.keys import Name, NotNegative, Positive
 from floatframe.model.shapes import GEOMETRIES, Shape
 from floatframe.model.shapes.mesh import mesh_file
@@ -55,18 +54,10 @@ class ShapeSection(Table):
     cant: float | list[float] | None = Field(None, description="how much higher the left rail lies, one number or many")
     rail_height: Positive | None = Field(None, description="a number above 0, the height of the rails")
     sleeper_distance: Positive | None = Field(None, description="a number above 0, from sleeper to sleeper")
-    file: Path | None = Field(None, description="the path of a surface, relative to the system file")
+    file: Annotated[Path, BeforeValidator(existing_file("surface such as an .stl file"))] | None = Field(
+        None, description="the path of a surface, relative to the system file"
+    )
     scale: Positive | None = Field(None, description="a factor above 0 on the numbers of the file")
-
-    @field_validator("file", mode="before")
-    @classmethod
-    def _beside_the_system(cls, value: Any, info: ValidationInfo) -> Path:
-        if not isinstance(value, str) or not value:
-            raise ValueError("expected the path of a surface such as an .stl file, text")
-        path = Path(info.context or ".") / value
-        if not path.is_file():
-            raise ValueError(f"no such file: {path}{near_file(path)}")
-        return path
 
     @model_validator(mode="after")
     def _keys_of_its_geometry(self) -> "ShapeSection":

@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
-from fe_models.foundation.paths import near_file
-from fe_models.foundation.toml_file import Table, choice
+from fe_models.foundation.toml_file import Table, choice, existing_file
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import SignalError
@@ -44,7 +43,9 @@ class SignalFunction:
 class SignalSection(Table):
     """[signals.NAME]: a channel of a file as a function of time."""
 
-    file: Path = Field(description=f"the path of a file with signals ({', '.join(SIGNAL_FORMATS)})")
+    file: Annotated[Path, BeforeValidator(existing_file("file with signals"))] = Field(
+        description=f"the path of a file with signals ({', '.join(SIGNAL_FORMATS)})"
+    )
     channel: Annotated[str | int | None, Field(description=CHANNEL)] = None
     column: Annotated[str | int | None, Field(description=CHANNEL)] = None
     unit: str | None = Field(None, description='the unit of its numbers, such as "mm", "g" or "kN"; "-" for a number')
@@ -73,16 +74,6 @@ class SignalSection(Table):
     corner: Positive | None = Field(None, description='a number above 0, the corner in Hz of drift = "high-pass"')
     position: Number | None = Field(None, description="a number, the position at the first sample; default 0")
     velocity: Number | None = Field(None, description="a number, the velocity at the first sample; default 0")
-
-    @field_validator("file", mode="before")
-    @classmethod
-    def _beside_the_system(cls, value: Any, info: ValidationInfo) -> Path:
-        if not isinstance(value, str) or not value:
-            raise ValueError("expected the path of a file with signals, text")
-        path = Path(info.context or ".") / value
-        if not path.is_file():
-            raise ValueError(f"no such file: {path}{near_file(path)}")
-        return path
 
     @model_validator(mode="after")
     def _fits_together(self) -> "SignalSection":
