@@ -15,7 +15,7 @@ from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
 from cms.linear_algebra.solvers.registry import solver_of
 from cms.modes.families.cost import large_interfaces
 from cms.modes.families.fixed_interface import FixedInterfaceBody, fix_interfaces, fixed_interface_modes
-from cms.modes.families.flexibility import BoundaryConditions, CondensedBody, Flexibility
+from cms.modes.families.flexibility import BoundaryConditions, CondensedBody, Flexibility, elastic_modes
 from cms.modes.families.rigid_modes import determinate_partition, independent_rigid_modes
 from cms.modes.families.static_modes import (
     attachment_modes,
@@ -26,7 +26,6 @@ from cms.modes.families.static_modes import (
     residual_attachment_modes,
     unrestrained_attachment_modes,
 )
-from cms.modes.families.vibration_modes import elastic_modes
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, IntArray
 from fe_models.foundation.ranks.spread_matrix import largest_entry

@@ -175,8 +175,7 @@ def assembled_data(
     progress: Progress | None,
 ) -> tuple[Array, Array]:
     """Compute the entries of K, row by row, and of M_s: steps (3) and (4)."""
-    from fe_models.elements.solids.assembly_kernels import element_matrices, scatter_elements
-    from fe_models.elements.solids.tensor_kernels import tensor_stiffness
+    from fe_models.elements.solids.assembly_kernels import element_matrices, scatter_elements, tensor_stiffness
 
     n_parts = n_threads()
     K_data, M_data = np.zeros(9 * len(graph.columns)), np.zeros(len(graph.columns))
