@@ -8,7 +8,7 @@ import pytest
 from tests.cms.path_of_a_job import functions_called
 from tests.root import ROOT
 
-MOST_FUNCTIONS = 490
+MOST_FUNCTIONS = 487
 MOST_FILES = 80
 
 
