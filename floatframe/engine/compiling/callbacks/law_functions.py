@@ -89,14 +89,19 @@ def compiled_callback(where: str, function: Any, kind: str, template: Callable[[
         except (NumbaError, NotImplementedError) as error:
             name = "tangent" if kind == "given" else "function"
             what = "with complex numbers, " if kind == "complex" else ""
-            reason = str(error).strip().splitlines()
-            told = next((line for line in reason if line and not line.startswith(("Failed in", "-"))), reason[0])
             raise ModelError(
-                f"{where}: its {name} cannot be compiled {what}as {SIGNATURES[name]} with arrays of numbers: {told}"
+                f"{where}: its {name} cannot be compiled {what}as {SIGNATURES[name]} with arrays of numbers: "
+                f"{reason_of(error)}"
             ) from error
         compiled[key] = whole, function
     whole, _ = compiled[key]
     return Callback(where, int(whole.address or 0), whole)
+
+
+def reason_of(error: Exception) -> str:
+    """Return the line of a message of numba that says what is wrong."""
+    lines = str(error).strip().splitlines() or [type(error).__name__]
+    return next((line for line in lines if line and not line.startswith(("Failed in", "-"))), lines[0])
 
 
 def lean_c_function(
@@ -110,11 +115,11 @@ def lean_c_function(
         names = {"law": law.lean_law(function), "carray": law.block_at, "new_vector": law.new_vector}
         made = filled(template, function, (digest or 1) ^ int(compiler_key()[:14], 16))
         made.__globals__.update(names)
-        return c_function(made, digest is not None, pipeline_class=law.EntryCompiler)
+        return c_function(made, digest is not None, pipeline_class=law.LawEntryCompiler)
     except (
         Exception
     ) as error:  # of any kind inside numba, whose passes are not all used; plain numba tells what is wrong
-        log.info("%s: %s is compiled by plain numba: %s", where, function.__name__, str(error).strip().split("\n")[-1])
+        log.info("%s: %s is compiled by plain numba: %s", where, function.__name__, reason_of(error))
         return None
 
 

@@ -19,12 +19,13 @@ from numba.core.registry import cpu_target
 from numba.extending import intrinsic
 
 from floatframe.engine.kernels.compiler.block import SafeBlock, make_block, parts_of
-from floatframe.engine.kernels.compiler.lean import EntryCompiler, NotLeanError, of_law
+from floatframe.engine.kernels.compiler.lean import LawEntryCompiler, NotLeanError, of_law
 from floatframe.engine.kernels.compiler.sources import names_of
 
-__all__ = ["EntryCompiler", "block_at", "lean_law", "new_vector"]
+__all__ = ["LawEntryCompiler", "block_at", "lean_law", "new_vector"]
 
-SAME = {"nopython", "nogil", "boundscheck", "error_model", "cache"}  #: options of `njit` that change no result
+#: options of `njit` and `register_jitable` that change no result
+SAME = {"nopython", "nogil", "boundscheck", "error_model", "cache", "no_cpython_wrapper"}
 
 #: inner functions by the identities of those that they replace, which are kept alive; None while one is made
 made: dict[int, tuple[Any, Any]] = {}
@@ -74,14 +75,14 @@ def replaced(value: Any) -> Any:
 
 
 def is_jitable(function: FunctionType) -> bool:
-    """Whether a function was decorated by `register_jitable` without options."""
+    """Whether a function was decorated by `register_jitable`, without options that change its results."""
     context = cpu_target.typing_context
     context.refresh()
     for template in getattr(context._lookup_global(function), "templates", ()):
         overload = getattr(template, "_overload_func", None)
         cells = getattr(overload, "__closure__", None) or ()
         if any(cell.cell_contents is function for cell in cells):
-            return not template._jit_options and template._inline.is_never_inline
+            return template._jit_options.keys() <= SAME and template._inline.is_never_inline
     return False
 
 

@@ -58,7 +58,7 @@ from floatframe.engine.kernels.compiler.stored import StoredCode, code_key, dele
 __all__ = [
     "ENTRY",
     "INNER",
-    "EntryCompiler",
+    "LawEntryCompiler",
     "NotLeanError",
     "array_type",
     "array_value",
@@ -275,6 +275,8 @@ def add_internal(module, other):
 class EntryLibrary(JITCodeLibrary):
     """The code of an entry and of all functions that it calls (2)."""
 
+    attributes = ()  #: of LLVM
+
     def finalize(self):
         """Link, optimise, and generate machine code."""
         libraries: dict = {}
@@ -445,6 +447,14 @@ class EntryCompiler(CompilerBase):
             result = super().compile_extra(func)
         delete_old()
         return result
+
+
+class LawEntryCompiler(EntryCompiler):
+    """The pipeline of the C function of a law."""
+
+    def define_pipelines(self):
+        """Return the one pipeline."""
+        return [pipeline(self.state, INNER)]
 
 
 class LoopCompiler(InnerCompiler):

@@ -259,12 +259,15 @@ def with_fast_mathematics(t, x, z, lam, data, wrench, z_dot, g, outputs):
     wrench[0, 0] = 0.125 * x[0, 0]
 
 
-@pytest.mark.parametrize("function", [calls_itself, with_fast_mathematics])
-def test_other_laws_are_left_to_plain_numba_with_a_line_of_the_log(function, caplog):
+@pytest.mark.parametrize(
+    ("function", "reason"),
+    [(calls_itself, "falling calls itself"), (with_fast_mathematics, "with_fast_mathematics has the options fastmath")],
+)
+def test_other_laws_are_left_to_plain_numba_with_a_line_of_the_log(function, reason, caplog):
     inputs = motions(HEAD, np.random.default_rng(5))
     with caplog.at_level(logging.INFO):
         made = callback("element 'e'", function, "value", HEAD)
-    assert f"element 'e': {function.__name__} is compiled by plain numba" in caplog.text
+    assert f"element 'e': {function.__name__} is compiled by plain numba: {reason}" in caplog.text
     assert_array_equal(
         called_law(made.address, HEAD, np.ones(NUMBERS), inputs, N_OUT + OUTPUTS)[:, 0], 0.125 * inputs[:, 1]
     )
