@@ -366,7 +366,7 @@ def body_of_mesh(
 
 def solid_mesh_of(job: Job) -> "Mesh":
     """Return the complete solid mesh; faces that interfaces and loads select are groups."""
-    from fe_models.files import read_mesh
+    from fe_models.files.read_mesh import read_mesh
 
     if job.body.mesh is None:
         raise JobError("job: expected a mesh, got none")
