@@ -1,8 +1,9 @@
 """Errors of this package: one root class, and leaves that also derive from `ValueError` or `RuntimeError`."""
 
-from fe_models.foundation.errors import BodyError, CmsError, ModalFileError, UnitsError
+from fe_models.foundation.errors import ArgumentError, BodyError, CmsError, ModalFileError, UnitsError
 
 __all__ = [
+    "ArgumentError",
     "BodyError",
     "CmsError",
     "CompareError",

@@ -1,8 +1,9 @@
 """Errors of this package: one root class, and leaves that also derive from `ValueError` or `RuntimeError`."""
 
-from fe_models.foundation.errors import BodyError, FeModelsError, UnitsError
+from fe_models.foundation.errors import ArgumentError, BodyError, FeModelsError, UnitsError
 
 __all__ = [
+    "ArgumentError",
     "BeamError",
     "BodyError",
     "FeModelsError",

@@ -8,5 +8,14 @@ trajectory = integrate(system, GeneralizedAlpha(rho_inf=0.8), t_end=1.0, h=1e-3)
 
 import lazy_loader
 
-# The public names are listed in __init__.pyi. A module is imported when one of its names is first used.
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+# The public names are listed in __init__.pyi. A module is imported when one of its names is first used, and a function
+# checks its arguments.
+attribute, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+
+def __getattr__(name: str) -> object:
+    found = attribute(name)
+    from fe_models.foundation.typed_inputs import at_door
+    from floatframe.errors import ModelError
+
+    return at_door(__name__, name, found, ModelError)

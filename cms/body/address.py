@@ -9,7 +9,9 @@ from cms.body.reduced_body import ReducedBody
 from cms.errors import BodyError
 from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.foundation.arrays import Array, IntArray, frozen
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import quoted
 
 __all__ = ["KINDS_OF_ADDRESS", "Address", "FoundNodes"]
@@ -20,6 +22,7 @@ NEAREST = 3  #: how many nodes a message lists
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class FoundNodes:
     """The kept nodes that an address selects.
 
@@ -56,6 +59,7 @@ class FoundNodes:
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class Address:
     """One place on a body, given by exactly one of node, element, set and position.
 

@@ -9,7 +9,9 @@ import numpy as np
 from cms.errors import BodyError
 from fe_models.foundation.arrays import SYMMETRY_DEFECT, Array, IntArray, frozen, require_finite, require_shape
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import Units
 
 __all__ = ["SPIN_PAIRS", "UNIT_LOADS", "GeometricStiffness", "RotatedLoads", "SpreadLoads", "stiffness_of_loads"]
@@ -23,6 +25,7 @@ SPIN_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))  #: (a, b) of omeg
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class RotatedLoads:
     """K_j between a rotation of the whole body and a mode: work on mode k of the balanced load j as it rotates too.
 
@@ -55,6 +58,7 @@ class RotatedLoads:
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class SpreadLoads:
     """Six loads distributed over the nodes with weights w_i, w = Σ w_i: the reaction of a Buckens frame (theory.md §7).
 
@@ -86,6 +90,7 @@ class SpreadLoads:
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class GeometricStiffness:
     """K_j,kl = [Phi.T K_geo(sigma_j) Phi]_kl for unit loads f_j; sigma_j is the stress of the static response [1]_.
 

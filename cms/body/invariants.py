@@ -9,7 +9,9 @@ import numpy as np
 from cms.errors import BodyError
 from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["INERTIA_TERMS", "NEGATIVITY", "Moments", "NodalSums", "known_P", "known_S_kl", "moments_from_gram"]
@@ -25,6 +27,7 @@ NEGATIVITY = "negativity of the moments"
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class Moments:
     """Canonical moments of a body about the origin of its frame B [1]_.
 

@@ -7,7 +7,9 @@ import numpy as np
 from cms.errors import BodyError
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, require_finite, require_shape
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["SOURCES", "KeptPoints"]
@@ -22,6 +24,7 @@ SOURCES = {
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class KeptPoints:
     """Rotations of kept nodes over the modes; the translations are in `ReducedBody.Phi`, as for all kept nodes.
 

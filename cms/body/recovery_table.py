@@ -19,7 +19,9 @@ from cms.body.geometric_stiffness import SPIN_PAIRS
 from cms.errors import BodyError
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, require_finite, require_shape
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import Dimensions, Units, unit_words
 from fe_models.foundation.words import nearest, quoted
 
@@ -33,6 +35,7 @@ TEXTS = ("labels", "quantities", "entities", "components")
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class RecoveryTable:
     """Named rows of a reduced body; row components are in mesh axes or element axes, columns in axes of B.
 

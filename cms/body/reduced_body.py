@@ -15,8 +15,10 @@ from cms.errors import BodyError
 from fe_models.body.load_cases import ReducedLoadCase
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, require_finite, require_shape
 from fe_models.foundation.copies import FrozenMapping, frozen_copies
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import Summary, listed, presented
 from fe_models.foundation.tall.on_disk import row_slices
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.numbering import NONE, Numbering
@@ -41,6 +43,7 @@ def require_orthonormal(where: str, axes: Array) -> None:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class BodyFrame:
     """The frame B in which elastic displacement is measured, as its position in the undeformed mesh.
 
@@ -84,6 +87,7 @@ class BodyFrame:
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class ReducedInterface:
     """An interface of a reduced body: its reference point in B and the motion of that point with q.
 
@@ -128,6 +132,7 @@ class ReducedInterface:
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class ReducedBody:
     """A body as r = c + Phi q in its frame B, with M-orthonormal, K-diagonal shapes (docs/theory.md §3-5).
 

@@ -17,9 +17,11 @@ from cms.modes.families.families import Families
 from cms.modes.families.static_modes import boundary_names
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, frozen
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.ranks.spread_columns import spread_beside
 from fe_models.foundation.tall.columns import are_finite, beside, frozen_columns
+from fe_models.foundation.typed_inputs import checked_fields
 
 __all__ = [
     "Block", "ModeSet", "boundary_block", "checked_modes", "constraint_block", "mode_set", "require_interfaces",
@@ -29,6 +31,7 @@ __all__ = [
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class ModeSet:
     """Columns over all dofs of a coupled body, before the finishing step of `reduce`.
 

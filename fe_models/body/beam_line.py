@@ -8,7 +8,8 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.errors import BodyError
+from fe_models.foundation.errors import ArgumentError, BodyError
+from fe_models.foundation.typed_inputs import checked_fields
 
 __all__ = ["BeamLine", "Law"]
 
@@ -19,6 +20,7 @@ SMOOTH_DEGREE = 24  #: polynomial degree assumed when a law given as a Python fu
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class BeamLine:
     """A straight beam from x = 0 to its length; y and z are the principal axes of its sections, with centroids on x.
 

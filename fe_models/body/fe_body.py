@@ -20,13 +20,14 @@ from fe_models.foundation.arrays import (
     require_shape,
     symmetric_csc,
 )
-from fe_models.foundation.errors import BodyError
+from fe_models.foundation.errors import ArgumentError, BodyError
 from fe_models.foundation.presentation import Summary, listed, presented
 from fe_models.foundation.ranks.row_layout import RowLayout
 from fe_models.foundation.ranks.spread_columns import spread_parts
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 from fe_models.foundation.tall.columns import elsewhere, in_memory
 from fe_models.foundation.tall.on_disk import is_on_disk, release, row_slices, zeros_like
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.numbering import Numbering
@@ -168,6 +169,7 @@ class StressPointModel(Protocol):
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class Interface:
     """A named place at which neighbours connect to the body.
 
@@ -284,6 +286,7 @@ class MeanNode:
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class FEBody:
     """Finite element model of one body, free or intentionally held to the ground.
 

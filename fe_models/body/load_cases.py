@@ -7,8 +7,9 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
 from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.errors import BodyError
+from fe_models.foundation.errors import ArgumentError, BodyError
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 
 __all__ = ["LOAD_CASE_KINDS", "LoadCase", "ReducedLoadCase", "check_load_cases", "load_columns"]
 
@@ -18,6 +19,7 @@ LOAD_CASE_KINDS = ("pressure", "gravity", "force")  #: kinds in the job file; a 
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class LoadCase:
     """A named load of unit amplitude: generalised forces over the dofs of its body.
 
@@ -49,6 +51,7 @@ class LoadCase:
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class ReducedLoadCase:
     """A named load of unit amplitude on a reduced body: its resultant and its modal forces.
 

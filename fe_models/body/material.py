@@ -8,6 +8,8 @@ import numpy as np
 
 from fe_models.errors import MaterialError
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.errors import ArgumentError
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.mesh import Mesh
 
@@ -26,6 +28,7 @@ SYMMETRY = 1e-9
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class Material:
     """Isotropic, linear elastic material.
 
@@ -89,6 +92,7 @@ class Material:
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class OrthotropicMaterial:
     """Orthotropic, linear elastic material: three planes of symmetry normal to its axes 1, 2, 3.
 
@@ -166,6 +170,7 @@ class OrthotropicMaterial:
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class AnisotropicMaterial:
     """Linear elastic material without any symmetry: 21 constants.
 

@@ -16,7 +16,9 @@ from fe_models.checks.report import Finding, Report
 from fe_models.checks.unit_check import implausible_units
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import Units, unit_system
 from fe_models.meshes.cell_shapes import CELL_SHAPES, cell_jacobians, quadrature, shape_values
 from fe_models.meshes.connectivity import Connectivity, coincident_nodes, connectivity
@@ -90,6 +92,7 @@ class CellGeometry:
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class MeshReport(Report):
     """Numbers of a mesh and findings about it.
 

@@ -5,11 +5,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from fe_models.errors import MeshError
+from fe_models.foundation.errors import ArgumentError
+from fe_models.foundation.typed_inputs import checked_fields
 
 __all__ = ["Finding", "Report"]
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class Finding:
     """A fault of a mesh, or a doubt about it.
 

@@ -14,7 +14,9 @@ from fe_models.checks.unit_check import implausible_units
 from fe_models.elements.beams.attachments import RigidLink, Spring
 from fe_models.elements.shells.quality import WARP_LIMIT, cell_quality
 from fe_models.elements.shells.skin import cell_edges
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import Units
 from fe_models.meshes.objects.as_mesh import as_shell_mesh
 from fe_models.meshes.shell_mesh import ShellMesh
@@ -28,6 +30,7 @@ ASPECT_NOTED = 20.0  #: ratio of longest to shortest side above which a warning 
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class ShellReport(Report):
     """Numbers of a mesh of shells, and findings about it.
 

@@ -7,7 +7,16 @@ from the built-in error that a caller would expect. Errors about bodies and unit
 
 from typing import Any
 
-__all__ = ["BodyError", "CmsError", "FeModelsError", "ModalFileError", "ReportedError", "StorageError", "UnitsError"]
+__all__ = [
+    "ArgumentError",
+    "BodyError",
+    "CmsError",
+    "FeModelsError",
+    "ModalFileError",
+    "ReportedError",
+    "StorageError",
+    "UnitsError",
+]
 
 
 class ReportedError(Exception):
@@ -31,6 +40,10 @@ class FeModelsError(ReportedError):
 
 class CmsError(ReportedError):
     """Root of every intentional error of `cms`."""
+
+
+class ArgumentError(FeModelsError, CmsError, TypeError):
+    """A public function was given an object of another kind than its argument asks for."""
 
 
 class BodyError(FeModelsError, CmsError, ValueError):

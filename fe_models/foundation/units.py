@@ -3,7 +3,8 @@
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from fe_models.foundation.errors import UnitsError
+from fe_models.foundation.errors import ArgumentError, UnitsError
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = [
@@ -13,6 +14,7 @@ __all__ = [
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class Units:
     """A coherent unit system: force = mass * length / time². Nothing is converted internally.
 
@@ -49,6 +51,11 @@ class Units:
     time_symbol: str
     force_symbol: str
     stress_symbol: str
+
+    @staticmethod
+    def of_name(name: str) -> "Units":
+        """Return the unit system of that name, as `unit_system` does."""
+        return unit_system(name)
 
     def to_si(self, *, length: int = 0, mass: int = 0, time: int = 0) -> float:
         """Return the SI value of one unit with the given exponents, e.g. density: `to_si(mass=1, length=-3)`."""

@@ -9,7 +9,9 @@ from numpy.typing import ArrayLike
 from fe_models.errors import BeamError
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 from fe_models.foundation.copies import FrozenMapping, frozen_copies
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 
 __all__ = ["LineMesh", "divide_lines", "straight_line"]
 
@@ -20,6 +22,7 @@ __all__ = ["LineMesh", "divide_lines", "straight_line"]
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class LineMesh:
     """Nodes and two-node lines of one body.
 

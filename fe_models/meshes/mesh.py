@@ -7,7 +7,9 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 from fe_models.foundation.copies import FrozenMapping, frozen_copies
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 
 __all__ = ["FACE_TYPES", "SOLID_TYPES", "Mesh", "drop_unused_nodes", "used_nodes"]
 
@@ -29,6 +31,7 @@ FACE_TYPES = ("triangle", "triangle6", "quad", "quad8", "quad9")
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class Mesh:
     """Nodes and cells of one body, in the node order of meshio (VTK).
 

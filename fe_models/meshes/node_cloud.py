@@ -7,7 +7,9 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 from fe_models.foundation.copies import FrozenMapping, frozen_copies
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 
 __all__ = ["NodeCloud"]
 
@@ -15,6 +17,7 @@ __all__ = ["NodeCloud"]
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class NodeCloud:
     """Nodes of solids, shells, beams or unknown elements; all nodes can be selected.
 

@@ -13,8 +13,9 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray, frozen_int
 from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.errors import BodyError
+from fe_models.foundation.errors import ArgumentError, BodyError
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["NONE", "NO_NUMBERS", "NamedSet", "Numbering", "node_place", "numbering_side_by_side"]
@@ -27,6 +28,7 @@ NO_NUMBERS = frozen_int(np.zeros(0))  #: stands for unknown numbers
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class NamedSet:
     """A set of the user, with the members that the body has kept.
 
@@ -58,6 +60,7 @@ class NamedSet:
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class Numbering:
     """The user's numbers of nodes and of elements at the surface, and the user's sets.
 

@@ -8,7 +8,9 @@ import numpy as np
 
 from fe_models.errors import InterfaceError
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest
 from fe_models.meshes.boundary import CORNERS, boundary_facets, boundary_nodes, first_of_equal_rows
 from fe_models.meshes.line_mesh import LineMesh
@@ -35,6 +37,7 @@ class Selection(Protocol):
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class FaceGroup:
     """The nodes of one or more named groups of faces, or of groups of shell cells.
 
@@ -90,6 +93,7 @@ def _faces_of_group(mesh: Mesh | ShellMesh | NodeCloud, name: str) -> dict[str, 
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class NodeSet:
     """The nodes of a named node set.
 
@@ -117,6 +121,7 @@ class NodeSet:
 
 @presented
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class NodeNumbers:
     """Nodes selected by their numbers in the file.
 
@@ -148,6 +153,7 @@ class NodeNumbers:
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class Plane:
     """The surface nodes on a plane.
 
@@ -183,6 +189,7 @@ class Plane:
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class Cylinder:
     """The surface nodes on the curved surface of a cylinder.
 
@@ -238,6 +245,7 @@ class Cylinder:
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class Box:
     """The surface nodes inside a box whose edges are parallel to the mesh axes.
 
@@ -272,6 +280,7 @@ class Box:
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class NearestNode:
     """The surface node nearest to a point.
 

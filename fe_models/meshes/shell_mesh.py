@@ -8,7 +8,9 @@ import numpy as np
 from fe_models.errors import ShellError
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 from fe_models.foundation.copies import FrozenMapping, frozen_copies
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 
 __all__ = ["FLAT_TYPES", "ShellMesh", "flat_plate", "mapped_shell"]
 
@@ -18,6 +20,7 @@ FLAT_TYPES = ("triangle", "quad")  #: meshio names and node order
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class ShellMesh:
     """Nodes and flat cells of one body; lines between its nodes may stiffen it.
 

@@ -14,7 +14,9 @@ from numpy.typing import ArrayLike
 
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray, frozen
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.meshes.boundary import area_centroid, boundary_facets
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.mesh import Mesh, drop_unused_nodes
@@ -27,6 +29,7 @@ SomeMesh = Mesh | LineMesh | ShellMesh
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class Cut:
     """Common boundary of two parts.
 
@@ -50,6 +53,7 @@ class Cut:
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class Split(Generic[AnyMesh]):
     """A mesh in parts along an axis; cut k is between parts k and k + 1, counted from 1.
 

@@ -21,6 +21,7 @@ from scipy.optimize import nnls
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.driven.driven_motion import rigid_columns
 from floatframe.engine.compiling.file_frames import state_of_file
@@ -54,6 +55,7 @@ NO_WAY = 1e-11  #: size of an iteration below which the search has ended
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Target:
     """Desired position or orientation of a marker, or both, in ground axes.
 
@@ -77,6 +79,7 @@ class Target:
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class ReachedPose:
     """The result of inverse kinematics.
 

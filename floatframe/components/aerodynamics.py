@@ -8,6 +8,7 @@ from numba import njit
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.checked_values import array_of_shape, number
@@ -31,6 +32,7 @@ LEAST_SPEED = 1e-6  #: speed below which force and angle are zero
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class LiftingSurface(Element):
     """Lift and drag at a marker whose x axis points forward along the chord, and z upward from the surface.
 

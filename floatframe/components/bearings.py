@@ -22,6 +22,7 @@ from numba.extending import register_jitable
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.checked_values import array_of_shape, number, unit_vector
@@ -42,6 +43,7 @@ LEAST_COSINE = 0.5  #: least cosine between both axes as assembled; a smaller on
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Bearing(Element):
     """A shaft at marker b in a bearing at marker a, described by coefficients in axes of a; the shaft spins freely.
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from numba import njit
 
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.checked_values import number
@@ -28,6 +29,7 @@ ELEMENTS = {"cable": "floatframe.components.cables:Cable"}
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Cable(Element):
     """A cable between points of bodies, with the stiffness of the whole cable; preloaded or slack as assembled.
 

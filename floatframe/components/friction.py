@@ -18,6 +18,7 @@ from numba import njit
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.checked_values import number, unit_vector
@@ -35,6 +36,7 @@ MOTIONS = {"along": ("N", "m", "m/s"), "about": ("N m", "rad", "rad/s")}  #: uni
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class BristleFriction(Element):
     """Friction between markers b and a, for sliding along an axis or rotation about it, which can stick.
 

@@ -5,6 +5,8 @@ An integrator is a frozen object with the functions `start` and `step`; what it 
 
 from collections.abc import Callable
 
+from fe_models.foundation.words import nearest
+from floatframe.errors import ModelError
 from floatframe.integrators.energy_momentum import EnergyDecaying, EnergyMomentum
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha, hht, newmark, trapezoidal
 from floatframe.integrators.ida import Ida
@@ -27,6 +29,7 @@ __all__ = [
     "has_second_order",
     "hht",
     "in_formulation",
+    "made_integrator",
     "newmark",
     "trapezoidal",
 ]
@@ -50,6 +53,25 @@ CLASSES = {
         GeneralizedAlpha, RelativeGeneralizedAlpha, RelativeOde, EnergyMomentum, EnergyDecaying, Variational, Ida,
     )
 }  # fmt: skip
+
+
+def made_integrator(chosen: Integrator | type[Integrator] | str) -> Integrator:
+    """Return an integrator from an object, or with its defaults from a class or its name in a system file.
+
+    Raises
+    ------
+    ModelError
+        If the name is unknown, or the class is none of an integrator.
+    """
+    if isinstance(chosen, str):
+        if chosen not in INTEGRATORS:
+            raise ModelError(f"integrator: unknown {chosen!r}{nearest(chosen, INTEGRATORS)}")
+        return INTEGRATORS[chosen]()
+    if not isinstance(chosen, type):
+        return chosen
+    if Integrator not in chosen.__mro__:
+        raise ModelError(f"integrator: expected an integrator, got the class {chosen.__name__}")
+    return chosen()
 
 
 def has_second_order(integrator: Integrator) -> bool:

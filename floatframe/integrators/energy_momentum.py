@@ -5,6 +5,7 @@ Evaluated in `floatframe.engine.structure_preserving.kernels.steps`.
 
 from dataclasses import dataclass
 
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.engine.structure_preserving.kernels.records import CONSERVING
 from floatframe.errors import ModelError
 from floatframe.integrators.discrete_run import DiscreteScheme, check_options
@@ -13,6 +14,7 @@ __all__ = ["EnergyDecaying", "EnergyMomentum"]
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class EnergyMomentum(DiscreteScheme):
     """Energy, linear and angular momentum to the tolerance of Newton's method, second order [1]_ [2]_ [3]_.
 
@@ -61,6 +63,7 @@ class EnergyMomentum(DiscreteScheme):
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class EnergyDecaying(DiscreteScheme):
     """The scheme of `EnergyMomentum` with dissipation in unresolved modes: energy never increases.
 

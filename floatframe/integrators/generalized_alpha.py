@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.initial_conditions.constraint_words import open_joints
 from floatframe.engine.initial_conditions.initial import (
@@ -49,6 +50,7 @@ LONGER = 1 + 1e-6  #: ratio below which two step sizes count as equal
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class GeneralizedAlpha(Integrator):
     """Generalized-alpha for index-3 equations of motion on a Lie group [1]_ [2]_, second order.
 

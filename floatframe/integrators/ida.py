@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.initial_conditions.gaps import gaps_at, has_gaps
 from floatframe.engine.initial_conditions.initial import (
@@ -40,6 +41,7 @@ MOST_STEPS = 100_000  #: between two outputs
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class Ida(Integrator):
     """Backward differentiation of orders one to five with variable steps: SUNDIALS IDA [1]_, through scikit-sundae.
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.initial_conditions.initial import work_from
 from floatframe.engine.initial_conditions.newton_equations import displaced, set_iterate
@@ -35,6 +36,7 @@ NEAR_BY = 1e-3  #: fraction of a step for the difference that gives the rates of
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class RelativeGeneralizedAlpha(Integrator):
     """Generalized-alpha in the coordinates of joints and modes (docs/relative.md §6), otherwise as `GeneralizedAlpha`.
 

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest
 from floatframe.engine.compiling.callbacks import raise_errors_of
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
@@ -51,6 +52,7 @@ SETTLED = 1e-12  #: tolerance of the last change of reactions and similar unknow
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class RelativeOde(Integrator):
     """SciPy's `solve_ivp` on the ordinary differential equation of the independent coordinates (docs/relative.md §7).
 

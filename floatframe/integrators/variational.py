@@ -5,6 +5,7 @@ Evaluated in `floatframe.engine.structure_preserving.kernels.steps`.
 
 from dataclasses import dataclass
 
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.engine.kernels.memory import Memory
 from floatframe.engine.structure_preserving.kernels.records import VARIATIONAL
 from floatframe.errors import ModelError
@@ -16,6 +17,7 @@ __all__ = ["Variational"]
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class Variational(DiscreteScheme):
     """Symplectic, momentum exact, energy bounded without drift, joints closed in positions and velocities, order two.
 

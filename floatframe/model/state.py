@@ -9,6 +9,8 @@ import numpy as np
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.copies import FrozenMapping, frozen_copies
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
+from floatframe.errors import ModelError
 
 __all__ = ["State"]
 
@@ -16,6 +18,7 @@ __all__ = ["State"]
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class State:
     """Positions and velocities of all bodies, in the order of the system.
 

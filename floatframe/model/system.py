@@ -7,6 +7,7 @@ from typing import Any, Protocol, TypeVar, cast
 
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.presentation import Summary, listed, presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import Quantity, Units, unit_system
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
@@ -74,6 +75,7 @@ class Named(Protocol):
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class System:
     """Bodies, the joints between them and the forces on them.
 

@@ -7,13 +7,14 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.engine.compiling.callbacks import raise_errors_of
 from floatframe.engine.compiling.callbacks.law_functions import called_law, law_callbacks
 from floatframe.engine.compiling.markers import MarkerData
 from floatframe.engine.compiling.public_elements import PlacedLaw
 from floatframe.engine.compiling.system import compiled_system
-from floatframe.errors import ResultsError
+from floatframe.errors import ModelError, ResultsError
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.elements.switched_off import law_switched_off, times_off
 from floatframe.model.system import System
@@ -26,6 +27,7 @@ __all__ = ["ElementMotion", "element_motion", "placed_law"]
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class ElementMotion:
     """Outputs, states and multipliers of an element over time, by name, (n_t,) each, and its wrenches.
 

@@ -17,8 +17,9 @@ from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
-from floatframe.errors import ResultsError
+from floatframe.errors import ModelError, ResultsError
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.system import System
 from floatframe.results.joint_coordinates import CoordinateMotion, joint_coordinate
@@ -39,6 +40,7 @@ __all__ = ["JointMotion", "Motion", "MovedBody", "motion_of"]
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Motion(Trajectory):
     """A motion with its system.
 

@@ -10,9 +10,10 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.presentation import Summary, presented, text_of
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest, quoted
-from floatframe.errors import ResultsError
+from floatframe.errors import ModelError, ResultsError
 from floatframe.model.state import State
 from floatframe.results.head import BodyEntry, Head
 from floatframe.results.results_file import ArraySource, open_results, validity_text
@@ -84,6 +85,7 @@ class Drift:
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Trajectory:
     """A motion, in memory or on disk (arrays are then read on demand).
 

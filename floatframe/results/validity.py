@@ -5,6 +5,9 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
+from fe_models.foundation.typed_inputs import checked_fields
+from floatframe.errors import ModelError
+
 __all__ = ["ValidityNote", "notes_from_json", "notes_to_json"]
 
 OF_FRAMES = ("rotation", "load", "speed", "inertia")  #: kinds of notes about the linear frame of a body
@@ -16,6 +19,7 @@ KINDS = (*OF_FRAMES, "steps", *OF_ENERGY, *OF_LAWS, *OF_ANGLES)
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class ValidityNote:
     """A note of a run about its validity: a limit that is exceeded, and the remedy.
 

@@ -12,6 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ModelError
@@ -62,6 +63,7 @@ SILENT: dict[type, dict[str, Any]] = {
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class Event:
     """Actions when a measured value passes a level, or at a given time.
 

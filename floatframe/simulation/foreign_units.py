@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from fe_models.foundation.copies import FrozenMapping, frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import number
 
@@ -14,6 +15,7 @@ SCHEMES = ("explicit", "iterated")
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class ForeignUnit:
     """An FMU for co-simulation in a system: a controller, a tyre, hydraulics.
 
@@ -45,6 +47,7 @@ class ForeignUnit:
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class Coupling:
     """How a system and its foreign units take their steps together.
 

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.tasks.interrupts import heeded_interrupts
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest
 from floatframe.engine.compiling.callbacks import raise_errors_of
 from floatframe.engine.compiling.file_frames import rows_of_file
@@ -30,7 +31,7 @@ from floatframe.engine.initial_conditions.mass_positivity import indefinite_mass
 from floatframe.engine.kernels.memory import Memory, Rows
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import ConvergenceError, ModelError, ResultsError
-from floatframe.integrators import CLASSES, has_fixed_steps, has_second_order, in_formulation
+from floatframe.integrators import CLASSES, has_fixed_steps, has_second_order, in_formulation, made_integrator
 from floatframe.integrators.integrator import Failure, Integrator, joined_rows
 from floatframe.model.checked_values import number
 from floatframe.model.state import State
@@ -67,6 +68,7 @@ SAME_TIME = 1e-6  #: fraction of a step by which a run may begin apart from the 
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class Progress:
     """Progress of a run.
 
@@ -99,7 +101,7 @@ class Progress:
 
 def integrate(
     system: System,
-    integrator: Integrator,
+    integrator: Integrator | type[Integrator] | str,
     t_end: float,
     h: float,
     *,
@@ -119,7 +121,8 @@ def integrate(
     system
         The system; its bodies as placed are made consistent first.
     integrator
-        The method, such as `GeneralizedAlpha(rho_inf=0.8)`.
+        The method, such as `GeneralizedAlpha(rho_inf=0.8)`; a class or a name of a system file, such as "hht": with
+        its defaults.
     t_end
         End time [s].
     h
@@ -165,9 +168,14 @@ def integrate(
         )
     t_start, t_end = number("integrate: t_start", t_start), number("integrate: t_end", t_end)
     h = number("integrate: h", h, above=0.0)
-    integrator = in_formulation(integrator, formulation)
+    integrator = in_formulation(made_integrator(integrator), formulation)
     if t_end <= t_start:
         raise ModelError(f"integrate: expected t_end above t_start = {t_start:g}, got {t_end:g}")
+    if h > (t_end - t_start) * (1 + 1e-9):
+        raise ModelError(
+            f"integrate: h: expected at most the time from {t_start:g} to t_end = {t_end:g}, got {h:g}; "
+            f"are t_end and h swapped?"
+        )
     if output_every < 1 or batch_steps < 1:
         raise ModelError(
             f"integrate: expected output_every and batch_steps of at least 1, got {output_every} and {batch_steps}"

@@ -13,7 +13,9 @@ import numpy as np
 
 from cms.assessment.quality.errors import QualityError
 from cms.assessment.quality.limits import LIMITS
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["VERDICTS", "QualityRecord", "Verdict", "has_failed", "information", "judge", "plain", "worst"]
@@ -24,6 +26,7 @@ VERDICTS: tuple[Verdict, ...] = ("info", "pass", "warn", "fail")  #: from harmle
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class QualityRecord:
     """One question about a reduced body, and its answer.
 

@@ -16,7 +16,9 @@ from fe_models.elements.solids.body import solid_body
 from fe_models.files.matrices.foreign_matrices import ForeignMatrices
 from fe_models.files.matrices.given import ScalarMassModel, scalar_mass_of
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import Units
 from fe_models.meshes.mesh import Mesh
 
@@ -34,6 +36,7 @@ Shapes = Callable[[IntArray], Array]  #: (node number, component) rows -> shapes
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class FullMass:
     """The mass matrix of the full model, over dofs that the superelement recovers.
 
@@ -54,6 +57,7 @@ class FullMass:
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class NodalMasses:
     """Point masses at nodes that the superelement recovers, such as its lumped mass.
 
@@ -71,6 +75,7 @@ class NodalMasses:
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class MeshMass:
     """The mesh behind the superelement, whose node numbers it recovers, and its density.
 

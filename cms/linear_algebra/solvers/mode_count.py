@@ -5,11 +5,14 @@ import operator
 from dataclasses import dataclass
 
 from cms.errors import ModeSetError
+from fe_models.foundation.errors import ArgumentError
+from fe_models.foundation.typed_inputs import checked_fields
 
 __all__ = ["ModeCount", "mode_count"]
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class ModeCount:
     """The wanted vibration modes: the lowest n, or all up to a cutoff.
 

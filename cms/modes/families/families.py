@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cms.errors import BodyError, ModeSetError
+from cms.errors import ArgumentError, BodyError, ModeSetError
 from cms.linear_algebra.solvers.eigen import EigenResult, no_modes
 from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
 from cms.linear_algebra.solvers.registry import solver_of
@@ -32,6 +32,7 @@ from fe_models.foundation.ranks.spread_matrix import largest_entry
 from fe_models.foundation.solver import Solver
 from fe_models.foundation.tall.columns import combine, elsewhere, of_this_process, rows_times
 from fe_models.foundation.tall.on_disk import release
+from fe_models.foundation.words import quoted
 
 __all__ = ["Families", "body_of", "families_of"]
 
@@ -77,6 +78,8 @@ class Families:
         FactorizationError
             If the solver is unknown or not installed.
         """
+        if not isinstance(body, FEBody):
+            raise ArgumentError(f"Families: body: expected an FEBody, got {quoted(body)}")
         body.require_coupled()
         self.body = body
         self.solver = solver_of(solver)

@@ -10,7 +10,9 @@ from cms.errors import BodyError, ModeSetError
 from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.tall.columns import of_this_process
+from fe_models.foundation.typed_inputs import checked_fields
 
 __all__ = ["InterfaceLoad", "boundary_load", "condensed_load", "point_load"]
 
@@ -19,6 +21,7 @@ COLLINEAR = 1e-6  #: second radius of the members relative to the first, as for 
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class InterfaceLoad:
     """Mass and stiffness over the motions of one interface, or of several interfaces that a neighbour connects.
 

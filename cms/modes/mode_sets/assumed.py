@@ -1,12 +1,11 @@
 """Assumed modes of a slender body: functions along its axis, combined with the kinematics of a beam section."""
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cms.errors import ModeSetError
-from cms.modes.families.families import body_of
+from cms.modes.families.families import Families, body_of
 from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets.axis_functions import AXIS_FUNCTIONS, AxisFunctions, axis_functions
@@ -14,9 +13,6 @@ from cms.modes.mode_sets.mesh_field import coupled_field
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
 from fe_models.foundation.words import nearest, quoted
-
-if TYPE_CHECKING:
-    from cms.modes.families.families import Families
 
 __all__ = ["assumed_modes"]
 
@@ -26,7 +22,7 @@ SLENDER_RATIO = 1e-6
 
 
 def assumed_modes(
-    body: "FEBody | Families",
+    body: FEBody | Families,
     *,
     n_modes: int | None = None,
     n_axial: int | None = None,

@@ -4,21 +4,17 @@ import logging
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 from zipfile import BadZipFile
 
 import numpy as np
 
 from cms.errors import ModeSetError
-from cms.modes.families.families import body_of
+from cms.modes.families.families import Families, body_of
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets.mesh_field import coupled_field
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
-
-if TYPE_CHECKING:
-    from cms.modes.families.families import Families
 
 __all__ = ["OVER", "coupled_columns", "log_frequencies", "user_basis"]
 
@@ -159,7 +155,7 @@ def log_frequencies(where: str, body: FEBody, X: Array, frequencies: Array) -> N
 
 
 def user_basis(
-    body: "FEBody | Families",
+    body: FEBody | Families,
     *,
     columns: Array | str | os.PathLike[str] | None = None,
     columns_over: str | None = None,

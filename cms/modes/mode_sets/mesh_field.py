@@ -7,13 +7,16 @@ import numpy as np
 from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import Array, frozen
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 
 __all__ = ["CoupledField", "coupled_field"]
 
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class CoupledField:
     """Columns over the dofs of a coupled body, and the part of the motion that rigid interfaces cannot follow.
 

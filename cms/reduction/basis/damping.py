@@ -12,6 +12,8 @@ import numpy as np
 
 from cms.errors import ModeSetError
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.errors import ArgumentError
+from fe_models.foundation.typed_inputs import checked_fields
 
 __all__ = [
     "CUSTOMARY_STEPS",
@@ -28,6 +30,7 @@ CUSTOMARY_STEPS = ((100.0, 0.01), (1000.0, 0.1))  #: 1 % below 100 Hz, 10 % belo
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class ModalDamping:
     """The same damping ratio for every mode: D = diag(2 ratio omega).
 
@@ -44,6 +47,7 @@ class ModalDamping:
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class PerModeDamping:
     """A damping ratio for each mode in the order of the reduced body; the last ratio holds for all further modes.
 
@@ -63,6 +67,7 @@ class PerModeDamping:
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class RampDamping:
     """Damping ratios in steps of frequency. The default is customary: modes above the band of interest are suppressed.
 
@@ -89,6 +94,7 @@ class RampDamping:
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class RayleighDamping:
     """D = alpha M + beta K.
 

@@ -18,7 +18,9 @@ from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.node_motion import node_weights, weighted_rigid_modes
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, IntArray
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.tall.columns import inner, rows_times
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.numbering import Numbering
 
@@ -33,6 +35,7 @@ Axes = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class NodalFrame:
     """Frame attached to six dofs that do not deform: those of an interface, given ones, or automatically chosen.
 
@@ -59,6 +62,7 @@ class NodalFrame:
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class TisserandFrame:
     """Mean-axis frame: Psi_Rᵀ M u = 0, smallest relative kinetic energy; origin at the undeformed centre of mass [1]_.
 
@@ -79,6 +83,7 @@ class TisserandFrame:
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class BuckensFrame:
     """Frame of least deformation: Psi_Rᵀ W u = 0 minimises Σ w |u|² over the nodes; origin at their weighted centre.
 

@@ -24,8 +24,10 @@ from cms.reduction.recovery.load_columns import WRENCH, forces_of_loads, on_coor
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.files.nastran_matrices.write_op4 import op4_parts
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.paths import replace_files
 from fe_models.foundation.seal import reason
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import Dimensions, Units, unit_text
 from fe_models.foundation.words import nearest, quoted
 
@@ -314,6 +316,7 @@ class InterfaceRows:
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class CraigBampton:
     """Mass, stiffness and damping over (u_b, eta), and rigid motions in these coordinates.
 

@@ -3,7 +3,9 @@
 from dataclasses import dataclass, field
 
 from cms.errors import RecoveryError
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import Dimensions
 from fe_models.foundation.words import nearest, quoted
 
@@ -22,6 +24,7 @@ Place = str | int
 
 @presented
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class Rows:
     """Rows of one quantity at some places.
 
@@ -66,6 +69,7 @@ class Rows:
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class RecoveryRequest:
     """Rows of one table, in their order, and further loads for their static part.
 

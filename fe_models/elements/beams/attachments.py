@@ -8,6 +8,8 @@ import numpy as np
 from fe_models.elements.beams.slices import Slices, second_moments
 from fe_models.errors import BeamError
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, tilde
+from fe_models.foundation.errors import ArgumentError
+from fe_models.foundation.typed_inputs import checked_fields
 
 __all__ = ["PointMass", "RigidLink", "Spring"]
 
@@ -16,6 +18,7 @@ SYMMETRIC = 1e-9  #: relative asymmetry of a given matrix that counts as roundin
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class PointMass:
     """A rigid piece that a node carries.
 
@@ -60,6 +63,7 @@ class PointMass:
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class Spring:
     """A linear spring between two nodes. It acts at one point, to which both nodes are connected rigidly.
 
@@ -110,6 +114,7 @@ class Spring:
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class RigidLink:
     """Nodes that move rigidly with one node (RBE2 inside the body); their dofs are eliminated.
 

@@ -10,6 +10,8 @@ from fe_models.elements.beams.section_properties import SectionProperties
 from fe_models.elements.beams.sections import Section
 from fe_models.errors import SectionError
 from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.errors import ArgumentError
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.line_mesh import LineMesh
 
@@ -17,6 +19,7 @@ __all__ = ["BeamProperty", "assign_properties", "section_of"]
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class BeamProperty:
     """Section, material and beam theory of a group of lines.
 

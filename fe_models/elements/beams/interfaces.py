@@ -8,7 +8,9 @@ from numpy.typing import ArrayLike
 from fe_models.body.fe_body import Interface
 from fe_models.errors import InterfaceError
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.selections import AnyMesh, Selection
 
@@ -17,6 +19,7 @@ __all__ = ["NodeIndices", "line_interface", "node_interface"]
 
 @presented
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class NodeIndices:
     """Selection of nodes by their index in the mesh.
 

@@ -15,6 +15,8 @@ from fe_models.elements.beams.section_properties import SectionProperties, norma
 from fe_models.elements.beams.torsion import rectangle_torsion_constant, rectangle_torsion_stress
 from fe_models.errors import SectionError
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.errors import ArgumentError
+from fe_models.foundation.typed_inputs import checked_fields
 
 __all__ = [
     "SECTIONS",
@@ -114,6 +116,7 @@ class Section(Protocol):
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class Circle:
     """Solid circle.
 
@@ -134,6 +137,7 @@ class Circle:
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class Tube:
     """Hollow circle.
 
@@ -159,6 +163,7 @@ class Tube:
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class Rectangle:
     """Solid rectangle.
 
@@ -204,6 +209,7 @@ class Rectangle:
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class BoxSection:
     """Rectangular hollow section, given by its outer sides; webs are along z.
 
@@ -267,6 +273,7 @@ class BoxSection:
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class ISection:
     """Doubly symmetric I or H section, web along z.
 
@@ -334,6 +341,7 @@ class ISection:
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class GeneralSection:
     """A section given by its properties, in principal axes.
 

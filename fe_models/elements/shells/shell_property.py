@@ -8,6 +8,8 @@ import numpy as np
 from fe_models.body.material import AnisotropicMaterial, AnyMaterial, Material, OrthotropicMaterial, require_isotropic
 from fe_models.errors import ShellError
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.errors import ArgumentError
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.shell_mesh import ShellMesh
 
@@ -26,6 +28,7 @@ ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class ShellProperty:
     """Thickness, material and offset of a group of cells.
 
@@ -73,6 +76,7 @@ class ShellProperty:
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class Layer:
     """One layer of a laminate.
 
@@ -113,6 +117,7 @@ class Layer:
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class LaminateProperty:
     """Layers and offset of a group of cells.
 
@@ -171,6 +176,7 @@ class LaminateProperty:
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class StiffnessProperty:
     """Stiffness and mass per area, and offset of a group of cells, for sections whose layers are not known.
 

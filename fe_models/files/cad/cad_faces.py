@@ -6,6 +6,8 @@ from types import ModuleType
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.errors import ArgumentError
+from fe_models.foundation.typed_inputs import checked_fields
 
 __all__ = ["FACE_KINDS", "CadFace", "cad_faces"]
 
@@ -18,6 +20,7 @@ INSIDE = 1e-5  #: of the diagonal: how far from a face the side of the material 
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class CadFace:
     """One face of the geometry, in the length unit of the job.
 

@@ -14,6 +14,8 @@ from fe_models.files.cad.cad_model import CadModel, CadPart, open_cad
 from fe_models.files.cad.face_selectors import chosen_faces
 from fe_models.files.cad.gmsh_model import gmsh_call
 from fe_models.files.gmsh import read_gmsh
+from fe_models.foundation.errors import ArgumentError
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import Units
 from fe_models.meshes.cells.raw_mesh import mesh_from_raw
 from fe_models.meshes.mesh import Mesh
@@ -25,6 +27,7 @@ MOST_ELEMENTS = 5e6  #: estimated, above which a size is taken for a mistake in 
 
 
 @dataclass(frozen=True)
+@checked_fields(ArgumentError)
 class MeshSize:
     """How fine a CAD geometry is meshed.
 

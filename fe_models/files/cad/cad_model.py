@@ -14,8 +14,10 @@ from fe_models.files.cad.cad_faces import CadFace, cad_faces
 from fe_models.files.cad.cad_units import CAD_SUFFIXES, length_unit
 from fe_models.files.cad.gmsh_model import gmsh_call, gmsh_model
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest, quoted
 
@@ -36,6 +38,7 @@ KERNEL_UNITS = {1e-3: "MM", 1e-2: "CM", 1.0: "M", 1e3: "KM", 0.0254: "INCH", 0.3
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class CadPart:
     """What a CAD file holds, in the length unit of the job.
 

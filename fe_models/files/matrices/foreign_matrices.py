@@ -10,7 +10,9 @@ import scipy.sparse as sp
 from fe_models.errors import MatrixError
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 from fe_models.foundation.copies import FrozenMapping, frozen_copies
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 
 __all__ = ["SCALAR", "ForeignMatrices", "pair_keys"]
 
@@ -21,6 +23,7 @@ ROLES = ("K", "M", "D")
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class ForeignMatrices:
     """Matrices, the dofs of their rows and the nodes behind them, as far as files say it.
 

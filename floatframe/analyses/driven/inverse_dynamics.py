@@ -15,6 +15,7 @@ from typing import Any
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.analyses.driven.driven_motion import Elasticity, quasi_static_bodies
 from floatframe.analyses.driven.kinematics import kinematics
 from floatframe.errors import ModelError
@@ -31,6 +32,7 @@ __all__ = ["InverseDynamics", "drive_forces", "inverse_dynamics", "with_motors"]
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class InverseDynamics:
     """A prescribed motion and the forces it requires.
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from floatframe.engine.compiling.interface_loads import amplitudes, loads_on_interfaces
@@ -35,6 +36,7 @@ WITH_AMPLITUDE = {PointForce: "amplitude", BodyLoad: "amplitude", JointForce: "m
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class ForceInput:
     """A force of the system as an input: the change of its amplitude, or of the motor of a joint force.
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.analyses.linear.linearization import LinearSystem
 from floatframe.analyses.linear.system_modes import system_modes
 from floatframe.errors import ModelError
@@ -19,6 +20,7 @@ LEAST_DAMPING = 1e-4  #: least damping used for the width of a resonance, becaus
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class FrequencyResponse:
     """Responses y/s at frequencies.
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.linear.force_inputs import ForceInput, force_column, forces_of_amplitude
@@ -50,6 +51,7 @@ __all__ = [
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class DriveMotion:
     """The prescribed motion of a joint coordinate as an input: its change about the steady value, or its rates.
 
@@ -80,6 +82,7 @@ class DriveMotion:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class BaseMotion:
     """A motion of the base of a system, the ground side of its joints, springs and bushings.
 
@@ -126,6 +129,7 @@ class BaseMotion:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class ParameterInput:
     """A parameter of the expressions of a user force as an input: its change about its value.
 

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.analyses.equilibrium import Equilibrium, static_equilibrium
 from floatframe.analyses.linear.channels import (
     AnyInput,
@@ -97,6 +98,7 @@ def empty() -> Array:
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class LinearSystem:
     """Small motions z about a steady motion, with n_s inputs s, and outputs y.
 

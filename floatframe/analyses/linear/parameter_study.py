@@ -10,6 +10,7 @@ from scipy.optimize import linear_sum_assignment
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.analyses.equilibrium import Equilibrium, steady_rotation
 from floatframe.analyses.linear.channels import AnyOutput, outputs_of
 from floatframe.analyses.linear.linearization import LinearSystem, linearize
@@ -33,6 +34,7 @@ MOST_HALVINGS = 3  #: largest number of halvings of a step between values in whi
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Locus:
     """Eigenvalues as functions of a parameter; each column follows one mode.
 

@@ -19,6 +19,7 @@ from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.extras import extra_module
 from fe_models.foundation.paths import replace_file
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.analyses.linear.linearization import LinearSystem, NamedMotions
 from floatframe.analyses.system_matrices import settled
 from floatframe.errors import ModelError
@@ -34,6 +35,7 @@ NEW = 1e-9  #: smallest independent part that is not a rounding error, used if n
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class NamedStateSpace:
     """A state space x_dot = A x + B u,  y = C x + D u, with the name and unit of each state, input and output.
 

@@ -7,8 +7,10 @@ import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import Summary, presented
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.analyses.linear.linearization import LinearSystem
 from floatframe.analyses.system_matrices import ROUNDING
+from floatframe.errors import ModelError
 
 __all__ = ["SystemModes", "system_modes"]
 
@@ -21,6 +23,7 @@ LEAST_BODY_MOTION = 1e-9  #: motion of bodies, relative to the change of states,
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class SystemModes:
     """Modes exp(lambda t) by ascending |lambda|; only one mode of each conjugate pair is listed.
 

@@ -6,6 +6,7 @@ from numba import njit
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import SPEED, Quantity
 from floatframe.components.clearances.contact import (
     NUMBERS,
@@ -43,6 +44,7 @@ OUTPUTS = {"eccentricity": "m", "force": "N", "energy": "J", "power lost": "W", 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class BallWithPlay(Element):
     """A ball at marker b in a larger socket at marker a; the contact force is described in `contact`.
 
@@ -101,6 +103,7 @@ MOTIONS = {"along": ("N", "m"), "about": ("N m", "rad")}  #: units of force and 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Backlash(Element):
     """A dead band in the motion of marker b relative to marker a, along an axis or about it.
 

@@ -15,6 +15,7 @@ from numba.extending import register_jitable
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import SPEED, Quantity
 from floatframe.components.clearances.contact import (
     NUMBERS,
@@ -24,6 +25,7 @@ from floatframe.components.clearances.contact import (
     depth_force,
     require_numbers,
 )
+from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.checked_values import unit_vector
 from floatframe.model.elements import Element, ElementLaw, GapSpring, Placed
@@ -52,6 +54,7 @@ OUTPUTS = {
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class HingeWithPlay(Element):
     """A pin at marker b in a larger bearing at marker a, which rotates about an axis.
 

@@ -8,6 +8,7 @@ from numba.extending import register_jitable
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import RATE, TIME, Quantity
 from floatframe.components.drives.shaft import check_shaft, required, time_functions
 from floatframe.errors import ModelError
@@ -36,6 +37,7 @@ PILOT = 17  #: index in the data of the pilot's pressure
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class AntiSkidBrake(Element):
     """Brake torque on marker b relative to marker a about an axis, with a valve that releases a skidding wheel.
 

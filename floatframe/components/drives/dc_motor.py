@@ -7,6 +7,7 @@ from numba import njit
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import RATE, Quantity
 from floatframe.components.drives.pid import Pid, pid_law
 from floatframe.components.drives.shaft import (
@@ -42,6 +43,7 @@ OUTPUTS = (
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class DcMotor(Element):
     """Torque k i on marker b (rotor) relative to marker a (stator) about an axis; L di/dt = u - R i - k ratio omega.
 

@@ -21,6 +21,7 @@ from numba import njit
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.components.drives.shaft import Z_AXIS, check_shaft, required, shaft_numbers, time_functions
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
@@ -44,6 +45,7 @@ FIRST_HARMONIC = 23
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class InductionMotor(Element):
     """Torque on marker b (rotor) relative to marker a (stator) about an axis, for a supply frequency and amplitude.
 

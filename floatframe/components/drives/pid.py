@@ -6,6 +6,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import number
@@ -24,6 +25,7 @@ PROPORTIONAL, INTEGRAL, DERIVATIVE, FILTER, LOW, HIGH, MODE, TRACKING, WIDTH, TA
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Pid:
     """u = kp e + I + kd d, limited, with e = target - value, dI/dt = ki e, and d the filtered rate of e.
 

@@ -6,6 +6,7 @@ from numba import njit
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.components.drives.pid import Pid, pid_law, target_of
 from floatframe.components.drives.shaft import Z_AXIS, check_controller, check_shaft, required, shaft_numbers
 from floatframe.components.drives.turns import turned_angle
@@ -25,6 +26,7 @@ CONTROLLER = 12  #: index in the data of the controller
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class PidDrive(Element):
     """The output of a PID controller as a torque about, or a force along, the axis of marker a, acting on b and on a.
 

@@ -6,6 +6,7 @@ from numba import njit
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.components.drives.shaft import Z_AXIS, check_shaft, required, time_functions
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
@@ -20,6 +21,7 @@ __all__ = ["SpeedControl"]
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class SpeedControl(Element):
     """Torque C = K ((target - omega) - lambda domega/dt) on marker b relative to marker a about an axis.
 

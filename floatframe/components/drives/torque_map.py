@@ -7,6 +7,7 @@ from numba import njit
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.components.drives.pid import Pid, pid_law
 from floatframe.components.drives.shaft import Z_AXIS, check_controller, check_shaft, required, time_functions
 from floatframe.errors import ModelError
@@ -28,6 +29,7 @@ OUTPUTS = (
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class TorqueMap(Element):
     """Torque from a map over the speed of the motor and the throttle, bilinear and constant beyond its edges.
 

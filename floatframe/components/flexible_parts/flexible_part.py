@@ -6,6 +6,7 @@ from typing import Protocol
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
@@ -18,6 +19,7 @@ __all__ = ["FlexiblePart", "PartMaker"]
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class FlexiblePart:
     """Bodies, joints and forces for a system, and markers at named points of the part.
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.components.hydraulics.circuit_law import (
     ACCUMULATOR,
@@ -440,6 +441,7 @@ def passes(record: Record, i: int, j: int, values: np.ndarray) -> bool:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Circuit(Element):
     """A hydraulic circuit: components between named nodes; cylinders and pumps connect it to markers.
 

@@ -5,6 +5,7 @@ from typing import Any
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import SPEED, Quantity
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
@@ -66,6 +67,7 @@ class Node:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Cylinder:
     """A cylinder between two markers; head pressure pushes them apart, rod pressure pulls them together.
 
@@ -116,6 +118,7 @@ class Cylinder:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Orifice:
     """An orifice with the flow opening discharge area √(2 Δp/ρ) from node a to b, linear for Δp below `transition`.
 
@@ -232,6 +235,7 @@ class Pipe:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Supply:
     """A node with a prescribed pressure, a function of time or a number."""
 
@@ -257,6 +261,7 @@ class Tank:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class FlowSource:
     """A prescribed flow from node a to node b, a function of time or a number, like that of an ideal pump."""
 
@@ -271,6 +276,7 @@ class FlowSource:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Pump:
     """A pump or motor of displacement D, with flow D omega from node a to b and torque D (p_a - p_b) on marker b.
 
@@ -294,6 +300,7 @@ class Pump:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class DirectionalValve:
     """A 4/3 valve with spool position u in -1 .. 1: u > 0 connects pressure to a and b to tank; u < 0 pressure to b.
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import SPEED, Quantity
 from floatframe.components.hydraulics.fluid import Fluid
 from floatframe.errors import ModelError
@@ -38,6 +39,7 @@ OUTPUTS = (
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class OleoStrut(Element):
     """A shock absorber with stroke s = `extended_length` minus the distance of marker b from marker a along the axis.
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.components.rails.irregularities import Irregularities
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import array_of_shape, number
@@ -83,6 +84,7 @@ class TrackFrame(NamedTuple):
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Track:
     """Consecutive segments from a point of the ground in a given direction, with irregularities of the rails."""
 

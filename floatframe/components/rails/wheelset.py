@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import quoted
 from floatframe.components.rails.assembly import ContactLaws, Wheel, law_numbers, output_names
 from floatframe.components.rails.contact_search import Pair, quasi_elastic
@@ -40,6 +41,7 @@ LAW_KEYS = (
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Wheelset(Element):
     """Two wheels that rotate with one axle, on the rails of a track fixed to the ground.
 
@@ -79,6 +81,7 @@ class Wheelset(Element):
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class WheelOnRail(Element):
     """One wheel on its rail: an independently rotating wheel, or one side of a wheelset with different profiles.
 

@@ -9,6 +9,7 @@ from numba import njit
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import SPEED, TIME, Quantity
 from floatframe.components.wheels.contact import (
     COMMON,
@@ -30,6 +31,7 @@ from floatframe.components.wheels.reading import Read, tyre_of_table
 from floatframe.components.wheels.roads.road import FlatRoad, Road
 from floatframe.components.wheels.slip import direction, hold_tread, tread_slip
 from floatframe.components.wheels.tyre_fields import check_common, common_numbers
+from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.elements import Element, ElementLaw, Placed
 from floatframe.model.shapes import Arrow, MarkerShapes
@@ -112,6 +114,7 @@ SETTLING_TIME = Quantity(0.02, TIME)
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class BrushTyre(Element):
     """A brush tyre, defined by slip stiffness, contact length and friction; it includes combined slip.
 

@@ -10,6 +10,7 @@ from numba.extending import register_jitable
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import TIME, UNIT_SYSTEMS, Dimensions, Quantity, Units
 from floatframe.components.wheels.coefficients import COEFFICIENTS, NEEDED_COMBINED
 from floatframe.components.wheels.contact import (
@@ -216,6 +217,7 @@ PRESSURE = Dimensions(mass=1, length=-1, time=-2)
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class MagicFormulaTyre(Element):
     """A tyre with the Magic Formula 5.2 or 6.1: combined slip, relaxation and standstill, without turn slip.
 

@@ -10,6 +10,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.paths import replace_files
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import quoted
 from floatframe.design.generation.graph import Operations
 from floatframe.design.generation.joint_forces import model_terms
@@ -81,6 +82,7 @@ LANGUAGES: dict[str, Callable[[Routine, Sequence[str]], dict[str, str]]] = {
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class GeneratedCode:
     """The text of a routine, and its number of operations.
 

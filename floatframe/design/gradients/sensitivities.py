@@ -10,6 +10,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.equilibrium import static_equilibrium
 from floatframe.analyses.linear.linearization import linearize
@@ -71,6 +72,7 @@ SLOPE_STEP = 2e-4  #: step of differences of sensors, relative to the magnitude 
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Sensitivities:
     """Values of outputs and their derivatives by parameters.
 

@@ -20,6 +20,7 @@ import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.design.identification.base_parameters import (
     BaseParameters,
     base_parameters,
@@ -46,6 +47,7 @@ BASE = ("base F_x", "base F_y", "base F_z", "base M_x", "base M_y", "base M_z")
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Measured:
     """A motion with its measurements.
 

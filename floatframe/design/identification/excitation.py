@@ -21,6 +21,7 @@ import scipy.linalg as la
 from scipy.optimize import LinearConstraint, minimize
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.design.identification.base_parameters import (
     BaseParameters,
@@ -37,6 +38,7 @@ SMALLER = 9  #: number of decreasing amplitudes that are tried to satisfy torque
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class MotionLimits:
     """The limits of a coordinate.
 
@@ -62,6 +64,7 @@ class MotionLimits:
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class ExcitingMotion:
     """A periodic motion.
 

@@ -29,6 +29,7 @@ import scipy.linalg as la
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.design.gradients.outputs import columns_of, wanted_of
 from floatframe.errors import FloatframeError, ModelError
@@ -54,6 +55,7 @@ TOLERANCE = 1e-10  #: tolerance of Newton iterations in compared runs
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class MeasuredOutputs:
     """Outputs measured at equidistant times, from the beginning of the run.
 
@@ -90,6 +92,7 @@ class MeasuredOutputs:
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class OutputFit:
     """Estimated parameters, and the quality of their fit.
 

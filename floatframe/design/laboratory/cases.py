@@ -4,12 +4,14 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.errors import ModelError
 
 __all__ = ["Case", "grid"]
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class Case:
     """One description of the body.
 

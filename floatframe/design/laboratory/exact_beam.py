@@ -6,6 +6,7 @@ import numpy as np
 
 from fe_models.body.fe_body import FEBody
 from fe_models.elements.beams.model import BeamModel
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.components.flexible_parts.exact_beams import exact_beams
 from floatframe.design.laboratory.substitution import with_part
 from floatframe.errors import ModelError
@@ -16,6 +17,7 @@ __all__ = ["ExactBeam", "with_exact_beams"]
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class ExactBeam:
     """Reference: the lines of the body as geometrically exact beams, of this many elements and of twice as many.
 

@@ -12,6 +12,7 @@ import numpy as np
 from cms.modes.mode_set import ModeSet
 from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.foundation.arrays import MOTION_COMPONENTS
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.errors import ModelError
 
 __all__ = ["MOST_DOFS", "FullModel", "all_dofs"]
@@ -20,6 +21,7 @@ MOST_DOFS = 1200  #: largest number of dofs, because dense matrices of this size
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class FullModel:
     """Reference: the body of the job unreduced, all of its dofs run in the system by the integrator of the study.
 

@@ -33,6 +33,7 @@ from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.body.rigid_motion import MassLoads
 from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.errors import ModelError
 
 __all__ = ["FrameAcceleration", "FullTransient", "full_transient"]
@@ -41,6 +42,7 @@ MOST_NUMBERS = 2.5e8  #: largest number of results in memory, 2 GB
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class FrameAcceleration:
     """Motion of the frame relative to which the body deforms, as inertia load; components in mesh axes.
 
@@ -64,6 +66,7 @@ class FrameAcceleration:
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class FullTransient:
     """Motion of the selected rows, and forces at the interfaces with prescribed motion.
 

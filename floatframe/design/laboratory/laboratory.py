@@ -34,6 +34,7 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.stages import Stages
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.design.laboratory.cases import Case
 from floatframe.design.laboratory.exact_beam import ExactBeam, with_exact_beams
 from floatframe.design.laboratory.full_model import FullModel, all_dofs
@@ -51,6 +52,7 @@ LEAST_RANGE = 1e-6  #: range of a column, relative to the largest column of its 
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Reference:
     """Columns of a reference over time.
 
@@ -119,6 +121,7 @@ class CaseResult:
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class LaboratoryResult:
     """All cases, compared with the reference.
 

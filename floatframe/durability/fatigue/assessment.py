@@ -12,6 +12,7 @@ from cms.body.modal_file.file import digest, read
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.durability.fatigue.criteria import Criterion
 from floatframe.durability.fatigue.fatigue_file import (
@@ -37,7 +38,7 @@ from floatframe.durability.shaking.loads.random_vibration import RandomRun, Rand
 from floatframe.durability.shaking.shake import shake
 from floatframe.durability.shaking.shake_file import read_shake
 from floatframe.durability.shaking.structure.model import ShakenModel, driven, modal_response
-from floatframe.errors import FatigueError
+from floatframe.errors import FatigueError, ModelError
 from floatframe.results.trajectory import Trajectory, read_trajectory
 
 __all__ = ["Assessment", "assess", "equivalent_repeats", "shaken_damage", "shaken_spectra"]
@@ -48,6 +49,7 @@ SAME_PLACE = 1e-9  #: distance, relative to the size of the body, within which a
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Assessment:
     """A fatigue result with its programme.
 

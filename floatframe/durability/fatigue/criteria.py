@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.durability.fatigue.planes import normal_rows, shear_pairs, tensor_rows
-from floatframe.errors import FatigueError
+from floatframe.errors import FatigueError, ModelError
 
 __all__ = ["CRITERIA", "TENSORS", "Criterion", "largest_size"]
 
@@ -29,6 +30,7 @@ FROBENIUS = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class Criterion:
     """A criterion. Its stresses equal those of a bar under tension, so that curves measured on bars apply.
 

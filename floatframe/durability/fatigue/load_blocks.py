@@ -7,7 +7,8 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.copies import frozen_copies
-from floatframe.errors import FatigueError
+from fe_models.foundation.typed_inputs import checked_fields
+from floatframe.errors import FatigueError, ModelError
 from floatframe.results.trajectory import Trajectory
 
 __all__ = ["GAP", "LoadBlock", "block_of_results"]
@@ -17,6 +18,7 @@ GAP = 10.0  #: ratio to the median time step above which a step is a gap
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class LoadBlock:
     """A history of modal coordinates with its number of `repeats` in a load programme.
 

@@ -19,8 +19,9 @@ Goodman, Soderberg, Morrow and Gerber take a mean in compression as none unless 
 import math
 from dataclasses import dataclass
 
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
-from floatframe.errors import FatigueError
+from floatframe.errors import FatigueError, ModelError
 
 __all__ = ["MEAN_STRESS", "NO_CORRECTION", "MeanStress"]
 
@@ -40,6 +41,7 @@ MEAN_STRESS = {
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class MeanStress:
     """A mean stress correction and its parameter.
 

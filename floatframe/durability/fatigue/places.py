@@ -7,17 +7,19 @@ import numpy as np
 
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.meshes.numbering import NONE
 from floatframe.durability.fatigue.criteria import Criterion
 from floatframe.durability.fatigue.mean_stress import NO_CORRECTION, MeanStress
 from floatframe.durability.fatigue.planes import surface_frames, surface_nodes
 from floatframe.durability.fatigue.sn_curve import SNCurve
-from floatframe.errors import FatigueError
+from floatframe.errors import FatigueError, ModelError
 
 __all__ = ["FatigueMaterial", "Places", "assessed_places", "point_number"]
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class FatigueMaterial:
     """A material of places: its S-N curve with factors, and its mean stress correction.
 

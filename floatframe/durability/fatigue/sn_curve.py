@@ -8,7 +8,8 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.copies import frozen_copies
-from floatframe.errors import FatigueError
+from fe_models.foundation.typed_inputs import checked_fields
+from floatframe.errors import FatigueError, ModelError
 
 __all__ = ["BELOW", "LEAST_CYCLES", "SNCurve", "basquin_curve", "normal_quantile", "table_curve"]
 
@@ -23,6 +24,7 @@ LEAST_CYCLES = 1000.0  #: first number of cycles of a curve given by a slope; fe
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class SNCurve:
     """Cycles to failure at constant amplitude: N = N_j (S / S_j)^(-k_j) for S between the corners j + 1 and j.
 

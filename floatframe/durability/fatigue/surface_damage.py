@@ -13,6 +13,7 @@ from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.meshes.numbering import NONE
 from floatframe.durability.fatigue.criteria import Criterion
 from floatframe.durability.fatigue.history_damage import RESIDUES, Counted, Progress, count_histories
@@ -28,7 +29,7 @@ from floatframe.durability.fatigue.places import (
 from floatframe.durability.fatigue.sn_curve import SNCurve
 from floatframe.durability.fatigue.spectral.spectra import ModalSpectra
 from floatframe.durability.fatigue.spectral.spectral_damage import count_spectra
-from floatframe.errors import FatigueError
+from floatframe.errors import FatigueError, ModelError
 
 __all__ = ["FatigueResult", "history_damage", "spectral_damage"]
 
@@ -39,6 +40,7 @@ MOST_BEYOND = 0.01
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class FatigueResult:
     """Damage at places of a body for one pass through a load programme; the life is 1 / damage passes.
 

@@ -8,6 +8,7 @@ import numpy as np
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.durability.shaking.loads.inputs import band_notes
 from floatframe.durability.shaking.loads.notching import DEEPEST, Limit, NotchedRun, notched_random, notched_sine
 from floatframe.durability.shaking.loads.random_vibration import RandomRun, RandomTest, random_runs
@@ -28,6 +29,7 @@ LITTLE_MASS = 0.9  #: fraction of the mass in modes of a direction below which a
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class NotchRequest:
     """Limits for one kind of test, or one test.
 
@@ -51,6 +53,7 @@ class NotchRequest:
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class ShakeJob:
     """The structure, its bases and damping, the tests, and the requested outputs.
 
@@ -124,6 +127,7 @@ class EffectiveMasses:
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class ShakeResult:
     """All runs of a job.
 

@@ -16,6 +16,7 @@ import numpy as np
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.engine.compiling.stiffening import stiffened_shape_moments
 from floatframe.errors import ModelError
 from floatframe.model.bodies.flexible_body import FlexibleBody
@@ -26,6 +27,7 @@ __all__ = ["BodyEquations", "body_equations"]
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class BodyEquations:
     """Invariants of a body about its frame, and the terms of its equations; all in axes of the frame.
 

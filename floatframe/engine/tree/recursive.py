@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import quoted
 from floatframe.engine.compiling.file_frames import state_of_engine, state_of_file
 from floatframe.engine.compiling.markers import find_marker
@@ -50,6 +51,7 @@ class AccelerationDerivatives(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class RelativeModel:
     """Equations of a tree of rigid and flexible bodies: M(z) z_ddot + h(z, z_dot) = forces, evaluated by recursion.
 

@@ -13,8 +13,9 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted, shortened
-from floatframe.errors import UrdfError
+from floatframe.errors import ModelError, UrdfError
 from floatframe.model.checked_values import array_of_shape, number, unit_vector
 from floatframe.model.shapes import Box, Cylinder, Sphere
 
@@ -152,6 +153,7 @@ class RobotJoint:
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Robot:
     """A robot: links, and joints that connect them to one tree.
 

@@ -24,6 +24,7 @@ import numpy as np
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError, UrdfError
@@ -52,6 +53,7 @@ PLACE = 1e-3  #: farthest an interface may be from its joint, of the size of the
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class FlexibleLink:
     """A reduced body in the place of a link.
 
@@ -78,6 +80,7 @@ class FlexibleLink:
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class RobotSystem:
     """A robot as a system, and where its links are in it.
 

@@ -19,6 +19,7 @@ from cms.body.geometric_stiffness import SPIN_PAIRS, GeometricStiffness
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import array_of_shape, number
@@ -28,6 +29,7 @@ __all__ = ["AddedMass", "second_moments", "with_masses"]
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class AddedMass:
     """A small rigid mass fixed to an interface.
 

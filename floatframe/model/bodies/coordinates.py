@@ -6,6 +6,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.checked_values import unit_vector
@@ -14,6 +15,7 @@ __all__ = ["AxialAngle", "AxialDistance", "Coordinate", "JointCoordinate", "Poin
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class JointCoordinate:
     """A coordinate of a joint, a distance or an angle, free or prescribed.
 
@@ -31,6 +33,7 @@ class JointCoordinate:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class AxialDistance:
     """Distance of the point of marker B from that of marker A along an axis of A; its force acts at the point of B.
 
@@ -54,6 +57,7 @@ class AxialDistance:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class AxialAngle:
     """Angle of marker B about an axis of A, zero as assembled; its rate is the angular velocity along the axis.
 
@@ -80,6 +84,7 @@ class AxialAngle:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class PointDistance:
     """Distance between the points of two markers; its force acts along the line between them.
 

@@ -10,6 +10,7 @@ from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.errors import ModelError
 from floatframe.model.bodies.mean_axes import MeanAxes, mean_axes
 from floatframe.model.bodies.rigid_body import euler_parameters_from_user
@@ -23,6 +24,7 @@ __all__ = ["FlexibleBody"]
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class FlexibleBody:
     """An instance of a reduced body; several instances can share its data.
 

@@ -2,10 +2,14 @@
 
 from dataclasses import dataclass
 
+from fe_models.foundation.typed_inputs import checked_fields
+from floatframe.errors import ModelError
+
 __all__ = ["GROUND", "Ground"]
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class Ground:
     """The inertial frame as a body; markers on it are at rest.
 

@@ -8,6 +8,7 @@ from cms.errors import BodyError
 from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import array_of_shape, rotation_of
 
@@ -24,6 +25,7 @@ class Named(Protocol):
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Marker:
     """A point with axes on a body.
 
@@ -70,6 +72,12 @@ class Marker:
             object.__setattr__(self, "position", array_of_shape(f"{where}: position", self.position, (3,)))
         if self.triad is not None:
             object.__setattr__(self, "triad", rotation_of(f"{where}: triad", self.triad))
+
+    @staticmethod
+    def of_name(name: str) -> "Marker":
+        """Return the marker that "body" or "body.interface" names, so that a text may stand for it."""
+        body, _, interface = name.partition(".")
+        return Marker(body, interface or None)
 
     @property
     def address(self) -> Address | None:

@@ -8,6 +8,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import array_of_shape, number
 from floatframe.model.shapes.shape import Geometry, Shape, shape_tuple
@@ -21,6 +22,7 @@ TRIANGLE_DEFECT = 1e-6
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class RigidBody:
     """A rigid body with its initial position and motion.
 
@@ -65,6 +67,11 @@ class RigidBody:
         where = f"rigid body {self.name!r}"
         put = object.__setattr__
         put(self, "mass", number(f"{where}: mass", self.mass, above=0.0))
+        if np.shape(self.inertia) == (3,):
+            raise ModelError(
+                f"{where}: inertia: expected a tensor of shape (3, 3), got three numbers; "
+                f"principal moments about the body axes are numpy.diag({list(self.inertia)})"
+            )
         put(self, "inertia", array_of_shape(f"{where}: inertia", self.inertia, (3, 3)))
         for name in ("center_of_mass", "position", "velocity", "omega_B"):
             put(self, name, array_of_shape(f"{where}: {name}", getattr(self, name), (3,)))

@@ -26,6 +26,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import Units
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
@@ -67,6 +68,7 @@ class GapSpring:
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False, kw_only=True)
+@checked_fields(ModelError)
 class ElementLaw:
     """The contribution of an element to the equations of motion; its function is described in the module docstring.
 

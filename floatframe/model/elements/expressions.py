@@ -18,6 +18,7 @@ from numba import njit
 from numba.extending import register_jitable
 
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
@@ -264,6 +265,7 @@ def expression_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class ExpressionElement(Element):
     """Forces, states and outputs as expressions of the motion of markers relative to the first; see the module."""
 

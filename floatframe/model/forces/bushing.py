@@ -10,6 +10,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Place
 from floatframe.model.checked_values import array_of_shape
@@ -24,6 +25,7 @@ AXES = {"a": 0.0, "b": 1.0, "half way": 0.5}
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Bushing:
     """Force and torque K xi + D xi_dot + preload + tables(xi) between two markers, derived from a potential.
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker, Named
 from floatframe.model.checked_values import array_of_shape, number
@@ -22,6 +23,7 @@ __all__ = ["BodyLoad", "Gravity", "PointForce"]
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Gravity:
     """A uniform gravitational acceleration, which acts on every particle of the deformed bodies.
 
@@ -42,6 +44,7 @@ class Gravity:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class BodyLoad:
     """A load case of a flexible body times an amplitude; it rotates with the body.
 
@@ -81,6 +84,7 @@ class BodyLoad:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class PointForce:
     """A force and a torque on a marker.
 

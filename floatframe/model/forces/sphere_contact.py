@@ -9,6 +9,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import SPEED, Quantity
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
@@ -70,6 +71,7 @@ def hertz_stiffness(modulus: float, radius: float, other_radius: float | None = 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class SphereContact:
     """Contact of a sphere about the point of marker B with a plane through, or a sphere about, the point of marker A.
 

@@ -7,6 +7,7 @@ Evaluated in `floatframe.engine.kernels.connections.spring_damper`,
 from dataclasses import dataclass, field
 
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import SPEED, Quantity
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
@@ -21,6 +22,7 @@ __all__ = ["JointForce", "SpringDamper"]
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class SpringDamper:
     """Tension k (l - l_0) + c l_dot + preload + characteristic(l - l_0) along the line from marker A to marker B.
 
@@ -81,6 +83,7 @@ FRICTION_SPEED = Quantity(1e-3, SPEED)
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class JointForce:
     """A force or torque that acts to increase a free coordinate x of a joint (a distance or an angle).
 

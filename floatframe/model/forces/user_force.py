@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.errors import ModelError
 from floatframe.model.bodies.coordinates import Coordinate, coordinate_words
 from floatframe.model.checked_values import number
@@ -21,6 +22,7 @@ __all__ = ["UserForce"]
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class UserForce:
     """Forces Q along coordinates x, and states z with z_dot = g, as functions of t, x, x_dot and z.
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import number
 
@@ -37,6 +38,7 @@ NOT_OF_TIME = {"of_time": False}
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class TimeFunction:
     """A piecewise function; the first piece also holds before its start, and the last one has no end.
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.errors import ModelError
 from floatframe.model.bodies.coordinates import Coordinate, coordinate_words
 from floatframe.model.checked_values import number
@@ -16,6 +17,7 @@ __all__ = ["CoordinateCoupler", "Limits"]
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class Limits:
     """Stops of a coupler: lower <= Σ a_k x_k <= upper, with Newton's coefficient of restitution.
 
@@ -53,6 +55,7 @@ class Limits:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class CoordinateCoupler:
     """Enforces a linear relation between coordinates: Σ a_k x_k = c; one constraint.
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import LENGTH, Quantity
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Place
@@ -45,6 +46,7 @@ __all__ = ["CylindricalJoint", "PlanarJoint", "PrismaticJoint", "RevoluteJoint",
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class RevoluteJoint:
     """Allows one rotation between two markers, about an axis; five constraints.
 
@@ -94,6 +96,7 @@ class RevoluteJoint:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class PrismaticJoint:
     """Lets marker B slide along an axis of marker A without rotation; five constraints.
 
@@ -145,6 +148,7 @@ METRE = Quantity(1.0, LENGTH)
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class ScrewJoint:
     """Lets marker B rotate about an axis and slide along it by `lead` for each turn; five constraints.
 
@@ -217,6 +221,7 @@ class ScrewJoint:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class CylindricalJoint:
     """Lets marker B slide along an axis and rotate about it; four constraints.
 
@@ -270,6 +275,7 @@ class CylindricalJoint:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class SphericalJoint:
     """Holds the point of marker B at the point of marker A; three constraints.
 
@@ -299,6 +305,7 @@ class SphericalJoint:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class PlanarJoint:
     """Keeps the point of marker B in a plane of marker A, with parallel normals; three constraints.
 

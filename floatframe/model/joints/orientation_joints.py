@@ -10,6 +10,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Place
 from floatframe.model.checked_values import rotation_of
@@ -36,6 +37,7 @@ __all__ = ["ConstantOrientation", "ConstantVelocityJoint", "FixedJoint", "Univer
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class FixedJoint:
     """Fixes marker B to marker A; six constraints.
 
@@ -75,6 +77,7 @@ class FixedJoint:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class ConstantOrientation:
     """Fixes the orientation of marker B relative to marker A; three constraints.
 
@@ -114,6 +117,7 @@ class ConstantOrientation:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class UniversalJoint:
     """Joins two points, and keeps an axis of marker A normal to an axis of marker B; four constraints.
 
@@ -173,6 +177,7 @@ class UniversalJoint:
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class ConstantVelocityJoint:
     """Joins two points, and makes the shafts through them rotate equally at any angle between them; four constraints.
 

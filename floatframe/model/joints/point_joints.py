@@ -10,6 +10,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Place
 from floatframe.model.checked_values import number
@@ -25,6 +26,7 @@ __all__ = ["DistanceJoint", "PointOnLine", "PointOnPlane"]
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class PointOnLine:
     """Keeps the point of marker B on a line through the point of marker A; two constraints.
 
@@ -67,6 +69,7 @@ class PointOnLine:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class PointOnPlane:
     """Keeps the point of marker B on a plane through the point of marker A; one constraint.
 
@@ -111,6 +114,7 @@ class PointOnPlane:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class DistanceJoint:
     """Keeps the points of two markers at a distance, like a massless rod; one constraint.
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import LENGTH, Quantity
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker, Place, body_name
@@ -23,6 +24,7 @@ METRE = Quantity(1.0, LENGTH)
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class RollingDisc:
     """A thin disc about the point of marker B rolls without slip on a plane through the point of marker A.
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker, Place
 from floatframe.model.checked_values import unit_vector
@@ -24,6 +25,7 @@ ALONG, ACROSS, UPWARD = range(3)  #: parts of LINE rows
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class SlidingJoint:
     """Keeps the point of marker B on the deformed line through interfaces of a flexible body; two constraints.
 

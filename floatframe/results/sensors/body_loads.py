@@ -11,6 +11,7 @@ from cms.errors import BodyError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.engine.compiling.interface_loads import Load, amplitudes, in_body, interface_number, loads_on_interfaces
 from floatframe.engine.compiling.markers import MarkerData, find_marker
@@ -144,6 +145,7 @@ def interface_load_rows(small: SmallMotions, body: FlexibleBody) -> list[Rows]:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class InterfaceForceSensor:
     """The total force and moment on a flexible body at an interface, from joints, springs and point forces.
 
@@ -220,6 +222,7 @@ class InterfaceForceSensor:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class SpringSensor:
     """A spring-damper along its line: length, its rate, and the tension, negative in compression.
 
@@ -274,6 +277,7 @@ class SpringSensor:
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class RecoverySensor:
     """Rows of a recovery table of a flexible body: motions, stresses and forces, including residual static parts.
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import STRESS_COMPONENTS, Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import Units
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
@@ -33,6 +34,7 @@ VALUE = "value"  #: name of the only column
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Channel:
     """The motion of a marker along a direction: displacement [m] from the start, or rotation [rad] about it.
 
@@ -124,6 +126,7 @@ class Channel:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class CoordinateChannel:
     """A joint coordinate; as an input, the force or torque along it.
 
@@ -181,6 +184,7 @@ class CoordinateChannel:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class StressChannel:
     """A stress component at a node of a flexible body, in axes of its frame; an output only.
 

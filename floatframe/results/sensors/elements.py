@@ -6,6 +6,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.engine.compiling.callbacks import raise_errors_of
 from floatframe.engine.compiling.callbacks.law_slopes import difference_slopes
@@ -67,6 +68,7 @@ def output_rows(placed: PlacedLaw, small: SmallMotions) -> Rows:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class CouplerSensor:
     """A coupler: value, rate and force of each of its terms, numbered from 1.
 
@@ -115,6 +117,7 @@ class CouplerSensor:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class ControlSensor:
     """A user force: its coordinates, their rates, the forces along them, and its states, all by name.
 
@@ -186,6 +189,7 @@ def coordinate_units(system: System, is_angle: bool) -> tuple[str, str, str]:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class ElementSensor:
     """Outputs, states and multipliers of a public element, by name, or one of them.
 
@@ -266,6 +270,7 @@ NAMES = (*DEFORMATIONS, *(f"{name} rate" for name in DEFORMATIONS))
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class BushingSensor:
     """Deformations x, y, z, rx, ry, rz of a bushing and their rates, as used by its stiffness and damping.
 

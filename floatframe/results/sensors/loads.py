@@ -6,6 +6,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.engine.compiling.markers import MarkerData, find_marker, joint_markers
 from floatframe.engine.compiling.pair_forces import bushing_markers
@@ -34,6 +35,7 @@ ENERGIES = (*Energies.__dataclass_fields__, "total", "balance")
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class ReactionSensor:
     """Force and moment that a joint or spring-damper exerts on its marker A, in ground axes or its own.
 
@@ -111,6 +113,7 @@ class ReactionSensor:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class CoordinateSensor:
     """A coordinate of a joint: value, rate, and the force along it.
 
@@ -153,6 +156,7 @@ class CoordinateSensor:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class EnergySensor:
     """Energies of the whole system: kinetic, strain, gravity, springs, work, dissipated, total and balance.
 
@@ -180,6 +184,7 @@ class EnergySensor:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class MomentumSensor:
     """Linear momentum, and angular momentum about the ground origin, in ground axes.
 
@@ -219,6 +224,7 @@ class MomentumSensor:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class ModeSensor:
     """A modal coordinate of a flexible body, and its rate.
 

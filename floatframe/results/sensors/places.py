@@ -13,6 +13,7 @@ from cms.errors import BodyError
 from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.engine.compiling.counted_angles import CountedAngle, angle_of
 from floatframe.engine.compiling.markers import MarkerData, find_body, find_marker
 from floatframe.errors import ModelError
@@ -159,6 +160,7 @@ def nearest_node(body: FlexibleBody, position: Array, *, where: str = "place", t
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class PlaceSensor:
     """Position, velocity, acceleration, rotation vector or angular velocity of a marker.
 
@@ -298,6 +300,7 @@ def relative(place: PlaceMotion, other: PlaceMotion, quantity: str) -> Array:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class AngleSensor:
     """The rotation angle of marker B relative to marker A about an axis of A, counted through full turns.
 
@@ -361,6 +364,7 @@ class AngleSensor:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class DisplacementSensor:
     """Elastic displacement of an interface or node of a flexible body, in axes of its frame B, from all modes.
 

@@ -11,6 +11,7 @@ from cms.errors import BodyError
 from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.foundation.arrays import STRESS_COMPONENTS, Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.model.bodies.flexible_body import FlexibleBody
@@ -109,6 +110,7 @@ def von_mises_rows(modes: Array, q: Array, coordinates: Rows) -> Rows | None:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class StressSensor:
     """Stress at a node or stress point: six components in axes of the body frame, and the von Mises stress.
 
@@ -187,6 +189,7 @@ class StressSensor:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class VonMisesSensor:
     """The largest von Mises stress of a body, or of a part of it, over its kept nodes, and the node of this stress.
 
@@ -263,6 +266,7 @@ def node_words(reduced: ReducedBody, row: int) -> str:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class StrainGauge:
     """Strain along a direction at a node, computed from its stress by Hooke's law of an isotropic material.
 
@@ -331,6 +335,7 @@ class StrainGauge:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class ElongationSensor:
     """An extensometer: change of the distance between two nodes, divided by the distance; needs no stress modes.
 

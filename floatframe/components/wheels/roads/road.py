@@ -8,6 +8,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.components.wheels.roads.surface import CENTRE, CUBIC, FLAT, GRID, GRIP, road_height
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import array_of_shape, number
@@ -71,6 +72,7 @@ ENVELOPE_STEPS = 20  #: number of steps of an envelope per radius
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Grip:
     """A friction factor along the road, for example of a wet patch, linear between knots."""
 
@@ -104,6 +106,7 @@ def check_grip(road: Any) -> None:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class FlatRoad:
     """The infinite plane z = 0."""
 
@@ -123,6 +126,7 @@ class FlatRoad:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class GridRoad:
     """Heights z at knots x, along the road, and y, to the left; beyond the knots the road is level.
 
@@ -204,6 +208,7 @@ def at_row(y: Array, rows: Array, place: float) -> Array:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Polyline:
     """A profile of straight pieces, which may have upright steps: two corners with equal x."""
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.presentation import presented
-from floatframe.errors import FatigueError
+from fe_models.foundation.typed_inputs import checked_fields
+from floatframe.errors import FatigueError, ModelError
 
 __all__ = ["ORDERS", "ModalSpectra", "modal_moments", "spectra_of_history"]
 
@@ -21,6 +22,7 @@ HERMITIAN = 1e-8  #: largest defect of a cross spectrum, and its most negative e
 @presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class ModalSpectra:
     """Stationary Gaussian motion of the modal coordinates, as one-sided cross spectra, with its duration.
 

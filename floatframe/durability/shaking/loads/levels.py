@@ -12,6 +12,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.paths import near_file
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from floatframe.durability.shaking.structure.model import STANDARD_GRAVITY, gravity_in
@@ -35,6 +36,7 @@ FEWEST = 2  #: smallest number of rows
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Level:
     """A level at frequencies [Hz]: amplitudes of an acceleration or displacement, or a power spectral density.
 

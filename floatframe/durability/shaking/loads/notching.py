@@ -22,6 +22,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.durability.shaking.loads.levels import OF_OUTPUT, Level, in_model
 from floatframe.durability.shaking.loads.random_vibration import RandomRun
@@ -38,6 +39,7 @@ JOINED = 0.01  #: smallest reported depth of a notch [dB]
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class ResponseLimit:
     """An output and a level that it must not exceed.
 
@@ -84,6 +86,7 @@ class ResponseLimit:
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class ForceLimit:
     """The semi-empirical limit of an interface force, in the driven direction or another one.
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.durability.shaking.loads.inputs import input_index, require_damped
 from floatframe.durability.shaking.loads.levels import Level, in_model, level_rms
 from floatframe.durability.shaking.loads.uncertainty import Uncertainty
@@ -34,6 +35,7 @@ CHUNK_SIZE = 4_000_000  #: largest number of stress values in memory
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class CrossSpectrum:
     """Coherence and phase between two inputs, the same at all frequencies.
 
@@ -56,6 +58,7 @@ class CrossSpectrum:
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class RandomTest:
     """A stationary Gaussian excitation.
 

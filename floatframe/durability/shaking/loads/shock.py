@@ -8,6 +8,7 @@ import numpy as np
 import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.durability.shaking.loads.inputs import input_index
 from floatframe.durability.shaking.loads.pulses import Synthesis
 from floatframe.durability.shaking.loads.uncertainty import Uncertainty
@@ -29,6 +30,7 @@ LOST = 0.01  #: of the largest value of a history; a note reports a larger chang
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class SpectrumRequest:
     """A request for shock response spectra of accelerations.
 
@@ -64,6 +66,7 @@ class SpectrumRequest:
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class TimeTest:
     """Histories of inputs, linear between their samples.
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.errors import ModelError
 
 __all__ = ["Uncertainty"]
@@ -20,6 +21,7 @@ SAME = 1e-9  #: relative distance of frequencies that differ by rounding alone
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class Uncertainty:
     """Factor on responses and relative uncertainty of frequencies, constant or by frequency band.
 

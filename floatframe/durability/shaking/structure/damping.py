@@ -8,12 +8,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.errors import ModelError
 
 __all__ = ["Damping"]
 
 
 @dataclass(frozen=True)
+@checked_fields(ModelError)
 class Damping:
     """Damping ratios zeta = 1/(2 Q); later entries override earlier ones: `ratio`, `table`, `bands`, `modes`.
 

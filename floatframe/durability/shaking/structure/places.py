@@ -12,6 +12,7 @@ from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 
@@ -24,6 +25,7 @@ MOST_NODES = 500  #: largest number of nodes of an element or set
 
 @presented
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Observed:
     """A place at which something is observed; one of interface, node, element, set, position and point says where.
 

@@ -1,0 +1,127 @@
+"""Public classes and functions name an argument of the wrong kind; nothing fails inside."""
+
+import inspect
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+import cms
+import fe_models
+import floatframe as ff
+from fe_models.foundation.errors import ReportedError
+from fe_models.foundation.typed_inputs import MismatchError, conformed
+from fe_models.foundation.units import Units
+from tests.bodies import bar
+
+
+class Stranger:
+    """Of no kind that anything expects."""
+
+
+def required(subject):
+    """Return the parameters without a default."""
+    kinds = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+    parameters = inspect.signature(subject).parameters.values()
+    return [each.name for each in parameters if each.default is each.empty and each.kind in kinds]
+
+
+def is_made_or_called(subject):
+    if inspect.isclass(subject):
+        return not issubclass(subject, Exception) and not getattr(subject, "_is_protocol", False)
+    return callable(subject)
+
+
+PUBLIC = [
+    pytest.param(getattr(package, name), id=f"{package.__name__}.{name}")
+    for package in (fe_models, cms, ff)
+    for name in package.__all__
+    if is_made_or_called(getattr(package, name)) and required(getattr(package, name))
+]
+
+
+@pytest.mark.parametrize("subject", PUBLIC)
+def test_an_argument_of_another_kind_is_refused_in_words(subject):
+    given = {name: Stranger() for name in required(subject)}
+    with pytest.raises(ReportedError):
+        subject(**given)
+
+
+@pytest.mark.parametrize("subject", PUBLIC)
+def test_an_argument_that_is_unknown_is_told_by_python(subject):
+    with pytest.raises(TypeError, match="nosuch"):
+        subject(nosuch=1)
+
+
+def block(**changes):
+    return ff.RigidBody(**{"name": "block", "mass": 2.0, "inertia": np.diag([1.0, 2, 2.5])} | changes)
+
+
+def test_a_body_alone_stands_for_a_list_and_a_name_for_units():
+    system = ff.System(block(), units="mm-t-s")
+    assert [body.name for body in system.bodies] == ["block"]
+    assert system.units.name == "mm-t-s"
+    with pytest.raises(fe_models.UnitsError, match="unknown unit system 'si'"):
+        ff.System(block(), units="si")
+
+
+def test_a_marker_can_be_written_as_body_and_interface():
+    spring = ff.SpringDamper("spring", "ground", "rod.big_end", stiffness=10.0)
+    assert (spring.marker_a.body, spring.marker_a.interface) == ("ground", None)
+    assert (spring.marker_b.body, spring.marker_b.interface) == ("rod", "big_end")
+
+
+@pytest.mark.parametrize("integrator", [ff.GeneralizedAlpha, "generalized-alpha", ff.GeneralizedAlpha()])
+def test_an_integrator_is_an_object_a_class_or_a_name(integrator):
+    system = ff.System(block(velocity=(1.0, 2.0, 3.0), omega_B=(3.0, -1.0, 2.0)))
+    motion = ff.integrate(system, integrator, 0.1, 0.01)
+    expected = ff.integrate(system, ff.GeneralizedAlpha(), 0.1, 0.01)
+    np.testing.assert_array_equal(motion.body("block").r, expected.body("block").r)
+
+
+WRONG = {
+    "an end before the step": (lambda s: ff.integrate(s, "hht", 0.01, 1.0), "h: .*swapped"),
+    "a scheme that is none": (lambda s: ff.integrate(s, "htt", 1.0, 0.01), "did you mean 'hht'"),
+    "a class with a parameter": (lambda s: ff.integrate(s, ff.RigidBody, 1.0, 0.01), "integrator"),
+    "a time as text": (lambda s: ff.integrate(s, "hht", "1 s", 0.01), "t_end: expected a number, got '1 s'"),
+    "a list as a system": (lambda s: ff.integrate([s], "hht", 1.0, 0.01), "system: expected a System"),
+    "a class for an object": (lambda s: ff.System([ff.RigidBody]), "bodies: .* each of it a RigidBody or a Flex"),
+    "three moments": (lambda s: block(inertia=(1.0, 2.0, 2.5)), r"numpy.diag\(\[1.0, 2.0, 2.5\]\)"),
+    "a joint of numbers": (lambda s: ff.RevoluteJoint("pin", 1, 2, axis=(0, 0, 1)), "'pin': marker_a: expected a Mark"),
+    "a mode set that is none": (lambda s: cms.reduce(cms.couple(bar()), 12), "modes: expected a ModeSet, got 12"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_was_meant_is_said(name):
+    call, words = WRONG[name]
+    with pytest.raises(ReportedError, match=words):
+        call(ff.System([block()]))
+
+
+@pytest.mark.parametrize(
+    ("hint", "value", "found"),
+    [
+        (Sequence[str], "x", ("x",)),
+        (Sequence[float] | None, None, None),
+        (float | None, 2, 2),
+        (type, float, float),
+        (Sequence[Units], ["mm-t-s"], (fe_models.UNIT_SYSTEMS["mm-t-s"],)),
+    ],
+)
+def test_values_become_what_the_annotation_wants(hint, value, found):
+    assert conformed(hint, value) == found
+
+
+@pytest.mark.parametrize(
+    ("hint", "value", "words"),
+    [
+        (Sequence[str], ["a", 3], "text; one is 3"),
+        (float, "2", "a number"),
+        (str | None, 3, "^text$"),
+        (Units, 3, "a Units"),
+    ],
+)
+def test_another_kind_is_told(hint, value, words):
+    with pytest.raises(MismatchError, match=words):
+        conformed(hint, value)
