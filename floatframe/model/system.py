@@ -162,9 +162,6 @@ class System:
             raise ModelError(f"{where}: expected at least one body, got none")
         require_names(f"{where}: bodies", [body.name for body in self.bodies], taken=(GROUND.name,))
         named = [force.name for force in self.forces if not isinstance(force, Gravity)]
-        for element in self.elements:
-            if not isinstance(element, Element):
-                raise ModelError(f"{where}: elements: expected a floatframe.model.elements.Element, got {element!r}")
         named += [element.name for element in self.elements]
         require_names(
             f"{where}: joints, forces and elements", [joint.name for joint in (*self.joints, *self.couplers)] + named
