@@ -15,6 +15,6 @@ attribute, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 def __getattr__(name: str) -> object:
     found = attribute(name)
     from cms.errors import ArgumentError
-    from fe_models.foundation.typed_inputs import at_door
+    from fe_models.foundation.records import at_door
 
     return at_door(__name__, name, found, ArgumentError)

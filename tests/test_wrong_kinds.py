@@ -10,7 +10,7 @@ import cms
 import fe_models
 import floatframe as ff
 from fe_models.foundation.errors import ReportedError
-from fe_models.foundation.typed_inputs import MismatchError, conformed
+from fe_models.foundation.records import MismatchError, conformed
 from fe_models.foundation.units import Units
 from tests.bodies import bar
 

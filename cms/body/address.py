@@ -11,7 +11,7 @@ from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import quoted
 
 __all__ = ["KINDS_OF_ADDRESS", "Address", "FoundNodes"]

@@ -8,10 +8,9 @@ import numpy as np
 
 from cms.errors import BodyError
 from fe_models.foundation.arrays import SYMMETRY_DEFECT, Array, IntArray, frozen, require_finite, require_shape
-from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.units import Units
 
 __all__ = ["SPIN_PAIRS", "UNIT_LOADS", "GeometricStiffness", "RotatedLoads", "SpreadLoads", "stiffness_of_loads"]

@@ -18,10 +18,9 @@ import numpy as np
 from cms.body.geometric_stiffness import SPIN_PAIRS
 from cms.errors import BodyError
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, require_finite, require_shape
-from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.units import Dimensions, Units, unit_words
 from fe_models.foundation.words import nearest, quoted
 

@@ -14,11 +14,10 @@ from cms.body.stress import PointStress
 from cms.errors import BodyError
 from fe_models.body.load_cases import ReducedLoadCase
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, require_finite, require_shape
-from fe_models.foundation.copies import FrozenMapping, frozen_copies
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import Summary, listed, presented
+from fe_models.foundation.records import FrozenMapping, checked_fields, frozen_copies
 from fe_models.foundation.tall.on_disk import row_slices
-from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.numbering import NONE, Numbering

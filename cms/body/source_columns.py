@@ -6,7 +6,7 @@ import numpy as np
 
 from cms.errors import BodyError
 from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
-from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.records import frozen_copies
 
 __all__ = ["SourceColumns", "source_columns"]
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
-from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.records import frozen_copies
 
 __all__ = ["PointStress", "stress_of", "von_mises", "von_mises_of"]
 

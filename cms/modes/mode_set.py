@@ -20,8 +20,8 @@ from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, frozen
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.ranks.spread_columns import spread_beside
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.tall.columns import are_finite, beside, frozen_columns
-from fe_models.foundation.typed_inputs import checked_fields
 
 __all__ = [
     "Block", "ModeSet", "boundary_block", "checked_modes", "constraint_block", "mode_set", "require_interfaces",

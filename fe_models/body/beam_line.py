@@ -9,7 +9,7 @@ from numpy.polynomial import Polynomial
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ArgumentError, BodyError
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 
 __all__ = ["BeamLine", "Law"]
 

@@ -25,9 +25,9 @@ from fe_models.foundation.presentation import Summary, listed, presented
 from fe_models.foundation.ranks.row_layout import RowLayout
 from fe_models.foundation.ranks.spread_columns import spread_parts
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.tall.columns import elsewhere, in_memory
 from fe_models.foundation.tall.on_disk import is_on_disk, release, row_slices, zeros_like
-from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.numbering import Numbering

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
-from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.errors import ArgumentError, BodyError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 
 __all__ = ["LOAD_CASE_KINDS", "LoadCase", "ReducedLoadCase", "check_load_cases", "load_columns"]
 

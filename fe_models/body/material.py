@@ -9,7 +9,7 @@ import numpy as np
 from fe_models.errors import MaterialError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import ArgumentError
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.mesh import Mesh
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from fe_models.errors import MeshError
 from fe_models.foundation.errors import ArgumentError
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 
 __all__ = ["Finding", "Report"]
 

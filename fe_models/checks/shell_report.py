@@ -16,7 +16,7 @@ from fe_models.elements.shells.quality import WARP_LIMIT, cell_quality
 from fe_models.elements.shells.skin import cell_edges
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.units import Units
 from fe_models.meshes.objects.as_mesh import as_shell_mesh
 from fe_models.meshes.shell_mesh import ShellMesh

@@ -8,10 +8,9 @@ from numpy.typing import ArrayLike
 
 from fe_models.errors import BeamError
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
-from fe_models.foundation.copies import FrozenMapping, frozen_copies
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import FrozenMapping, checked_fields, frozen_copies
 
 __all__ = ["LineMesh", "divide_lines", "straight_line"]
 

@@ -6,10 +6,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
-from fe_models.foundation.copies import FrozenMapping, frozen_copies
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import FrozenMapping, checked_fields, frozen_copies
 
 __all__ = ["FACE_TYPES", "SOLID_TYPES", "Mesh", "drop_unused_nodes", "used_nodes"]
 

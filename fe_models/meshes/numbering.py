@@ -12,10 +12,9 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray, frozen_int
-from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.errors import ArgumentError, BodyError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["NONE", "NO_NUMBERS", "NamedSet", "Numbering", "node_place", "numbering_side_by_side"]

@@ -10,7 +10,7 @@ from fe_models.errors import InterfaceError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import nearest
 from fe_models.meshes.boundary import CORNERS, boundary_facets, boundary_nodes, first_of_equal_rows
 from fe_models.meshes.line_mesh import LineMesh

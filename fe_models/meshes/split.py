@@ -16,7 +16,7 @@ from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.meshes.boundary import area_centroid, boundary_facets
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.mesh import Mesh, drop_unused_nodes

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from floatframe.engine.compiling.callbacks import raise_errors_of
 from floatframe.engine.compiling.callbacks.law_functions import called_law
 from floatframe.engine.compiling.callbacks.law_slopes import difference_slopes

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from floatframe.analyses.led_equilibrium import LARGEST, Balance, LoadPathEnd, is_left_by_none, led_equilibrium
 from floatframe.analyses.observed_state import observed_state
 from floatframe.analyses.relative.tree_flow import tree_flow

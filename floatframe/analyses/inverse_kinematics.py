@@ -21,7 +21,7 @@ from scipy.optimize import nnls
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.driven.driven_motion import rigid_columns
 from floatframe.engine.compiling.file_frames import state_of_file

@@ -5,7 +5,7 @@ Evaluated in `floatframe.engine.structure_preserving.kernels.steps`.
 
 from dataclasses import dataclass
 
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from floatframe.engine.structure_preserving.kernels.records import CONSERVING
 from floatframe.errors import ModelError
 from floatframe.integrators.discrete_run import DiscreteScheme, check_options

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import nearest
 from floatframe.engine.compiling.callbacks import raise_errors_of
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen
-from fe_models.foundation.copies import FrozenMapping, frozen_copies
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import FrozenMapping, checked_fields, frozen_copies
 from floatframe.errors import ModelError
 
 __all__ = ["State"]

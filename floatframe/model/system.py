@@ -3,11 +3,10 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
-from typing import Any, Protocol, TypeVar, cast
+from typing import Annotated, Any, Protocol, TypeVar, cast
 
-from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.presentation import Summary, listed, presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import Takes, checked_fields, frozen_copies
 from fe_models.foundation.units import Quantity, Units, unit_system
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
@@ -124,7 +123,7 @@ class System:
     """
 
     bodies: Sequence[Body]
-    joints: Sequence[Joint] = ()
+    joints: Annotated[Sequence[Joint], Takes(Sequence[Joint | CoordinateCoupler])] = ()
     forces: Sequence[Force] = ()
     units: Units = field(default_factory=lambda: unit_system("m-kg-s"))
     name: str = "system"

@@ -7,7 +7,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.engine.compiling.callbacks import raise_errors_of
 from floatframe.engine.compiling.callbacks.law_functions import called_law, law_callbacks

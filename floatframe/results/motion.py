@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError, ResultsError
 from floatframe.model.bodies.flexible_body import FlexibleBody

@@ -12,9 +12,9 @@ import h5py
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.hdf5_file import as_attribute, opened, own_items, require_digest
 from fe_models.foundation.paths import near_file
+from fe_models.foundation.records import frozen_copies
 from fe_models.foundation.seal import Kind, altered, check_seal, newer
 from fe_models.foundation.words import quoted
 from floatframe.engine.kernels.memory import N_DRIFTS

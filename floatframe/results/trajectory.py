@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.presentation import Summary, presented, text_of
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError, ResultsError

@@ -12,7 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ModelError

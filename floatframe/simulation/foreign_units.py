@@ -3,8 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from fe_models.foundation.copies import FrozenMapping, frozen_copies
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import FrozenMapping, checked_fields, frozen_copies
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import number
 

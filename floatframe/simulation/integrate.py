@@ -20,8 +20,8 @@ from typing import Any
 
 import numpy as np
 
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.tasks.interrupts import heeded_interrupts
-from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest
 from floatframe.engine.compiling.callbacks import raise_errors_of
 from floatframe.engine.compiling.file_frames import rows_of_file

@@ -5,6 +5,7 @@ motions. Schemes that are absolute alone stay as they are, and so do what a test
 """
 
 import functools
+import inspect
 from pathlib import Path
 
 import pytest
@@ -74,7 +75,7 @@ def take_relative() -> None:
     from floatframe.integrators.generalized_alpha import GeneralizedAlpha
 
     for function in (linearize, static_equilibrium, steady_rotation):
-        function.__kwdefaults__["formulation"] = "relative"
+        inspect.unwrap(function).__kwdefaults__["formulation"] = "relative"
     given = integration.in_formulation
 
     @functools.wraps(given)

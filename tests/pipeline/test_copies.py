@@ -13,8 +13,8 @@ from numpy.testing import assert_array_equal
 import cms
 import fe_models
 import floatframe
-from fe_models.foundation.copies import FrozenMapping
 from fe_models.foundation.errors import ReportedError
+from fe_models.foundation.records import FrozenMapping
 from floatframe import GROUND, ConvergenceError, FlexibleBody, GeneralizedAlpha, RevoluteJoint, System, integrate
 from floatframe.components.mechanisms import slider_crank
 from tests.bodies import box_mesh

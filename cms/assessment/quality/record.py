@@ -15,7 +15,7 @@ from cms.assessment.quality.errors import QualityError
 from cms.assessment.quality.limits import LIMITS
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["VERDICTS", "QualityRecord", "Verdict", "has_failed", "information", "judge", "plain", "worst"]

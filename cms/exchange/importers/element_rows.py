@@ -13,7 +13,7 @@ import numpy as np
 from cms.errors import ForeignBodyError
 from cms.reduction.recovery.blocks import RowName
 from fe_models.foundation.arrays import Array, IntArray, frozen
-from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.records import frozen_copies
 from fe_models.foundation.units import Dimensions
 
 __all__ = ["ForeignRows", "force_rows", "motion_rows", "stress_rows"]

@@ -18,7 +18,7 @@ from fe_models.files.matrices.given import ScalarMassModel, scalar_mass_of
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.units import Units
 from fe_models.meshes.mesh import Mesh
 

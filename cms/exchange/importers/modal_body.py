@@ -23,7 +23,7 @@ from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.load_cases import ReducedLoadCase
 from fe_models.checks.unit_check import implausible_motion
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
-from fe_models.foundation.copies import FrozenMapping, frozen_copies
+from fe_models.foundation.records import FrozenMapping, frozen_copies
 from fe_models.meshes.numbering import Numbering
 
 __all__ = ["ForeignInterface", "ModalBody", "body_of_modes"]

@@ -9,7 +9,7 @@ from cms.errors import ForeignBodyError
 from cms.exchange.importers.element_rows import ForeignRows
 from fe_models.files.matrices.foreign_matrices import SCALAR, ForeignMatrices, pair_keys
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
-from fe_models.foundation.copies import FrozenMapping, frozen_copies
+from fe_models.foundation.records import FrozenMapping, frozen_copies
 
 __all__ = ["RecoveryRows", "Superelement", "superelement_of_matrices"]
 

@@ -11,8 +11,8 @@ from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
 from fe_models.foundation.errors import ArgumentError
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.tall.columns import of_this_process
-from fe_models.foundation.typed_inputs import checked_fields
 
 __all__ = ["InterfaceLoad", "boundary_load", "condensed_load", "point_load"]
 

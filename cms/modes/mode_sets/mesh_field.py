@@ -9,7 +9,7 @@ from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 
 __all__ = ["CoupledField", "coupled_field"]
 

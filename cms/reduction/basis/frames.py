@@ -19,8 +19,8 @@ from cms.reduction.basis.node_motion import node_weights, weighted_rigid_modes
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, IntArray
 from fe_models.foundation.errors import ArgumentError
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.tall.columns import inner, rows_times
-from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.numbering import Numbering
 

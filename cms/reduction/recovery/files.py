@@ -26,8 +26,8 @@ from fe_models.files.nastran_matrices.write_op4 import op4_parts
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.paths import replace_files
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.seal import reason
-from fe_models.foundation.typed_inputs import checked_fields
 from fe_models.foundation.units import Dimensions, Units, unit_text
 from fe_models.foundation.words import nearest, quoted
 

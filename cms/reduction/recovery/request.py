@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from cms.errors import RecoveryError
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.units import Dimensions
 from fe_models.foundation.words import nearest, quoted
 

@@ -9,7 +9,7 @@ from fe_models.elements.beams.slices import Slices, second_moments
 from fe_models.errors import BeamError
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, tilde
 from fe_models.foundation.errors import ArgumentError
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 
 __all__ = ["PointMass", "RigidLink", "Spring"]
 

@@ -11,7 +11,7 @@ from fe_models.elements.beams.sections import Section
 from fe_models.errors import SectionError
 from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.errors import ArgumentError
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.line_mesh import LineMesh
 

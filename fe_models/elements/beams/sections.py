@@ -16,7 +16,7 @@ from fe_models.elements.beams.torsion import rectangle_torsion_constant, rectang
 from fe_models.errors import SectionError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import ArgumentError
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 
 __all__ = [
     "SECTIONS",

@@ -9,7 +9,7 @@ from fe_models.body.material import AnisotropicMaterial, AnyMaterial, Material, 
 from fe_models.errors import ShellError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import ArgumentError
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.shell_mesh import ShellMesh
 

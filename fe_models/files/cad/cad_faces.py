@@ -7,7 +7,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ArgumentError
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 
 __all__ = ["FACE_KINDS", "CadFace", "cad_faces"]
 

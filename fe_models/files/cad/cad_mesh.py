@@ -15,7 +15,7 @@ from fe_models.files.cad.face_selectors import chosen_faces
 from fe_models.files.cad.gmsh_model import gmsh_call
 from fe_models.files.gmsh import read_gmsh
 from fe_models.foundation.errors import ArgumentError
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.units import Units
 from fe_models.meshes.cells.raw_mesh import mesh_from_raw
 from fe_models.meshes.mesh import Mesh

@@ -17,7 +17,7 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest, quoted
 

@@ -15,7 +15,7 @@ from typing import Any
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from floatframe.analyses.driven.driven_motion import Elasticity, quasi_static_bodies
 from floatframe.analyses.driven.kinematics import kinematics
 from floatframe.errors import ModelError

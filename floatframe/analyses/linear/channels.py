@@ -7,7 +7,7 @@ from typing import Any, Protocol, cast
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.linear.force_inputs import ForceInput, force_input_unit
 from floatframe.analyses.linear.inputs import BaseMotion, DriveMotion, ParameterInput

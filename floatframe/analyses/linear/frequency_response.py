@@ -6,7 +6,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from floatframe.analyses.linear.linearization import LinearSystem
 from floatframe.analyses.linear.system_modes import system_modes
 from floatframe.errors import ModelError

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.linear.force_inputs import ForceInput, force_column, forces_of_amplitude

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from floatframe.analyses.equilibrium import Equilibrium, static_equilibrium
 from floatframe.analyses.linear.channels import (
     AnyInput,

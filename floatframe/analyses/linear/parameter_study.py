@@ -10,7 +10,7 @@ from scipy.optimize import linear_sum_assignment
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from floatframe.analyses.equilibrium import Equilibrium, steady_rotation
 from floatframe.analyses.linear.channels import AnyOutput, outputs_of
 from floatframe.analyses.linear.linearization import LinearSystem, linearize

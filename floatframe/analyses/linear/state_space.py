@@ -19,7 +19,7 @@ from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.extras import extra_module
 from fe_models.foundation.paths import replace_file
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from floatframe.analyses.linear.linearization import LinearSystem, NamedMotions
 from floatframe.analyses.system_matrices import settled
 from floatframe.errors import ModelError

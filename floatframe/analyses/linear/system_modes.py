@@ -7,7 +7,7 @@ import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import Summary, presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from floatframe.analyses.linear.linearization import LinearSystem
 from floatframe.analyses.system_matrices import ROUNDING
 from floatframe.errors import ModelError

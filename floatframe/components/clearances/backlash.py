@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from numba import njit
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.units import SPEED, Quantity
 from floatframe.components.clearances.contact import (
     NUMBERS,

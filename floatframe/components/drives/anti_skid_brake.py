@@ -7,8 +7,7 @@ from numba import njit
 from numba.extending import register_jitable
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.units import RATE, TIME, Quantity
 from floatframe.components.drives.shaft import check_shaft, required, time_functions
 from floatframe.errors import ModelError

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba.extending import register_jitable
 
-from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.words import nearest
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import number

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from numba import njit
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.components.drives.pid import Pid, pid_law
 from floatframe.components.drives.shaft import Z_AXIS, check_controller, check_shaft, required, time_functions
 from floatframe.errors import ModelError

@@ -6,7 +6,7 @@ from typing import Protocol
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.words import nearest, quoted
 from floatframe.components.hydraulics.circuit_law import (
     ACCUMULATOR,

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.units import SPEED, Quantity
 from floatframe.components.hydraulics.fluid import Fluid
 from floatframe.errors import ModelError

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.records import frozen_copies
 from floatframe.components.rails.profile import Profile
 from floatframe.components.rails.standard_profiles import GAUGE_DEPTH, inclined, rail_60e1, rotated_rail, wheel_s1002
 from floatframe.errors import ModelError

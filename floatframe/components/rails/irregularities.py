@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.records import frozen_copies
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import number
 

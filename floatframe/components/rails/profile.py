@@ -13,7 +13,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline, make_smoothing_spline
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.records import frozen_copies
 from floatframe.errors import ModelError
 
 __all__ = ["Profile", "profile_of_points"]

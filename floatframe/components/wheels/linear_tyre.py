@@ -8,8 +8,7 @@ import numpy as np
 from numba import njit
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.units import SPEED, TIME, Quantity
 from floatframe.components.wheels.contact import (
     COMMON,

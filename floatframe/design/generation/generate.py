@@ -10,7 +10,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.paths import replace_files
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import quoted
 from floatframe.design.generation.graph import Operations
 from floatframe.design.generation.joint_forces import model_terms

@@ -20,7 +20,7 @@ import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from floatframe.design.identification.base_parameters import (
     BaseParameters,
     base_parameters,

@@ -21,7 +21,7 @@ import scipy.linalg as la
 from scipy.optimize import LinearConstraint, minimize
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.design.identification.base_parameters import (
     BaseParameters,

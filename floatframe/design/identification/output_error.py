@@ -29,7 +29,7 @@ import scipy.linalg as la
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.design.gradients.outputs import columns_of, wanted_of
 from floatframe.errors import FloatframeError, ModelError

@@ -6,7 +6,7 @@ import numpy as np
 
 from fe_models.body.fe_body import FEBody
 from fe_models.elements.beams.model import BeamModel
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from floatframe.components.flexible_parts.exact_beams import exact_beams
 from floatframe.design.laboratory.substitution import with_part
 from floatframe.errors import ModelError

@@ -12,7 +12,7 @@ import numpy as np
 from cms.modes.mode_set import ModeSet
 from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.foundation.arrays import MOTION_COMPONENTS
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from floatframe.errors import ModelError
 
 __all__ = ["MOST_DOFS", "FullModel", "all_dofs"]

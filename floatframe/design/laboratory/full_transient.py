@@ -33,7 +33,7 @@ from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.body.rigid_motion import MassLoads
 from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from floatframe.errors import ModelError
 
 __all__ = ["FrameAcceleration", "FullTransient", "full_transient"]

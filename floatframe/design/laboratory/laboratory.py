@@ -33,8 +33,8 @@ from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.presentation import presented
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.stages import Stages
-from fe_models.foundation.typed_inputs import checked_fields
 from floatframe.design.laboratory.cases import Case
 from floatframe.design.laboratory.exact_beam import ExactBeam, with_exact_beams
 from floatframe.design.laboratory.full_model import FullModel, all_dofs

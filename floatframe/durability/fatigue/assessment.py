@@ -12,7 +12,7 @@ from cms.body.modal_file.file import digest, read
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.durability.fatigue.criteria import Criterion
 from floatframe.durability.fatigue.fatigue_file import (

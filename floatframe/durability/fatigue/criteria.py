@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.durability.fatigue.planes import normal_rows, shear_pairs, tensor_rows
 from floatframe.errors import FatigueError, ModelError

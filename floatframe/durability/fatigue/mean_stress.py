@@ -19,7 +19,7 @@ Goodman, Soderberg, Morrow and Gerber take a mean in compression as none unless 
 import math
 from dataclasses import dataclass
 
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import FatigueError, ModelError
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.meshes.numbering import NONE
 from floatframe.durability.fatigue.criteria import Criterion
 from floatframe.durability.fatigue.mean_stress import NO_CORRECTION, MeanStress

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen
-from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import FatigueError, ModelError
 
 __all__ = ["BELOW", "LEAST_CYCLES", "SNCurve", "basquin_curve", "normal_quantile", "table_curve"]

@@ -11,9 +11,8 @@ import numpy as np
 
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
-from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.meshes.numbering import NONE
 from floatframe.durability.fatigue.criteria import Criterion
 from floatframe.durability.fatigue.history_damage import RESIDUES, Counted, Progress, count_histories

@@ -8,7 +8,7 @@ import numpy as np
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from floatframe.durability.shaking.loads.inputs import band_notes
 from floatframe.durability.shaking.loads.notching import DEEPEST, Limit, NotchedRun, notched_random, notched_sine
 from floatframe.durability.shaking.loads.random_vibration import RandomRun, RandomTest, random_runs

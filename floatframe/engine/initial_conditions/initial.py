@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from floatframe.engine.compiling.callbacks import raise_errors_of
 from floatframe.engine.compiling.file_frames import motion_of_file, state_of_engine
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system

@@ -16,7 +16,7 @@ import numpy as np
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from floatframe.engine.compiling.stiffening import stiffened_shape_moments
 from floatframe.errors import ModelError
 from floatframe.model.bodies.flexible_body import FlexibleBody

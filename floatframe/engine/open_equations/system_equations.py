@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from floatframe.engine.compiling.callbacks import raise_errors_of
 from floatframe.engine.compiling.file_frames import state_of_engine, state_of_file
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system

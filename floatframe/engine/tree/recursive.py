@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import quoted
 from floatframe.engine.compiling.file_frames import state_of_engine, state_of_file
 from floatframe.engine.compiling.markers import find_marker

@@ -11,9 +11,8 @@ from functools import cached_property
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.words import nearest, quoted, shortened
 from floatframe.errors import ModelError, UrdfError
 from floatframe.model.checked_values import array_of_shape, number, unit_vector

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray, frozen
-from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.records import frozen_copies
 from floatframe.errors import SignalError
 from floatframe.files.signals.signals import Signal
 from floatframe.files.signals.spectra import window_corrections, window_samples

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen
-from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.records import frozen_copies
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import SignalError
 from floatframe.files.signals.signal_units import per_hertz

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array, frozen
-from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.records import frozen_copies
 from floatframe.errors import SignalError
 from floatframe.files.signals.spectra import (
     AVERAGES,

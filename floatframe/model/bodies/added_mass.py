@@ -18,8 +18,7 @@ import numpy as np
 from cms.body.geometric_stiffness import SPIN_PAIRS, GeometricStiffness
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import array_of_shape, number

@@ -8,9 +8,8 @@ import numpy as np
 
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
 from floatframe.model.bodies.mean_axes import MeanAxes, mean_axes
 from floatframe.model.bodies.rigid_body import euler_parameters_from_user

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from floatframe.errors import ModelError
 
 __all__ = ["GROUND", "Ground"]

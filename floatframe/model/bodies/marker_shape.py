@@ -27,7 +27,7 @@ from cms.body.reduced_body import ReducedBody
 from cms.reduction.basis.node_motion import are_spread
 from fe_models.body.couplings.couplings import mean_motion
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.records import frozen_copies
 from floatframe.model.rotations import cross, left_jacobian, rotated, rotation_exp, spin_rate, tilde
 
 __all__ = [

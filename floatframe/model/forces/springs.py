@@ -6,8 +6,7 @@ Evaluated in `floatframe.engine.kernels.connections.spring_damper`,
 
 from dataclasses import dataclass, field
 
-from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.units import SPEED, Quantity
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker

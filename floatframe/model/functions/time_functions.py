@@ -10,8 +10,7 @@ from math import factorial, perm
 import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen
-from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import number
 

@@ -6,8 +6,7 @@ Evaluated in `floatframe.engine.kernels.connections.coupler`.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
 from floatframe.model.bodies.coordinates import Coordinate, coordinate_words
 from floatframe.model.checked_values import number

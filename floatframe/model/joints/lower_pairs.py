@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.units import LENGTH, Quantity
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Place

@@ -9,9 +9,8 @@ import numpy as np
 from cms.body.recovery_table import RecoveryTable
 from cms.errors import BodyError
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.words import nearest, quoted
 from floatframe.engine.compiling.interface_loads import Load, amplitudes, in_body, interface_number, loads_on_interfaces
 from floatframe.engine.compiling.markers import MarkerData, find_marker

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.words import nearest, quoted
 from floatframe.engine.compiling.markers import MarkerData, find_marker, joint_markers
 from floatframe.engine.compiling.pair_forces import bushing_markers

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.copies import FrozenMapping, frozen_copies
+from fe_models.foundation.records import FrozenMapping, frozen_copies
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ResultsError

@@ -12,8 +12,7 @@ from cms.body.address import Address, FoundNodes
 from cms.errors import BodyError
 from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.engine.compiling.counted_angles import CountedAngle, angle_of
 from floatframe.engine.compiling.markers import MarkerData, find_body, find_marker
 from floatframe.errors import ModelError

@@ -10,8 +10,7 @@ from cms.body.stress import stress_of, von_mises
 from cms.errors import BodyError
 from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.foundation.arrays import STRESS_COMPONENTS, Array
-from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.model.bodies.flexible_body import FlexibleBody

@@ -52,12 +52,12 @@ def read_bends(model: NastranModel) -> None:
     (5) each half of the arc is a rigid piece of its end
     """
     for card in model.of("CBEND"):
-        why = _bend(model, card)
+        why = _curved_beam(model, card)
         if why:
             model.ledger.refuse("CBEND", why)
 
 
-def _bend(model: NastranModel, card: Card) -> str:
+def _curved_beam(model: NastranModel, card: Card) -> str:
     """Add a curved beam; the text says why it cannot be taken."""
     known = model.property_of(card, "PBEND")
     if known is None:

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.components.wheels.roads.surface import CENTRE, CUBIC, FLAT, GRID, GRIP, road_height
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import array_of_shape, number

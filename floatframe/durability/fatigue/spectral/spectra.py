@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array, frozen
-from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import FatigueError, ModelError
 
 __all__ = ["ORDERS", "ModalSpectra", "modal_moments", "spectra_of_history"]

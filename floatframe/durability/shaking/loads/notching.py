@@ -22,7 +22,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.durability.shaking.loads.levels import OF_OUTPUT, Level, in_model
 from floatframe.durability.shaking.loads.random_vibration import RandomRun

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from floatframe.durability.shaking.loads.inputs import input_index
 from floatframe.durability.shaking.loads.pulses import Synthesis
 from floatframe.durability.shaking.loads.uncertainty import Uncertainty

@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from floatframe.durability.shaking.loads.inputs import input_index, require_damped
 from floatframe.durability.shaking.loads.levels import Level, in_model
 from floatframe.durability.shaking.loads.uncertainty import Uncertainty

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.typed_inputs import checked_fields
+from fe_models.foundation.records import checked_fields
 from floatframe.errors import ModelError
 
 __all__ = ["Uncertainty"]

@@ -1,24 +1,89 @@
-"""What public functions and classes are given, checked against their annotations where it enters.
+"""Public objects and functions: what they are given is checked where it enters, and copies of objects are frozen too.
 
-A class that has a name for each of its objects offers `of_name(text)`, and is taken by that name too.
+Annotations say what is expected; a class that has a name for each of its objects offers `of_name(text)`, and is taken
+by that name too. NumPy makes writable copies of read-only arrays, and a mapping proxy cannot be pickled at all.
 """
 
 import inspect
 import sys
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from dataclasses import fields
 from functools import cache, wraps
 from types import GenericAlias, NoneType, UnionType
-from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
+import scipy.sparse as sp
 from typing_extensions import get_protocol_members, is_protocol
 
+from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["MismatchError", "at_door", "checked_fields", "conformed"]
+__all__ = ["FrozenMapping", "MismatchError", "Takes", "at_door", "checked_fields", "conformed", "frozen_copies"]
+
+MOST_KINDS = 3  #: named in a message
 
 Class = TypeVar("Class", bound=type)
+Key = TypeVar("Key")
+Item = TypeVar("Item")
 Result = TypeVar("Result")
+
+
+# frozen copies --------------------------------------------------------------------------------------------------------
+
+
+class FrozenMapping(dict[Key, Item]):
+    """An immutable mapping whose copies are immutable too."""
+
+    def _refuse(self, *_: Any, **__: Any) -> Any:
+        raise TypeError("this mapping cannot be changed; make a dict of it")
+
+    __setitem__ = __delitem__ = __ior__ = clear = pop = popitem = setdefault = update = _refuse
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return restored_mapping, (dict(self),)
+
+
+def restored_mapping(items: dict[Any, Any]) -> "FrozenMapping[Any, Any]":
+    """Return the mapping from its pickled items, with read-only arrays."""
+    return FrozenMapping({key: read_only(value) for key, value in items.items()})
+
+
+def frozen_copies(kind: Class) -> Class:
+    """Decorate a frozen data class: copies hold only its fields, without cached values, and arrays are read-only."""
+
+    def state(self: Any) -> dict[str, Any]:
+        return {part.name: getattr(self, part.name) for part in fields(self)}
+
+    def restore(self: Any, values: dict[str, Any]) -> None:
+        for name, value in values.items():
+            object.__setattr__(self, name, read_only(value))
+
+    kind.__getstate__ = state  # type: ignore[method-assign, assignment]
+    kind.__setstate__ = restore  # type: ignore[attr-defined]
+    return kind
+
+
+def read_only(value: Any) -> Any:
+    """Return the value with read-only arrays, also in tuples and sparse matrices."""
+    if isinstance(value, np.ndarray):
+        value.flags.writeable = False
+    elif isinstance(value, tuple):
+        for each in value:
+            read_only(each)
+    elif sp.issparse(value):
+        for name in ("data", "indices", "indptr"):
+            read_only(getattr(value, name, None))
+    return value
+
+
+# checked inputs -------------------------------------------------------------------------------------------------------
+
+
+class Takes(NamedTuple):
+    """What a field takes, if that is more than what it holds afterwards: `Annotated[held, Takes(taken)]`."""
+
+    hint: Any
 
 
 class MismatchError(Exception):
@@ -47,6 +112,9 @@ def conformed(hint: Any, value: Any) -> Any:
             return _first_conformed(hint.__constraints__, value)
         hint = hint.__bound__ or Any
     origin = get_origin(hint)
+    if origin is Annotated:
+        held, *extras = get_args(hint)
+        return conformed(next((extra.hint for extra in extras if isinstance(extra, Takes)), held), value)
     if origin in (Union, UnionType):
         return _first_conformed(get_args(hint), value)
     if origin is Literal:
@@ -79,6 +147,8 @@ def conformed(hint: Any, value: Any) -> Any:
 def _first_conformed(hints: Sequence[Any], value: Any) -> Any:
     """Return the value for the first of some annotations that takes it as it is, else for the first that takes it."""
     found, expected = [], []
+    if any("numpy._typing" in f"{getattr(hint, '__module__', '')} {hint}" for hint in hints):  # all that makes an array
+        return _of_class(np.ndarray, value) if value is not None or NoneType not in hints else None
     for hint in hints:
         try:
             found.append(conformed(hint, value))
@@ -89,7 +159,9 @@ def _first_conformed(hints: Sequence[Any], value: Any) -> Any:
                 return value
     if found:
         return found[0]
-    raise MismatchError(" or ".join(dict.fromkeys(words for words in expected if words != "None")) or "None")
+    kinds = list(dict.fromkeys(words for words in expected if words != "None")) or ["None"]
+    more = f" or one of {len(kinds) - MOST_KINDS} other kinds" if len(kinds) > MOST_KINDS else ""
+    raise MismatchError(" or ".join(kinds[:MOST_KINDS]) + more)
 
 
 def _called(value: Any) -> Any:
@@ -156,7 +228,7 @@ def words_of(hint: type) -> str:
 @cache
 def hints_of(subject: Hashable) -> dict[str, Any]:
     """Return the resolved annotations of a function or data class."""
-    return get_type_hints(subject)
+    return get_type_hints(subject, include_extras=True)
 
 
 def conformed_inputs(where: str, hints: Mapping[str, Any], given: Mapping[str, Any], error: type[Exception]) -> Any:
@@ -190,9 +262,12 @@ def checked_fields(error: type[Exception]) -> Callable[[Class], Class]:
         def check(self: Any) -> None:
             name = getattr(self, "name", None)
             where = f"{kind.__name__} {name!r}" if isinstance(name, str) else type(self).__name__
-            for changed, value in conformed_inputs(
-                where, hints_of(cast(Hashable, type(self))), vars(self), error
-            ).items():
+            try:
+                inputs = conformed_inputs(where, hints_of(cast(Hashable, type(self))), vars(self), error)
+            except error:
+                refused_by(own, self)
+                raise
+            for changed, value in inputs.items():
                 object.__setattr__(self, changed, value)
             if own is not None:
                 own(self)
@@ -201,6 +276,17 @@ def checked_fields(error: type[Exception]) -> Callable[[Class], Class]:
         return kind
 
     return decorate
+
+
+def refused_by(own: Callable[[Any], None] | None, subject: Any) -> None:
+    """Let a class refuse an object in its own words, if it does; they say more than the annotation."""
+    if own is None:
+        return
+    try:
+        own(subject)
+    except Exception as failure:
+        if isinstance(failure, ReportedError):
+            raise  # any other: it was not made for a value of this kind
 
 
 def checked_function(function: Callable[..., Result], module: str, error: type[Exception]) -> Callable[..., Result]:
