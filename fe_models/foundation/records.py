@@ -241,7 +241,8 @@ def conformed_inputs(where: str, hints: Mapping[str, Any], given: Mapping[str, A
             found = conformed(hints[name], value)
         except MismatchError as mismatch:
             got = f"the class {value.__name__} itself" if isinstance(value, type) else quoted(value)
-            raise error(f"{where}: {name}: expected {mismatch}, got {got}") from None
+            given_words = "" if "one is" in str(mismatch) else f", got {got}"
+            raise error(f"{where}: {name}: expected {mismatch}{given_words}") from None
         if found is not value:
             changed[name] = found
     return changed

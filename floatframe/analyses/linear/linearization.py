@@ -18,7 +18,7 @@ follow the motions in z. Their equations are of first order, with ones in C and 
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import scipy.linalg as la
@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.records import checked_fields
+from fe_models.foundation.records import Takes, checked_fields
 from floatframe.analyses.equilibrium import Equilibrium, static_equilibrium
 from floatframe.analyses.linear.channels import (
     AnyInput,
@@ -58,7 +58,7 @@ from floatframe.engine.tree.formulation import is_relative
 from floatframe.errors import ModelError
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.forces import UserForce
-from floatframe.model.system import System
+from floatframe.model.system import Named, System
 from floatframe.results.sensors.measurement import unit_words
 from floatframe.results.small_motions.joint_rates import coordinate_rows
 from floatframe.results.small_motions.rows import Rows, joined
@@ -367,7 +367,7 @@ def linearize(
     system: System,
     about: Equilibrium | None = None,
     *,
-    inputs: Sequence[AnyInput] | None = None,
+    inputs: Annotated[Sequence[AnyInput] | None, Takes(Sequence[Named] | None)] = None,
     outputs: Sequence[AnyOutput] | None = None,
     formulation: str = "absolute",
 ) -> LinearSystem:

@@ -68,7 +68,7 @@ def test_a_body_that_keeps_level_glides_as_scipy_says_while_its_lift_fades():
         ({"lift_slope": -1.0}, "lift_slope"),
         ({"most_lift": 0.0}, "most_lift"),
         ({"wind": [1.0]}, "wind"),
-        ({"marker": "wing"}, "marker: expected a Marker"),
+        ({"marker": 3}, "marker: expected a Marker"),
     ],
 )
 def test_numbers_out_of_their_range_are_refused(changes, message):

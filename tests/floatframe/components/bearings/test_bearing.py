@@ -171,7 +171,7 @@ def test_a_system_file_names_it(tmp_path):
         ({"stiffness": 0.0}, "other than zero, got none"),
         ({"axial_stiffness": -1.0}, "axial_stiffness: expected"),
         ({"axis": (1, 0, 0), "x_axis": (2, 0, 0)}, "not parallel to the axis, got a parallel one"),
-        ({"marker_b": "rotor"}, "marker_b: expected a Marker"),
+        ({"marker_b": 3}, "marker_b: expected a Marker"),
     ],
 )
 def test_what_does_not_fit_is_refused(numbers, words):

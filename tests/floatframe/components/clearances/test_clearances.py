@@ -150,7 +150,7 @@ def test_tangent_is_exact_and_the_law_is_right(kind):
         ({"exponent": 0.5}, "exponent"),
         ({"length": -1.0}, "length"),
         ({"axis": (0, 0, 0)}, "zero vector"),
-        ({"marker_b": "block"}, "expected a Marker"),
+        ({"marker_b": 3}, "expected a Marker"),
     ],
 )
 def test_wrong_numbers_are_refused(options, words):
