@@ -17,7 +17,6 @@ from cms.exchange.import_body import FORMATS as REDUCED
 from fe_models.files.formats import FORMATS as MODELS
 from fe_models.foundation.formats import FileFormat
 from fe_models.foundation.units import UNIT_SYSTEMS
-from fe_models.foundation.words import nearest, quoted
 
 if TYPE_CHECKING:
     from cms.body.reduced_body import ReducedBody
@@ -109,11 +108,11 @@ def run_export(request: ExportRequest) -> None:
     CmsError
         If the format or the units are unknown or missing, the body does not fit, or the files cannot be written.
     """
-    from cms.exchange.export import WRITERS, export_body
+    from cms.exchange.export import WRITERS, export_body, unknown_format
     from cms.exchange.exporters.formats import FORMATS
 
     if request.to not in WRITERS:
-        raise ExportError(f"--to {quoted(request.to)}: unknown format{nearest(request.to, WRITERS)}")
+        raise ExportError(f"--to: {unknown_format(request.to)}")
     suffix = next(known.suffixes[0] for known in FORMATS if known.key == request.to and known.writes)
     default = request.file.with_name(f"{request.file.stem}_{request.to}{suffix}")
     path = output_path(request.output, default, ExportError, overwrite_of=(request.file,))

@@ -90,6 +90,22 @@ class Exported:
     units: Units  #: of the numbers in the files
 
 
+#: formats that are not documented, by their names and those of their programs (docs/formats.md)
+UNDOCUMENTED = {"mnf": "Adams", "adams": "Adams", "fbi": "Simpack", "simpack": "Simpack"}
+
+
+def unknown_format(name: str) -> str:
+    """Return what a message says of a format that is not written here."""
+    program = UNDOCUMENTED.get(name.lower())
+    if program is None:
+        return f"unknown format {quoted(name)}{nearest(name, WRITERS)}"
+    near = "nastran-dmig" if program == "Adams" else "sid_fem"
+    return (
+        f"{quoted(name)}: the file of {program} is not documented, so it is not written; "
+        f'{near} may serve, see "Adams and Simpack" in docs/formats.md'
+    )
+
+
 def export_body(
     body: ReducedBody | str | os.PathLike[str],
     path: str | os.PathLike[str],
@@ -132,7 +148,7 @@ def export_body(
         If the unit system is unknown.
     """
     if to not in WRITERS:
-        raise ExportError(f"export: unknown format {quoted(to)}{nearest(to, WRITERS)}")
+        raise ExportError(f"export: {unknown_format(to)}")
     writer = WRITERS[to]
     source = "" if isinstance(body, ReducedBody) else f"{Path(body).name}, digest {digest(body)}"
     body = body if isinstance(body, ReducedBody) else read(body)

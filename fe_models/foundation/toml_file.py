@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, TypeVar, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, ValidationInfo
@@ -256,11 +257,23 @@ class Enumeration:
         return {"type": "string", "enum": list(self.choices())}
 
 
-def choice(what: str, choices: Callable[[], Sequence[str]]) -> Any:
-    """Return the type of a string that must be one of the choices; the message suggests the nearest choice."""
+def choice(what: str, choices: Callable[[], Sequence[str]], elsewhere: Mapping[str, str] = MappingProxyType({})) -> Any:
+    """Return the type of a string that must be one of the choices; the message suggests the nearest choice.
+
+    Parameters
+    ----------
+    what
+        What is chosen, for the message.
+    choices
+        Returns the choices.
+    elsewhere
+        Choices by the names that other programs give them.
+    """
 
     def check(value: Any) -> Any:
         names = choices()
+        if value in elsewhere:
+            raise ValueError(f'unknown {what}; it is called "{elsewhere[value]}" here')
         if value not in names:
             raise ValueError(f"unknown {what}{nearest(str(value), names)}")
         return value

@@ -44,10 +44,19 @@ KEYS_OF_JOINTS = {
 }
 
 
+#: joints by the names that other programs give them
+ELSEWHERE = {
+    "hinge": "revolute", "pin": "revolute", "continuous": "revolute", "translational": "prismatic",
+    "translation": "prismatic", "slider": "prismatic", "slide": "prismatic", "ball": "spherical", "point": "spherical",
+    "weld": "fixed", "rigid": "fixed", "bracket": "fixed", "cardan": "universal", "hooke": "universal",
+    "homokinetic": "constant-velocity", "helical": "screw", "inline": "point-on-line", "inplane": "point-on-plane",
+}  # fmt: skip
+
+
 class JointSection(Table):
     """[joints.NAME]: a joint between two bodies."""
 
-    type: choice("type of joint", lambda: tuple(JOINTS)) = Field(  # type: ignore[valid-type]
+    type: choice("type of joint", lambda: tuple(JOINTS), ELSEWHERE) = Field(  # type: ignore[valid-type]
         description=f"one of {', '.join(JOINTS)}"
     )
     body_a: Name = Field(description='the name of a body, or "ground"')

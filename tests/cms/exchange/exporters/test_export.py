@@ -109,6 +109,8 @@ def refused(tmp_path, match, body, to="mbsim", error=ExportError, **options):
 
 def test_an_unknown_format_is_refused_with_the_nearest(body, tmp_path):
     refused(tmp_path, "unknown format 'mbsin'; did you mean 'mbsim'", body, to="mbsin")
+    refused(tmp_path, "'mnf': the file of Adams is not documented.* nastran-dmig", body, to="mnf")
+    refused(tmp_path, "'Simpack': the file of Simpack is not documented.* sid_fem", body, to="Simpack")
 
 
 def test_units_are_those_of_the_file_where_none_are_said(body, tmp_path):

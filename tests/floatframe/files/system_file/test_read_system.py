@@ -21,7 +21,9 @@ from floatframe import (
     newmark,
     trapezoidal,
 )
+from floatframe.files.system_file.connections import ELSEWHERE
 from floatframe.files.system_file.read_system import read_system
+from floatframe.model.joints import JOINTS
 from floatframe.model.rotations import euler_parameters_of_rotation_vector
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
@@ -121,6 +123,8 @@ def test_file_becomes_the_system_it_describes(write):
         ("inertia = [[0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]]", "inertia = [[1, 0, 0], [0, 1, 0], [0, 0, 9]]",
          "no mass distribution has the principal moments"),
         ('type = "revolute"', 'type = "revolut"', "unknown type of joint; did you mean 'revolute'"),
+        ('type = "revolute"', 'type = "hinge"', 'unknown type of joint; it is called "revolute" here'),
+        ('type = "revolute"', 'type = "translational"', 'unknown type of joint; it is called "prismatic" here'),
         ('type = "revolute"', 'type = "spherical"', "a spherical joint has no key axis"),
         ('body_b = "rod"', 'body_b = "rodd"', r'pin.body_b = "rodd": there is no such body; did you mean .rod.'),
         ('marker_b = "end_b"', 'marker_b = "end_bb"', "has no interface 'end_bb'; did you mean 'end_b'"),
@@ -381,6 +385,11 @@ def test_modal_coordinates_at_the_start_stand_in_the_file(write):
             read_system(write((where, f"{where}\n{keys}")))
     with pytest.raises(SystemFileError, match="q: a rigid body has no such key"):
         read_system(write(("mass = 2.0", "mass = 2.0\nq = [0.0]")))
+
+
+def test_names_that_joints_have_elsewhere_lead_to_joints():
+    assert set(ELSEWHERE.values()) <= set(JOINTS)
+    assert not set(ELSEWHERE) & set(JOINTS)
 
 
 def test_read_system_is_public():
