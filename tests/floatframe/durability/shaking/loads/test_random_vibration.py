@@ -138,6 +138,15 @@ def test_uncertainty_stands_beside_the_nominal_rms():
     assert (wide.uncertain[[ACCELERATION, FORCE]] > 1.3 * wide.rms[[ACCELERATION, FORCE]]).all()
 
 
+def test_uncertainty_is_the_same_of_one_input_and_of_two_that_act_as_one():
+    level = Level.of([(20, 0.01), (200, 0.01)], "g2/Hz")
+    doubtful = Uncertainty(1.5, 0.05)
+    alone = random_runs(masses([50.0], 0.02), RandomTest("r", level, ("z",)), doubtful)[0]
+    cross = [CrossSpectrum("x", "z", 1.0, 180.0)]
+    both = random_runs(two_bases(), RandomTest("r", levels={"x": level, "z": level}, cross=cross), doubtful)[0]
+    assert_allclose(both.uncertain, 2.0 * alone.uncertain, rtol=1e-9)  # opposite signs of both bases add
+
+
 def test_the_largest_to_expect_is_that_of_simulated_noise():
     # band-limited noise from 40 to 60 Hz seen through a stiff mass: Gaussian with nu = 50.3 Hz
     level = Level.of([(40, 1.0), (60, 1.0)], "g2/Hz")
