@@ -8,7 +8,7 @@ write(reduce(body, modes, frame=NodalFrame("big_end")), "rod.h5")
 import lazy_loader
 
 # The public names are listed in __init__.pyi. A module is imported when one of its names is first used, and a function
-# checks its arguments.
+# checks its arguments (`at_door`).
 attribute, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 

@@ -9,7 +9,7 @@ trajectory = integrate(system, GeneralizedAlpha(rho_inf=0.8), t_end=1.0, h=1e-3)
 import lazy_loader
 
 # The public names are listed in __init__.pyi. A module is imported when one of its names is first used, and a function
-# checks its arguments.
+# checks its arguments (`at_door`).
 attribute, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 

@@ -1,10 +1,13 @@
 """Public classes and functions name an argument of the wrong kind; nothing fails inside."""
 
 import inspect
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+from typing import Literal
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 import cms
 import fe_models
@@ -48,7 +51,7 @@ def test_an_argument_of_another_kind_is_refused_in_words(subject):
 
 
 @pytest.mark.parametrize("subject", PUBLIC)
-def test_an_argument_that_is_unknown_is_told_by_python(subject):
+def test_an_argument_that_is_unknown_is_told(subject):
     with pytest.raises(TypeError, match="nosuch"):
         subject(nosuch=1)
 
@@ -87,6 +90,7 @@ WRONG = {
     "a list as a system": (lambda s: ff.integrate([s], "hht", 1.0, 0.01), "system: expected a System"),
     "a class for an object": (lambda s: ff.System([ff.RigidBody]), "bodies: .* each of it a RigidBody or a Flex"),
     "three moments": (lambda s: block(inertia=(1.0, 2.0, 2.5)), r"numpy.diag\(\[1.0, 2.0, 2.5\]\)"),
+    "a ragged tensor": (lambda s: block(inertia=[[1.0], [2.0, 2.5], [3.0]]), "inertia: expected numbers of shape"),
     "a joint of numbers": (lambda s: ff.RevoluteJoint("pin", 1, 2, axis=(0, 0, 1)), "'pin': marker_a: expected a Mark"),
     "a mode set that is none": (lambda s: cms.reduce(cms.couple(bar()), 12), "modes: expected a ModeSet, got 12"),
 }  # fmt: skip
@@ -106,6 +110,13 @@ def test_what_was_meant_is_said(name):
         (Sequence[float] | None, None, None),
         (float | None, 2, 2),
         (type, float, float),
+        (tuple[str, ...], ["x", "y"], ("x", "y")),
+        (tuple[str, float], ["x", 2.0], ["x", 2.0]),
+        (ArrayLike, [1, 2.0], [1, 2.0]),
+        (Callable[[float], float], abs, abs),
+        (Literal["a", "b"], "b", "b"),
+        (Mapping[str, int], {"a": 1}, {"a": 1}),
+        (dict[str, int], MappingProxyType({"a": 1}), {"a": 1}),
         (Sequence[Units], ["mm-t-s"], (fe_models.UNIT_SYSTEMS["mm-t-s"],)),
     ],
 )
@@ -114,14 +125,28 @@ def test_values_become_what_the_annotation_wants(hint, value, found):
 
 
 @pytest.mark.parametrize(
-    ("hint", "value", "words"),
+    ("hint", "value", "words", "wrong"),
     [
-        (Sequence[str], ["a", 3], "text; one is 3"),
-        (float, "2", "a number"),
-        (str | None, 3, "^text$"),
-        (Units, 3, "a Units"),
+        (Sequence[str], ["a", 3], "^a list, each of it text$", 3),
+        (tuple[str, ...], 3, "^a list, each of it text$", 3),
+        (float, "2", "^a number$", "2"),
+        (str | None, 3, "^text$", 3),
+        (ArrayLike | None, "x", "^numbers$", "x"),
+        (Callable[[float], float], 3, "^a function$", 3),
+        (Mapping[str, int], [3], "^a dictionary$", [3]),
+        (Literal["a", "b"], "c", "^one of a, b$", "c"),
+        (Literal["a", "b"], ["c", "d"], "^one of a, b$", ["c", "d"]),
+        (Units, 3, "^a Units$", 3),
+        (
+            int | Units | str | Mapping[str, int] | bool,
+            [3],
+            "^a number or a Units or text or one of 2 other kinds$",
+            [3],
+        ),
+        (int | Units | str | Mapping[str, int] | None, [3], "^a number or a Units or text or a dictionary$", [3]),
     ],
 )
-def test_another_kind_is_told(hint, value, words):
-    with pytest.raises(MismatchError, match=words):
+def test_another_kind_is_told(hint, value, words, wrong):
+    with pytest.raises(MismatchError, match=words) as caught:
         conformed(hint, value)
+    assert caught.value.wrong == wrong

@@ -9,11 +9,12 @@ import sys
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import fields
 from functools import cache, wraps
-from types import GenericAlias, NoneType, UnionType
+from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import ArrayLike
 from typing_extensions import get_protocol_members, is_protocol
 
 from fe_models.foundation.errors import ReportedError
@@ -81,17 +82,29 @@ def read_only(value: Any) -> Any:
 
 
 class Takes(NamedTuple):
-    """What a field takes, if that is more than what it holds afterwards: `Annotated[held, Takes(taken)]`."""
+    """What a field or argument takes, if that is more than what its type says: `Annotated[type, Takes(taken)]`."""
 
     hint: Any
 
 
 class MismatchError(Exception):
-    """A value is not of the annotated kind; the text says what was expected."""
+    """A value is not of the annotated kind.
+
+    Parameters
+    ----------
+    expected
+        Words for what was expected.
+    wrong
+        The value, or the item of a list.
+    """
+
+    def __init__(self, expected: str, wrong: Any) -> None:
+        super().__init__(expected)
+        self.expected, self.wrong = expected, wrong
 
 
 def conformed(hint: Any, value: Any) -> Any:
-    """Return a value as its annotation wants it: names become objects, an object alone a sequence of one.
+    """Return a value as its annotation wants it: a name becomes an object, one object a sequence of one.
 
     Shapes and bounds of numbers are left to those who use them.
 
@@ -108,121 +121,103 @@ def conformed(hint: Any, value: Any) -> Any:
         If the value is of another kind.
     """
     if isinstance(hint, TypeVar):
-        if hint.__constraints__:
-            return _first_conformed(hint.__constraints__, value)
-        hint = hint.__bound__ or Any
-    origin = get_origin(hint)
-    if origin is Annotated:
+        return _first_conformed(hint.__constraints__ or (hint.__bound__ or Any,), value)
+    kind = get_origin(hint) or hint
+    if kind is Annotated:
         held, *extras = get_args(hint)
         return conformed(next((extra.hint for extra in extras if isinstance(extra, Takes)), held), value)
-    if origin in (Union, UnionType):
-        return _first_conformed(get_args(hint), value)
-    if origin is Literal:
+    if kind in (Union, UnionType):
+        return _first_conformed(_without_array_like(get_args(hint)), value)
+    if kind is Literal:
         choices = get_args(hint)
-        if value not in choices:
-            raise MismatchError(f"one of {', '.join(map(str, choices))}")
+        is_one = any(isinstance(value, type(choice)) and value == choice for choice in choices)
+        return _required(is_one, f"one of {', '.join(map(str, choices))}", value)
+    if kind is Any or not isinstance(kind, type):  # or it says nothing at run time
         return value
-    if origin is type:
-        if not isinstance(value, type):
-            raise MismatchError("a class")
-        return value
-    if origin is not None and isinstance(origin, type):
-        if issubclass(origin, np.ndarray):
-            return _of_class(np.ndarray, value)
-        if issubclass(origin, Callable):  # type: ignore[arg-type]
-            return _called(value)
-        if issubclass(origin, Mapping):
-            if not isinstance(value, Mapping):
-                raise MismatchError("a dictionary")
-            return value
-        if issubclass(origin, Iterable):
-            is_row = origin is tuple and Ellipsis not in get_args(hint)  # of items of different kinds
-            return value if is_row and hasattr(value, "__len__") else _sequence(hint, origin, value)
-        hint = origin
-    if isinstance(hint, type) and not isinstance(hint, GenericAlias):
-        return _of_class(hint, value)
+    if kind in (type, Callable):
+        return _required(isinstance(value, type) if kind is type else callable(value), KINDS[kind], value)
+    if issubclass(kind, Iterable) and not issubclass(kind, str | bytes | Mapping | np.ndarray) and get_args(hint):
+        is_row = kind is tuple and Ellipsis not in get_args(hint)  # of items of different kinds
+        return value if is_row and hasattr(value, "__len__") else _sequence(kind, get_args(hint)[0], value)
+    return _of_class(kind, value)
+
+
+def _required(is_so: bool, expected: str, value: Any) -> Any:
+    """Return a value that is of the expected kind; raise `MismatchError` if it is not."""
+    if not is_so:
+        raise MismatchError(expected, value)
     return value
+
+
+def _without_array_like(hints: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Return alternatives with one for all that NumPy makes an array of (`ArrayLike`), which has several of its own."""
+    if not ARRAY_LIKE <= set(hints):
+        return hints
+    return np.ndarray, *(hint for hint in hints if hint not in ARRAY_LIKE)
 
 
 def _first_conformed(hints: Sequence[Any], value: Any) -> Any:
     """Return the value for the first of some annotations that takes it as it is, else for the first that takes it."""
     found, expected = [], []
-    if any("numpy._typing" in f"{getattr(hint, '__module__', '')} {hint}" for hint in hints):  # all that makes an array
-        return _of_class(np.ndarray, value) if value is not None or NoneType not in hints else None
     for hint in hints:
         try:
             found.append(conformed(hint, value))
         except MismatchError as mismatch:
-            expected.append(str(mismatch))
+            expected.append(mismatch)
         else:
             if found[-1] is value:
                 return value
     if found:
         return found[0]
-    kinds = list(dict.fromkeys(words for words in expected if words != "None")) or ["None"]
-    more = f" or one of {len(kinds) - MOST_KINDS} other kinds" if len(kinds) > MOST_KINDS else ""
-    raise MismatchError(" or ".join(kinds[:MOST_KINDS]) + more)
+    kinds = list(dict.fromkeys(each.expected for each in expected if each.expected != KINDS[NoneType]))
+    if len(kinds) > MOST_KINDS + 1:
+        kinds[MOST_KINDS:] = [f"one of {len(kinds) - MOST_KINDS} other kinds"]
+    raise MismatchError(" or ".join(kinds), expected[0].wrong)
 
 
-def _called(value: Any) -> Any:
-    if not callable(value):
-        raise MismatchError("a function")
-    return value
+def _sequence(kind: type, item: Any, value: Any) -> Any:
+    """Return a sequence of conformed items; one item becomes a sequence of one."""
+    is_one = isinstance(value, str) or not isinstance(value, Iterable)
+    if not is_one and not isinstance(value, list | tuple):
+        return value  # its reader goes through it, perhaps only once
+    given = [value] if is_one else value
+    try:
+        items = [conformed(item, each) for each in given]
+    except MismatchError as mismatch:
+        raise MismatchError(f"a list, each of it {mismatch.expected}", mismatch.wrong) from None
+    is_as_given = all(a is b for a, b in zip(items, given, strict=True)) and not is_one
+    return value if is_as_given and (kind is not tuple or isinstance(value, tuple)) else tuple(items)
 
 
-def _sequence(hint: Any, origin: type, value: Any) -> Any:
-    """Return a sequence of conformed items; an item alone becomes a sequence of one."""
-    item = next(iter(get_args(hint)), Any)
-    if isinstance(value, str) or not isinstance(value, Iterable):
-        try:
-            return (conformed(item, value),)
-        except MismatchError as mismatch:
-            raise MismatchError(f"a list, each of it {mismatch}") from None
-    if not isinstance(value, list | tuple):
-        return value  # what can be gone through only once is left to its reader
-    items = []
-    for each in value:
-        try:
-            items.append(conformed(item, each))
-        except MismatchError as mismatch:
-            raise MismatchError(f"a list, each of it {mismatch}; one is {quoted(each)}") from None
-    is_as_given = all(a is b for a, b in zip(items, value, strict=True)) and (
-        origin is not tuple or origin is type(value)
-    )
-    return value if is_as_given else tuple(items)
+#: words for those kinds that are not called by the names of their classes
+KINDS: dict[Any, str] = {
+    str: "text", NoneType: "None", bool: "True or False", type: "a class", Callable: "a function",
+    Mapping: "a dictionary", dict: "a dictionary", np.ndarray: "numbers", float: "a number", int: "a number",
+    complex: "a number",
+}  # fmt: skip
+#: attributes one of which a value has that may be a number, or an array
+OF_NUMBERS, OF_ARRAYS = ("__float__", "__index__", "__complex__"), ("__len__", "__float__", "shape")
+ARRAY_LIKE = set(get_args(ArrayLike))
 
 
-def _of_class(hint: type, value: Any) -> Any:
-    """Return an object of a class, also from its name; numbers and arrays are left as they are."""
-    if hint in (object, Any):
-        return value
-    if hint in (float, int, complex, bool):
-        if isinstance(value, str) or not any(hasattr(value, way) for way in ("__float__", "__index__", "__complex__")):
-            raise MismatchError("a number" if hint is not bool else "True or False")
-        return value
-    if hint is np.ndarray or hint.__module__.startswith("scipy.sparse"):
-        if isinstance(value, str) or not any(hasattr(value, way) for way in ("__len__", "__float__", "shape")):
-            raise MismatchError("numbers" if hint is np.ndarray else "a matrix")
-        return value
-    if hint is NoneType:
-        if value is not None:
-            raise MismatchError("None")
-        return value
-    if is_protocol(hint):
-        missing = [name for name in get_protocol_members(hint) if not hasattr(value, name)]
-        if missing or isinstance(value, type):
-            raise MismatchError(words_of(hint))
-        return value
-    if isinstance(value, str) and not issubclass(str, hint) and hasattr(hint, "of_name"):
-        return hint.of_name(value)
-    if not isinstance(value, hint):
-        raise MismatchError(words_of(hint))
-    return value
-
-
-def words_of(hint: type) -> str:
-    """Return the words for an object of a class: 'a Marker'."""
-    return "text" if hint is str else f"{'an' if hint.__name__[0] in 'AEIO' else 'a'} {hint.__name__}"
+def _of_class(kind: type, value: Any) -> Any:
+    """Return an object of a class, also from its name; what may be a number or an array is left as it is."""
+    is_text = isinstance(value, str)
+    is_array = kind is np.ndarray or kind.__module__.startswith("scipy.sparse")
+    if is_text and kind is not str and hasattr(kind, "of_name"):
+        return kind.of_name(value)
+    if kind in (float, int, complex, bool):
+        is_so = not is_text and any(hasattr(value, way) for way in OF_NUMBERS)
+    elif is_array:
+        is_so = not is_text and any(hasattr(value, way) for way in OF_ARRAYS)
+    elif issubclass(kind, Mapping):
+        is_so = isinstance(value, Mapping)
+    elif is_protocol(kind):
+        is_so = not isinstance(value, type) and all(hasattr(value, name) for name in get_protocol_members(kind))
+    else:
+        is_so = isinstance(value, kind)
+    article = "an" if kind.__name__[0] in "AEIO" else "a"
+    return _required(is_so, KINDS.get(kind, f"{article} {kind.__name__}"), value)
 
 
 @cache
@@ -240,9 +235,9 @@ def conformed_inputs(where: str, hints: Mapping[str, Any], given: Mapping[str, A
         try:
             found = conformed(hints[name], value)
         except MismatchError as mismatch:
-            got = f"the class {value.__name__} itself" if isinstance(value, type) else quoted(value)
-            given_words = "" if "one is" in str(mismatch) else f", got {got}"
-            raise error(f"{where}: {name}: expected {mismatch}{given_words}") from None
+            wrong = mismatch.wrong
+            got = f"the class {wrong.__name__} itself" if isinstance(wrong, type) else quoted(wrong)
+            raise error(f"{where}: {name}: expected {mismatch.expected}, got {got}") from None
         if found is not value:
             changed[name] = found
     return changed
@@ -258,7 +253,7 @@ def checked_fields(error: type[Exception]) -> Callable[[Class], Class]:
     """
 
     def decorate(kind: Class) -> Class:
-        own = kind.__dict__.get("__post_init__") or getattr(kind, "__post_init__", None)
+        own = getattr(kind, "__post_init__", None)
 
         def check(self: Any) -> None:
             name = getattr(self, "name", None)
@@ -300,17 +295,18 @@ def checked_function(function: Callable[..., Result], module: str, error: type[E
     module
         Module at whose door it stands, under its name.
     error
-        Raised if an argument is of another kind, has an unknown name, or is missing.
+        Raised if an argument is of another kind; Python's `TypeError` if one is missing or has an unknown name.
     """
     signature = inspect.signature(function)
-    kinds = {parameter.kind for parameter in signature.parameters.values()}
+    kinds = {name: parameter.kind for name, parameter in signature.parameters.items()}
+    takes_any_name = inspect.Parameter.VAR_KEYWORD in kinds.values()
     variable = {inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD}
-    single = [name for name, parameter in signature.parameters.items() if parameter.kind not in variable]
+    single = [name for name, kind in kinds.items() if kind not in variable]
 
     @wraps(function)
     def checked(*args: Any, **kwargs: Any) -> Result:
-        unknown = [] if inspect.Parameter.VAR_KEYWORD in kinds else [name for name in kwargs if name not in single]
-        if unknown:
+        unknown = [name for name in kwargs if name not in single]
+        if unknown and not takes_any_name:
             raise TypeError(f"{function.__name__}: no argument {unknown[0]!r}{nearest(unknown[0], single)}")
         try:
             bound = signature.bind(*args, **kwargs)

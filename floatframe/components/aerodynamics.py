@@ -62,8 +62,6 @@ class LiftingSurface(Element):
 
     def __post_init__(self) -> None:
         where = f"element {self.name!r}"
-        if not isinstance(self.marker, Marker):
-            raise ModelError(f"{where}: marker: expected a Marker, got {self.marker!r}")
         for key in ("area", "density", "most_lift"):
             object.__setattr__(self, key, number(f"{where}: {key}", getattr(self, key), above=0.0))
         for key in ("lift_slope", "zero_drag", "induced_drag"):

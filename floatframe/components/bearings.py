@@ -72,9 +72,6 @@ class Bearing(Element):
 
     def __post_init__(self) -> None:
         where = f"element {self.name!r}"
-        for key in ("marker_a", "marker_b"):
-            if not isinstance(getattr(self, key), Marker):
-                raise ModelError(f"{where}: {key}: expected a Marker, got {getattr(self, key)!r}")
         for key in ("stiffness", "damping"):
             object.__setattr__(self, key, two_by_two(f"{where}: {key}", getattr(self, key)))
         for key in ("axial_stiffness", "axial_damping", "tilt_stiffness", "tilt_damping"):

@@ -47,8 +47,6 @@ class Cable(Element):
 
     def __post_init__(self) -> None:
         where = f"element {self.name!r}"
-        if isinstance(self.points, Marker) or not all(isinstance(each, Marker) for each in self.points):
-            raise ModelError(f"{where}: points: expected markers, got {self.points!r}")
         if len(self.points) < 2:
             raise ModelError(f"{where}: points: expected two at least, got {len(self.points)}")
         object.__setattr__(self, "stiffness", number(f"{where}: stiffness", self.stiffness, above=0.0))

@@ -65,9 +65,6 @@ class BristleFriction(Element):
 
     def __post_init__(self) -> None:
         where = f"element {self.name!r}"
-        for key in ("marker_a", "marker_b"):
-            if not isinstance(getattr(self, key), Marker):
-                raise ModelError(f"{where}: {key}: expected a Marker, got {getattr(self, key)!r}")
         if self.motion not in MOTIONS:
             raise ModelError(f"{where}: motion: expected one of {', '.join(MOTIONS)}, got {self.motion!r}")
         object.__setattr__(self, "axis", unit_vector(f"{where}: axis", self.axis))

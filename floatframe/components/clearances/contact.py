@@ -16,8 +16,6 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from floatframe.errors import ModelError
-from floatframe.model.bodies.markers import Marker
 from floatframe.model.checked_values import number
 from floatframe.model.elements.pairs import inner_product, vector_product
 
@@ -45,11 +43,8 @@ RANGES = {
 
 
 def require_numbers(element: Any, more: dict[str, Range]) -> None:
-    """Check the markers and parameters of an element with play, and store floats; `ModelError` for invalid values."""
+    """Check the parameters of an element with play, and store floats; `ModelError` for invalid values."""
     where = f"element {element.name!r}"
-    for key in ("marker_a", "marker_b"):
-        if not isinstance(getattr(element, key), Marker):
-            raise ModelError(f"{where}: {key}: expected a Marker, got {getattr(element, key)!r}")
     for key, allowed in (RANGES | more).items():
         value = getattr(element, key, None)
         if value is not None:

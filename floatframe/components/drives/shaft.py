@@ -6,7 +6,6 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest
 from floatframe.components.drives.pid import Pid
 from floatframe.errors import ModelError
-from floatframe.model.bodies.markers import Marker
 from floatframe.model.checked_values import number, unit_vector
 from floatframe.model.elements import Placed
 from floatframe.model.elements.pairs import angle_numbers
@@ -18,11 +17,8 @@ Z_AXIS: Any = (0.0, 0.0, 1.0)
 
 
 def check_shaft(element: Any) -> None:
-    """Check the markers and the axis of a drive."""
+    """Check the axis of a drive, and make it a unit vector."""
     where = f"element {element.name!r}"
-    for key in ("marker_a", "marker_b"):
-        if not isinstance(getattr(element, key), Marker):
-            raise ModelError(f"{where}: {key}: expected a Marker, got {getattr(element, key)!r}")
     object.__setattr__(element, "axis", unit_vector(f"{where}: axis", element.axis))
 
 

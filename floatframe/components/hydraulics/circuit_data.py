@@ -462,8 +462,6 @@ class Circuit(Element):
 
     def __post_init__(self) -> None:
         where = f"element {self.name!r}"
-        if not isinstance(self.fluid, Fluid):
-            raise ModelError(f"{where}: fluid: expected a Fluid, got {self.fluid!r}")
         object.__setattr__(self, "components", tuple(self.components))
         for k, component in enumerate(self.components):
             if not isinstance(component, tuple(COMPONENTS.values())):

@@ -1,6 +1,6 @@
 """Components of a circuit: descriptions without behaviour, between nodes given by name. Pressures are absolute."""
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any
 
 from fe_models.foundation.arrays import Array
@@ -46,9 +46,6 @@ def checked(
         value = getattr(component, key)
         if value is not None and not isinstance(value, TimeFunction):
             object.__setattr__(component, key, constant(number(f"{where}: {key}", value)))
-    for each in fields(component):
-        if each.name.startswith("marker") and not isinstance(getattr(component, each.name), Marker):
-            raise ModelError(f"{where}: {each.name}: expected a Marker, got {getattr(component, each.name)!r}")
 
 
 @dataclass(frozen=True)
@@ -139,6 +136,7 @@ class Orifice:
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Resistance:
     """A laminar flow conductance Δp from node a to node b, such as through a gap or a porous plug."""
 
@@ -152,6 +150,7 @@ class Resistance:
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class CheckValve:
     """An orifice for flow from node a to node b that begins to open at Δp = `cracking` and is open at `full`."""
 
@@ -175,11 +174,13 @@ class CheckValve:
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class ReliefValve(CheckValve):
     """A check valve to the tank, node b, whose `cracking` pressure is the set pressure above that of node b."""
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Accumulator:
     """A gas volume behind a bladder at a node, polytropic, with volume V_0 at the charge pressure and no oil below it.
 
@@ -206,6 +207,7 @@ class Accumulator:
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Pipe:
     """A pipe from node a to node b in equal segments with inertia and friction; each end has half a segment of oil.
 
@@ -251,6 +253,7 @@ class Supply:
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class Tank:
     """A node at the ambient pressure."""
 

@@ -84,11 +84,6 @@ class OleoStrut(Element):
 
     def __post_init__(self) -> None:
         where = f"element {self.name!r}"
-        if not isinstance(self.fluid, Fluid):
-            raise ModelError(f"{where}: fluid: expected a Fluid, got {self.fluid!r}")
-        for key in ("marker_a", "marker_b"):
-            if not isinstance(getattr(self, key), Marker):
-                raise ModelError(f"{where}: {key}: expected a Marker, got {getattr(self, key)!r}")
         above = ("gas_volume", "charge", "gas_area", "oil_area", "stroke", "stop_stiffness", "exponent", "discharge")
         for key in (*above, "friction_speed", "oil_volume"):
             if getattr(self, key) is not None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from numbers import Real
 
 import numpy as np
 
@@ -66,10 +67,11 @@ class RigidBody:
         where = f"rigid body {self.name!r}"
         put = object.__setattr__
         put(self, "mass", number(f"{where}: mass", self.mass, above=0.0))
-        if np.shape(self.inertia) == (3,):
+        moments = self.inertia.tolist() if isinstance(self.inertia, np.ndarray) else self.inertia
+        if isinstance(moments, list | tuple) and len(moments) == 3 and all(isinstance(x, Real) for x in moments):
             raise ModelError(
                 f"{where}: inertia: expected a tensor of shape (3, 3), got three numbers; "
-                f"principal moments about the body axes are numpy.diag({list(self.inertia)})"
+                f"principal moments about the body axes are numpy.diag({list(moments)})"
             )
         put(self, "inertia", array_of_shape(f"{where}: inertia", self.inertia, (3, 3)))
         for name in ("center_of_mass", "position", "velocity", "omega_B"):
