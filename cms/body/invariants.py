@@ -247,22 +247,18 @@ def moments_from_gram(gram: Array, *, is_exact: bool = True, missing: tuple[str,
         As in `Moments`.
     """
     n = (gram.shape[0] - 4) // 3
-
-    def part(rows: slice, columns: slice) -> Array:
-        # symmetric by definition; the averaged halves differ only by rounding
-        return np.asarray((gram[rows, columns] + gram[columns, rows].T) / 2)
-
-    one, c, blocks = slice(0, 1), slice(1, 4), [slice(4 + a * n, 4 + (a + 1) * n) for a in range(3)]
+    # symmetric by definition; the averaged halves differ only by rounding
+    first = (gram[:4] + gram[:, :4].T) / 2  # rows of 1 and c
+    phi_phi = gram[4:, 4:].reshape(3, n, 3, n).transpose(0, 2, 1, 3)
     S_kl = np.empty((3, 3, n, n))
-    for a in range(3):
-        for b in range(3):
-            S_kl[a, b] = part(blocks[a], blocks[b])
+    np.add(phi_phi, phi_phi.transpose(1, 0, 3, 2), out=S_kl)
+    S_kl /= 2
     return Moments(
         m=float(gram[0, 0]),
-        S=part(one, c)[0],
-        R=part(c, c),
-        C1=np.stack([part(one, block)[0] for block in blocks]),
-        P=np.stack([part(c, block) for block in blocks], axis=1),
+        S=first[0, 1:4],
+        R=first[1:, 1:4],
+        C1=first[0, 4:].reshape(3, n),
+        P=first[1:, 4:].reshape(3, 3, n),
         S_kl=S_kl,
         is_exact=is_exact,
         missing=missing,

@@ -8,7 +8,8 @@ format" and "Legacy formats: MSH file format version 2".
 
 import shlex
 import warnings
-from collections.abc import Callable
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -89,21 +90,21 @@ class _Text:
         return values.astype(np.int64)
 
 
+@dataclass
 class _Binary:
     """Numbers of a binary file, in sequence from a place in it."""
 
-    def __init__(self, data: bytes, at: int, where: str) -> None:
-        self._data = data
-        self.at = at
-        self._where = where
+    data: bytes
+    at: int  #: place of the next number
+    where: str  #: for messages
 
     def take(self, kind: str, count: int) -> np.ndarray:
         """Return the next numbers of a kind in `_BINARY`: float64, or int64."""
         dtype = np.dtype(_BINARY[kind])
         size = dtype.itemsize * int(count)
-        if count < 0 or self.at + size > len(self._data):
-            raise MeshError(f"{self._where}: ends too early; the file is truncated or damaged")
-        values = np.frombuffer(self._data, dtype, int(count), self.at)
+        if count < 0 or self.at + size > len(self.data):
+            raise MeshError(f"{self.where}: ends too early; the file is truncated or damaged")
+        values = np.frombuffer(self.data, dtype, int(count), self.at)
         self.at += size
         return values if kind == "real" else values.astype(np.int64)
 
@@ -146,14 +147,13 @@ def read_gmsh(path: Path, data: bytes) -> RawMesh:
         missing = "Nodes" if "Nodes" not in sections else "Elements"
         raise MeshError(f"{where}: expected a section ${missing}, got none; is the file complete?")
     names = _physical_names(where, data, sections)
-
-    def numbers(section: str) -> _Numbers:
-        start, end = sections[section]
-        place = f"{where}: section ${section}"
-        return _Binary(data, start, place) if is_binary else _Text(data[start:end], place)
-
     if version == "4.1":
-        return _read_41(where, "Entities" in sections, numbers, names)
+        numbers: dict[str, _Numbers] = {}
+        for name in ("Entities", "Nodes", "Elements"):
+            if name in sections:
+                (start, end), place = sections[name], f"{where}: section ${name}"
+                numbers[name] = _Binary(data, start, place) if is_binary else _Text(data[start:end], place)
+        return _read_41(where, numbers, names)
     nodes, node_numbers = _nodes_22(where, data, sections["Nodes"], is_binary)
     place_of = _places(where, node_numbers)
     blocks = _cells_22(where, data, sections["Elements"], is_binary, place_of, names)
@@ -247,10 +247,10 @@ def _type(where: str, code: int) -> tuple[str, int, int]:
     return _TYPES[code]
 
 
-def _read_41(where: str, has_entities: bool, numbers: Callable[[str], _Numbers], names: _Names) -> RawMesh:
+def _read_41(where: str, numbers: Mapping[str, _Numbers], names: _Names) -> RawMesh:
     physical: dict[tuple[int, int], list[int]] = {}
-    if has_entities:
-        source = numbers("Entities")
+    if "Entities" in numbers:
+        source = numbers["Entities"]
         for dim, count in enumerate(source.take("size", 4)):
             for _ in range(count):
                 tag = int(source.take("int", 1)[0])
@@ -258,7 +258,7 @@ def _read_41(where: str, has_entities: bool, numbers: Callable[[str], _Numbers],
                 physical[dim, tag] = [int(t) for t in source.take("int", source.take("size", 1)[0])]
                 if dim:
                     source.take("int", source.take("size", 1)[0])
-    source = numbers("Nodes")
+    source = numbers["Nodes"]
     n_blocks, n_nodes, _, _ = source.take("size", 4)
     coordinates, node_numbers = [np.zeros((0, 3))], [np.zeros(0, np.int64)]
     for _ in range(n_blocks):
@@ -271,7 +271,7 @@ def _read_41(where: str, has_entities: bool, numbers: Callable[[str], _Numbers],
     if len(numbers_of_nodes) != n_nodes:
         raise MeshError(f"{where}: section $Nodes: {n_nodes} nodes announced, {len(numbers_of_nodes)} found")
     place_of = _places(where, numbers_of_nodes)
-    source = numbers("Elements")
+    source = numbers["Elements"]
     n_blocks, n_cells, _, _ = source.take("size", 4)
     blocks, found = [], 0
     for _ in range(n_blocks):

@@ -127,7 +127,10 @@ def conformed(hint: Any, value: Any) -> Any:
         held, *extras = get_args(hint)
         return conformed(next((extra.hint for extra in extras if isinstance(extra, Takes)), held), value)
     if kind in (Union, UnionType):
-        return _first_conformed(_without_array_like(get_args(hint)), value)
+        hints = get_args(hint)
+        if ARRAY_LIKE <= set(hints):  # one alternative for the several of `ArrayLike`: all that NumPy makes an array of
+            hints = np.ndarray, *(hint for hint in hints if hint not in ARRAY_LIKE)
+        return _first_conformed(hints, value)
     if kind is Literal:
         choices = get_args(hint)
         is_one = any(isinstance(value, type(choice)) and value == choice for choice in choices)
@@ -147,13 +150,6 @@ def _required(is_so: bool, expected: str, value: Any) -> Any:
     if not is_so:
         raise MismatchError(expected, value)
     return value
-
-
-def _without_array_like(hints: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Return alternatives with one for all that NumPy makes an array of (`ArrayLike`), which has several of its own."""
-    if not ARRAY_LIKE <= set(hints):
-        return hints
-    return np.ndarray, *(hint for hint in hints if hint not in ARRAY_LIKE)
 
 
 def _first_conformed(hints: Sequence[Any], value: Any) -> Any:

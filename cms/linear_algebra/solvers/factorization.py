@@ -79,12 +79,8 @@ class Factorization:
     def __init__(self, factor: Factor, solver: Solver) -> None:
         self.factor = factor  #: made by the solver
         self.n = factor.n  #: order of the matrix
+        self.description = factor.description  #: solver, its version and settings, for the provenance
         self.solver = solver  #: the solver that made the factor, for further matrices of the same body
-
-    @property
-    def description(self) -> str:
-        """Solver, its version and settings, for the provenance."""
-        return self.factor.description
 
     @property
     def n_factor_entries(self) -> int:

@@ -17,7 +17,7 @@ import scipy.sparse as sp
 from fe_models.body.couplings.coupling_on_ranks import spread_extension
 from fe_models.body.couplings.submatrix import principal_block
 from fe_models.body.fe_body import MULTIPLIER, FEBody, Interface, Recovery
-from fe_models.body.rigid_motion import rigid_motion_of_points
+from fe_models.body.rigid_motion import rigid_motion_of_dofs, rigid_motion_of_points
 from fe_models.errors import InterfaceError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
@@ -81,7 +81,10 @@ def couple(body: FEBody) -> FEBody:
 
     # u_mesh = T u, where T is the identity on kept dofs and the rigid motion of the reference node on slave dofs
     slave_rows = np.concatenate(slaves) if slaves else np.zeros(0, np.int64)
-    blocks = [_rigid_rows(body, interface, slave) for interface, slave in zip(rigid, slaves, strict=True)]
+    blocks = [
+        rigid_motion_of_dofs(body.nodes, body.dofs[slave], interface.reference)
+        for interface, slave in zip(rigid, slaves, strict=True)
+    ]
     T_s = sp.block_diag(blocks, format="csr") if blocks else sp.csr_array((0, 0))
     recovery = _recovery_matrix(body.n_dof, keep, slave_rows, T_s, first_reference, n_new)
     n_constrained = n_new - first_reference - T_s.shape[1]
@@ -158,17 +161,6 @@ def _dofs_of(body: FEBody, nodes: IntArray) -> IntArray:
     at = place[body.dofs[:, 0]]
     own = np.flatnonzero(at >= 0)
     return own[np.lexsort((body.dofs[own, 1], at[own]))]
-
-
-def _rigid_rows(body: FEBody, interface: Interface, slaves: IntArray) -> Array:
-    """Return the rows of u_members = T u_reference for these slave dofs, (n_slaves, 6)."""
-    node, component = body.dofs[slaves].T
-    rows = np.zeros((len(slaves), 6))
-    translation = component < 3
-    motion = rigid_motion_of_points(body.nodes[node], interface.reference)
-    rows[translation] = motion[np.flatnonzero(translation), component[translation]]
-    rows[~translation, component[~translation]] = 1.0
-    return rows
 
 
 def _recovery_matrix(
