@@ -17,7 +17,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.callbacks.law_source import digest_of
 from floatframe.engine.compiling.callbacks.user_forces import Callback
-from floatframe.engine.kernels.compiler.choice import is_lean
+from floatframe.engine.kernels.compiler.choice import is_lean, level
 from floatframe.engine.kernels.compiler.garbage import without_garbage_collection
 from floatframe.errors import ModelError
 from floatframe.model.elements.element import ElementLaw
@@ -83,6 +83,8 @@ def compiled_callback(where: str, function: Any, kind: str, template: Callable[[
     key = id(function), template.__name__
     if key not in compiled:
         digest = digest_of(function)
+        if digest is not None:
+            digest ^= level  # of optimisation, which decides the machine code too
         whole = lean_c_function(where, function, template, digest) if is_lean else None
         try:
             whole = whole or c_function(filled(template, function, digest or 1), digest is not None)
@@ -116,9 +118,7 @@ def lean_c_function(
         made = filled(template, function, (digest or 1) ^ int(compiler_key()[:14], 16))
         made.__globals__.update(names)
         return c_function(made, digest is not None, pipeline_class=law.LawEntryCompiler)
-    except (
-        Exception
-    ) as error:  # of any kind inside numba, whose passes are not all used; plain numba tells what is wrong
+    except Exception as error:  # of any kind, as not all passes of numba are used; plain numba tells what is wrong
         log.info("%s: %s is compiled by plain numba: %s", where, function.__name__, reason_of(error))
         return None
 

@@ -8,10 +8,11 @@ a step takes somewhat longer (docs/multibody.md has the figures).
 import os
 
 import numba
+from numba.core import config
 
 from floatframe.errors import FloatframeError
 
-__all__ = ["KNOWN_VERSIONS", "VARIABLE", "is_lean", "words"]
+__all__ = ["KNOWN_VERSIONS", "VARIABLE", "compiler", "is_lean", "level", "words"]
 
 KNOWN_VERSIONS = ("0.68",)  #: versions of numba whose internals the lean compiler supports
 VARIABLE = "FLOATFRAME_COMPILER"  #: environment variable that selects one of `CHOICES`
@@ -34,6 +35,8 @@ def chosen() -> str:
 
 
 is_lean = chosen() == "lean"
+level = int(config.OPT)  # type: ignore[attr-defined]  #: of optimisation, from NUMBA_OPT
+compiler = f"{chosen()} at level {level}"  #: what decides the machine code of a source
 
 
 def words() -> str:

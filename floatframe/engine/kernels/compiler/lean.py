@@ -51,6 +51,7 @@ from numba.core.typing import signature
 from numba.core.untyped_passes import ExtractByteCode, FixupArgs, IRProcessing, TranslateByteCode
 
 from floatframe.engine.kernels.compiler.block import Block, make_block
+from floatframe.engine.kernels.compiler.choice import level
 from floatframe.engine.kernels.compiler.garbage import without_garbage_collection
 from floatframe.engine.kernels.compiler.lowering import KernelContext, KernelLower, LawContext, LawLower
 from floatframe.engine.kernels.compiler.stored import StoredCode, code_key, delete_old, read_code, write_code
@@ -287,6 +288,10 @@ class EntryLibrary(JITCodeLibrary):
 
     def _optimize_final_module(self):
         manager, builder = self._codegen._module_pass_manager()
+        if level == 0:  # code that refers to addresses in this process, even unused ones, cannot be stored on disk
+            manager.add_sroa_pass()
+            manager.add_dead_code_elimination_pass()
+            manager.add_global_dead_code_eliminate_pass()
         manager.run(self._final_module, builder)
 
 

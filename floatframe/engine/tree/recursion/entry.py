@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from fe_models.foundation.arrays import IntArray
-from floatframe.engine.kernels.compiler.choice import is_lean
+from floatframe.engine.kernels.compiler.choice import compiler
 from floatframe.engine.kernels.compiler.compilation import inner, kept_entry, loops, small
 from floatframe.engine.kernels.compiler.sources import source_digest
 from floatframe.engine.kernels.compiler.structure import converter
@@ -214,7 +214,7 @@ def make_entry(digest):
     return kept_entry(run)
 
 
-run = make_entry(source_digest(__name__, "lean" if is_lean else "plain"))
+run = make_entry(source_digest(__name__, compiler))
 
 
 @dataclass(frozen=True, eq=False)

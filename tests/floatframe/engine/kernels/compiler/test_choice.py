@@ -8,7 +8,9 @@ import tomllib
 from pathlib import Path
 
 import numba
+import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from floatframe.engine.kernels.compiler.choice import CHOICES, KNOWN_VERSIONS, VARIABLE
 from tests.__main__ import GROUPS, KERNELS, PLAIN, environment
@@ -38,6 +40,33 @@ def test_any_other_numba_compiles_plainly_and_says_why(version):
 def test_the_switch_takes_the_plain_compiler():
     words = f"False plain, with numba {KNOWN_VERSIONS[0]}.0 (asked for by {VARIABLE})\n"
     assert said("plain", f"{KNOWN_VERSIONS[0]}.0").stdout == words
+
+
+MOTION = """
+import numpy as np
+from floatframe import GeneralizedAlpha, Gravity, RigidBody, System, integrate
+from floatframe.engine.kernels.compiler.choice import compiler
+body = RigidBody("top", 2.0, np.diag([0.1, 0.2, 0.25]), (0.1, 0.2, 0.3), position=(1, 2, 3), omega_B=(3, -2, 5))
+motion = integrate(System([body], forces=[Gravity((0.1, 0, -9.81))]), GeneralizedAlpha(), 0.1, 1e-2)
+print(compiler)
+print(*motion.body("top").p[-1])
+"""
+
+
+def moved(level: str) -> list[str]:
+    """Return the compiler and the last orientation of a top, with kernels of a level of optimisation."""
+    known = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_OPT": level}
+    command = [sys.executable, "-W", "error", "-c", MOTION]  # numba warns where code cannot be stored
+    done = subprocess.run(command, capture_output=True, text=True, env=known, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()
+
+
+def test_kernels_that_are_not_optimised_move_alike_and_are_stored_apart():
+    """`NUMBA_OPT=0` shortens the wait after an edited kernel line."""
+    (fast, expected), (slow, orientation) = moved("3"), moved("0")
+    assert (fast, slow) == ("lean at level 3", "lean at level 0")
+    assert_allclose(np.array(orientation.split(), float), np.array(expected.split(), float), rtol=1e-11)
 
 
 @pytest.mark.parametrize(
