@@ -79,6 +79,9 @@ from .files.read_mesh import read_mesh as read_mesh
 from .files.read_mesh import read_shell_mesh as read_shell_mesh
 from .files.skfem_body import body_from_skfem as body_from_skfem
 from .files.tables import read_tables as read_tables
+from .foundation.documents.table import Table as Table
+from .foundation.documents.table import TableError as TableError
+from .foundation.documents.table import read_table as read_table
 from .foundation.units import UNIT_SYSTEMS as UNIT_SYSTEMS
 from .foundation.units import Units as Units
 from .foundation.units import unit_system as unit_system

@@ -200,8 +200,8 @@ from .results.coordinate_elements import coupler_motion as coupler_motion
 from .results.coordinate_elements import user_force_motion as user_force_motion
 from .results.element_motion import ElementMotion as ElementMotion
 from .results.element_motion import element_motion as element_motion
-from .results.export import export_csv as export_csv
 from .results.export import export_vtk as export_vtk
+from .results.export import motion_table as motion_table
 from .results.joint_coordinates import joint_coordinate as joint_coordinate
 from .results.joint_coordinates import joint_coordinates as joint_coordinates
 from .results.motion import Motion as Motion

@@ -1,9 +1,8 @@
 """The command `cms frf`: frequency response between two interfaces of a modal file, optionally with its full model."""
 
-import csv
-import io
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,14 +17,17 @@ from cms.assessment.quality.reference.port_model import (
     resonances,
 )
 from cms.body.reduced_body import ReducedBody
-from cms.cli.console import output_path, print_table, say
+from cms.cli.console import print_table, say
+from cms.cli.outputs import PICTURES, TABLES, output_files, write_outputs
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
-from fe_models.foundation.paths import replace_file
+from fe_models.foundation.documents.table import Table
 from fe_models.foundation.words import nearest, quoted
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["FrfRequest", "parse_band", "parse_component", "run_frf"]
 
-PICTURES, TABLES = (".png", ".svg", ".pdf"), (".csv",)
 #: damping ratio in both responses if none is given, because a full model has no comparable damping
 OVERLAY_DAMPING = 0.01
 
@@ -51,7 +53,8 @@ def run_frf(request: FrfRequest) -> None:
 
     frequencies = parse_band(request.band)
     pairs = tuple(parse_component(text) for text in request.components or MOTION_COMPONENTS[:3])
-    paths = [checked_output(path, request) for path in request.outputs]
+    inputs = [request.file] + ([request.job] if request.job else [])
+    paths = output_files(request.outputs, [], (*PICTURES, *TABLES), QualityError, overwrite_of=inputs)
     reduced = read(request.file)
     for name in (request.excited, request.answering):
         reduced.interface(name)  # raises an error for an unknown interface before any work
@@ -65,12 +68,10 @@ def run_frf(request: FrfRequest) -> None:
         full = whole.between(request.excited, request.answering)
     own = file_response(reduced, frequencies, damping=damping).between(request.excited, request.answering)
     print_peaks(request, reduced, own, full, pairs)
-    for path in paths:
-        if path.suffix in TABLES:
-            write_table(path, own, full, pairs, is_inertance=request.is_inertance)
-        else:
-            draw(path, request, reduced, own, full, pairs)
-        say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    write_outputs(
+        paths, table=lambda: response_table(request, reduced, own, full, pairs),
+        figure=lambda: response_figure(request, reduced, own, full, pairs), dpi=150,
+    )  # fmt: skip
 
 
 def parse_band(text: str) -> Array:
@@ -107,14 +108,6 @@ def parse_component(text: str) -> tuple[int, int]:
                 f"--component {text!r}: {quoted(word)} is no component{nearest(word, MOTION_COMPONENTS)}"
             )
     return MOTION_COMPONENTS.index(motion), MOTION_COMPONENTS.index(force)
-
-
-def checked_output(path: Path, request: FrfRequest) -> Path:
-    """Return the output path, after a check that it can be written and has a known suffix."""
-    if path.suffix.lower() not in (*PICTURES, *TABLES):
-        raise QualityError(f"--output {path}: expected a name that ends in {', '.join((*PICTURES, *TABLES))}")
-    inputs = [request.file] + ([request.job] if request.job else [])
-    return Path(output_path(path, "", QualityError, overwrite_of=inputs))
 
 
 def full_model(request: FrfRequest, reduced: ReducedBody, highest: float) -> tuple[PortModel, float]:
@@ -194,50 +187,41 @@ def response_unit(reduced: ReducedBody, motion: int, force: int, request: FrfReq
     return f"{top}/{bottom}"
 
 
-def write_table(
-    path: Path,
-    own: FrequencyResponse,
-    full: FrequencyResponse | None,
-    pairs: tuple[tuple[int, int], ...],
-    *,
-    is_inertance: bool,
-) -> None:
-    """Write frequency, and real and imaginary part of each component, as CSV."""
-    columns = [("frequency_hz", own.frequencies)]
-    for source, response in (("reduced", own), ("full", full)):
-        if response is None:
-            continue
-        for motion, force in pairs:
-            values = plotted_response(response, is_inertance)[:, motion, force]
-            words = f"{source} {pair_words(motion, force)}"
-            columns += [(f"{words} real", values.real), (f"{words} imag", values.imag)]
-    stream = io.StringIO(newline="")
-    writer = csv.writer(stream)
-    writer.writerow([name for name, _ in columns])
-    writer.writerows(zip(*(map(repr, map(float, values)) for _, values in columns), strict=True))
-    replace_file(path, stream.getvalue().encode("utf-8"))
-
-
-def draw(
-    path: Path,
+def response_table(
     request: FrfRequest,
     reduced: ReducedBody,
     own: FrequencyResponse,
     full: FrequencyResponse | None,
     pairs: tuple[tuple[int, int], ...],
-) -> None:
-    """Draw magnitude and phase of each component."""
+) -> Table:
+    """Return the frequency, and each component as a complex column."""
+    columns, units = {"frequency": own.frequencies}, {"frequency": "Hz"}
+    for source, response in (("reduced", own), ("full", full)):
+        if response is None:
+            continue
+        for motion, force in pairs:
+            name = f"{source} {pair_words(motion, force)}"
+            columns[name] = plotted_response(response, request.is_inertance)[:, motion, force]
+            units[name] = response_unit(reduced, motion, force, request)
+    return Table(columns, units)
+
+
+def response_figure(
+    request: FrfRequest,
+    reduced: ReducedBody,
+    own: FrequencyResponse,
+    full: FrequencyResponse | None,
+    pairs: tuple[tuple[int, int], ...],
+) -> "Figure":
+    """Return magnitude and phase of each component."""
     from cms.assessment.quality.plots import frf_figure
 
     curves = {"reduced": own} if full is None else {"full model": full, "reduced": own}
     units = [response_unit(reduced, motion, force, request) for motion, force in pairs]
-    figure = frf_figure(
+    return frf_figure(
         curves,
         [(motion, force) for motion, force in pairs],
         [f"{pair_words(*pair)} [{unit}]" for pair, unit in zip(pairs, units, strict=True)],
         is_inertance=request.is_inertance,
         title=f"{reduced.name}: {request.excited} to {request.answering}, {own.damping}",
     )
-    picture = io.BytesIO()
-    figure.savefig(picture, format=path.suffix.lower().removeprefix("."), dpi=150)
-    replace_file(path, picture.getvalue())

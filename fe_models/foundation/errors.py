@@ -15,6 +15,7 @@ __all__ = [
     "ModalFileError",
     "ReportedError",
     "StorageError",
+    "TableError",
     "UnitsError",
 ]
 
@@ -56,6 +57,10 @@ class UnitsError(FeModelsError, CmsError, ValueError):
 
 class StorageError(FeModelsError, CmsError, RuntimeError):
     """There is not enough disk space for arrays that should go to disk."""
+
+
+class TableError(FeModelsError, CmsError, ValueError):
+    """A table cannot be made, written or read."""
 
 
 class ModalFileError(CmsError, ValueError):

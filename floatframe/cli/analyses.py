@@ -9,6 +9,7 @@ import typer
 
 from cms.cli.arguments import SetValues, changes_of
 from cms.cli.console import guarded, output_path, print_table, say, stages, vector_words
+from cms.cli.outputs import PICTURES, TABLES, output_file, write_outputs
 
 if TYPE_CHECKING:
     from floatframe.analyses import Equilibrium, LinearSystem, Locus, SystemModes
@@ -213,7 +214,9 @@ def modes_command(
 def campbell_command(
     system: SystemArgument,
     speeds: Annotated[str, typer.Option(help='Speeds "from:to:number" [rad/time unit].')],
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture (.png, .svg, .pdf) or .csv.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Picture (.png, .svg, .pdf) or table (.csv, ...).")
+    ] = None,
     axis: Axis = "z",
     center: Center = "0,0,0",
     n_modes: Modes = 12,
@@ -233,47 +236,24 @@ def campbell_command(
 
     Example: floatframe campbell rotor.toml --speeds 0:200:21 --out bearing --out "tip.x" -o rotor.csv
     """
-    import csv
-    import io
-
-    import numpy as np
-
-    from fe_models.foundation.paths import replace_file
     from floatframe.analyses import campbell
     from floatframe.analyses.linear.plots import campbell_figure
     from floatframe.cli.channel_names import chosen
     from floatframe.errors import ModelError
 
     model, _ = read_in_formulation(system, None, set_values)
-    path = output_path(output, system.with_suffix(".png"), ModelError, overwrite_of=(system, *model.files))
-    kind = path.suffix.lower().removeprefix(".")
-    if kind not in ("png", "svg", "pdf", "csv"):
-        raise ModelError(f"--output {path}: expected a file name that ends in .png, .svg, .pdf or .csv")
+    inputs = (system, *model.files)
+    path = output_file(output, system.with_suffix(".png"), (*PICTURES, *TABLES), ModelError, overwrite_of=inputs)
     values = speed_range(speeds)
     with stages() as clock, clock("modes over the speed") as advance:
         locus = campbell(
             model, values, axis=vector(axis, "--axis"), center=vector(center, "--center"), n_modes=n_modes,
             outputs=chosen(model, outputs, model.outputs), progress=lambda done, all_: advance(done / all_),
         )  # fmt: skip
-    if kind == "csv":
-        table = np.column_stack(
-            [locus.values, locus.frequencies / model.units.time, locus.damping_ratios, locus.steady]
-        )
-        n = locus.eigenvalues.shape[1]
-        head = ["speed", *(f"Hz {k + 1}" for k in range(n)), *(f"damping {k + 1}" for k in range(n))]
-        head += [f"{name} [{unit}]" for name, unit in zip(locus.outputs, locus.output_units, strict=True)]
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(head)
-        writer.writerows([f"{value:.10g}" for value in row] for row in table)
-        replace_file(path, text.getvalue().encode())
-    else:
-        picture = io.BytesIO()
-        campbell_figure(locus, time_unit=model.units.time).savefig(picture, format=kind, dpi=130)
-        replace_file(path, picture.getvalue())
     if locus.outputs:
         print_steady(locus, model.units.time_symbol)
-    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    time = model.units.time
+    write_outputs([path], table=lambda: locus.to_table(time), figure=lambda: campbell_figure(locus, time_unit=time))
 
 
 def print_steady(locus: "Locus", time: str) -> None:

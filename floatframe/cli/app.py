@@ -28,6 +28,7 @@ from cms.cli.console import (
     say,
     stages,
 )
+from cms.cli.outputs import PICTURES, TABLES, output_file, write_outputs
 from cms.cli.schema import schema_command_of
 from cms.cli.show import show_command
 
@@ -387,10 +388,7 @@ def plot_command(
 
     Example: floatframe plot swing.h5 --sensor "tip*" --as psd
     """
-    import io
-
     from cms.errors import CmsError
-    from fe_models.foundation.paths import replace_file
     from floatframe.errors import ResultsError
     from floatframe.pictures.animation import bodies_of
     from floatframe.pictures.overview import plot_overview
@@ -400,10 +398,8 @@ def plot_command(
     from floatframe.results.trajectory import read_trajectory
 
     trajectory = read_trajectory(file)
-    path = output_path(output, file.with_suffix(".png"), ResultsError, overwrite_of=(file, *trajectory.files))
-    ending = path.suffix.lower().removeprefix(".")
-    if ending not in ("png", "svg", "pdf"):
-        raise ResultsError(f"--output {path}: expected a file name that ends in .png, .svg or .pdf")
+    read = (file, *trajectory.files)
+    path = output_file(output, file.with_suffix(".png"), PICTURES, ResultsError, overwrite_of=read)
     if kind:
         spectra.plot_as(trajectory, sensors, kind, path, resolution=resolution, rotation=rotation)
         return
@@ -413,7 +409,6 @@ def plot_command(
         typer.echo(f"note: elastic displacement is left out: {error}", err=True)
         bodies = {}
     system = known_system(trajectory)
-    picture = io.BytesIO()
     if sensors:
         if system is None:
             raise ResultsError("--sensor: the system file of the run is gone, or the run was made in Python")
@@ -422,9 +417,7 @@ def plot_command(
     else:
         found = [] if system is None else [*measured(system, trajectory).values()]
         figure = plot_overview(trajectory, bodies, found)
-    figure.savefig(picture, format=ending, dpi=130)
-    replace_file(path, picture.getvalue())
-    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    write_outputs([path], figure=lambda: figure)
 
 
 @guarded
@@ -479,7 +472,8 @@ def animate_command(
 def export_command(
     file: ResultsFile,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="A .csv table, a .pvd series, or RPC III (.rsp, .drv, .tim).")
+        Path | None,
+        typer.Option("--output", "-o", help="A table (.csv, ...), a .pvd series, or RPC III (.rsp, .drv, .tim)."),
     ] = None,
     sensors: Annotated[
         list[str],
@@ -489,7 +483,8 @@ def export_command(
 ) -> None:
     """Write a motion as a table, for ParaView, or for a test rig.
 
-    The ending of -o decides: .csv holds all sensors, .pvd deformed surfaces with stress, .rsp, .drv or .tim signals.
+    The ending of -o decides: .csv, .json, .mat, .npz and .parquet hold all sensors, .pvd deformed surfaces with
+    stress, .rsp, .drv or .tim signals.
 
     Without -o, a table is written next to the results: swing.h5 gives swing.csv.
 
@@ -502,31 +497,32 @@ def export_command(
     from floatframe.errors import ResultsError
     from floatframe.files.signals.rpc_file import write_rpc
     from floatframe.pictures.animation import bodies_of
-    from floatframe.results.export import export_csv, export_vtk
+    from floatframe.results.export import export_vtk, motion_table, sensor_table
     from floatframe.results.sensor_choice import chosen_measurements
     from floatframe.results.trajectory import read_trajectory
 
     trajectory = read_trajectory(file)
-    path = output_path(output, file.with_suffix(".csv"), ResultsError, overwrite_of=(file, *trajectory.files))
+    signals, read = (".rsp", ".drv", ".tim", ".rpc"), (file, *trajectory.files)
+    path = output_file(output, file.with_suffix(".csv"), (*TABLES, ".pvd", *signals), ResultsError, overwrite_of=read)
     bodies = bodies_of(trajectory)
-    if path.suffix.lower() == ".csv":
+    if path.suffix.lower() in TABLES:
         system = known_system(trajectory)
         if sensors and system is None:
             raise ResultsError("--sensor: the system file of the run is gone, or the run was made in Python")
-        chosen = None if system is None or not sensors else chosen_measurements(system, trajectory, sensors)
-        export_csv(trajectory, path, bodies, system, chosen=chosen)
-        say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
-    elif path.suffix.lower() in (".rsp", ".drv", ".tim", ".rpc"):
+        if system is None or not sensors:
+            table = motion_table(trajectory, bodies, system)
+        else:
+            table = sensor_table(trajectory, chosen_measurements(system, trajectory, sensors))
+        write_outputs([path], table=lambda: table)
+    elif path.suffix.lower() in signals:
         write_rpc(spectra.sensor_signals(trajectory, sensors), path)
         say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
-    elif path.suffix.lower() == ".pvd":
+    else:
         with stages(remaining=True) as clock, clock("surfaces") as advance:
             written = export_vtk(
                 trajectory, bodies, path, every=every, on_frame=lambda done, all_: advance(done / all_)
             )
         say(f"wrote {path} and {len(written) - 1} surfaces in {path.with_suffix('')}")
-    else:
-        raise ResultsError(f"--output {path}: expected a file name that ends in .csv, .pvd, .rsp, .drv or .tim")
 
 
 register(

@@ -1,16 +1,16 @@
 """The commands of durability: fatigue, shake."""
 
-import json as json_module
 import math
+from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from cms.cli.console import guarded, output_path, print_table, say, stages
+from cms.cli.outputs import TABLES, json_text, output_files, write_outputs
 
 if TYPE_CHECKING:
-    from floatframe.durability.fatigue.assessment import Assessment
     from floatframe.durability.shaking.loads.levels import Level
     from floatframe.durability.shaking.shake import ShakeJob, ShakeResult
 
@@ -20,14 +20,12 @@ __all__ = ["fatigue_command", "shake_command"]
 # the command fatigue: damage and life on the surface of a body --------------------------------------------------------
 
 
-FATIGUE_KINDS = ("html", "json", "csv", "vtu", "png")
-
-
 @guarded
 def fatigue_command(
     file: Annotated[Path, typer.Argument(help="Fatigue file (TOML), see docs/fatigue.md.")],
     outputs: Annotated[
-        list[Path], typer.Option("--output", "-o", help="A .html, .json, .csv, .vtu or .png file; repeatable.")
+        list[Path],
+        typer.Option("--output", "-o", help="A .html, .json, .vtu or .png file, or a table (.csv, ...); repeatable."),
     ] = [],  # noqa: B006
     json: Annotated[bool, typer.Option("--json", help="Write the same record as JSON, for other programs.")] = False,
 ) -> None:
@@ -42,58 +40,36 @@ def fatigue_command(
 
     Example: floatframe fatigue arm.toml -o hot_spot.png -o arm.csv
     """
-    from fe_models.foundation.paths import replace_file
     from fe_models.foundation.toml_file import files_named
     from floatframe.durability.fatigue.assessment import assess
     from floatframe.durability.fatigue.fatigue_file import read_fatigue
-    from floatframe.durability.fatigue.outputs import fatigue_record
+    from floatframe.durability.fatigue.outputs import fatigue_record, render_fatigue, vtu_of, worst_table
+    from floatframe.durability.fatigue.report import fatigue_html
     from floatframe.errors import FatigueError
 
     given = read_fatigue(file)
     inputs = (file, *files_named(given))
-    paths = [output_path(path, None, FatigueError, overwrite_of=inputs) for path in outputs]
-    if not paths and not json:
-        paths = [
-            output_path(None, file.with_suffix(f".{kind}"), FatigueError, overwrite_of=inputs)
-            for kind in FATIGUE_KINDS[:4]
-        ]
-    for path in paths:
-        if path.suffix.lower().removeprefix(".") not in FATIGUE_KINDS:
-            raise FatigueError(
-                f"--output {path}: expected a name that ends in {', '.join('.' + k for k in FATIGUE_KINDS)}"
-            )
+    default = [] if json else [file.with_suffix(ending) for ending in (".html", ".json", ".csv", ".vtu")]
+    endings = (".html", ".vtu", ".png", *TABLES)
+    paths = output_files(outputs, default, endings, FatigueError, overwrite_of=inputs)
     with stages(remaining=True) as clock, clock("damage on the surface") as advance:
         made = assess(given, progress=advance)
     record = fatigue_record(made)
     if json:
-        typer.echo(json_module.dumps(record, indent=2))
+        typer.echo(json_text(record), nl=False)
     else:
         print_fatigue(record)
-    for path in paths:
-        write(made, record, path, replace_file)
-        if not json:
-            say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
-
-
-def write(made: "Assessment", record: dict[str, Any], path: Path, replace_file: Any) -> None:
-    """Write a file of a result, in the format of its suffix."""
-    from floatframe.durability.fatigue.outputs import csv_of, render_fatigue, vtu_of
-
-    kind = path.suffix.lower().removeprefix(".")
-    if kind == "png":
+    for path in [path for path in paths if path.suffix.lower() == ".png"]:
         drawing = render_fatigue(made, path)
+        paths.remove(path)
         if drawing.note:
             typer.echo(f"note: {drawing.note}", err=True)
-    elif kind == "html":
-        from floatframe.durability.fatigue.report import fatigue_html
-
-        replace_file(path, fatigue_html(made).encode())
-    elif kind == "vtu":
-        replace_file(path, vtu_of(made))
-    elif kind == "csv":
-        replace_file(path, csv_of(made).encode())
-    else:
-        replace_file(path, (json_module.dumps(record, indent=2) + "\n").encode())
+        if not json:
+            say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    write_outputs(
+        paths, table=lambda: worst_table(made), record=record, is_quiet=json,
+        others={".html": lambda _: fatigue_html(made).encode(), ".vtu": lambda _: vtu_of(made)},
+    )  # fmt: skip
 
 
 def sn_words(curve: dict[str, Any], unit: str) -> str:
@@ -140,7 +116,6 @@ def print_fatigue(record: dict[str, Any]) -> None:
 # the command shake: a structure on a moving base ----------------------------------------------------------------------
 
 
-SHAKE_KINDS = (".html", ".json", ".csv")
 SHOWN = 14  #: largest number of printed outputs of a run
 
 
@@ -148,7 +123,10 @@ SHOWN = 14  #: largest number of printed outputs of a run
 def shake_command(
     file: Annotated[Path, typer.Argument(help="A shake file (TOML), see docs/shake.md, or a modal file (.h5).")],
     outputs: Annotated[
-        list[Path], typer.Option("--output", "-o", help="A .html, .json or .csv file; repeatable; default: all three.")
+        list[Path],
+        typer.Option(
+            "--output", "-o", help="A .html or .json file, or a table (.csv, ...); repeatable; default: three."
+        ),
     ] = [],  # noqa: B006
     base: Annotated[str | None, typer.Option(help="Of a modal file: the interface on the base.")] = None,
     q_factor: Annotated[
@@ -181,10 +159,9 @@ def shake_command(
     Example: floatframe shake tower.h5 --base foot --Q 25 --sine 5:1,100:1 --rate 2 --random
     20:0.01,80:0.04,350:0.04,2000:0.007
     """
-    from fe_models.foundation.paths import replace_file
     from floatframe.durability.shaking.light_record import light_record
     from floatframe.durability.shaking.page import shake_html
-    from floatframe.durability.shaking.record import shake_csv, shake_record
+    from floatframe.durability.shaking.record import shake_record, shake_table
     from floatframe.durability.shaking.shake import shake
     from floatframe.errors import ModelError
 
@@ -199,42 +176,31 @@ def shake_command(
     else:
         job = job_of_options(file, base, q_factor, sine, rate, random, shock, directions, at)
     inputs = (file, Path(job.source)) if job.source else (file,)
-    paths = [output_path(path, None, ModelError, overwrite_of=inputs) for path in outputs]
-    for path in paths:
-        if path.suffix.lower() not in SHAKE_KINDS:
-            raise ModelError(f"--output {path}: expected a file name that ends in {', '.join(SHAKE_KINDS)}")
-    if not paths and not json:
-        paths = [
-            output_path(None, file.with_suffix(f".shake{kind}"), ModelError, overwrite_of=inputs)
-            for kind in SHAKE_KINDS
-        ]
+    default = [] if json else [file.with_suffix(f".shake{ending}") for ending in (".html", ".json", ".csv")]
+    paths = output_files(outputs, default, (".html", *TABLES), ModelError, overwrite_of=inputs)
     with stages() as clock, clock(f"{job.structure.name}: shaken"):
         result = shake(job)
     if json:
         light, _ = light_record(shake_record(result), "")
         if "curves" in light:
             light["curves"] = "left out here; -o NAME.json writes them into NAME.npz"
-        typer.echo(json_module.dumps(light, indent=1))
+        typer.echo(dumps(light, indent=1))
     else:
         print_result(result)
-    for path in paths:
-        kind = path.suffix.lower()
-        if kind == ".html":
-            content = shake_html(result)
-        elif kind == ".json":
-            beside = path.with_suffix(".npz")
-            light, curves = light_record(shake_record(result), beside.name)
-            content = json_module.dumps(light, separators=(",", ":")) + "\n"
-            if curves:
-                beside = output_path(beside, None, ModelError, overwrite_of=inputs)
-                replace_file(beside, npz_of(curves))
-                if not json:
-                    say(f"wrote {beside} ({beside.stat().st_size / 1e6:.2f} MB): the curves of {path.name}")
-        else:
-            content = shake_csv(result)
-        replace_file(path, content.encode())
-        if not json:
-            say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+    def with_curves(path: Path) -> dict[Path, bytes]:
+        """Return the record, and its curves in an archive beside it."""
+        beside = path.with_suffix(".npz")
+        light, curves = light_record(shake_record(result), beside.name)
+        files = {path: (dumps(light, separators=(",", ":")) + "\n").encode()}
+        if curves:
+            files[output_path(beside, None, ModelError, overwrite_of=inputs)] = npz_of(curves)
+        return files
+
+    write_outputs(
+        paths, table=lambda: shake_table(result), is_quiet=json,
+        others={".html": lambda _: shake_html(result).encode(), ".json": with_curves},
+    )  # fmt: skip
 
 
 def npz_of(arrays: dict[str, Any]) -> bytes:

@@ -1,6 +1,5 @@
 """The commands that find parameters: identify, optimize."""
 
-import json as json_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -8,6 +7,8 @@ import typer
 
 from cms.cli.arguments import Journal, Workers
 from cms.cli.console import guarded, output_path, print_table, say, stages
+from cms.cli.outputs import PICTURES, TABLES, json_text, output_files, write_outputs
+from fe_models.foundation.documents.table import Table
 
 if TYPE_CHECKING:
     from floatframe.design.identification.excitation import ExcitingMotion
@@ -18,9 +19,6 @@ __all__ = ["identify_command", "optimize_command"]
 
 
 # the command identify: inertial parameters of a tree from a measured motion -------------------------------------------
-
-
-IDENTIFY_KINDS = ("html", "json")
 
 
 @guarded
@@ -60,7 +58,6 @@ def identify_command(
 
     Example: floatframe identify robot.toml measured.csv --cutoff 10 -o report.html
     """
-    from fe_models.foundation.paths import replace_file
     from floatframe.design.identification.estimation import estimate
     from floatframe.design.identification.identify_report import identification_html, identification_record
     from floatframe.design.identification.measured_file import measured_coordinates, read_measured
@@ -72,15 +69,9 @@ def identify_command(
 
     described = read_system(system)[0]
     inputs = tuple(path for path in (system, data, check) if path is not None)
-    wanted = outputs or ([] if json else [data.with_suffix(".html")])
-    paths = [output_path(path, None, ModelError, overwrite_of=inputs) for path in wanted]
-    for path in paths:
-        if path.suffix.lower().removeprefix(".") not in IDENTIFY_KINDS:
-            raise ModelError(
-                f"--output {path}: expected a file name that ends in {', '.join('.' + k for k in IDENTIFY_KINDS)}"
-            )
-    if motion is not None:
-        motion = output_path(motion, None, ModelError, overwrite_of=inputs)
+    default = [] if json else [data.with_suffix(".html")]
+    paths = output_files(outputs, default, (".html", ".json"), ModelError, overwrite_of=inputs)
+    motions = output_files([] if motion is None else [motion], [], TABLES, ModelError, overwrite_of=inputs)
     named = [term.strip() for term in terms.split(",") if term.strip() not in ("", "none")]
     with stages() as clock:
         with clock("measured motion"):
@@ -94,7 +85,7 @@ def identify_command(
             with clock("real bodies"):
                 bodies = real_parameters(made)
         better, notes = None, read.notes
-        if paths or motion is not None:
+        if paths or motions:
             with clock("motion that would help"):
                 try:
                     better = next_motion(made)
@@ -108,34 +99,26 @@ def identify_command(
         with clock("record"):
             record = identification_record(made, bodies, other, notes, better)
     if json:
-        typer.echo(json_module.dumps(record, indent=2))
+        typer.echo(json_text(record), nl=False)
     else:
         print_estimate(record)
-    for path in paths:
-        if path.suffix.lower() == ".json":
-            replace_file(path, (json_module.dumps(record, indent=2) + "\n").encode())
-        else:
-            replace_file(path, identification_html(made, record, other).encode())
-        if not json:
-            say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
-    if motion is not None and better is None and not json:
-        say(f"{motion} is not written: no better motion was found")
-    if motion is not None and better is not None:
-        replace_file(motion, motion_table(better.motion, form).encode())
-        if not json:
-            say(f"wrote {motion}")
+    page = {".html": lambda _: identification_html(made, record, other).encode()}
+    write_outputs(paths, record=record, others=page, is_quiet=json)
+    if better is not None:
+        write_outputs(motions, table=lambda: motion_table(better.motion, form), is_quiet=json)
+    elif motions and not json:
+        say(f"{motions[0]} is not written: no better motion was found")
 
 
-def motion_table(motion: "ExcitingMotion", form: "LinearForm") -> str:
+def motion_table(motion: "ExcitingMotion", form: "LinearForm") -> Table:
     """Return the positions of one period, at 100 times per period of the fastest harmonic, as a table."""
     import numpy as np
 
     n = 100 * ((motion.coefficients.shape[1] - 1) // 2)
     t = np.arange(n + 1) * motion.period / n
     units = [form.system.units.length_symbol if column.unit == "m" else "rad" for column in form.columns]
-    heads = ["time [s]", *(f"{name} [{unit}]" for name, unit in zip(motion.names, units, strict=True))]
-    rows = np.column_stack([t, motion.at(t)[0]])
-    return "\n".join([",".join(heads), *(",".join(f"{x:.9g}" for x in row) for row in rows)]) + "\n"
+    columns = {"time": t, **dict(zip(motion.names, motion.at(t)[0].T, strict=True))}
+    return Table(columns, {"time": "s", **dict(zip(motion.names, units, strict=True))})
 
 
 def print_estimate(record: dict[str, Any]) -> None:
@@ -160,9 +143,6 @@ def print_estimate(record: dict[str, Any]) -> None:
 # the command optimize: the best values of parameters of a system ------------------------------------------------------
 
 
-OPTIMIZE_KINDS = ("csv", "json", "png", "svg", "pdf", "toml")
-
-
 @guarded
 def optimize_command(
     design: Annotated[Path, typer.Argument(help="Design file (TOML), see docs/optimization.md.")],
@@ -171,7 +151,8 @@ def optimize_command(
         typer.Option(
             "--output",
             "-o",
-            help="A .csv, .json, .png, .svg or .pdf file, or .toml, the system with the best values.",
+            help="A table (.csv, .json, .mat, .npz, .parquet), a picture (.png, .svg, .pdf), or .toml, the system with "
+            "the best values; repeatable.",
         ),
     ] = [],  # noqa: B006
     journal: Journal = None,
@@ -190,9 +171,6 @@ def optimize_command(
 
     Example: floatframe optimize study.toml --workers dask://cluster:8786
     """
-    import io
-
-    from fe_models.foundation.paths import replace_file
     from fe_models.foundation.tasks.workers import tasks_of
     from floatframe.design.optimization.design_file import read_design
     from floatframe.design.optimization.history_plots import plot_history
@@ -203,13 +181,10 @@ def optimize_command(
     described = read_design(design)
     inputs = (design, Path(described.study.system), *read_system(described.study.system)[0].files, *described.tables)
     kept = output_path(journal, design.with_suffix(".journal"), ModelError, overwrite_of=inputs, needs_file=True)
-    wanted = outputs or ([] if json else [design.with_suffix(".csv"), design.with_suffix(".png")])
-    paths = [output_path(path, None, ModelError, overwrite_of=(*inputs, kept)) for path in wanted]
+    default = [] if json else [design.with_suffix(".csv"), design.with_suffix(".png")]
+    endings = (*TABLES, *PICTURES, ".toml")
+    paths = output_files(outputs, default, endings, ModelError, overwrite_of=(*inputs, kept))
     for path in paths:
-        if path.suffix.lower().removeprefix(".") not in OPTIMIZE_KINDS:
-            raise ModelError(
-                f"--output {path}: expected a file name that ends in {', '.join('.' + k for k in OPTIMIZE_KINDS)}"
-            )
         if path.suffix.lower() == ".toml" and path.resolve().parent != Path(described.study.system).resolve().parent:
             raise ModelError(
                 f"--output {path}: expected a place beside {described.study.system}, which names files relative to it"
@@ -224,23 +199,13 @@ def optimize_command(
             result = optimize(described, workers=tasks, journal=kept)
     record = optimization_record(result)
     if json:
-        typer.echo(json_module.dumps(record, indent=2))
+        typer.echo(json_text(record), nl=False)
     else:
         print_optimum(result)
-    for path in paths:
-        kind = path.suffix.lower().removeprefix(".")
-        if kind == "csv":
-            replace_file(path, csv_of(result).encode())
-        elif kind == "toml":
-            replace_file(path, best_system(result).encode())
-        elif kind == "json":
-            replace_file(path, (json_module.dumps(record, indent=2) + "\n").encode())
-        else:
-            picture = io.BytesIO()
-            plot_history(result).savefig(picture, format=kind, dpi=130)
-            replace_file(path, picture.getvalue())
-        if not json:
-            say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    write_outputs(
+        paths, table=lambda: history_table(result), record=record, figure=lambda: plot_history(result),
+        others={".toml": lambda _: best_system(result).encode()}, is_quiet=json,
+    )  # fmt: skip
 
 
 def print_optimum(result: "OptimizationResult") -> None:
@@ -330,17 +295,12 @@ def best_system(result: "OptimizationResult") -> str:
     return str(tomlkit.dumps(document))
 
 
-def csv_of(result: "OptimizationResult") -> str:
-    """Return the history as comma-separated values with 17 digits; a failure has empty cells and a reason."""
-    import csv
-    import io
-
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
+def history_table(result: "OptimizationResult") -> Table:
+    """Return the history; the numbers of a failed evaluation are missing."""
     names = [p.name for p in result.design.parameters] + [q.output.name for q in result.design.quantities]
-    writer.writerow(["evaluation", "purpose", *names, "objective", "violation", "error"])
+    rows = []
     for i, row in enumerate(result.history):
         r = row_record(result, row)
-        cells = [*r["parameters"].values(), *r["numbers"].values(), r["objective"], r["violation"]]
-        writer.writerow([i + 1, r["purpose"], *("" if c is None else repr(c) for c in cells), row.evaluation.error])
-    return text.getvalue()
+        numbers = (*r["parameters"].values(), *r["numbers"].values(), r["objective"], r["violation"])
+        rows.append((i + 1, r["purpose"], *numbers, row.evaluation.error))
+    return Table.of_rows(("evaluation", "purpose", *names, "objective", "violation", "error"), rows)

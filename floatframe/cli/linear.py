@@ -8,6 +8,7 @@ import typer
 
 from cms.cli.arguments import SetValues
 from cms.cli.console import guarded, output_path, print_table, say
+from cms.cli.outputs import PICTURES, TABLES, output_file, write_outputs
 from floatframe.cli.analyses import Axis, Center, Formulation, Speed, SystemArgument, linearized, read_in_formulation
 from floatframe.cli.channel_names import chosen
 
@@ -86,7 +87,9 @@ def response_command(
     band: Annotated[str, typer.Option(help='Frequencies "from:to" in Hz; default: around all modes.')] = "",
     inputs: Inputs = [],  # noqa: B006
     outputs: Outputs = [],  # noqa: B006
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture (.png, .svg, .pdf) or .csv.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Picture (.png, .svg, .pdf) or table (.csv, ...).")
+    ] = None,
     points: Annotated[int, typer.Option(min=2, help="Frequencies, besides those around resonances.")] = 400,
     speed: Speed = 0.0,
     axis: Axis = "z",
@@ -104,18 +107,13 @@ def response_command(
 
     Example: floatframe response crane.toml --input jib/tip:z --out jib/tip:z -o frf.csv
     """
-    import io
-
-    from fe_models.foundation.paths import replace_file
     from floatframe.analyses.linear.frequency_response import frequency_response, resolved_frequencies
     from floatframe.analyses.linear.plots import plot_frequency_response
     from floatframe.errors import ModelError
 
     model, form = read_in_formulation(system, formulation, set_values)
-    path = output_path(output, system.with_suffix(".response.png"), ModelError, overwrite_of=(system, *model.files))
-    kind = path.suffix.lower().removeprefix(".")
-    if kind not in ("png", "svg", "pdf", "csv"):
-        raise ModelError(f"--output {path}: expected a file name that ends in .png, .svg, .pdf or .csv")
+    default, read = system.with_suffix(".response.png"), (system, *model.files)
+    path = output_file(output, default, (*PICTURES, *TABLES), ModelError, overwrite_of=read)
     linear = linearized(
         model,
         speed,
@@ -129,14 +127,11 @@ def response_command(
     seconds = model.units.time
     first, last = band_of(band, linear, seconds)
     response = frequency_response(linear, resolved_frequencies(linear, first * seconds, last * seconds, n=points))
-    if kind == "csv":
-        replace_file(path, csv_of(response, seconds).encode())
-    else:
-        picture = io.BytesIO()
-        plot_frequency_response(response, time_unit=seconds).savefig(picture, format=kind, dpi=130)
-        replace_file(path, picture.getvalue())
     print_peaks(response, seconds)
-    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    write_outputs(
+        [path], table=lambda: response.to_table(seconds),
+        figure=lambda: plot_frequency_response(response, time_unit=seconds),
+    )  # fmt: skip
 
 
 def print_left_out(linear: "LinearSystem") -> None:
@@ -179,25 +174,3 @@ def print_peaks(response: "FrequencyResponse", seconds: float) -> None:
                          f"{response.frequencies[k] / seconds:.6g}"))  # fmt: skip
     low = response.frequencies[0] / seconds
     print_table("Responses", ("output / input", "unit", f"at {low:.3g} Hz>", "greatest>", "at Hz>"), rows)
-
-
-def csv_of(response: "FrequencyResponse", seconds: float) -> str:
-    """Return frequencies in Hz, amplitudes and phases in degrees as comma-separated values."""
-    import csv
-    import io
-
-    pairs = [(o, i) for o in range(len(response.outputs)) for i in range(len(response.inputs))]
-    names = [f"{response.outputs[o]} / {response.inputs[i]}" for o, i in pairs]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    heads = [
-        head
-        for name, (o, i) in zip(names, pairs, strict=True)
-        for head in (f"{name} amplitude [{response.units[o][i]}]", f"{name} phase [degrees]")
-    ]
-    writer.writerow(["frequency [Hz]", *heads])
-    amplitudes, phases = response.amplitudes, response.phases
-    for k, f in enumerate(response.frequencies / seconds):
-        row = [value for o, i in pairs for value in (amplitudes[k, o, i], phases[k, o, i])]
-        writer.writerow([repr(float(f)), *(repr(float(value)) for value in row)])
-    return text.getvalue()

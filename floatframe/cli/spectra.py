@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cms.cli.console import guarded, output_path, print_table, say
+from cms.cli.console import guarded, print_table
+from cms.cli.outputs import PICTURES, TABLES, output_file, write_outputs
 
 if TYPE_CHECKING:
     from floatframe.files.signals.analysis import SpectrumRequest
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["plot_as", "sensor_signals", "spectrum_command"]
 
-PICTURES = ("png", "svg", "pdf")
+ENDINGS = (*TABLES, *PICTURES)
 MOST_ROWS = 40  #: largest number of printed rows
 
 
@@ -29,7 +30,9 @@ def spectrum_command(
         str,
         typer.Option("--as", help="psd, amplitude, octave, third-octave, orders, waterfall or response."),
     ] = "psd",
-    output: Annotated[Path | None, typer.Option("--output", "-o", help=".csv, .json, .png, .svg or .pdf.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="A table (.csv, .json, ...) or a picture (.png, ...).")
+    ] = None,
     resolution: Annotated[float | None, typer.Option(help="Distance of lines in Hz; of orders: in orders.")] = None,
     window: Annotated[
         str, typer.Option(help="hann, flattop, rectangular, hamming, blackman, blackman-harris.")
@@ -54,7 +57,7 @@ def spectrum_command(
     from floatframe.files.signals.analysis import SpectrumRequest
 
     signals, extra, inputs = chosen_signals(file, sensors, (rotation, input_name), rate)
-    path = output_path(output, file.with_suffix(f".{kind}.csv"), ResultsError, overwrite_of=inputs)
+    path = output_file(output, file.with_suffix(f".{kind}.csv"), ENDINGS, ResultsError, overwrite_of=inputs)
     request = SpectrumRequest(window, resolution, rms, extra[0], extra[1], max_order)
     write_spectra(signals, kind, request, path, title=file.name)
 
@@ -124,27 +127,13 @@ def plot_as(
 
 def write_spectra(signals: "Signals", kind: str, request: "SpectrumRequest", path: Path, *, title: str) -> None:
     """Write spectra of all channels as picture, table or record, and print a summary."""
-    import io
     import json
 
-    from fe_models.foundation.paths import replace_file
-    from floatframe.errors import ResultsError
-    from floatframe.files.signals.analysis import spectra_of, spectral_csv, spectral_record
+    from floatframe.files.signals.analysis import spectra_of, spectral_record, spectral_table
     from floatframe.files.signals.spectra import Spectrum
     from floatframe.pictures.spectrum_plots import plot_spectra
 
-    ending = path.suffix.lower().removeprefix(".")
-    if ending not in (*PICTURES, "csv", "json"):
-        raise ResultsError(f"--output {path}: expected a file name that ends in .csv, .json, .png, .svg or .pdf")
     spectra = spectra_of(signals, kind, request)
-    if ending in PICTURES:
-        picture = io.BytesIO()
-        plot_spectra(spectra, title=title).savefig(picture, format=ending, dpi=130)
-        replace_file(path, picture.getvalue())
-    elif ending == "csv":
-        replace_file(path, spectral_csv(spectra).encode())
-    else:
-        replace_file(path, (json.dumps(spectral_record(spectra), ensure_ascii=True) + "\n").encode())
     rows = [
         (s.name, s.kind, s.unit, f"{s.values.max():.6g}", f"{s.frequencies[s.values.argmax()]:.6g}",
          f"{s.resolution:.4g}", str(s.n_averages))
@@ -154,4 +143,7 @@ def write_spectra(signals: "Signals", kind: str, request: "SpectrumRequest", pat
     if rows:
         heads = ("", "kind", "unit", "greatest>", "at Hz>", "resolution Hz>", "averages>")
         print_table("Spectra", heads, rows)
-    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    write_outputs(
+        [path], table=lambda: spectral_table(spectra), figure=lambda: plot_spectra(spectra, title=title),
+        others={".json": lambda _: (json.dumps(spectral_record(spectra), ensure_ascii=True) + "\n").encode()},
+    )  # fmt: skip

@@ -1,6 +1,5 @@
 """The commands that vary parameters: sweep, study, gradient."""
 
-import json as json_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -8,6 +7,7 @@ import typer
 
 from cms.cli.arguments import Journal, Workers
 from cms.cli.console import USER_ERROR, guarded, output_path, print_error, print_table, say, stages
+from cms.cli.outputs import PICTURES, TABLES, json_text, output_files, write_outputs
 
 if TYPE_CHECKING:
     from floatframe.design.gradients import Sensitivities
@@ -20,7 +20,6 @@ __all__ = ["compare_command", "gradient_command", "sweep_command"]
 # the command sweep: parameter studies of a system ---------------------------------------------------------------------
 
 
-SWEEP_KINDS = ("csv", "json", "png", "svg", "pdf")
 MOST_ROWS = 60  #: largest number of printed rows
 
 
@@ -29,7 +28,11 @@ def sweep_command(
     study: Annotated[Path, typer.Argument(help="Study file (TOML), see docs/analyses.md.")],
     outputs: Annotated[
         list[Path],
-        typer.Option("--output", "-o", help="A .csv, .json, .png, .svg or .pdf file; repeatable."),
+        typer.Option(
+            "--output",
+            "-o",
+            help="A table (.csv, .json, .mat, .npz, .parquet) or picture (.png, .svg, .pdf); repeatable.",
+        ),
     ] = [],  # noqa: B006
     journal: Journal = None,
     workers: Workers = None,
@@ -47,9 +50,6 @@ def sweep_command(
 
     Example: floatframe sweep study.toml --workers dask://cluster:8786
     """
-    import io
-
-    from fe_models.foundation.paths import replace_file
     from fe_models.foundation.tasks.workers import tasks_of
     from floatframe.design.studies.study import run_study
     from floatframe.design.studies.study_file import read_study
@@ -60,13 +60,8 @@ def sweep_command(
     described = read_study(study)
     inputs = (study, Path(described.system), *read_system(described.system)[0].files)
     kept = output_path(journal, study.with_suffix(".journal"), ModelError, overwrite_of=inputs, needs_file=True)
-    wanted = outputs or ([] if json else [study.with_suffix(".csv")])
-    paths = [output_path(path, None, ModelError, overwrite_of=(*inputs, kept)) for path in wanted]
-    for path in paths:
-        if path.suffix.lower().removeprefix(".") not in SWEEP_KINDS:
-            raise ModelError(
-                f"--output {path}: expected a file name that ends in {', '.join('.' + k for k in SWEEP_KINDS)}"
-            )
+    default = [] if json else [study.with_suffix(".csv")]
+    paths = output_files(outputs, default, (*TABLES, *PICTURES), ModelError, overwrite_of=(*inputs, kept))
     n = sum(1 for _ in described.points())
     asked = described.workers if workers is None else workers
     with stages(remaining=True) as clock, tasks_of(asked, n) as tasks:
@@ -79,31 +74,13 @@ def sweep_command(
             table = run_study(described, workers=tasks, journal=kept, progress=lambda done, all_: advance(done / all_))
     record = study_record(table)
     if json:
-        typer.echo(json_module.dumps(record, indent=2))
+        typer.echo(json_text(record), nl=False)
     else:
         print_study(table)
-    for path in paths:
-        kind = path.suffix.lower().removeprefix(".")
-        if kind == "csv":
-            replace_file(path, sweep_csv(table).encode())
-        elif kind == "json":
-            replace_file(path, (json_module.dumps(record, indent=2) + "\n").encode())
-        else:
-            picture = io.BytesIO()
-            plot_study(table).savefig(picture, format=kind, dpi=130)
-            replace_file(path, picture.getvalue())
-        if not json:
-            say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    write_outputs(paths, table=table.to_table, record=record, figure=lambda: plot_study(table), is_quiet=json)
     if table.n_failed == len(table.rows):
         print_error(f"no point gave a result; the first one: {table.rows[0].error}")
         raise typer.Exit(USER_ERROR)
-
-
-def headers(table: "StudyTable") -> list[str]:
-    """Return the names of the columns: parameters, and outputs with their units."""
-    study = table.study
-    named = [f"{o.name} [{unit}]" if unit else o.name for o, unit in zip(study.outputs, table.units, strict=True)]
-    return [parameter.name for parameter in study.parameters] + named
 
 
 def print_study(table: "StudyTable") -> None:
@@ -118,7 +95,7 @@ def print_study(table: "StudyTable") -> None:
         for row in table.rows
     ]
     n = len(table.study.parameters)
-    names = headers(table)
+    names = table.to_table().heads[:-1]
     print_table("Study", tuple([*names[:n], *(f"{name}>" for name in names[n:])]), rows[:MOST_ROWS])
     if len(rows) > MOST_ROWS:
         say(f"... and {len(rows) - MOST_ROWS} more points, in the files written")
@@ -157,31 +134,19 @@ def study_record(table: "StudyTable") -> dict[str, Any]:
     }
 
 
-def sweep_csv(table: "StudyTable") -> str:
-    """Return a study as comma-separated values with 17 digits; a failed point has empty cells and a reason."""
-    import csv
-    import io
-
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([*headers(table), "error"])
-    for row in table.rows:
-        numbers = ["" if row.error else repr(value) for value in row.outputs]
-        writer.writerow([*(repr(v) if isinstance(v, float) else v for v in row.values), *numbers, row.error])
-    return text.getvalue()
-
-
 # the command compare: models of a flexible body compared with a reference ---------------------------------------------
-
-
-STUDY_KINDS = (".csv", ".json", ".png", ".svg", ".pdf")
 
 
 @guarded
 def compare_command(
     file: Annotated[Path, typer.Argument(help="Laboratory file (TOML), see docs/laboratory.md.")],
     outputs: Annotated[
-        list[Path] | None, typer.Option("--output", "-o", help="A .csv, .json, .png, .svg or .pdf file; repeatable.")
+        list[Path] | None,
+        typer.Option(
+            "--output",
+            "-o",
+            help="A table (.csv, .json, .mat, .npz, .parquet) or picture (.png, .svg, .pdf); repeatable.",
+        ),
     ] = None,
 ) -> None:
     """Run a mechanism with many models of its flexible body.
@@ -194,56 +159,21 @@ def compare_command(
 
     Example: floatframe compare blade.toml -o blade.csv -o blade.pdf
     """
-    import io
-
-    from fe_models.foundation.paths import replace_files
     from floatframe.design.laboratory.figures import convergence_figure
     from floatframe.design.laboratory.laboratory_file import read_laboratory, run_laboratory
     from floatframe.errors import ModelError
 
     asked = read_laboratory(file)
-    wanted = outputs or [file.with_suffix(".csv"), file.with_suffix(".png")]
+    default = [file.with_suffix(".csv"), file.with_suffix(".png")]
     inputs = (file, asked.system, asked.job)
-    paths = [output_path(path, None, ModelError, overwrite_of=inputs, needs_file=True) for path in wanted]
-    for path in paths:
-        if path.suffix.lower() not in STUDY_KINDS:
-            raise ModelError(f"--output {path}: expected a file name that ends in {', '.join(STUDY_KINDS)}")
+    paths = output_files(outputs, default, (*TABLES, *PICTURES), ModelError, overwrite_of=inputs, needs_file=True)
     with stages() as clock:
         result = run_laboratory(asked, clock)
-    contents: dict[Path, bytes] = {}
-    for path in paths:
-        if path.suffix.lower() == ".json":
-            record = {"name": result.name, "reference": result.reference, "settled": result.settled,
-                      "cases": result.table()}  # fmt: skip
-            contents[path] = json_module.dumps(record, indent=2).encode()
-        elif path.suffix.lower() == ".csv":
-            contents[path] = csv_text(result).encode()
-        else:
-            target = io.BytesIO()
-            convergence_figure(result).savefig(target, format=path.suffix.lower().removeprefix("."), dpi=200)
-            contents[path] = target.getvalue()
-    try:
-        replace_files(contents)
-    except OSError as error:
-        raise ModelError(f"study: cannot be written: {error.strerror or error}; check folder and space") from error
     print_result(result)
-    for path in paths:
-        say(f"wrote {path}")
+    record = {"name": result.name, "reference": result.reference, "settled": result.settled, "cases": result.table()}
+    write_outputs(paths, table=result.to_table, record=record, figure=lambda: convergence_figure(result), dpi=200)
     if all(row.failure for row in result.cases):
         raise typer.Exit(USER_ERROR)
-
-
-def csv_text(result: "LaboratoryResult") -> str:
-    """Return the tidy table as CSV."""
-    import csv
-    import io
-
-    rows = result.table()
-    text = io.StringIO()
-    writer = csv.DictWriter(text, fieldnames=list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue()
 
 
 def print_result(result: "LaboratoryResult") -> None:
@@ -281,7 +211,7 @@ def gradient_command(
     omega: Annotated[str | None, typer.Option(help='Of rotation: angular velocity "x,y,z", rad per time unit.')] = None,
     center: Annotated[str, typer.Option(help='Of rotation: a point of the axis, "x,y,z".')] = "0,0,0",
     method: Annotated[str, typer.Option(help="direct or adjoint.")] = "direct",
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="A .csv or .json file.")] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="A table (.csv, .json, .mat, ...).")] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the result as JSON, for other programs.")] = False,
 ) -> None:
     """Derivatives of results by numbers of the system file.
@@ -298,15 +228,12 @@ def gradient_command(
 
     Example: floatframe gradient arm.toml --analysis modes -m "frequency 1" -p forces.bush.stiffness
     """
-    from fe_models.foundation.paths import replace_file
     from floatframe.cli.analyses import vector
     from floatframe.design.gradients import sensitivities
     from floatframe.design.studies.study_file import TAKES
     from floatframe.errors import ModelError
 
-    path = None if output is None else output_path(output, None, ModelError, overwrite_of=(system,))
-    if path is not None and path.suffix.lower() not in (".csv", ".json"):
-        raise ModelError(f"--output {path}: expected a file name that ends in .csv or .json")
+    paths = output_files(None if output is None else [output], [], TABLES, ModelError, overwrite_of=(system,))
     if not outputs or not parameters:
         raise ModelError("gradient: expected at least one --out and one --parameter")
     wanted: dict[str, str | tuple[str, str]] = {}
@@ -320,7 +247,7 @@ def gradient_command(
         )  # fmt: skip
     record = record_of(found)
     if json:
-        typer.echo(json_module.dumps(record, indent=2))
+        typer.echo(json_text(record), nl=False)
     else:
         for k, name in enumerate(found.outputs):
             rows = [
@@ -333,11 +260,7 @@ def gradient_command(
             print_table(
                 f"{name} = {found.values[k]:.9g}{unit}", ("parameter", "value>", "derivative>", "% for 1 %>"), rows
             )
-    if path is not None:
-        text = gradient_csv(found) if path.suffix.lower() == ".csv" else json_module.dumps(record, indent=2) + "\n"
-        replace_file(path, text.encode())
-        if not json:
-            say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    write_outputs(paths, table=found.to_table, record=record, is_quiet=json)
 
 
 def record_of(found: "Sensitivities") -> dict[str, Any]:
@@ -354,17 +277,3 @@ def record_of(found: "Sensitivities") -> dict[str, Any]:
         },
         "repeated": list(found.repeated),
     }
-
-
-def gradient_csv(found: "Sensitivities") -> str:
-    """Return one row per output and parameter, with 17 digits."""
-    import csv
-    import io
-
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["output", "unit", "value", "parameter", "at", "derivative"])
-    for name, unit, value, row in zip(found.outputs, found.units, found.values, found.gradient, strict=True):
-        for parameter, at, slope in zip(found.parameters, found.parameter_values, row, strict=True):
-            writer.writerow([name, unit, repr(float(value)), parameter, repr(float(at)), repr(float(slope))])
-    return text.getvalue()

@@ -1,4 +1,4 @@
-"""Motions for other programs: a table (CSV), deformed surfaces for ParaView (PVD and VTU), a record of the run."""
+"""Motions for other programs: a table, deformed surfaces for ParaView (PVD and VTU), a record of the run."""
 
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -12,6 +12,7 @@ import numpy as np
 from cms.body.reduced_body import ReducedBody
 from cms.body.stress import stress_of, von_mises
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.documents.table import Table
 from fe_models.foundation.paths import replace_file
 from fe_models.meshes.numbering import NONE
 from floatframe.errors import ResultsError
@@ -24,13 +25,13 @@ from floatframe.results.sensors import coordinate_sensors, measured, sensors_of
 from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.trajectory import Trajectory
 
-__all__ = ["export_csv", "export_vtk", "motion_table", "run_record"]
+__all__ = ["export_vtk", "motion_table", "run_record", "sensor_table"]
 
 
 def motion_table(
     trajectory: Trajectory, bodies: Mapping[str, ReducedBody] | None = None, system: System | None = None
-) -> dict[str, Array]:
-    """Return the columns of a motion, named with their units, (n_t,) each.
+) -> Table:
+    """Return the table of a motion; `motion_table(motion).write("motion.csv")` writes it.
 
     The columns are time; position and motion of every body frame; position, velocity and elastic displacement in B for
     the interfaces of the given bodies; force and moment on marker A for joints and springs; and energies. With the
@@ -39,11 +40,13 @@ def motion_table(
     units = trajectory.units
     m, s = units.length_symbol, units.time_symbol
     N, Nm = units.force_symbol, f"{units.force_symbol} {units.length_symbol}"
-    table: dict[str, Array] = {f"t [{s}]": trajectory.t}
+    table: dict[str, Array] = {"t": trajectory.t}
+    known = {"t": s}
 
     def put(name: str, values: Array, unit: str, components: str = "xyz") -> None:
         for k, component in enumerate(components):
-            table[f"{name} {component} [{unit}]"] = values[:, k]
+            table[f"{name} {component}"] = values[:, k]
+            known[f"{name} {component}"] = unit
 
     for name in trajectory.body_names:
         motion = trajectory.body(name)
@@ -64,51 +67,26 @@ def motion_table(
         put(f"{name} moment", reaction.moment, Nm)
     energies = trajectory.energies
     for name in ("kinetic", "strain", "gravity", "springs", "work", "dissipated", "total", "balance"):
-        table[f"energy {name} [{Nm}]"] = getattr(energies, name)
+        table[f"energy {name}"] = getattr(energies, name)
+        known[f"energy {name}"] = Nm
     if system is not None:
         for measurement in measured(system, trajectory, [*coordinate_sensors(system), *sensors_of(system)]).values():
-            table |= dict(zip(measurement.headers, measurement.columns.values(), strict=True))
-    return table
+            add_measurement(measurement, table, known)
+    return Table(table, known)
 
 
-def sensor_table(trajectory: Trajectory, chosen: Sequence[Measurement]) -> dict[str, Array]:
-    """Return the time and the columns of measurements, named with their units, (n_t,) each."""
-    table: dict[str, Array] = {f"t [{trajectory.units.time_symbol}]": trajectory.t}
+def sensor_table(trajectory: Trajectory, chosen: Sequence[Measurement]) -> Table:
+    """Return the time and the columns of measurements."""
+    columns, units = {"t": trajectory.t}, {"t": trajectory.units.time_symbol}
     for measurement in chosen:
-        table |= dict(zip(measurement.headers, measurement.columns.values(), strict=True))
-    return table
+        add_measurement(measurement, columns, units)
+    return Table(columns, units)
 
 
-def export_csv(
-    trajectory: Trajectory,
-    path: str | os.PathLike[str],
-    bodies: Mapping[str, ReducedBody] | None = None,
-    system: System | None = None,
-    *,
-    chosen: Sequence[Measurement] | None = None,
-) -> None:
-    """Write `motion_table` as comma-separated values with 17 digits, so that every number is read back exactly.
-
-    With `chosen`, only the time and these measurements are written.
-
-    Parameters
-    ----------
-    trajectory
-        The motion.
-    path
-        Name of the file.
-    bodies
-        Reduced bodies by name, whose interfaces get columns; None: none.
-    system
-        The system that moved, for joint coordinates and sensors; None: neither.
-    chosen
-        Measurements to write beside the time, in place of all columns.
-    """
-    table = motion_table(trajectory, bodies, system) if chosen is None else sensor_table(trajectory, chosen)
-    names = [f'"{name}"' if "," in name else name for name in table]
-    rows = np.column_stack(list(table.values()))
-    lines = [",".join(names), *(",".join(repr(float(value)) for value in row) for row in rows)]
-    replace_file(Path(path), ("\n".join(lines) + "\n").encode())
+def add_measurement(measurement: Measurement, columns: dict[str, Array], units: dict[str, str]) -> None:
+    """Add the columns of a measurement and their units."""
+    columns |= {measurement.head(name): values for name, values in measurement.columns.items()}
+    units |= {measurement.head(name): unit for name, unit in measurement.units.items()}
 
 
 def export_vtk(

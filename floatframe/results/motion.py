@@ -10,11 +10,11 @@ motion.to_dataframe("tip", "pin.angle")
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cached_property
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.documents.table import Table
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.words import nearest, quoted
@@ -98,29 +98,29 @@ class Motion(Trajectory):
             return tuple(chosen_measurements(system, self, names))
         return tuple(measured(system, self, [*coordinate_sensors(system), *sensors_of(system)]).values())
 
+    def to_table(self, *names: str) -> Table:
+        """Return the time t and measurements (see `measurements`) as a table, columns such as "tip x".
+
+        `motion.to_table("tip").write("tip.csv")` writes them, also as .json, .mat, .npz or .parquet.
+        """
+        chosen = self.measurements(*names)
+        columns = {one.channel(name): values for one in chosen for name, values in one.columns.items()}
+        units = {one.channel(name): unit for one in chosen for name, unit in one.units.items()}
+        return Table({"t": self.t, **columns}, {"t": self.units.time_symbol, **units})
+
     def to_dataframe(self, *names: str) -> "DataFrame":
         """Return a pandas DataFrame of measurements over time (see `measurements`), columns such as "tip x".
 
         The units stand in `attrs["units"]`, by column. Needs pandas (`pip install "floatframe[tables]"`).
         """
-        columns, units = columns_of(self.measurements(*names))
-        pandas = required("pandas")
-        frame: DataFrame = pandas.DataFrame(columns, index=pandas.Index(self.t, name="t"))
-        frame.attrs["units"] = units | {"t": self.units.time_symbol}
-        return frame
+        return self.to_table(*names).to_dataframe("t")
 
     def to_xarray(self, *names: str) -> "Dataset":
         """Return an xarray Dataset of measurements over t (see `measurements`), each with its unit in `attrs`.
 
         Needs xarray (`pip install "floatframe[tables]"`).
         """
-        columns, units = columns_of(self.measurements(*names))
-        xarray = required("xarray")
-        found: Dataset = xarray.Dataset(
-            {name: ("t", values, {"units": units[name]}) for name, values in columns.items()},
-            coords={"t": ("t", self.t, {"units": self.units.time_symbol})},
-        )
-        return found
+        return self.to_table(*names).to_xarray("t")
 
 
 @frozen_copies
@@ -208,18 +208,3 @@ def motion_of(trajectory: Trajectory, system: System | Callable[[], System | Non
     """Return a motion with its system, or with a function that finds it when it is needed."""
     t = trajectory
     return Motion(t.head, t.source, t.is_complete, t.path, t.validity, system)
-
-
-def columns_of(measurements: tuple[Measurement, ...]) -> tuple[dict[str, Array], dict[str, str]]:
-    """Return the columns of measurements and their units, by channel."""
-    columns = {one.channel(name): values for one in measurements for name, values in one.columns.items()}
-    units = {one.channel(name): unit for one in measurements for name, unit in one.units.items()}
-    return columns, units
-
-
-def required(name: str) -> Any:
-    """Return an optional library; `ResultsError` with the way to install it if it is missing."""
-    try:
-        return import_module(name)
-    except ImportError as error:
-        raise ResultsError(f'{name} is not installed: pip install "floatframe[tables]"') from error

@@ -1,7 +1,5 @@
-"""A comparison as JSON: every number the other reports show, in plain types."""
+"""A comparison in plain types, with every number that the other reports show, and as a table."""
 
-import csv
-import io
 import json
 import math
 from dataclasses import asdict
@@ -9,8 +7,9 @@ from typing import Any
 
 from cms.assessment.compare.comparison import Comparison, Point, SetResult
 from cms.assessment.quality.record import plain
+from fe_models.foundation.documents.table import Table
 
-__all__ = ["FORMAT", "comparison_csv", "comparison_json", "comparison_record"]
+__all__ = ["FORMAT", "comparison_json", "comparison_record", "comparison_table"]
 
 
 FORMAT = "cms-comparison"
@@ -70,30 +69,21 @@ def point_record(point: Point) -> dict[str, Any]:
     }
 
 
-# A comparison as CSV: one row for every set and number of modes -------------------------------------------------------
-
-
-def comparison_csv(comparison: Comparison) -> str:
-    """Return the values of all records as CSV, comma-separated, with one heading row; non-finite values are empty.
+def comparison_table(comparison: Comparison) -> Table:
+    """Return the values of all records, one row for every set and number of modes; non-finite values are missing.
 
     A set that could not be made has one row, with the reason as its verdict.
     """
     names = list(
         dict.fromkeys(record.name for result in comparison.sets for p in result.points for record in p.records)
     )
-    text = io.StringIO(newline="")
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(["set", "n_modes", "n_columns", "n_coordinates", "n_dropped", "verdict", *names])
+    rows: list[tuple[Any, ...]] = []
     for result in comparison.sets:
         if not result.points:
-            table.writerow([result.name, "", "", "", "", result.sentence, *[""] * len(names)])
+            rows.append((result.name, None, None, None, None, result.sentence, *[None] * len(names)))
         for point in result.points:
-            values = {record.name: record.value for record in point.records}
-            table.writerow(
-                [
-                    result.name, point.n_modes, point.n_columns, point.n_q, len(point.dropped),
-                    "good enough" if point.is_good else "not good enough",
-                    *[repr(values[n]) if n in values and math.isfinite(values[n]) else "" for n in names],
-                ]
-            )  # fmt: skip
-    return text.getvalue()
+            values = {record.name: record.value for record in point.records if math.isfinite(record.value)}
+            verdict = "good enough" if point.is_good else "not good enough"
+            counts = (point.n_modes, point.n_columns, point.n_q, len(point.dropped))
+            rows.append((result.name, *counts, verdict, *map(values.get, names)))
+    return Table.of_rows(("set", "n_modes", "n_columns", "n_coordinates", "n_dropped", "verdict", *names), rows)

@@ -243,19 +243,17 @@ def read_motion(path: Path, body: "FEBody") -> "Snapshots":
 
 def write_report(folder: Path, comparison: "Comparison", stills: int) -> list[Path]:
     """Write HTML, JSON and CSV; return their paths."""
-    from cms.assessment.report import comparison_csv, comparison_html, comparison_json
-    from fe_models.foundation.paths import replace_file
+    from cms.assessment.report import comparison_html, comparison_json, comparison_table
+    from fe_models.foundation.paths import replace_files
 
     texts = {
         "html": comparison_html(comparison, stills=stills),
         "json": comparison_json(comparison),
-        "csv": comparison_csv(comparison),
     }
-    paths = []
-    for kind, text in texts.items():
-        paths.append(folder / FILES[kind])
-        replace_file(paths[-1], text.encode("utf-8"))
-    return paths
+    contents = {folder / FILES[kind]: text.encode() for kind, text in texts.items()}
+    contents[folder / FILES["csv"]] = comparison_table(comparison).content(".csv")
+    replace_files(contents)
+    return list(contents)
 
 
 def print_comparison(comparison: "Comparison") -> None:

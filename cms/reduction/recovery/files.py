@@ -4,7 +4,6 @@ The coordinates x are z = (d, theta, q) or (u_b, eta). Rows = displacement @ x +
 load @ p. Mass M, damping D and stiffness K over x are included.
 """
 
-import csv
 import io
 import os
 from collections.abc import Callable, Mapping
@@ -24,6 +23,7 @@ from cms.reduction.recovery.load_columns import WRENCH, forces_of_loads, on_coor
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.files.nastran_matrices.write_op4 import op4_parts
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
+from fe_models.foundation.documents.table import Table
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.paths import replace_files
 from fe_models.foundation.records import checked_fields
@@ -223,8 +223,8 @@ def op4_files(path: Path, content: _Content) -> Files:
     )
     files = {
         path: b"".join(op4_parts(f"OP4 file {path}", kept)),
-        rows: csv_bytes([ROW_HEAD, *row_words(content.table)]),
-        columns: csv_bytes([("matrix", "column", "name", "unit"), *column_words(content)]),
+        rows: Table.of_rows(ROW_HEAD, row_words(content.table)).content(".csv"),
+        columns: Table.of_rows(("matrix", "column", "name", "unit"), column_words(content)).content(".csv"),
     }
     return files, notes
 
@@ -252,7 +252,8 @@ def column_words(content: _Content) -> list[tuple[str, int, str, str]]:
 
 def csv_files(path: Path, content: _Content) -> Files:
     """Return one table: names, number and unit of each row, then its entries; zero matrices are left out."""
-    head, blocks = list(ROW_HEAD), []
+    table: dict[str, Any] = dict(Table.of_rows(ROW_HEAD, row_words(content.table)).columns)
+    table_units: dict[str, str] = {}
     left: list[str] = []
     for name, matrix in content.matrices.items():
         if not matrix.size or not np.any(matrix):
@@ -261,23 +262,15 @@ def csv_files(path: Path, content: _Content) -> Files:
         of_loads = name == "load"
         columns = content.loads if of_loads else content.coordinates
         units = content.load_units if of_loads else content.coordinate_units
-        head += [f"{name}: {column} [{unit}]" for column, unit in zip(columns, units, strict=True)]
-        blocks.append(matrix)
-    numbers = np.hstack(blocks) if blocks else np.zeros((content.table.n_rows, 0))
-    lines = [(*words, *map(repr, own.tolist())) for words, own in zip(row_words(content.table), numbers, strict=True)]
+        for column, unit, values in zip(columns, units, matrix.T, strict=True):
+            table[f"{name}: {column}"], table_units[f"{name}: {column}"] = values, unit
     notes: tuple[str, ...] = (
         "units in brackets are those of the coordinate; its velocity and acceleration are per time",
     )
     if left:
         notes += (f"zero and left out: {', '.join(left)}",)
-    return {path: csv_bytes([tuple(head), *lines])}, (*notes, "mass, damping and stiffness are not in the table")
-
-
-def csv_bytes(rows: list[tuple[Any, ...]]) -> bytes:
-    """Return rows as CSV."""
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
-    return text.getvalue().encode("utf-8")
+    notes += ("mass, damping and stiffness are not in the table",)
+    return {path: Table(table, table_units).content(".csv")}, notes
 
 
 RECOVERY_FORMATS: dict[str, Callable[[Path, _Content], Files]] = {

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.documents.table import Table
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from floatframe.analyses.linear.linearization import LinearSystem
@@ -53,6 +54,20 @@ class FrequencyResponse:
     def phases(self) -> Array:
         """Phase of y/s, continuous over the frequency, starting between -180 and 180, same shape [degrees]."""
         return np.degrees(np.unwrap(np.angle(self.values), axis=0))
+
+    def to_table(self, time_unit: float = 1.0) -> Table:
+        """Return the frequency in Hz, and amplitude and phase of every output divided by every input.
+
+        time_unit: the unit of time of the system [s].
+        """
+        columns, units = {"frequency": self.frequencies / time_unit}, {"frequency": "Hz"}
+        amplitudes, phases = self.amplitudes, self.phases
+        for o, output in enumerate(self.outputs):
+            for i, given in enumerate(self.inputs):
+                name = f"{output} / {given}"
+                columns |= {f"{name} amplitude": amplitudes[:, o, i], f"{name} phase": phases[:, o, i]}
+                units |= {f"{name} amplitude": self.units[o][i], f"{name} phase": "degrees"}
+        return Table(columns, units)
 
 
 def frequency_response(linear: LinearSystem, frequencies: Array) -> FrequencyResponse:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.documents.table import Table
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from floatframe.analyses.equilibrium import Equilibrium, steady_rotation
@@ -71,6 +72,20 @@ class Locus:
         """Damping ratios -Re(lambda)/|lambda|, (n_values, n_modes)."""
         size = np.abs(self.eigenvalues)
         return np.divide(-self.eigenvalues.real, size, out=np.zeros(size.shape), where=size > 0)
+
+    def to_table(self, time_unit: float = 1.0) -> Table:
+        """Return the parameter, frequencies in Hz, damping ratios and steady outputs, one row per value.
+
+        time_unit: the unit of time of the system [s].
+        """
+        n = range(self.eigenvalues.shape[1])
+        columns = {
+            self.parameter.partition(" [")[0]: self.values,
+            **{f"Hz {k + 1}": self.frequencies[:, k] / time_unit for k in n},
+            **{f"damping {k + 1}": self.damping_ratios[:, k] for k in n},
+            **dict(zip(self.outputs, self.steady.T, strict=True)),
+        }
+        return Table(columns, dict(zip(self.outputs, self.output_units, strict=True)))
 
 
 def root_locus(

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen
+from fe_models.foundation.documents.table import Table
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import nearest, quoted
@@ -113,6 +114,15 @@ class Sensitivities:
             if name not in choices:
                 raise ModelError(f"sensitivities: there is no {quoted(name)}{nearest(name, choices)}")
         return float(self.gradient[self.outputs.index(output), self.parameters.index(parameter)])
+
+    def to_table(self) -> Table:
+        """Return one row per output and parameter."""
+        rows = [
+            (name, unit, value, parameter, at, slope)
+            for name, unit, value, row in zip(self.outputs, self.units, self.values, self.gradient, strict=True)
+            for parameter, at, slope in zip(self.parameters, self.parameter_values, row, strict=True)
+        ]
+        return Table.of_rows(("output", "unit", "value", "parameter", "at", "derivative"), rows)
 
     @property
     def relative(self) -> Array:

@@ -31,6 +31,7 @@ from cms.pipeline import Plan, reduced, states_of_job
 from cms.reduction.geometric_stiffness.unit_states import UnitStates, require_geometric_stiffness
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.documents.table import Table
 from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
@@ -145,8 +146,13 @@ class LaboratoryResult:
     cases: tuple[CaseResult, ...]
     settled: float | None = None
 
+    def to_table(self) -> Table:
+        """Return one row per case."""
+        rows = self.table()
+        return Table.of_rows(list(rows[0]), [tuple(row.values()) for row in rows], meta={"reference": self.reference})
+
     def table(self) -> list[dict[str, Any]]:
-        """Return one row per case, for a data frame, CSV or JSON."""
+        """Return one row per case, in plain types."""
         return [
             {
                 "mode_set": r.case.mode_set,

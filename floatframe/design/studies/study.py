@@ -7,7 +7,7 @@ table = run_study(study)                     # rows: parameter values, and outpu
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.digest import file_digest
+from fe_models.foundation.documents.table import Table
 from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.tasks.installation import source_mark
 from fe_models.foundation.tasks.journal import TaskJournal, open_task_journal
@@ -162,12 +163,30 @@ class StudyTable:
         """Number of failed points."""
         return sum(bool(row.error) for row in self.rows)
 
+    def to_table(self) -> Table:
+        """Return parameters, outputs and the reason of a failure by point; outputs of failed points are missing."""
+        study = self.study
+        names = [parameter.name for parameter in study.parameters] + [output.name for output in study.outputs]
+        given = [of_one_kind(values) for values in zip(*(row.values for row in self.rows), strict=True)]
+        rows = [
+            (*values, *((None,) * len(row.outputs) if row.error else row.outputs), row.error)
+            for values, row in zip(zip(*given, strict=True), self.rows, strict=True)
+        ]
+        units = dict(zip((output.name for output in study.outputs), self.units, strict=True))
+        return Table.of_rows([*names, "error"], rows, units)
+
     def column(self, name: str) -> Array:
         """Return the values of an output at all points, (n_points,); NaN if a point failed."""
         names = [output.name for output in self.study.outputs]
         if name not in names:
             raise ModelError(f"study: no output {quoted(name)}{nearest(name, names)}")
         return np.array([row.outputs[names.index(name)] for row in self.rows])
+
+
+def of_one_kind(values: Sequence[Any]) -> Sequence[Any]:
+    """Return the values of a parameter if all are numbers, all texts or all booleans, else their texts."""
+    kinds = {type(value) for value in values}
+    return values if kinds <= {int, float} or kinds in ({str}, {bool}) else [str(value) for value in values]
 
 
 def run_study(

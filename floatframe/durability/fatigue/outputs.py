@@ -1,7 +1,5 @@
 """Output files of a fatigue result: a record, a table of the worst nodes, a surface for ParaView, a picture."""
 
-import csv
-import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,13 +10,14 @@ import numpy as np
 from cms.assessment.rendering import Drawing, Scene, Surface, Triad, render_picture
 from cms.exchange.programs.vtk import numbers_of_cells, numbers_of_nodes, unstructured_grid
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.documents.table import Table
 from fe_models.meshes.numbering import NONE
 from floatframe.durability.fatigue.assessment import Assessment
 from floatframe.durability.fatigue.planes import surface_frames
 from floatframe.durability.fatigue.sn_curve import SNCurve
 from floatframe.durability.fatigue.surface_damage import FatigueResult
 
-__all__ = ["csv_of", "fatigue_record", "fatigue_scene", "render_fatigue", "vtu_of"]
+__all__ = ["fatigue_record", "fatigue_scene", "render_fatigue", "vtu_of", "worst_table"]
 
 NEAR = 0.01  #: distance, relative to the size of the body, within which a stress point is shown at a node
 #: decades of damage shown by colours, below the largest; fewer if nodes with negligible damage were excluded
@@ -111,23 +110,20 @@ def finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def csv_of(made: Assessment) -> str:
-    """Return the worst places as comma-separated values, with 17 digits."""
-    record = fatigue_record(made)
-    units = made.result.body.units
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    places = [f"{axis} [{units.length_symbol}]" for axis in "xyz"]
-    names = [f"damage of {name}" for name in made.result.block_names]
-    writer.writerow(["rank", "node", "material", *places, "damage", f"life [{record['life_unit']}]",
-                     f"largest amplitude [{units.stress_symbol}]", "cycles", "beyond", "plane", *names])  # fmt: skip
-    for rank, each in enumerate(record["worst"], start=1):
-        row = [each[key] for key in ("x", "y", "z", "damage", "life", "largest_amplitude", "cycles", "beyond")]
-        numbers = ["inf" if value is None else repr(value) for value in row]
-        writer.writerow(
-            [rank, each["node"], each["material"], *numbers, each["plane"], *map(repr, each["of_blocks"].values())]
-        )
-    return text.getvalue()
+def worst_table(made: Assessment) -> Table:
+    """Return the worst places, the worst first."""
+    record, units = fatigue_record(made), made.result.body.units
+    numbers = ("x", "y", "z", "damage", "life", "largest_amplitude", "cycles", "beyond")
+    blocks = [f"damage of {name}" for name in made.result.block_names]
+    heads = [name.replace("_", " ") for name in numbers]
+    rows = [
+        (rank, each["node"], each["material"], *(math.inf if each[key] is None else each[key] for key in numbers),
+         each["plane"], *each["of_blocks"].values())
+        for rank, each in enumerate(record["worst"], start=1)
+    ]  # fmt: skip
+    known = dict.fromkeys("xyz", units.length_symbol)
+    known |= {"life": record["life_unit"], "largest amplitude": units.stress_symbol}
+    return Table.of_rows(("rank", "node", "material", *heads, "plane", *blocks), rows, known)
 
 
 def nodes_of_places(result: FatigueResult) -> tuple[IntArray, IntArray]:

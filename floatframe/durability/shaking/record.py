@@ -1,12 +1,11 @@
-"""A shake result as a record in plain types for JSON, and as a table for CSV; accelerations are in g."""
+"""A shake result as a record in plain types, and as a table; accelerations are in g."""
 
-import csv
-import io
 from typing import Any
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.documents.table import Table
 from floatframe.durability.shaking.loads.notching import NotchedRun
 from floatframe.durability.shaking.loads.random_vibration import RandomRun
 from floatframe.durability.shaking.loads.shock import TimeRun
@@ -14,7 +13,9 @@ from floatframe.durability.shaking.loads.sine import SineRun
 from floatframe.durability.shaking.shake import ShakeResult
 from floatframe.durability.shaking.structure.model import Output, ShakenModel
 
-__all__ = ["COLUMNS", "ROUNDING", "conversions", "in_tables", "shake_csv", "shake_record", "table_rows", "worst_nodes"]
+__all__ = [
+    "COLUMNS", "ROUNDING", "conversions", "in_tables", "shake_record", "shake_table", "table_rows", "worst_nodes",
+]  # fmt: skip
 
 FEW = 50  #: length of a list above which it is a curve
 DIGITS = 7  #: number of digits of the values of a curve
@@ -335,11 +336,6 @@ def reported_rows(outputs: tuple[Output, ...], values: Array) -> list[int]:
     return [k for k, (o, v) in enumerate(zip(outputs, values, strict=True)) if v > ROUNDING * largest[o.kind]]
 
 
-def shake_csv(result: ShakeResult) -> str:
-    """Return the table of all outputs and runs as comma-separated values."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for row in table_rows(result):
-        writer.writerow(["" if value is None else repr(value) if isinstance(value, float) else value for value in row])
-    return text.getvalue()
+def shake_table(result: ShakeResult) -> Table:
+    """Return the table of all outputs and runs."""
+    return Table.of_rows(COLUMNS, table_rows(result))

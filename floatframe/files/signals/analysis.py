@@ -1,14 +1,13 @@
 """Spectra of channels by kind, for `floatframe plot --as` and `floatframe spectrum`."""
 
-import csv
-import io
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.documents.table import Table
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import SignalError
@@ -21,52 +20,47 @@ from floatframe.files.signals.spectra import Spectrum, amplitude_spectrum, psd
 from floatframe.files.signals.transfer import TransferEstimate, transfer_estimate
 from floatframe.results.sensors.measurement import Measurement
 
-__all__ = ["SPECTRA", "SpectrumRequest", "even_signals", "signals_of", "spectra_of", "spectral_csv", "spectral_record"]
+__all__ = [
+    "SPECTRA", "SpectrumRequest", "even_signals", "signals_of", "spectra_of", "spectral_record", "spectral_table",
+]  # fmt: skip
 
 
-# spectra as tables (CSV) and records (JSON) for other programs --------------------------------------------------------
+# spectra as tables and records for other programs ---------------------------------------------------------------------
 
 
 AnySpectrum = Spectrum | SpectralMap | TransferEstimate
 
 
-def spectral_csv(spectra: Sequence[AnySpectrum]) -> str:
-    """Return spectra as comma-separated values: side by side over common frequencies, maps one below the other."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
+def spectral_table(spectra: Sequence[AnySpectrum]) -> Table:
+    """Return spectra as a table: side by side over common frequencies, maps one below the other."""
     first = spectra[0]
     if isinstance(first, SpectralMap):
-        line = "order" if first.kind == "order" else "frequency [Hz]"
-        writer.writerow(
-            ["name", "time [s]", "speed [rad/s]", line, f"amplitude ({'rms' if first.is_rms else 'peak'})", "unit"]
-        )
+        line, size = "order" if first.kind == "order" else "frequency", "rms" if first.is_rms else "peak"
+        rows = []
         for each in spectra:
             assert isinstance(each, SpectralMap)  # all spectra have the kind of the first
-            speeds: Iterable[Any] = [""] * len(each.times) if each.speeds is None else each.speeds.tolist()
+            speeds = [None] * len(each.times) if each.speeds is None else each.speeds.tolist()
             for t, speed, row in zip(each.times.tolist(), speeds, each.amplitudes.tolist(), strict=True):
-                writer.writerows(
-                    [each.name, repr(t), repr(speed) if speed != "" else "", repr(x), repr(a), each.unit]
-                    for x, a in zip(each.lines.tolist(), row, strict=True)
-                )
-        return text.getvalue()
-    columns: dict[str, Array] = {"frequency [Hz]": first.frequencies}
+                rows += [(each.name, t, speed, x, a, each.unit) for x, a in zip(each.lines.tolist(), row, strict=True)]
+        names = ("name", "time", "speed", line, f"amplitude ({size})", "unit")
+        return Table.of_rows(names, rows, {"time": "s", "speed": "rad/s"} | ({} if line == "order" else {line: "Hz"}))
+    columns: dict[str, Array] = {"frequency": first.frequencies}
     if isinstance(first, Spectrum) and first.edges is not None:
-        columns |= {"from [Hz]": first.edges[:, 0], "to [Hz]": first.edges[:, 1]}
+        columns |= {"from": first.edges[:, 0], "to": first.edges[:, 1]}
+    units = dict.fromkeys(columns, "Hz")
     for each in spectra:
         if isinstance(each, TransferEstimate):
             name = f"{each.output} / {each.input}"
-            columns |= {
-                f"{name} H1 [{each.unit}]": np.abs(each.H1), f"{name} H1 phase [degrees]": np.angle(each.H1, deg=True),
-                f"{name} H2 [{each.unit}]": np.abs(each.H2), f"{name} H2 phase [degrees]": np.angle(each.H2, deg=True),
-                f"{name} coherence": each.coherence,
-            }  # fmt: skip
+            for word, H in (("H1", each.H1), ("H2", each.H2)):
+                columns |= {f"{name} {word}": np.abs(H), f"{name} {word} phase": np.angle(H, deg=True)}
+                units |= {f"{name} {word}": each.unit, f"{name} {word} phase": "degrees"}
+            columns[f"{name} coherence"] = each.coherence
         elif isinstance(each, Spectrum):
-            columns[f"{each.name} {each.kind} [{each.unit}]"] = each.values
+            columns[f"{each.name} {each.kind}"] = each.values
+            units[f"{each.name} {each.kind}"] = each.unit
     if len({len(values) for values in columns.values()}) != 1:
         raise SignalError("spectra over different frequencies do not fit into one table; write them separately")
-    writer.writerow(columns)
-    writer.writerows([repr(float(x)) for x in row] for row in zip(*columns.values(), strict=True))
-    return text.getvalue()
+    return Table(columns, units)
 
 
 def spectral_record(spectra: Sequence[AnySpectrum]) -> list[dict[str, Any]]:

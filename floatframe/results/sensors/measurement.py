@@ -61,10 +61,9 @@ class Measurement:
         """The columns that are quantities over time, by name."""
         return {name: values for name, values in self.columns.items() if name not in self.numbers}
 
-    @property
-    def headers(self) -> tuple[str, ...]:
-        """Names of the columns for tables, with sensor, column and unit."""
-        return tuple(f"{self.sensor} {name} [{self.units[name]}]".replace("  ", " ") for name in self.columns)
+    def head(self, column: str) -> str:
+        """Return the name of a column in the table of a motion."""
+        return f"{self.sensor} {column}".strip()
 
     def channel(self, column: str) -> str:
         """Return the name of a column among those of all sensors, "sensor column"; "sensor.column" stays as it is."""

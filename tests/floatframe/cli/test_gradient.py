@@ -68,4 +68,4 @@ def test_refusals(swing):
     assert "did you mean 'rod'" in invoke(*asked, "-p", "bodies.rodd.mass", code=2)
     assert "did you mean 'mass'" in invoke(*asked, "-p", "bodies.rod.masss", code=2)
     assert "at least one" in invoke(*asked, code=2)
-    assert ".csv or .json" in invoke(*asked, "-p", "y", "-o", "out.txt", code=2)
+    assert ".csv, .json, .mat" in invoke(*asked, "-p", "y", "-o", "out.txt", code=2)

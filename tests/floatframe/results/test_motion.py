@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import floatframe as ff
+from fe_models.foundation.extras import MissingExtraError
 from floatframe.errors import ResultsError
 from floatframe.results.motion import motion_of
 from floatframe.results.trajectory import read_trajectory
@@ -95,5 +96,5 @@ def test_a_motion_read_from_a_file_of_python_asks_for_its_system(motion, tmp_pat
 
 def test_without_pandas_the_message_says_how_to_install_it(motion, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(ResultsError, match=r"pip install \"floatframe\[tables\]\""):
+    with pytest.raises(MissingExtraError, match=r"pip install \"floatframe\[tables\]\""):
         motion.to_dataframe()

@@ -30,11 +30,11 @@ from floatframe import (
     UniversalJoint,
     UserForce,
     Variational,
-    export_csv,
     integrate,
     joint_coordinate,
     kinematics,
     measured,
+    motion_table,
     read_results,
     resume,
 )
@@ -153,7 +153,7 @@ def test_results_on_disk_and_exports_have_the_turns(tmp_path):
     assert motion.head.angles is not None
     assert len(motion.head.angles) == 2  # the sensor has its zero elsewhere than the joint, or the same
     assert_allclose(joint_coordinate(system, motion, "axle", "angle").value, FAST * motion.t, rtol=1e-6, atol=0)
-    export_csv(motion, tmp_path / "wheel.csv", system=system)
+    motion_table(motion, system=system).write(tmp_path / "wheel.csv")
     head, *_, last = (tmp_path / "wheel.csv").read_text().splitlines()
     columns = dict(zip(head.split(","), map(float, last.split(",")), strict=True))
     assert_allclose(columns["turned angle [rad]"], FAST * 0.5, rtol=1e-6, atol=0)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fe_models import Table
 from floatframe.machines.flexible_arm import compared, links, moves, plot_motions
 
 if __name__ == "__main__":
@@ -23,7 +24,5 @@ if __name__ == "__main__":
     (here / "move.txt").write_text("\n".join(told) + "\n")
     plot_motions(motions).savefig(here / "move.png", dpi=110)
     move = found["flexible"]
-    np.savetxt(
-        here / "move.csv", np.column_stack([move.t, move.torque]), delimiter=",", comments="", fmt="%.12g",
-        header="t [s],shoulder [N m],elbow [N m]",
-    )  # fmt: skip
+    columns = {"t": move.t, "shoulder": move.torque[:, 0], "elbow": move.torque[:, 1]}
+    Table(columns, {"t": "s", "shoulder": "N m", "elbow": "N m"}).write(here / "move.csv")

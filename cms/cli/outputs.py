@@ -1,0 +1,105 @@
+"""Output files of commands: their endings are checked before the work, and all are written together at its end."""
+
+import io
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cms.cli.console import output_path, say
+from fe_models.foundation.documents.table import TABLE_SUFFIXES, Table
+from fe_models.foundation.paths import replace_files
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["PICTURES", "TABLES", "json_text", "output_file", "output_files", "write_outputs"]
+
+TABLES = TABLE_SUFFIXES
+PICTURES = (".png", ".svg", ".pdf")
+
+
+def output_files(
+    given: Sequence[Path] | None,
+    default: Sequence[Path],
+    endings: Sequence[str],
+    error: type[Exception],
+    *,
+    overwrite_of: Iterable[Any] = (),
+    needs_file: bool = False,
+) -> list[Path]:
+    """Return the output paths, after a check before any work that they can be written and have known endings.
+
+    Raises
+    ------
+    error
+        If a path ends in something else, or cannot be written (`output_path`).
+    """
+    inputs = tuple(overwrite_of)
+    paths = [output_path(path, None, error, overwrite_of=inputs, needs_file=needs_file) for path in given or default]
+    for path in paths:
+        if path.suffix.lower() not in endings:
+            raise error(f"--output {path}: expected a file name that ends in {', '.join(endings)}")
+    return paths
+
+
+def output_file(
+    given: Path | None, default: Path, endings: Sequence[str], error: type[Exception], **options: Any
+) -> Path:
+    """Return the only output path, as `output_files` does."""
+    return output_files(None if given is None else [given], [default], endings, error, **options)[0]
+
+
+def json_text(record: Any) -> str:
+    """Return a record as JSON for a file or the terminal."""
+    return json.dumps(record, indent=2) + "\n"
+
+
+def write_outputs(
+    paths: Iterable[Path],
+    *,
+    table: Callable[[], Table] | None = None,
+    record: Any = None,
+    figure: Callable[[], "Figure"] | None = None,
+    dpi: int = 130,
+    others: Mapping[str, Callable[[Path], bytes | Mapping[Path, bytes]]] | None = None,
+    is_quiet: bool = False,
+) -> None:
+    """Write a result in the forms of the endings: all files completely, or none.
+
+    Parameters
+    ----------
+    paths
+        Paths of `output_files`.
+    table
+        Returns the table, for `TABLES`.
+    record
+        Plain types, for .json; None: the table.
+    figure
+        Returns the figure, for `PICTURES`.
+    dpi
+        Resolution of a .png.
+    others
+        Functions by ending that return the bytes of a path, or those of several paths; they come before the rest.
+    is_quiet
+        Whether the names of the files are not printed.
+    """
+    contents: dict[Path, bytes] = {}
+    for path in paths:
+        ending = path.suffix.lower()
+        if others and ending in others:
+            made = others[ending](path)
+            contents |= {path: made} if isinstance(made, bytes) else made
+        elif ending == ".json" and record is not None:
+            contents[path] = json_text(record).encode()
+        elif ending in TABLES and table is not None:
+            contents[path] = table().content(ending, str(path))
+        else:
+            assert figure is not None  # endings were checked
+            picture = io.BytesIO()
+            figure().savefig(picture, format=ending[1:], dpi=dpi)
+            contents[path] = picture.getvalue()
+    replace_files(contents)
+    if not is_quiet:
+        for path, content in contents.items():
+            say(f"wrote {path} ({len(content) / 1e6:.2f} MB)")

@@ -1,0 +1,1 @@
+"""Tables and documents: what commands and results write for people and for other programs."""
