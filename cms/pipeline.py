@@ -139,7 +139,7 @@ def reduced(
         made = reduce(
             source,
             modes,
-            frame=frame_of(job, held=plan.body.is_held),
+            frame=frame_of(job, held=plan.body.is_held) if states is None else None,
             damping=None if job.damping is None else job.damping.damping,
             stress=job.reduction.stress is not False,
             quadratic=bool(job.reduction.quadratic_modes),

@@ -49,9 +49,10 @@ class RotatedLoads:
     interfaces: Array
 
     def __post_init__(self) -> None:
-        n, n_interfaces = np.asarray(self.translation).shape[-1], len(np.asarray(self.interfaces))
-        for name, first in numbers_of_loads(n_interfaces).items():
-            put_array(self, f"turned loads: {name}", name, (*first, 3, n))
+        n, n_loaded = np.asarray(self.translation).shape[-1], len(np.asarray(self.interfaces))
+        shapes = {"translation": (3, 3, n), "rotation": (3, 3, n), "spin": (6, 3, n), "interfaces": (n_loaded, 6, 3, n)}
+        for name, shape in shapes.items():
+            put_array(self, f"turned loads: {name}", name, shape)
 
 
 @presented
@@ -135,8 +136,9 @@ class GeometricStiffness:
         object.__setattr__(self, "is_loaded", tuple(bool(each) for each in self.is_loaded) or (True,) * n_loaded)
         if sum(self.is_loaded) != n_loaded:
             raise BodyError(f"geometric stiffness: {sum(self.is_loaded)} loaded interfaces, but matrices of {n_loaded}")
-        for name, first in numbers_of_loads(n_loaded).items():
-            put_array(self, f"geometric stiffness: {name}", name, (*first, n, n), is_symmetric=True)
+        shapes = {"translation": (3, n, n), "rotation": (3, n, n), "spin": (6, n, n), "interfaces": (n_loaded, 6, n, n)}
+        for name, shape in shapes.items():
+            put_array(self, f"geometric stiffness: {name}", name, shape, is_symmetric=True)
         if self.turned is not None:
             require_shape("turned loads: interfaces", self.turned.interfaces, (n_loaded, 6, 3, n))
         if self.spread is not None:
@@ -148,11 +150,6 @@ class GeometricStiffness:
     def n_q(self) -> int:
         """Number of modes."""
         return int(np.asarray(self.translation).shape[-1])
-
-    @property
-    def n_interfaces(self) -> int:
-        """Number of interfaces, with and without loads."""
-        return len(self.is_loaded)
 
     @property
     def loaded(self) -> IntArray:
@@ -199,11 +196,6 @@ class GeometricStiffness:
             spread = SpreadLoads(spread.K * by, spread.turned * by * q, spread.turned_rigid * by * q**2)
         of_loads: dict[str, Any] = {name: getattr(self, name) * by for name, by in by_load.items()}
         return replace(self, **of_loads, turned=turned, spread=spread)
-
-
-def numbers_of_loads(n_loaded: int) -> dict[str, tuple[int, ...]]:
-    """Return the number of unit loads of each kind, as array shapes."""
-    return {"translation": (3,), "rotation": (3,), "spin": (6,), "interfaces": (n_loaded, 6)}
 
 
 def put_array(record: object, where: str, name: str, shape: tuple[int, ...], *, is_symmetric: bool = False) -> None:

@@ -273,10 +273,10 @@ class ReducedBody:
             widths["stress points"] = (np.asarray(self.point_stress.modes).shape[2],)
         if self.geometric is not None:
             widths["geometric stiffness"] = (self.geometric.n_q,)
-            if self.geometric.n_interfaces != len(self.interfaces):
+            if len(self.geometric.is_loaded) != len(self.interfaces):
                 raise BodyError(
                     f"{where}: {len(self.interfaces)} interfaces, but geometric stiffness of "
-                    f"{self.geometric.n_interfaces}"
+                    f"{len(self.geometric.is_loaded)}"
                 )
             if self.geometric.spread is not None and self.nodal_sums is None:
                 raise BodyError(

@@ -74,10 +74,6 @@ class Products:
         """Return the products with the matrices of a body."""
         return cls(SymmetricProduct(body.K), SymmetricProduct(body.M))
 
-    def grams(self, X: Array) -> tuple[Array, Array]:
-        """Return Xᵀ K X and Xᵀ M X, (k, k)."""
-        return gram_in_blocks(X, self.K), gram_in_blocks(X, self.M)
-
     def beside(self, X: Array) -> DisplacementColumns:
         """Return columns with their products, (n_dof, k)."""
         return DisplacementColumns(X, self.K @ X, self.M @ X, np.eye(X.shape[1]))
@@ -153,7 +149,8 @@ def independent_columns(V: Array, body: FEBody, omega2: float) -> tuple[Displace
         Indices of columns with a remainder below the tolerance, ascending.
     """
     products = Products.of_body(body)
-    basis, redundant = independent_basis(V, *products.grams(V), products, body, omega2)
+    G_K, G_M = gram_in_blocks(V, products.K), gram_in_blocks(V, products.M)
+    basis, redundant = independent_basis(V, G_K, G_M, products, body, omega2)
     return basis.columns(products), redundant
 
 
@@ -237,7 +234,7 @@ def _pivoted(W: Array) -> tuple[IntArray, IntArray, Array]:
 
 def orthonormal_basis(Q: Array, T: Array, products: Products, omega2: float) -> Basis:
     """Make nearly W-orthonormal columns W-orthonormal to rounding, and return them as a basis."""
-    G_K, G_M = products.grams(Q)
+    G_K, G_M = gram_in_blocks(Q, products.K), gram_in_blocks(Q, products.M)
     Z = la.solve_triangular(la.cholesky(G_K + omega2 * G_M), np.eye(len(G_K)))
     return Basis(Q, Z, T @ Z, within(G_K, Z), within(G_M, Z))
 

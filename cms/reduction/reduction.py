@@ -83,7 +83,8 @@ def reduce(
     modes
         A mode set of that body.
     frame
-        Body reference frame. Default: Tisserand (mean axis), or the ground for a held body.
+        Body reference frame. Default: that of the given static states, else Tisserand (mean axis), or the ground for a
+        held body.
     damping
         Damping added to the body's own D, which is projected; default: none.
     stress
@@ -93,8 +94,8 @@ def reduce(
         stiffens the body by its spin, accelerations and interface loads. Default: True if the elements are known and it
         needs at most 2 GB (`cms.modes.families.cost`); a warning and the provenance say if
         it is left out. It costs a factorisation, unless `source` brings one, the static solution of 12 + 6 n_interfaces
-        loads, and one pass over the elements. Alternatively, the static states of the unit loads in this frame
-        (`unit_states`), which need no further factorisation.
+        loads, and one pass over the elements. Alternatively, the static states of the unit loads (`unit_states`), which
+        need no further factorisation; `frame` is then omitted.
     quadratic
         Whether to add quadratic modes, the second-order displacement of every kept node (`quadratic_modes`), together
         with the geometric stiffness that supplies their inertia. They are meant for slender bodies and cost three
@@ -119,10 +120,11 @@ def reduce(
     """
     body = body_of(source)
     states = geometric if isinstance(geometric, UnitStates) else None
+    of_interfaces = None if states is None else [interface.name for interface in states.interfaces]
     left_out = ""
     if geometric or quadratic:
         require_geometric_stiffness(body)
-        require_room_for_stiffness(body, modes.columns.shape[1], None if states is None else states.names)
+        require_room_for_stiffness(body, modes.columns.shape[1], of_interfaces)
     elif geometric is None:
         geometric = has_geometric_stiffness(body)
         left_out = left_out_words(body, modes.columns.shape[1]) if geometric else ""
@@ -134,19 +136,23 @@ def reduce(
     if left_out:
         log.warning("body %r: %s", body.name, left_out)
         geometric = False
-    frame = frame or (HeldFrame() if body.is_held else TisserandFrame())
-    condition = frame_condition(body, frame)
-    if states is not None:
-        require_states_of(body, condition.frame, states)
-    elif geometric or quadratic:
-        states = unit_states(source, frame=condition)
+    if states is None:
+        condition = frame_condition(body, frame or (HeldFrame() if body.is_held else TisserandFrame()))
+        states = unit_states(source, frame=condition) if geometric or quadratic else None
+    elif states.body is body and frame is None:
+        condition = states.condition
+    else:
+        raise ModeSetError(
+            f"reduce: the unit states are those of body {states.body.name!r} in a {states.condition.frame.kind} frame; "
+            f"expected states of this very body {body.name!r}, and no frame beside them"
+        )
     finished = finish(body, modes, condition)
     keeping = keep_nodes(body, keep) if keep else body
     if recovery and len(loaded := nodes_of_loads(body, unique(recovery))):
         keeping = replace(keeping, kept=np.concatenate([keeping.kept, loaded]))
     kept = kept_nodes(keeping)
     moments = reduced_moments(body, finished.Phi, condition.frame)
-    told = {"geometric stiffness": left_out if states is None else chosen_words(body, states.names)}
+    told = {"geometric stiffness": left_out if of_interfaces is None else chosen_words(body, of_interfaces)}
     if moments.is_exact and moments.negativity > OF_MASSES:
         told[NEGATIVITY] = f"{moments.negativity:.3g}"
     reduced = assembled(keeping, modes, finished, condition, kept=kept, moments=moments, damping=damping)
@@ -202,7 +208,7 @@ def assembled(
         node_ids=kept,
         Phi=Phi_kept,
         surface=index_of[body.surface],
-        numbering=body.numbering.of_rows(kept, len(body.nodes)).without_indices(kept),
+        numbering=body.numbering.of_rows(kept, len(body.nodes)),
         kept=kept_points(body, finished.Phi, axes, index_of) if len(body.kept) else None,
         interfaces=tuple(
             reduced_interface(body, interface, finished.Phi, condition.frame, index_of) for interface in body.interfaces
@@ -223,18 +229,6 @@ def kept_translations(body: FEBody, Phi: Array, nodes: IntArray, axes: Array) ->
         kept[:, :, some] = np.einsum("ba,nbk->nak", axes, moved)  # exact zeros stay exact if the axes are aligned
         release(kept)
     return kept
-
-
-def require_states_of(body: FEBody, frame: BodyFrame, states: UnitStates) -> None:
-    """Raise `ModeSetError` unless the static states belong to this body in this frame."""
-    other = states.condition.frame
-    is_same = frame.kind == other.kind and np.array_equal(frame.dofs, other.dofs)
-    is_same = is_same and np.array_equal(frame.origin, other.origin) and np.array_equal(frame.axes, other.axes)
-    if states.body is not body or not is_same:
-        raise ModeSetError(
-            f"reduce: the unit states are those of body {states.body.name!r} in a {other.kind} frame, expected "
-            f"{body.name!r} in a {frame.kind} frame with the same origin and axes; make them for this frame"
-        )
 
 
 def kept_nodes(body: FEBody) -> IntArray:

@@ -27,7 +27,6 @@ MOST_KINDS = 3  #: named in a message
 Class = TypeVar("Class", bound=type)
 Key = TypeVar("Key")
 Item = TypeVar("Item")
-Result = TypeVar("Result")
 
 
 # frozen copies --------------------------------------------------------------------------------------------------------
@@ -281,18 +280,23 @@ def refused_by(own: Callable[[Any], None] | None, subject: Any) -> None:
             raise  # any other: it was not made for a value of this kind
 
 
-def checked_function(function: Callable[..., Result], module: str, error: type[Exception]) -> Callable[..., Result]:
-    """Return a function that checks its arguments against their annotations.
+def at_door(package: str, name: str, found: Any, error: type[Exception]) -> Any:
+    """Return what a package offers under a name: of a function, one that checks its arguments against its annotations.
 
     Parameters
     ----------
-    function
-        The function.
-    module
-        Module at whose door it stands, under its name.
+    package
+        Name of the package, which keeps the checking function.
+    name
+        The public name.
+    found
+        What stands under it inside.
     error
         Raised if an argument is of another kind; Python's `TypeError` if one is missing or has an unknown name.
     """
+    if not inspect.isfunction(found):
+        return found
+    function: Callable[..., Any] = found
     signature = inspect.signature(function)
     kinds = {name: parameter.kind for name, parameter in signature.parameters.items()}
     takes_any_name = inspect.Parameter.VAR_KEYWORD in kinds.values()
@@ -300,7 +304,7 @@ def checked_function(function: Callable[..., Result], module: str, error: type[E
     single = [name for name, kind in kinds.items() if kind not in variable]
 
     @wraps(function)
-    def checked(*args: Any, **kwargs: Any) -> Result:
+    def checked(*args: Any, **kwargs: Any) -> Any:
         unknown = [name for name in kwargs if name not in single]
         if unknown and not takes_any_name:
             raise TypeError(f"{function.__name__}: no argument {unknown[0]!r}{nearest(unknown[0], single)}")
@@ -315,26 +319,6 @@ def checked_function(function: Callable[..., Result], module: str, error: type[E
             return function(*bound.args, **bound.kwargs)
         return function(*args, **kwargs)
 
-    checked.__module__ = module
-    return checked
-
-
-def at_door(package: str, name: str, found: Any, error: type[Exception]) -> Any:
-    """Return what a package offers under a name: of a function, the one that checks its arguments.
-
-    Parameters
-    ----------
-    package
-        Name of the package.
-    name
-        The public name.
-    found
-        What stands under it inside.
-    error
-        Raised if an argument is of another kind.
-    """
-    if not inspect.isfunction(found):
-        return found
-    checked = checked_function(found, package, error)
+    checked.__module__ = package
     setattr(sys.modules[package], name, checked)
     return checked

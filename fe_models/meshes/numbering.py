@@ -249,7 +249,10 @@ class Numbering:
         return replace(self, **extended)
 
     def of_rows(self, rows: IntArray, n_nodes: int) -> "Numbering":
-        """Return the numbering of the given rows of n_nodes, in that order, (n,); triangles stay the same."""
+        """Return the numbering of the given rows of n_nodes, in that order, (n,); triangles stay the same.
+
+        Node numbers that equal the indices of the rows are left out.
+        """
         place = np.full(n_nodes, NONE)
         place[rows] = np.arange(len(rows))
         sets = []
@@ -258,8 +261,11 @@ class Numbering:
                 members = place[each.members]
                 each = replace(each, members=members[members >= 0])
             sets.append(each)
-        taken = {name: getattr(self, name) for name in ("nodes", "on_skin", "node_instance")}
-        return replace(self, **{name: a[rows] if a.size else a for name, a in taken.items()}, sets=tuple(sets))
+        known = {name: getattr(self, name) for name in ("nodes", "on_skin", "node_instance")}
+        taken = {name: a[rows] if a.size else a for name, a in known.items()}
+        if np.array_equal(taken["nodes"], rows) and not self.instances and not taken["on_skin"].any():
+            taken |= {"nodes": NO_NUMBERS, "on_skin": NO_NUMBERS}
+        return replace(self, **taken, sets=tuple(sets))
 
     def with_instances(self, instances: tuple[str, ...], step: int) -> "Numbering":
         """Split numbers that contain the instance: instance k had k step added to its numbers.
@@ -276,12 +282,6 @@ class Numbering:
                 told[name] = np.where(at < len(instances), at, NONE)
                 told[of] = np.where(numbers == NONE, NONE, numbers % step)
         return replace(self, instances=instances, **told)  # type: ignore[arg-type]
-
-    def without_indices(self, indices: IntArray) -> "Numbering":
-        """Return the numbering without node numbers if they equal these indices, (n_nodes,)."""
-        if np.array_equal(self.nodes, indices) and not self.instances and not self.on_skin.any():
-            return replace(self, nodes=NO_NUMBERS, on_skin=NO_NUMBERS)
-        return self
 
 
 def split_name(where: str, what: str, asked: int | str) -> tuple[str | None, int]:

@@ -54,16 +54,17 @@ class TallSpace(Protocol):
         """Return the function that solves for columns with a factorisation."""
 
 
+@dataclass(eq=False)
 class ArraySpace:
     """Columns are arrays of this process."""
 
-    def __init__(self, n: int, numbering: IntArray | None = None) -> None:
-        """Columns with n rows; row r of random columns takes value numbering[r]; None: row order."""
-        self.n, self.numbering = n, slice(None) if numbering is None else numbering
+    n: int  #: number of rows
+    numbering: IntArray | None = None  #: row r of random columns takes value numbering[r]; None: row order
 
     def random(self, generator: np.random.Generator, k: int) -> Array:
         """Return columns of normally distributed numbers, (n, k)."""
-        return generator.standard_normal((k, self.n))[:, self.numbering].T
+        columns = generator.standard_normal((k, self.n))
+        return columns.T if self.numbering is None else columns[:, self.numbering].T
 
     product = SymmetricProduct
 

@@ -42,11 +42,6 @@ class CondensedBody:
     S: Array  #: Psi_Cᵀ K Psi_C = K_hh + K_hI Psi_C,I, (n_h, n_h) [N/m]
     Psi_R: Array  #: independent rigid-body modes, (n_dof, n_r)
 
-    @property
-    def body(self) -> FEBody:
-        """The body."""
-        return self.fixed.body
-
 
 @dataclass(frozen=True, eq=False)
 class BoundaryConditions:
@@ -84,7 +79,7 @@ class Flexibility:
     def __init__(self, condensed: CondensedBody, conditions: BoundaryConditions, r: IntArray | None = None) -> None:
         """Make the operator; r gives pivots among the columns of Z, instead of a choice by pivoted QR."""
         self.condensed, self.conditions = condensed, conditions
-        body, h, Z = condensed.body, condensed.fixed.b, conditions.Z
+        body, h, Z = condensed.fixed.body, condensed.fixed.b, conditions.Z
         self._K_hi = sp.csr_array(body.K[:, h].T)[:, condensed.fixed.i]
         S = condensed.S if conditions.K_load is None else condensed.S + conditions.K_load
         S_z = Z.T @ S @ Z
@@ -219,8 +214,9 @@ class Flexibility:
         size = np.sqrt(np.maximum(np.diag(G), 0.0))
         if not size.all() or la.eigvalsh(G / np.outer(size, size))[0] < 1e-12:
             raise BodyError(
-                f"body {self.condensed.body.name!r}: has no inertia in some rigid-body motion; free and attachment "
-                "modes need all of them; take constraint modes (guyan, craig-bampton), or add the missing mass"
+                f"body {self.condensed.fixed.body.name!r}: has no inertia in some rigid-body motion; free and "
+                "attachment modes need all of them; take constraint modes (guyan, craig-bampton), or add the missing "
+                "mass"
             )
         L = la.cholesky(G / np.outer(size, size), lower=True)
         scale = la.solve_triangular(L, np.diag(1 / size), lower=True).T
@@ -233,7 +229,7 @@ def _free_motions(condensed: CondensedBody, conditions: BoundaryConditions) -> A
     Psi_R = condensed.Psi_R
     if not Psi_R.shape[1]:
         return Psi_R  # a held body has no rigid-body motions
-    size = _lengths(condensed.body, h, np.eye(len(h)))
+    size = _lengths(condensed.fixed.body, h, np.eye(len(h)))
     scaled = Psi_R[h] / size[:, None]
     column = np.abs(scaled).max(axis=0)
     scaled = scaled / column
@@ -255,7 +251,7 @@ def _root_of_load(condensed: CondensedBody, conditions: BoundaryConditions, size
     values, vectors = la.eigh(conditions.K_load * np.outer(size, size) / stiffness)
     if values[0] < -1e-12 * max(values[-1], 1.0):
         raise BodyError(
-            f"body {condensed.body.name!r}: the stiffness of its neighbours has negative energy in some motion; "
+            f"body {condensed.fixed.body.name!r}: the stiffness of its neighbours has negative energy in some motion; "
             "expected a symmetric positive semidefinite matrix"
         )
     return np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T / size
@@ -292,7 +288,7 @@ def held_factor(
     S_ee = S_z[np.ix_(e, e)]
     if not len(e):
         return np.zeros(0), (S_ee, True)
-    body = condensed.body
+    body = condensed.fixed.body
     terms = np.abs(body.K.diagonal()[condensed.fixed.b])
     free = free_motions(body, condensed.Psi_C, Z[:, e], S_ee, terms, K_load)
     if free.shape[1]:
@@ -326,7 +322,7 @@ def _expansion(condensed: CondensedBody, Z: Array) -> sp.csc_array:
     rows = np.concatenate([fixed.i, fixed.b[row]])
     columns = np.concatenate([np.arange(n_i), n_i + column])
     values = np.concatenate([np.ones(n_i), Z[row, column]])
-    return sp.csc_array((values, (rows, columns)), shape=(condensed.body.n_dof, n_i + Z.shape[1]))
+    return sp.csc_array((values, (rows, columns)), shape=(condensed.fixed.body.n_dof, n_i + Z.shape[1]))
 
 
 # vibration modes of a body whose interfaces are free, loaded, or partly held (docs/theory.md §2) ----------------------
@@ -351,7 +347,7 @@ def elastic_modes(flexibility: Flexibility, wanted: ModeCount) -> EigenResult:
         modes = _proven(flexibility, modes, wanted)
     modes = replace(modes, Phi=flexibility.expand(modes.Phi))
     if flexibility.conditions.K_load is not None:
-        body, omega2 = flexibility.condensed.body, modes.omega2
+        body, omega2 = flexibility.condensed.fixed.body, modes.omega2
         rounding = rounding_of_energy(body, modes.Phi)
         if (without_energy(body, modes.Phi) & (rounding > LOST * omega2)).any():
             raise _lost_in_rounding(flexibility)
@@ -363,8 +359,9 @@ def _lost_in_rounding(flexibility: Flexibility) -> EigenError:
     load = flexibility.conditions.K_load
     largest = float(np.abs(flexibility.K.diagonal()).max())
     softest = "" if load is None else f", those of its neighbours {np.abs(np.diag(load)).max():.1e} at most"
+    name = flexibility.condensed.fixed.body.name
     return EigenError(
-        f"body {flexibility.condensed.body.name!r}: its slowest modes are lost in rounding: some motion besides the "
+        f"body {name!r}: its slowest modes are lost in rounding: some motion besides the "
         f"rigid ones has almost no stiffness compared with the largest stiffness, {largest:.1e}{softest}; rounding is "
         f"some {np.finfo(float).eps * largest:.1e}: increase the stiffness of this motion, or remove it"
     )

@@ -131,13 +131,13 @@ def unrestrained_attachment_modes(free: Flexibility) -> Array:
         (n_dof, n_b), with Psi_Rᵀ M Psi_U = 0; translations per force [m/N] or per moment [1/N]. Exactly zero, not
         rounding, if the free body responds to a load by acceleration alone.
     """
-    n_b, h = len(free.condensed.body.b), free.condensed.fixed.b
+    n_b, h = len(free.condensed.fixed.body.b), free.condensed.fixed.b
     on_boundary = np.zeros((len(h), n_b))  # u_h of the unit forces with R held
     on_boundary[free.e] = free.solve_boundary(np.eye(len(h), n_b)[free.e])
     u = of_this_process(combine(free.condensed.Psi_C, on_boundary))
     u -= combine(free.held(free.M_N), free.N[h[:n_b]].T)
     u = u - combine(free.N, free.M_N.T @ u)
-    body, b = free.condensed.body, h[:n_b]
+    body, b = free.condensed.fixed.body, h[:n_b]
     compliance = u[b, np.arange(n_b)] * _unit(body, body.dofs[b, 1] >= 3)
     u[:, compliance <= STIFF * compliance.max(initial=0.0)] = 0.0
     return u

@@ -70,7 +70,7 @@ def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedB
     """
     where = f"mode set {modes.name!r} of body {body.name!r}"
     V, products = modes.columns, Products.of_body(body)
-    V_K, V_M = products.grams(V)
+    V_K, V_M = gram_in_blocks(V, products.K), gram_in_blocks(V, products.M)
     omega2_1 = first_elastic(where, body, V, V_K, V_M, condition)
     Q, redundant = independent_basis(V, V_K, V_M, products, body, omega2_1)  # (1)
     try:

@@ -125,10 +125,11 @@ def stiffness_of_states(body: FEBody, Phi: Array, states: UnitStates) -> Geometr
         loads = states.loaded[some]
         mass = MassLoads(states.mass.A[loads], states.mass.b[loads])
         K[loads] = elastic_part(body, states.u[:, some], mass, columns)
-    is_loaded = states.is_loaded or (True,) * len(body.interfaces)
-    K -= mean_part(body, states.on_dofs, columns, frame.axes, is_loaded)
+    K -= mean_part(body, states.on_dofs, columns, frame.axes, states.interfaces)
     turned = (K[:, :3, 3:] + K[:, 3:, :3].transpose(0, 2, 1)) / 2
     rigid = None if states.spread is None else turned_rigid_work(body, states.spread, frame)
+    names = {interface.name for interface in states.interfaces}
+    is_loaded = tuple(interface.name in names for interface in body.interfaces)
     return stiffness_of_loads(K[:, 3:, 3:], turned, rigid, is_loaded=is_loaded)
 
 
@@ -216,7 +217,7 @@ def tie_part(body: FEBody, u: Array, Phi: Array) -> Array:
     return K
 
 
-def mean_part(body: FEBody, on_dofs: Array, Phi: Array, axes: Array, is_loaded: tuple[bool, ...]) -> Array:
+def mean_part(body: FEBody, on_dofs: Array, Phi: Array, axes: Array, loaded: tuple[Interface, ...]) -> Array:
     """Step (5): return the work of the loads on the second-order motion of the interfaces, (k, n, n).
 
     A distributing interface transmits the load on its reference node to its members. The other interfaces that are not
@@ -225,7 +226,6 @@ def mean_part(body: FEBody, on_dofs: Array, Phi: Array, axes: Array, is_loaded: 
     """
     work = distributing_part(body, on_dofs, Phi)
     turn = np.kron(np.eye(2), axes)
-    loaded = [interface for interface, is_own in zip(body.interfaces, is_loaded, strict=True) if is_own]
     for number, interface in enumerate(loaded):
         own = slice(12 + 6 * number, 18 + 6 * number)
         if interface.kind == "distributing":

@@ -21,7 +21,7 @@ from cms.modes.families.flexibility import held_factor
 from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.frames import Frame, FrameCondition, HeldFrame, TisserandFrame, frame_condition
 from cms.reduction.basis.node_motion import node_weights, reference_motion, weighted_rigid_modes
-from fe_models.body.fe_body import FEBody
+from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.rigid_motion import MassLoads
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.tall.columns import combine, of_this_process
@@ -49,19 +49,11 @@ class UnitLoads:
 
 
 def unit_loads(
-    body: FEBody, frame: BodyFrame, spread: Array | None = None, is_loaded: tuple[bool, ...] = ()
+    body: FEBody, frame: BodyFrame, interfaces: Sequence[Interface], spread: Array | None = None
 ) -> UnitLoads:
-    """Return the 12 loads per unit mass, then six for each loaded interface, then the given ones, (n_dof, 6).
-
-    Without `is_loaded`, all interfaces are loaded.
-    """
+    """Return the 12 loads per unit mass, then six for each of these interfaces, then the given ones, (n_dof, 6)."""
     turn = np.kron(np.eye(2), frame.axes)
-    chosen = is_loaded or (True,) * len(body.interfaces)
-    columns = [
-        reference_motion(body, interface).rows.T @ turn
-        for interface, is_chosen in zip(body.interfaces, chosen, strict=True)
-        if is_chosen
-    ]
+    columns = [reference_motion(body, interface).rows.T @ turn for interface in interfaces]
     on_dofs = np.hstack([np.zeros((body.n_dof, 12)), *columns, *([] if spread is None else [spread])])
     return together(body, unit_mass_loads(frame, on_dofs.shape[1] - 12), on_dofs)
 
@@ -163,14 +155,8 @@ class UnitStates:
     on_dofs: Array  #: loads on the dofs of the body, (n_dof, k) [N, N m]
     loaded: IntArray  #: indices of the loads that are not zero, (n_loaded,)
     u: Array  #: responses to the loaded ones, up to a rigid motion, (n_dof, n_loaded)
-    spread: Array | None = None  #: the last six loads before balancing, (n_dof, 6); None: not needed
-    is_loaded: tuple[bool, ...] = ()  #: for each interface, whether its loads are included; empty: all are
-
-    @property
-    def names(self) -> list[str]:
-        """Names of the interfaces whose loads are included."""
-        chosen = self.is_loaded or (True,) * len(self.body.interfaces)
-        return [each.name for each, is_chosen in zip(self.body.interfaces, chosen, strict=True) if is_chosen]
+    spread: Array | None  #: the last six loads before balancing, (n_dof, 6); None: not needed
+    interfaces: tuple[Interface, ...]  #: interfaces whose loads are included
 
 
 def unit_states(
@@ -180,7 +166,7 @@ def unit_states(
     spread: bool = True,
     interfaces: Sequence[str] | None = None,
 ) -> UnitStates:
-    """Return the static states of the unit loads of a body in a frame, for `reduce(..., geometric=states)`.
+    """Return the static states of the unit loads of a body in a frame, for `reduce(..., geometric=states)` in it.
 
     They are computed while the factorisation of the mode set exists, which can then be freed before the reduction needs
     the memory. This matters from several hundred thousand dofs on.
@@ -207,24 +193,24 @@ def unit_states(
     body = body_of(source)
     require_geometric_stiffness(body)
     condition = frame if isinstance(frame, FrameCondition) else frame_condition(body, frame or TisserandFrame())
-    is_loaded = loaded_interfaces(body, interfaces)
+    loaded_ones = loaded_interfaces(body, interfaces)
     forces = spread_forces(body, condition.frame) if spread else None
     with families_of(source) as families:
-        loads = balanced(body, unit_loads(body, condition.frame, forces, is_loaded), condition)
+        loads = balanced(body, unit_loads(body, condition.frame, loaded_ones, forces), condition)
         loaded = np.flatnonzero(~loads.is_zero)
         u = static_states(families, loads.F[:, loaded])
-    return UnitStates(body, condition, loads.mass, loads.on_dofs, loaded, u, forces, is_loaded)
+    return UnitStates(body, condition, loads.mass, loads.on_dofs, loaded, u, forces, loaded_ones)
 
 
-def loaded_interfaces(body: FEBody, names: Sequence[str] | None) -> tuple[bool, ...]:
-    """Return for each interface whether it is among these names (None: all); raise `BodyError` for an unknown name."""
+def loaded_interfaces(body: FEBody, names: Sequence[str] | None) -> tuple[Interface, ...]:
+    """Return the interfaces with these names (None: all); raise `BodyError` for an unknown name."""
     known = [interface.name for interface in body.interfaces]
     for name in names or ():
         if name not in known:
             raise BodyError(
                 f"body {body.name!r}: geometric stiffness: no interface {quoted(name)}{nearest(name, known)}"
             )
-    return tuple(names is None or name in names for name in known)
+    return tuple(each for each in body.interfaces if names is None or each.name in names)
 
 
 def has_geometric_stiffness(body: FEBody) -> bool:

@@ -42,7 +42,8 @@ def test_a_rigid_rotation_turns_the_loads(name, frame):
         found = reduced_geometric_stiffness(families, columns, condition)
     own = found.interfaces.reshape(-1, *found.spin.shape[1:])
     K = np.concatenate([found.translation, found.rotation, found.spin, own, found.spread.K])
-    loads = balanced(body, unit_loads(body, condition.frame, spread_forces(body, condition.frame)), condition)
+    spread = spread_forces(body, condition.frame)
+    loads = balanced(body, unit_loads(body, condition.frame, body.interfaces, spread), condition)
     assert_allclose(K[:, :3], 0, rtol=0, atol=1e-9 * np.abs(K).max())  # translations
     T = np.eye(body.n_dof) if body.recovery is None else body.recovery.matrix
     for a in range(3):
@@ -298,11 +299,13 @@ def test_states_made_before_serve_when_the_factorisation_is_gone():
         modes = cms.craig_bampton(families, n_modes=2)
         expected = cms.reduce(families, modes, frame=frame, geometric=True).geometric
         states = cms.unit_states(families, frame=frame)
-    found = cms.reduce(body, modes, frame=frame, geometric=states).geometric
+    found = cms.reduce(body, modes, geometric=states).geometric
     for name in ("translation", "rotation", "spin", "interfaces"):
         assert_array_equal(getattr(found, name), getattr(expected, name))
-    with pytest.raises(ModeSetError, match="'bar' in a nodal frame, expected 'bar' in a tisserand frame"):
-        cms.reduce(body, modes, geometric=states)
+    with pytest.raises(ModeSetError, match=r"those of body 'bar' in a nodal frame; .* no frame beside them"):
+        cms.reduce(body, modes, frame=cms.TisserandFrame(), geometric=states)
+    with pytest.raises(ModeSetError, match="expected states of this very body 'bar'"):
+        cms.reduce(cms.couple(bar(3, 1, 1)), modes, geometric=states)
 
 
 def test_bare_matrices_are_refused():
