@@ -17,8 +17,6 @@ __all__ = [
     "deformation_accelerations",
     "second_turning",
     "turning_bias",
-    "turning_bias_by_angle",
-    "turning_bias_by_rate",
 ]
 
 SERIES_UP_TO = 4.0  #: value of t² at the switch to series; below it the closed forms lose digits
@@ -84,18 +82,6 @@ def turning_bias_by_angle(th, w, d):
     second = scaled(quotient_ddb(x) * along * p + db * dp, y)
     third = add(scaled(da * p, dm), scaled(db * p, dy))
     return add(add(first, second), add(third, add(scaled(db * along, cross(w, m)), scaled(b, cross(w, dm)))))
-
-
-@inner
-def turning_bias_by_rate(th, w, d):
-    """Return the change of c for a change d of w."""
-    x = dot(th, th)
-    p, m, b = dot(th, w), cross(th, w), quotient_b(x)
-    da, db = quotient_da(x), quotient_db(x)
-    dp, dm = dot(th, d), cross(th, d)
-    first = add(scaled(da * dp, m), scaled(da * p, dm))
-    second = add(scaled(db * dp, cross(th, m)), scaled(db * p, cross(th, dm)))
-    return add(add(first, second), scaled(b, add(cross(d, m), cross(w, dm))))
 
 
 @inner

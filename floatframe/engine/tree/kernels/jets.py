@@ -14,11 +14,9 @@ theta = T(x) dx, and the rates z_dot, z_ddot, in axes of B, change by d(z_dot) =
 """
 
 from floatframe.engine.kernels.compiler.compilation import inner
-from floatframe.engine.kernels.marker import bent_by, bent_rate, shape
-from floatframe.engine.kernels.rotation import left_jacobian_derivative
 from floatframe.engine.kernels.vector import add, cross, put, scaled, sub, turned, vector
-from floatframe.engine.tree.kernels.elastic_turning import deformation_accelerations, second_turning
 from floatframe.engine.tree.kernels.kinematics import end_acceleration, end_motion
+from floatframe.engine.tree.kernels.mode_screws import mode_screws, screw_rates, second_rates
 from floatframe.engine.tree.kernels.spatial import (
     pair_sum,
     put_pair_of,
@@ -30,17 +28,16 @@ from floatframe.engine.tree.kernels.spatial import (
 from floatframe.engine.tree.kernels.spins import spin_variations, turning_by_columns
 from floatframe.engine.tree.kernels.tree import COLUMN, FAR_MODE, NEAR_MODE
 
-__all__ = ["carrier", "mode_rate", "mode_screw", "mode_screws", "put_jets", "put_mode_jet", "write_jets"]
+__all__ = ["carrier", "put_jets", "put_mode_jet", "write_jets"]
 
 
 @inner
 def put_jets(out, S_0, S_1, S_2, V, V_dot):
     """Write xi, xi_dot, xi_ddot, (18,), of a variation with S theta = S_0, S theta_dot = S_1, S theta_ddot = S_2."""
-    turned_once = spatial_cross(V, S_0)
+    xi_dot, xi_ddot = screw_rates(S_0, S_1, S_2, V, V_dot)
     put_pair_of(out, 0, S_0)
-    put_pair_of(out, 6, pair_sum(S_1, turned_once))
-    own = pair_sum(scaled_pair(2.0, spatial_cross(V, S_1)), spatial_cross(V_dot, S_0))
-    put_pair_of(out, 12, pair_sum(S_2, pair_sum(own, spatial_cross(V, turned_once))))
+    put_pair_of(out, 6, xi_dot)
+    put_pair_of(out, 12, xi_ddot)
 
 
 @inner
@@ -48,54 +45,6 @@ def put_reach(out, S_0, S_1, V):
     """Write xi and xi_dot, (12,)."""
     put_pair_of(out, 0, S_0)
     put_pair_of(out, 6, pair_sum(S_1, spatial_cross(V, S_0)))
-
-
-@inner
-def mode_screw(model, work, m, i, k):
-    """Return the screw of mode k at marker m about the frame origin of body i: (Psi_t + rho × b, b), b = T' Psi_r."""
-    d, th = shape(work.markers.psi[model.markers.psi0[m] :], model.bodies.n_q[i], k)
-    b = turned(work.markers.T_left[m], th)
-    return add(d, cross(vector(work.markers.rho[m]), b)), b
-
-
-@inner
-def mode_rate(model, work, m, i, k):
-    """Return the screw of `mode_screw` and its rate relative to the body.
-
-    `work.markers.bend_dot` has been written for the marker.
-    """
-    markers, n, o = work.markers, model.bodies.n_q[i], model.markers.psi0[m]
-    T, rho, rho_1 = markers.T_left[m], vector(markers.rho[m]), vector(markers.rho_dot[m])
-    s, b = mode_screw(model, work, m, i, k)
-    _, th = shape(markers.psi[o : o + 6 * n], n, k)
-    slope = left_jacobian_derivative(vector(markers.angle[m]), th, 1.0)
-    b_1 = turned(slope, vector(markers.angle_dot[m]))
-    s_1 = (0.0, 0.0, 0.0)
-    if model.markers.bend0[m] >= 0:  # the rate of Psi(q)
-        d_1, th_1 = shape(markers.bend_dot, n, k)
-        s_1, b_1 = sub(s_1, d_1), sub(b_1, turned(T, th_1))
-    return (s, b), (add(s_1, add(cross(rho_1, b), cross(rho, b_1))), b_1)
-
-
-@inner
-def mode_second_rate(model, work, m, i, k, screw, screw_1, rho_2, angle_2):
-    """Return the second rate of the screw of `mode_rate`; rho_2, angle_2 as of `deformation_accelerations`.
-
-    `work.markers.bend_ddot` has been written for the marker too.
-    """
-    markers, n, o = work.markers, model.bodies.n_q[i], model.markers.psi0[m]
-    T, rho, rho_1 = markers.T_left[m], vector(markers.rho[m]), vector(markers.rho_dot[m])
-    angle, angle_1, b, b_1 = vector(markers.angle[m]), vector(markers.angle_dot[m]), screw[1], screw_1[1]
-    _, th = shape(markers.psi[o : o + 6 * n], n, k)
-    slope = left_jacobian_derivative(angle, th, 1.0)
-    b_2 = second_turning(angle, angle_1, vector(markers.spin[m]), th, b, turned(slope, angle_1))
-    b_2, s_2 = add(b_2, turned(slope, angle_2)), (0.0, 0.0, 0.0)
-    if model.markers.bend0[m] >= 0:
-        _, th_1 = shape(markers.bend_dot, n, k)
-        d_2, th_2 = shape(markers.bend_ddot, n, k)
-        by_bending = turned(left_jacobian_derivative(angle, th_1, 1.0), angle_1)
-        s_2, b_2 = sub(s_2, d_2), sub(b_2, add(scaled(2.0, by_bending), turned(T, th_2)))
-    return add(s_2, add(cross(rho_2, b), add(scaled(2.0, cross(rho_1, b_1)), cross(rho, b_2)))), b_2
 
 
 @inner
@@ -127,29 +76,13 @@ def mode_jets(model, work, tree, tangent, i, kind, m, sign, c_m, c_d, c_k, rate)
 
 @inner
 def carrier(model, work, tangent, m, i):
-    """Return R, p, V, V' of the frame of body i, which carries marker m, and the second rates of its deformation there.
-
-    What `mode_screws` asks for has been written for the marker then.
-    """
+    """Return R, p, V, V' of the frame of body i, which carries marker m, and the `second_rates` of the marker there."""
     r, R, v, omega = end_motion(model, work, -1, i)
     a, alpha = end_acceleration(model, work, -1, i)
     p = sub(r, vector(tangent.origin))
     V, V_dot = spatial_motion(p, v, omega, a, alpha)
-    rho_2, angle_2 = deformation_accelerations(model, work, m, i)
-    if model.markers.bend0[m] >= 0:
-        n, u0 = model.bodies.n_q[i], model.bodies.u0[i] + 6
-        bent_rate(model, work, m, i, work.markers.bend_dot[: 6 * n])
-        bent_by(model, m, n, work.state.u_dot[u0 : u0 + n], work.markers.bend_ddot[: 6 * n])
+    rho_2, angle_2 = second_rates(model, work, m, i)
     return R, p, V, V_dot, rho_2, angle_2
-
-
-@inner
-def mode_screws(model, work, m, i, k, held):
-    """Return the screw of mode k at marker m and its rates relative to body i, ground axes; held: its `carrier`."""
-    R, p, _, _, rho_2, angle_2 = held
-    s, s_1 = mode_rate(model, work, m, i, k)
-    s_2 = mode_second_rate(model, work, m, i, k, s, s_1, rho_2, angle_2)
-    return world_screw(R, p, s), world_screw(R, p, s_1), world_screw(R, p, s_2)
 
 
 @inner

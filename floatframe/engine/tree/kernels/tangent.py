@@ -21,9 +21,8 @@ from floatframe.engine.kernels.body import (
 from floatframe.engine.kernels.compiler.compilation import inner, loops, small
 from floatframe.engine.kernels.connections.connection import connection_derivatives
 from floatframe.engine.kernels.evaluation import tangent_of_body
-from floatframe.engine.kernels.marker import bent_rate, shape
+from floatframe.engine.kernels.marker import bent_rate
 from floatframe.engine.kernels.model import C2, C3
-from floatframe.engine.kernels.rotation import left_jacobian_derivative
 from floatframe.engine.kernels.vector import (
     add,
     cross,
@@ -40,7 +39,8 @@ from floatframe.engine.kernels.vector import (
     unit_matrix,
     vector,
 )
-from floatframe.engine.tree.kernels.jets import carrier, mode_rate, mode_screws, put_mode_jet, write_jets
+from floatframe.engine.tree.kernels.jets import carrier, put_mode_jet, write_jets
+from floatframe.engine.tree.kernels.mode_screws import add_second_order, mode_rate, mode_screws
 from floatframe.engine.tree.kernels.projection import subtract_slopes
 from floatframe.engine.tree.kernels.spatial import (
     pair,
@@ -55,8 +55,8 @@ from floatframe.engine.tree.kernels.spatial import (
 from floatframe.engine.tree.kernels.tree import COLUMN, NEAR_MODE
 
 __all__ = [
-    "add_second_order",
     "assemble",
+    "body_frame",
     "inner_product",
     "product_of",
     "rigid_columns",
@@ -176,6 +176,12 @@ def product_of(A, x, out):
 
 
 @inner
+def body_frame(work, tangent, i):
+    """Return axes of body i, and its origin from `origin`."""
+    return work.state.R[i], sub(vector(work.state.r[i]), vector(tangent.origin))
+
+
+@inner
 def inner_product(x, y):
     """Return x · y of vectors of six numbers."""
     return dot(x, y) + dot(x[3:], y[3:])
@@ -217,7 +223,7 @@ def of_modes(model, work, tree, tangent, i):
     if n == 0:
         return
     H = newton_block(model, work, i)
-    R, p, f = work.state.R[i], sub(vector(work.state.r[i]), vector(tangent.origin)), tangent.f
+    (R, p), f = body_frame(work, tangent, i), tangent.f
     for k in range(n):
         put_pair_of(f, 0, wrench_of_column(H, 6 + k, R, p))
         b = i
@@ -286,31 +292,8 @@ def turning_modes(model, work, tree, tangent, i, c_k):
                 K[s, tree.jet_s[e]] += turned_power(pair(tangent.jet[e]), screw, F)
             b = tree.parent[b]
         m, sign = (tree.near[i], 1.0) if is_near else (tree.far[i], -1.0)
-        add_second_order(model, work, tangent, body, m, k, sign * c_k, F, K[s, tree.m0[body] :])
-
-
-@inner
-def add_second_order(model, work, tangent, i, m, k, factor, F, row):
-    """Add the change of the screw of mode k at marker m of body i due to all its modes, relative to the body, times F.
-
-    With b = T' Psi_r,k, its derivative slope, and f, m' the force and its moment about the marker, body axes:
-    Psi_t,l · (b × f) + Psi_r,l · (slopeᵀ m') - K_t,kl · f - K_r,kl · (T'ᵀ m').
-    """
-    n, o, first = model.bodies.n_q[i], model.markers.psi0[m], model.markers.bend0[m]
-    R, p = work.state.R[i], sub(vector(work.state.r[i]), vector(tangent.origin))
-    f, T = turned_back(R, F), work.markers.T_left[m]
-    moment = sub(turned_back(R, sub(vector(F[3:]), cross(p, vector(F)))), cross(vector(work.markers.rho[m]), f))
-    psi = work.markers.psi[o : o + 6 * n]
-    _, th_k = shape(psi, n, k)
-    slope = left_jacobian_derivative(vector(work.markers.angle[m]), th_k, 1.0)
-    by_place, by_turn, of_turn = cross(turned(T, th_k), f), turned_back(slope, moment), turned_back(T, moment)
-    for l in range(n):  # noqa: E741
-        d, th = shape(psi, n, l)
-        total = dot(d, by_place) + dot(th, by_turn)
-        if first >= 0:
-            d, th = shape(model.markers.bend[first + 6 * n * l : first + 6 * n * (l + 1)], n, k)
-            total -= dot(d, f) + dot(th, of_turn)
-        row[l] += factor * total
+        R, p = body_frame(work, tangent, body)
+        add_second_order(model, work, m, k, R, p, sign * c_k, F, K[s, tree.m0[body] :])
 
 
 @inner
@@ -329,7 +312,7 @@ def kept_marker(model, work, tree, tangent, m, first, rate):
     if model.markers.psi0[m] < 0:
         return
     state, u0 = work.state, model.bodies.u0[i]
-    R, origin = state.R[i], sub(vector(state.r[i]), vector(tangent.origin))
+    R, origin = body_frame(work, tangent, i)
     spin = turned(R, state.u[u0 + 3 :])
     V = sub(vector(state.u[u0:]), cross(spin, origin)), spin
     if model.markers.bend0[m] >= 0:

@@ -15,10 +15,10 @@ Wrenches that are kept are found from V - C K⁻¹ B, a column of K⁻¹ B being
 from floatframe.engine.kernels.body import newton_block
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.dense import lu_factor, lu_solve, lu_solve_columns
-from floatframe.engine.kernels.vector import sub, vector
+from floatframe.engine.tree.kernels.mode_screws import add_second_order
 from floatframe.engine.tree.kernels.projection import subtract_slopes
 from floatframe.engine.tree.kernels.spatial import pair, put_pair_of, turned_power, wrench_of_column
-from floatframe.engine.tree.kernels.tangent import add_second_order, inner_product, product_of, unit_of
+from floatframe.engine.tree.kernels.tangent import body_frame, inner_product, product_of, unit_of
 from floatframe.engine.tree.kernels.tree import COLUMN, NEAR_MODE
 
 __all__ = ["factorize_tree", "solve_bordered", "solve_newton", "solve_wrenches"]
@@ -54,7 +54,7 @@ def modal_forces(model, work, tangent, i):
     """Write the force of body i by its own modes."""
     n, q0 = model.bodies.n_q[i], model.bodies.q0[i]
     H = newton_block(model, work, i)
-    R, p = work.state.R[i], sub(vector(work.state.r[i]), vector(tangent.origin))
+    R, p = body_frame(work, tangent, i)
     for k in range(n):
         put_pair_of(tangent.by_mode[q0 + k], 0, wrench_of_column(H, 6 + k, R, p))
 
@@ -74,6 +74,7 @@ def factorize_joint(model, work, tree, tangent, i, c_d, c_k):
     H = newton_block(model, work, i)
     L = tangent.L[tree.l0[i] : tree.l0[i + 1]].reshape((n_l, n_l))
     R, W = tangent.G[s0 : s0 + n_l], tangent.W[s0 : s0 + n_l]
+    axes, origin = body_frame(work, tangent, i)
     for k in range(n_l):
         j, s = tree.own_jet[s0 + k], s0 + k
         for e in range(6):
@@ -94,7 +95,7 @@ def factorize_joint(model, work, tree, tangent, i, c_d, c_k):
             own_mode = s >= m0
             if own_mode:
                 add_turning(row, screw, F)  # with the jet of the body
-                add_second_order(model, work, tangent, i, tree.far[i], s - m0, -c_k, F, L[k, m0 - s0 :])
+                add_second_order(model, work, tree.far[i], s - m0, axes, origin, -c_k, F, L[k, m0 - s0 :])
             for l in range(n_l):  # noqa: E741
                 o = tree.own_jet[s0 + l]
                 if o >= 0:
@@ -146,7 +147,7 @@ def add_to_parent(model, work, tree, tangent, i, c_k):
     parent, P, F = tree.parent[i], tangent.D[i], tangent.F[i]
     q0 = model.bodies.q0[parent]
     H = newton_block(model, work, parent)
-    f = tangent.f
+    (R, p), f = body_frame(work, tangent, parent), tangent.f
     for j in range(tree.jet0[i], tree.jet0[i + 1]):
         if tree.jet_kind[j] != NEAR_MODE:
             continue
@@ -162,7 +163,7 @@ def add_to_parent(model, work, tree, tangent, i, c_k):
         for o in range(tree.jet0[i], tree.jet0[i + 1]):
             if tree.jet_kind[o] == NEAR_MODE:
                 H[6 + tree.jet_item[o], 6 + k] += inner_product(tangent.screw[o], f)
-        add_second_order(model, work, tangent, parent, tree.near[i], k, c_k, F, H[6 + k, 6:])
+        add_second_order(model, work, tree.near[i], k, R, p, c_k, F, H[6 + k, 6:])
     for r in range(6):
         for e in range(18):
             tangent.D[parent, r, e] += P[r, e]

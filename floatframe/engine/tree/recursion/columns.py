@@ -7,8 +7,9 @@ flexible body moves against its own marker, which the joint holds.
 """
 
 from floatframe.engine.kernels.compiler.compilation import loops, small
-from floatframe.engine.kernels.marker import shape
 from floatframe.engine.kernels.vector import add, cross, matrix, product, put, scaled, sub, turned, vector
+from floatframe.engine.tree.kernels.mode_screws import mode_screw
+from floatframe.engine.tree.kernels.spatial import put_pair_of, scaled_pair, world_screw
 from floatframe.engine.tree.recursion.nodes import ROTATION, SCREW, TRANSLATION
 
 __all__ = ["motion_in_ground", "rate_columns"]
@@ -48,41 +49,32 @@ def joint_columns(nodes, work, k, arm):
 
 
 @loops
-def marker_columns_in_ground(model, marker_work, m, R, arm, sign, out):
-    """Write sign times the motion by each mode of a point at arm from marker m, out (n, 6); R: axes of the body."""
-    o, n = model.markers.psi0[m], out.shape[0]
-    if o < 0:
+def put_mode_columns(model, marker_work, m, R, p, sign, out):
+    """Write sign times the motion by each mode at marker m, out (n, 6); R, p: axes and origin of its body."""
+    if m < 0 or model.markers.psi0[m] < 0:
         out[:, :] = 0.0
         return
-    psi, T = marker_work.markers.psi[o : o + 6 * n], marker_work.markers.T_left[m]
-    for k in range(n):
-        d, th = shape(psi, n, k)
-        turn = scaled(sign, turned(R, turned(T, th)))
-        put(out[k], 0, add(scaled(sign, turned(R, d)), cross(turn, arm)))
-        put(out[k], 3, turn)
+    for j in range(out.shape[0]):
+        S = world_screw(R, p, mode_screw(model, marker_work, m, model.markers.body[m], j))
+        put_pair_of(out[j], 0, scaled_pair(sign, S))
 
 
 @loops
 def rate_columns(nodes, work, model, marker_work):
     """Write S and above of all nodes, which are placed in the ground."""
     for k in range(nodes.parent.shape[0]):
-        n, m, above = nodes.n_q[k], nodes.own[k], nodes.parent[k]
-        arm = (0.0, 0.0, 0.0)
+        n, m, above, arm = nodes.n_q[k], nodes.own[k], nodes.parent[k], (0.0, 0.0, 0.0)
         if n > 0:
             out = work.S[nodes.vq[k] : nodes.vq[k] + n]
+            put_mode_columns(model, marker_work, m, work.R_G[k], arm, -1.0, out)
             if m >= 0:
                 arm = scaled(-1.0, turned(work.R_G[k], vector(marker_work.markers.rho[m])))
-                marker_columns_in_ground(model, marker_work, m, work.R_G[k], arm, -1.0, out)
-            else:
-                out[:, :] = 0.0
         joint_columns(nodes, work, k, arm)
         m = nodes.above[k]
         if m >= 0:
-            R = work.R_G[above]
-            r_P = add(vector(work.r_G[above]), turned(R, vector(work.rho[k])))
-            arm = sub(vector(work.r_G[k]), r_P)
+            p = sub(vector(work.r_G[above]), vector(work.r_G[k]))
             out = work.above[nodes.c0[k] : nodes.c0[k + 1]]
-            marker_columns_in_ground(model, marker_work, m, R, arm, 1.0, out)
+            put_mode_columns(model, marker_work, m, work.R_G[above], p, 1.0, out)
 
 
 @loops

@@ -139,7 +139,6 @@ class Dense(NamedTuple):
     row_a: Array = real(n_d, 6)  #: force along a rate for X of its complete subtree
     row_b: Array = real(n_d, 3)  #: by the rotation of Y
     by_mode: Array = real(n_d, 12)  #: wrench for a mode of a body and for its rate
-    scratch: Array = real(2, Size("most six"))
 
 
 def new_dense(nodes: Nodes, n_v: int, n_right: int, *, is_whole: bool) -> Dense:
@@ -149,7 +148,6 @@ def new_dense(nodes: Nodes, n_v: int, n_right: int, *, is_whole: bool) -> Dense:
         "right sides": n_right,
         "columns above": int(nodes.c0[-1]),
         "nodes of matrices": len(nodes.parent),
-        "most six": 6 * int(max(nodes.n_q, default=0)),
     }
     if is_whole:
         return zeros(Dense(), sizes)

@@ -7,7 +7,7 @@ X_j - V × Y_j with one motion X_j. Of a joint with its inner frame at V_P, A_P 
     by position   Y = V_P × S,  X = A_P × S + V_P × Y       (rotations taken back: V_Q, A_Q in the place of V_P, A_P)
     by rate       Y = S,        X = V_P × S + V_Q × S
 
-and of a mode what its markers do (`put_marker_changes`), with minus that of its own marker for the body itself. The
+and of a mode what its markers do (kernels/mode_screws.py), with minus that of its own marker for the body itself. The
 forces of a subtree, seen from itself, then change by I X + N Y, N = [[0, -2 p~], [0, Q]] (p its momentum, force by
 turning), and seen from the ground by S ×* f more. So
 
@@ -15,7 +15,7 @@ turning), and seen from the ground by S ×* f more. So
     (2) rows      force along rate i by what all above it does:  a_i·X + b_i·Y,  a = I S, b = Nᵀ S; a mode adds its row
                   of the equations of the body, and the rows of its markers at the subtrees
     (3) columns   wrench of all below j: I X + N Y + S ×* f, along the rates above; a mode adds the tangent of its body
-    (4) the body of the modes: rows times columns, and the change of Psi(q), T along what hangs at each marker
+    (4) the body of the modes: rows times columns, and the change of its screws along what hangs at each marker
 
 Sources: Carpentier & Mansard (2018); Singh, Russell & Wensing (2022) for rigid bodies; derived anew for flexible ones.
 """
@@ -30,10 +30,7 @@ from floatframe.engine.kernels.body import (
     moved_inertia,
 )
 from floatframe.engine.kernels.compiler.compilation import loops, small
-from floatframe.engine.kernels.dense import add_products
-from floatframe.engine.kernels.marker import shape, shape_sum
 from floatframe.engine.kernels.model import C2, C3
-from floatframe.engine.kernels.rotation import left_jacobian_derivative
 from floatframe.engine.kernels.vector import (
     add,
     congruent,
@@ -54,19 +51,21 @@ from floatframe.engine.kernels.vector import (
     turned_back,
     vector,
 )
-from floatframe.engine.tree.kernels.elastic_turning import turning_bias_by_angle, turning_bias_by_rate
+from floatframe.engine.tree.kernels.mode_screws import add_second_order, mode_screws, screw_rates, second_rates
 from floatframe.engine.tree.kernels.spatial import (
+    pair,
     pair_sum,
     put_pair_of,
+    scaled_pair,
     spatial_cross,
     spatial_motion,
+    turned_power,
     wrench_of_column,
 )
-from floatframe.engine.tree.recursion.columns import marker_columns_in_ground
 from floatframe.engine.tree.recursion.composite import along
 from floatframe.engine.tree.recursion.newton_euler import elastic_carrier
 
-__all__ = ["carried_change", "force_tangents", "put_marker_changes"]
+__all__ = ["force_tangents"]
 
 
 @loops
@@ -78,23 +77,15 @@ def node_motion(work, k):
 
 
 @loops
-def marker_in_body(model, marker_work, m, work, k):
-    """Return v, omega, a, alpha of marker m of flexible node k and omega, alpha of its body, body axes."""
+def marker_motion(model, marker_work, m, work, k):
+    """Return V, A of marker m of flexible node k."""
     R = work.R_G[k]
     omega, alpha, a = vector(work.omega[k]), vector(work.alpha[k]), vector(work.acc[k])
     omega_P, alpha_P, a_P = elastic_carrier(model, marker_work, m, omega, alpha, a)
     rho, rho_dot = vector(marker_work.markers.rho[m]), vector(marker_work.markers.rho_dot[m])
-    v = add(turned_back(R, vector(work.motion[k])), add(cross(omega, rho), rho_dot))
-    return v, omega_P, a_P, alpha_P, omega, alpha
-
-
-@loops
-def marker_motion(model, marker_work, m, work, k):
-    """Return V, A of marker m of flexible node k."""
-    R = work.R_G[k]
-    v, omega, a, alpha, _, _ = marker_in_body(model, marker_work, m, work, k)
-    r = add(vector(work.r_G[k]), turned(R, vector(marker_work.markers.rho[m])))
-    return spatial_motion(r, turned(R, v), turned(R, omega), turned(R, a), turned(R, alpha))
+    v = add(vector(work.motion[k]), turned(R, add(cross(omega, rho), rho_dot)))
+    r = add(vector(work.r_G[k]), turned(R, rho))
+    return spatial_motion(r, v, turned(R, omega_P), turned(R, a_P), turned(R, alpha_P))
 
 
 @loops
@@ -133,25 +124,32 @@ def joint_changes(nodes, work, dense, model, marker_work, k):
 @loops
 def mode_changes(nodes, work, dense, model, marker_work, k):
     """Write S, Y, X of the modes of a flexible body by its own marker, and of those of its parent by that above (1)."""
-    n, m, above = nodes.n_q[k], nodes.own[k], nodes.parent[k]
-    if n > 0:
-        S, change = dense.S[nodes.vq[k] : nodes.vq[k] + n], dense.change[nodes.vq[k] : nodes.vq[k] + n]
-        S[:, :] = 0.0
+    first, end = nodes.vq[k], nodes.vq[k] + nodes.n_q[k]
+    if end > first:
+        put_mode_changes(work, model, marker_work, k, nodes.own[k], -1.0, dense.S[first:end], dense.change[first:end])
+    first, end = nodes.c0[k], nodes.c0[k + 1]
+    if end > first:
+        S, change = dense.above[first:end], dense.above_change[first:end]
+        put_mode_changes(work, model, marker_work, nodes.parent[k], nodes.above[k], 1.0, S, change)
+
+
+@loops
+def put_mode_changes(work, model, marker_work, k, m, sign, out, change):
+    """Write sign times S, (n, 6), and Y, X, (n, 18), of the modes of flexible node k at its marker m, -1: none."""
+    if m < 0 or model.markers.psi0[m] < 0:
+        out[:, :] = 0.0
         change[:, :] = 0.0
-        if m >= 0:
-            R = work.R_G[k]
-            arm = scaled(-1.0, add(vector(work.r_G[k]), turned(R, vector(marker_work.markers.rho[m]))))
-            body = marker_in_body(model, marker_work, m, work, k)
-            marker_columns_in_ground(model, marker_work, m, R, arm, -1.0, S)
-            put_marker_changes(model, marker_work, m, body, R, arm, -1.0, change, dense.scratch)
-    m = nodes.above[k]
-    if m >= 0:
-        R = work.R_G[above]
-        arm = scaled(-1.0, add(vector(work.r_G[above]), turned(R, vector(work.rho[k]))))
-        S, change = dense.above[nodes.c0[k] : nodes.c0[k + 1]], dense.above_change[nodes.c0[k] : nodes.c0[k + 1]]
-        body = marker_in_body(model, marker_work, m, work, above)
-        marker_columns_in_ground(model, marker_work, m, R, arm, 1.0, S)
-        put_marker_changes(model, marker_work, m, body, R, arm, 1.0, change, dense.scratch)
+        return
+    i, R, r = model.markers.body[m], matrix(work.R_G[k]), vector(work.r_G[k])
+    V, A = node_motion(work, k)
+    rho_2, angle_2 = second_rates(model, marker_work, m, i)
+    for j in range(out.shape[0]):
+        S, S_1, S_2 = mode_screws(model, marker_work, m, i, j, (R, r, V, A, rho_2, angle_2))
+        Y, X = screw_rates(S, S_1, S_2, V, A)
+        put_pair_of(out[j], 0, scaled_pair(sign, S))
+        put_pair_of(change[j], 0, scaled_pair(sign, Y))
+        put_pair_of(change[j], 6, scaled_pair(sign, X))
+        put_pair_of(change[j], 12, scaled_pair(2.0 * sign, Y))
 
 
 @loops
@@ -235,12 +233,12 @@ def row_times(dense, i, change, first, turning):
 
 
 @small
-def put_rows(dense, k, v, m, s, J):
-    """Add the row of a motion of node k along S_v (2)."""
-    S, w = vector(dense.S[v]), vector(dense.S[v, 3:])
-    put_sum(dense.row_a[v], 0, add(scaled(m, S), cross(w, s)))
-    put_sum(dense.row_a[v], 3, add(cross(s, S), turned(J, w)))
-    put_sum(dense.row_b[v], 0, by_turning(vector(dense.momentum[k]), dense.Q[k], S, w))
+def put_rows(dense, k, v, S, m, s, J):
+    """Add the row of a motion S of subtree k to that of rate v (2)."""
+    move, w = vector(S), vector(S[3:])
+    put_sum(dense.row_a[v], 0, add(scaled(m, move), cross(w, s)))
+    put_sum(dense.row_a[v], 3, add(cross(s, move), turned(J, w)))
+    put_sum(dense.row_b[v], 0, by_turning(vector(dense.momentum[k]), dense.Q[k], move, w))
 
 
 @loops
@@ -281,13 +279,6 @@ def go_up_tangents(nodes, dense, k, v, f_z, t_z, f_d, t_d):
         k = above
 
 
-@small
-def wrench_in_body(dense, k, R, r):
-    """Return the wrench of subtree k about r in axes R."""
-    f, t = vector(dense.wrench[k]), vector(dense.wrench[k, 3:])
-    return turned_back(R, f), turned_back(R, sub(t, cross(r, f)))
-
-
 @loops
 def tangent_columns(nodes, work, dense, model, marker_work, k, c_d, c_k, first):
     """Add the tangent of the equations of flexible body k by its modes (c_k = 1) or their rates (c_d = 1) (4)."""
@@ -312,11 +303,11 @@ def flexible_tangents(nodes, work, dense, model, marker_work, k):
     tangent_columns(nodes, work, dense, model, marker_work, k, 0.0, 1.0, 0)
     tangent_columns(nodes, work, dense, model, marker_work, k, 1.0, 0.0, 6)
     m, s, J = work.mass[k], vector(dense.s[k]), matrix(dense.J[k])
-    R, f, t = work.R_G[k], (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    if own >= 0:
-        f, t = wrench_in_body(dense, k, R, add(vector(work.r_G[k]), turned(R, vector(marker_work.markers.rho[own]))))
+    R, r, F = work.R_G[k], vector(work.r_G[k]), dense.wrench[k]
     for j in range(n):
         v = vq + j
+        if own >= 0:
+            add_second_order(model, marker_work, own, j, R, r, -1.0, F, dense.by_z[v, vq:])
         C, S, more = dense.change[v], dense.S[v], dense.by_mode[v]
         f_z, t_z, f_d, t_d = change_of_wrench(dense, k, S, C, m, s, J)
         f_z, t_z = add(f_z, vector(more)), add(t_z, vector(more[3:]))
@@ -325,8 +316,7 @@ def flexible_tangents(nodes, work, dense, model, marker_work, k):
             row = vq + i
             dense.by_z[row, v] += row_times(dense, row, C, 6, C[3:]) + along(dense.S[row], f_z, t_z)
             dense.by_rate[row, v] += row_times(dense, row, C, 12, S[3:]) + along(dense.S[row], f_d, t_d)
-            if own >= 0:
-                dense.by_z[row, v] -= carried_change(model, marker_work, own, f, t, i, j, n)
+            dense.by_z[row, v] += turned_power(pair(S), dense.S[row], F)
         for row in range(v0, v0 + n_z):
             dense.by_z[row, v] = along(dense.S[row], f_z, t_z)
             dense.by_rate[row, v] = along(dense.S[row], f_d, t_d)
@@ -335,7 +325,7 @@ def flexible_tangents(nodes, work, dense, model, marker_work, k):
         put(more, 6, f_d)
         put(more, 9, t_d)
     for j in range(n):
-        put_rows(dense, k, vq + j, m, s, J)
+        put_rows(dense, k, vq + j, dense.S[vq + j], m, s, J)
         more = dense.by_mode[vq + j]
         go_up_tangents(nodes, dense, k, vq + j, vector(more), vector(more[3:]), vector(more[6:]), vector(more[9:]))
 
@@ -346,7 +336,7 @@ def joint_tangents(nodes, work, dense, k):
     m, s, J = work.mass[k], vector(dense.s[k]), matrix(dense.J[k])
     v0, n_z, n, vq = nodes.v0[k], nodes.n_z[k], nodes.n_q[k], nodes.vq[k]
     for v in range(v0, v0 + n_z):
-        put_rows(dense, k, v, m, s, J)
+        put_rows(dense, k, v, dense.S[v], m, s, J)
     for v in range(v0, v0 + n_z):
         C, S = dense.change[v], dense.S[v]
         f_z, t_z, f_d, t_d = change_of_wrench(dense, k, S, C, m, s, J)
@@ -365,26 +355,20 @@ def joint_tangents(nodes, work, dense, k):
 @loops
 def give_to_flexible_parent(nodes, work, dense, model, marker_work, k):
     """Add the contribution of subtree k to rows, columns and block of the modes of its parent (2), (4)."""
-    above, marker, c0 = nodes.parent[k], nodes.above[k], nodes.c0[k]
-    n, vq, R = nodes.n_q[above], nodes.vq[above], work.R_G[above]
+    above, c0 = nodes.parent[k], nodes.c0[k]
+    n, vq, R, r = nodes.n_q[above], nodes.vq[above], work.R_G[above], vector(work.r_G[above])
     m, s, J = work.mass[k], vector(dense.s[k]), matrix(dense.J[k])
-    p, Q = vector(dense.momentum[k]), dense.Q[k]
-    f, t = wrench_in_body(dense, k, R, add(vector(work.r_G[above]), turned(R, vector(work.rho[k]))))
     for j in range(n):
-        S, C, more = dense.above[c0 + j], dense.above_change[c0 + j], dense.by_mode[vq + j]
-        v, w = vector(S), vector(S[3:])
-        put_sum(dense.row_a[vq + j], 0, add(scaled(m, v), cross(w, s)))
-        put_sum(dense.row_a[vq + j], 3, add(cross(s, v), turned(J, w)))
-        put_sum(dense.row_b[vq + j], 0, by_turning(p, Q, v, w))
-        f_z, t_z = wrench_of(m, s, J, p, Q, vector(C[6:]), vector(C[9:]), vector(C[3:]))
-        f_d, t_d = wrench_of(m, s, J, p, Q, vector(C[12:]), vector(C[15:]), w)
+        v, S, C, more = vq + j, dense.above[c0 + j], dense.above_change[c0 + j], dense.by_mode[vq + j]
+        put_rows(dense, k, v, S, m, s, J)
+        f_z, t_z, f_d, t_d = change_of_wrench(dense, k, S, C, m, s, J)
         for i in range(n):
             T = dense.above[c0 + i]
-            dense.by_z[vq + i, vq + j] += along(T, f_z, t_z) + carried_change(model, marker_work, marker, f, t, i, j, n)
-            dense.by_rate[vq + i, vq + j] += along(T, f_d, t_d)
-        f_more, t_more = force_cross(v, w, vector(dense.wrench[k]), vector(dense.wrench[k, 3:]))
-        put_sum(more, 0, add(f_z, f_more))
-        put_sum(more, 3, add(t_z, t_more))
+            dense.by_z[vq + i, v] += along(T, f_z, t_z)
+            dense.by_rate[vq + i, v] += along(T, f_d, t_d)
+        add_second_order(model, marker_work, nodes.above[k], j, R, r, 1.0, dense.wrench[k], dense.by_z[v, vq:])
+        put_sum(more, 0, f_z)
+        put_sum(more, 3, t_z)
         put_sum(more, 6, f_d)
         put_sum(more, 9, t_d)
 
@@ -415,96 +399,3 @@ def force_tangents(nodes, work, dense, model, marker_work):
             put_sum(dense.momentum[above], 0, vector(dense.momentum[k]))
             for a in range(3):
                 put_sum(dense.Q[above, a], 0, vector(dense.Q[k, a]))
-
-
-# how the motion of a marker in its flexible body changes with the modes and their rates (docs/recursive.md §5) --------
-# With th_dot = Psi_r(q) q_dot, nu = T(th) th_dot, nu_dot = T th_ddot + c(th, th_dot), and of mode j, in axes of the
-# body
-#
-#     phi = T Psi_r                          turn of the marker
-#     by q      d rho_dot  = -(K_P q_dot)_t,   d rho_ddot = -(K_P q_ddot)_t,   the same with r for th_dot, th_ddot
-#               d nu = L(th, th_dot) Psi_r + T d th_dot
-#               d nu_dot = L(th, th_ddot) Psi_r + T d th_ddot + c_th Psi_r + c_w d th_dot
-#     by q_dot  Psi_t; -2 (K_P q_dot)_t;  phi;  -2 T (K_P q_dot)_r + c_w Psi_r
-#
-# L(th, v) = d(T v)/dth; c and its derivatives as in tree/kernels/elastic_turning.py.
-#
-# What is seen from the marker, which turns by phi: d_P x = dx - phi × x. Then Y = (d_P v, d_P omega) and
-# X = (d_P a - 2 d_P omega × v, d_P alpha + omega × d_P omega), which hold for all that hangs at the marker.
-
-
-@loops
-def put_marker_changes(model, marker_work, m, body, R, arm, sign, out, scratch):
-    """Write the effect of modes and their rates at marker m on everything attached to it; ground axes, a point at arm.
-
-    body: v, omega, a, alpha of the marker and omega, alpha of its body, body axes. out, (n, 18): Y, X by q; X by q_dot
-    (whose Y is the column of the mode itself).
-    """
-    o, n = model.markers.psi0[m], out.shape[0]
-    if o < 0:
-        out[:, :] = 0.0
-        return
-    i, markers = model.markers.body[m], marker_work.markers
-    u0, first = model.bodies.u0[i] + 6, model.markers.bend0[m]
-    v, omega_P, a, alpha_P, omega, alpha = body
-    psi, T = markers.psi[o : o + 6 * n], markers.T_left[m]
-    th, th_dot, zero = vector(markers.angle[m]), vector(markers.angle_dot[m]), (0.0, 0.0, 0.0)
-    q_ddot, q_dot = marker_work.state.u_dot[u0 : u0 + n], marker_work.state.u[u0 : u0 + n]
-    _, th_ddot = shape_sum(psi, n, q_ddot)
-    bend, bend_dot = scratch[0, : 6 * n], scratch[1, : 6 * n]
-    if first >= 0:
-        K = model.markers.bend[first : first + 6 * n * n]
-        for j in range(6 * n):
-            bend[j], bend_dot[j] = 0.0, 0.0
-        add_products(K, q_dot, bend)
-        add_products(K, q_ddot, bend_dot)
-        _, by_rates = shape_sum(bend, n, q_dot)
-        th_ddot = sub(th_ddot, by_rates)
-    by_angle, by_second = left_jacobian_derivative(th, th_dot, 1.0), left_jacobian_derivative(th, th_ddot, 1.0)
-    for k in range(n):
-        d, r = shape(psi, n, k)
-        phi = turned(T, r)
-        d_1, r_1, d_2, r_2 = zero, zero, zero, zero
-        if first >= 0:
-            d_1, r_1 = shape(bend, n, k)
-            d_2, r_2 = shape(bend_dot, n, k)
-        slip, turn_rate = scaled(-1.0, d_1), scaled(-1.0, r_1)
-        nu = add(turned(by_angle, r), turned(T, turn_rate))
-        bias = add(turning_bias_by_angle(th, th_dot, r), turning_bias_by_rate(th, th_dot, turn_rate))
-        nu_dot = add(sub(turned(by_second, r), turned(T, r_2)), bias)
-        dv = sub(add(cross(omega, d), slip), cross(phi, v))
-        dw = sub(nu, cross(phi, omega_P))
-        moved = add(cross(alpha, d), add(cross(omega, cross(omega, d)), scaled(2.0, cross(omega, slip))))
-        da = sub(sub(moved, d_2), cross(phi, a))
-        dalpha = sub(add(cross(omega, nu), nu_dot), cross(phi, alpha_P))
-        put_motion(out[k], 0, sign, R, arm, dv, dw)
-        put_motion(out[k], 6, sign, R, arm, sub(da, scaled(2.0, cross(dw, v))), add(dalpha, cross(omega_P, dw)))
-        nu_dot = sub(turning_bias_by_rate(th, th_dot, r), scaled(2.0, turned(T, r_1)))
-        da = sub(scaled(2.0, cross(omega, d)), scaled(2.0, d_1))
-        dalpha = add(cross(omega, phi), nu_dot)
-        put_motion(out[k], 12, sign, R, arm, sub(da, scaled(2.0, cross(phi, v))), add(dalpha, cross(omega_P, phi)))
-
-
-@small
-def put_motion(row, first, sign, R, arm, v, w):
-    """Write sign times a motion (v, w) in ground axes, of a point at arm."""
-    turn = scaled(sign, turned(R, w))
-    put(row, first, add(scaled(sign, turned(R, v)), cross(turn, arm)))
-    put(row, first + 3, turn)
-
-
-@loops
-def carried_change(model, marker_work, m, f, t, i, j, n):
-    """Return the change with mode j of the modal force i of a wrench (f, t) fixed in marker m; body axes."""
-    o, first, markers = model.markers.psi0[m], model.markers.bend0[m], marker_work.markers
-    psi, T = markers.psi[o : o + 6 * n], markers.T_left[m]
-    d, r = shape(psi, n, i)
-    _, r_j = shape(psi, n, j)
-    phi = turned(T, r_j)
-    turn = turned(left_jacobian_derivative(vector(markers.angle[m]), r, 1.0), r_j)
-    move = (0.0, 0.0, 0.0)
-    if first >= 0:
-        K = model.markers.bend[first + 6 * n * j : first + 6 * n * (j + 1)]
-        k_d, k_r = shape(K, n, i)
-        move, turn = scaled(-1.0, k_d), sub(turn, turned(T, k_r))
-    return dot(sub(move, cross(phi, d)), f) + dot(sub(turn, cross(phi, turned(T, r))), t)
