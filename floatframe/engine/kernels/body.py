@@ -52,8 +52,8 @@ __all__ = [
     "modal_term",
     "moved_inertia",
     "newton_block",
-    "put_rigid_blocks",
-    "put_rigid_row",
+    "put_block",
+    "put_column",
 ]
 
 
@@ -276,14 +276,6 @@ def put_block(H, row, column, A):
 
 
 @loops
-def add_block(H, row, column, A):
-    """Add a matrix to H at (row, column)."""
-    put_sum(H[row], column, A[0])
-    put_sum(H[row + 1], column, A[1])
-    put_sum(H[row + 2], column, A[2])
-
-
-@loops
 def put_column(H, row, column, x):
     """Write a vector down a column of H."""
     H[row, column], H[row + 1, column], H[row + 2, column] = x[0], x[1], x[2]
@@ -308,44 +300,25 @@ def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
         d(1) = m da - tilde(s) dalpha - (2 tilde(v) + tilde(omega × s) + tilde(omega) tilde(s)) domega + ...
         d(2) = tilde(s) da + J dalpha + (2 Σ q_dot_k D_k + tilde(omega) J - tilde(J omega)) domega + ...
     """
-    a, s = vector(work.bodies.a_B[i]), vector(work.bodies.s[i])
+    bodies, n, q0, u0 = work.bodies, model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
+    m, a, s, J = model.body_types.mass[model.bodies.kind[i]], vector(bodies.a_B[i]), vector(bodies.s[i]), bodies.J[i]
+    omega, q_dot = vector(work.state.u[u0 + 3 :]), work.state.u[u0 + 6 : u0 + 6 + n]
+    v, W = column_sum(bodies.C1[3 * q0 : 3 * (q0 + n)], n, q_dot), tilde(omega)
+    spin = matrix_sum(tilde(add(scaled(2.0, v), cross(omega, s))), product(W, tilde(s)))
+    gyro = matrix_sum(product(W, J), tilde(scaled(-1.0, turned(J, omega))))
+    gyro = matrix_sum(scaled_matrix(2.0, matrix(bodies.D_q_dot[i])), gyro)
     H[:, :] = 0.0
     turn[:, :] = 0.0
-    put_rigid_blocks(model, work, i, c_m, c_d, 3, H)
-    put_block(turn, 0, 0, tilde(scaled(model.body_types.mass[model.bodies.kind[i]], a)))
+    put_block(H, 0, 0, scaled_matrix(c_m * m, unit_matrix()))
+    put_block(H, 3, 0, tilde(scaled(c_m, s)))
+    put_block(H, 0, 3, matrix_sum(tilde(scaled(-c_m, s)), scaled_matrix(-c_d, spin)))
+    put_block(H, 3, 3, matrix_sum(scaled_matrix(c_m, matrix(J)), scaled_matrix(c_d, gyro)))
+    put_block(turn, 0, 0, tilde(scaled(m, a)))
     put_block(turn, 3, 0, product(tilde(s), tilde(a)))
-    if model.bodies.n_q[i] > 0:
+    if n > 0:
         modal_tangent(model, work, i, c_m, c_d, c_k, H, turn)
     if work.state.spins[i] != 0:
         spin_columns(model, work, i, c_d, H)
-
-
-@loops
-def put_rigid_blocks(model, work, i, c_m, c_d, first, H):
-    """Write the derivatives of (1) and (2) by a and alpha, times c_m, from columns 0 and 3 of H on.
-
-    c_d times those by omega are added from column `first` on, where H is zero or the columns are those of alpha.
-    """
-    bodies, t, n, u0 = work.bodies, model.bodies.kind[i], model.bodies.n_q[i], model.bodies.u0[i]
-    q0, m, s, J = model.bodies.q0[i], model.body_types.mass[t], vector(bodies.s[i]), matrix(bodies.J[i])
-    omega, q_dot = vector(work.state.u[u0 + 3 :]), work.state.u[u0 + 6 : u0 + 6 + n]
-    v = column_sum(bodies.C1[3 * q0 : 3 * (q0 + n)], n, q_dot)
-    spin = matrix_sum(tilde(add(scaled(2.0, v), cross(omega, s))), product(tilde(omega), tilde(s)))
-    gyro = matrix_sum(product(tilde(omega), J), tilde(scaled(-1.0, turned(J, omega))))
-    put_block(H, 0, 0, scaled_matrix(c_m * m, unit_matrix()))
-    put_block(H, 3, 0, tilde(scaled(c_m, s)))
-    put_block(H, 0, 3, tilde(scaled(-c_m, s)))
-    put_block(H, 3, 3, scaled_matrix(c_m, J))
-    add_block(H, 0, first, scaled_matrix(-c_d, spin))
-    add_block(H, 3, first, scaled_matrix(c_d, matrix_sum(scaled_matrix(2.0, matrix(bodies.D_q_dot[i])), gyro)))
-
-
-@loops
-def put_rigid_row(row, c_m, c_d, first, b, B, Y, J_omega):
-    """Write the derivatives of (3) of one mode by a, alpha and omega as `put_rigid_blocks`; J_omega: dJ/dq_k omega."""
-    put(row, 0, scaled(c_m, b))
-    put(row, 3, scaled(c_m, B))
-    put_sum(row, first, scaled(c_d, sub(scaled(2.0, Y), J_omega)))
 
 
 @loops
@@ -386,7 +359,8 @@ def modal_tangent(model, work, i, c_m, c_d, c_k, H, turn):
         put_column(H, 0, 6 + k, add(scaled(c_m, b), add(scaled(2 * c_d, turning), scaled(c_k, by_q))))
         by_q = add(cross(b, a), add(turned(J_k, alpha), cross(omega, J_omega)))
         put_column(H, 3, 6 + k, add(scaled(c_m, B_k), add(scaled(2 * c_d, D_omega), scaled(c_k, by_q))))
-        put_rigid_row(H[6 + k], c_m, c_d, 3, b, B_k, column(Y, n, k), J_omega)
+        put(H[6 + k], 0, scaled(c_m, b))
+        put(H[6 + k], 3, add(scaled(c_m, B_k), scaled(c_d, sub(scaled(2.0, column(Y, n, k)), J_omega))))
         put(turn[6 + k], 0, cross(b, a))
     modal_columns(model, work, i, c_d, c_k, H)
     if types.is_stiffened[t]:

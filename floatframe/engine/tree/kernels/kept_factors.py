@@ -20,7 +20,6 @@ import math
 from floatframe.engine.kernels.body import newton_block, put_block, put_column
 from floatframe.engine.kernels.compiler.compilation import inner, loops, matrix_loops, view
 from floatframe.engine.kernels.evaluation import tangent_of_body
-from floatframe.engine.kernels.marker import shape
 from floatframe.engine.kernels.vector import (
     add,
     cross,
@@ -39,6 +38,7 @@ from floatframe.engine.kernels.vector import (
     unit_matrix,
     vector,
 )
+from floatframe.engine.tree.kernels.mode_screws import mode_screw
 from floatframe.engine.tree.kernels.projection import subtract_slopes
 
 __all__ = ["factorize_poses", "keep_bodies", "solve_kept"]
@@ -105,19 +105,16 @@ def front(tree, tangent, i):
 
 @loops
 def put_screws(model, work, m, n, S):
-    """Write the screws, as in `jets.mode_screw`, of all modes of its body at marker m, (6, n), body axes."""
+    """Write the screws of all modes of its body at marker m, (6, n), body axes."""
     if m < 0 or model.markers.psi0[m] < 0:
         for r in range(6):
             for k in range(n):
                 S[r, k] = 0.0
         return
-    psi = work.markers.psi[model.markers.psi0[m] : model.markers.psi0[m] + 6 * n]
-    T, rho = matrix(work.markers.T_left[m]), vector(work.markers.rho[m])
     for k in range(n):
-        d, th = shape(psi, n, k)
-        b = turned(T, th)
-        put_column(S, 0, k, add(d, cross(rho, b)))
-        put_column(S, 3, k, b)
+        move, turn = mode_screw(model, work, m, model.markers.body[m], k)
+        put_column(S, 0, k, move)
+        put_column(S, 3, k, turn)
 
 
 @loops

@@ -8,7 +8,7 @@ frame with the spatial velocity V, its rate V', carries has xi = S theta and, wi
     xi_ddot = S theta_ddot + 2 (S' + V × S) theta_dot + (S'' + 2 V × S' + V' × S + V × (V × S)) theta
 """
 
-from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.compiler.compilation import inner, small
 from floatframe.engine.kernels.marker import bent_by, bent_rate, shape
 from floatframe.engine.kernels.rotation import left_jacobian_derivative
 from floatframe.engine.kernels.vector import add, cross, dot, scaled, sub, turned, turned_back, vector
@@ -18,7 +18,7 @@ from floatframe.engine.tree.kernels.spatial import pair_sum, scaled_pair, spatia
 __all__ = ["add_second_order", "mode_rate", "mode_screw", "mode_screws", "screw_rates", "second_rates"]
 
 
-@inner
+@small
 def mode_screw(model, work, m, i, k):
     """Return the screw of mode k at marker m about the frame origin of body i: (Psi_t + rho × b, b), b = T' Psi_r."""
     d, th = shape(work.markers.psi[model.markers.psi0[m] :], model.bodies.n_q[i], k)
@@ -28,39 +28,20 @@ def mode_screw(model, work, m, i, k):
 
 @inner
 def mode_rate(model, work, m, i, k):
-    """Return the screw of `mode_screw` and its rate relative to the body.
+    """Return the screw of mode k at marker m, its rate relative to the body, and the derivative of T' times Psi_r.
 
     `work.markers.bend_dot` has been written for the marker.
     """
-    markers, n, o = work.markers, model.bodies.n_q[i], model.markers.psi0[m]
+    markers, n = work.markers, model.bodies.n_q[i]
     T, rho, rho_1 = markers.T_left[m], vector(markers.rho[m]), vector(markers.rho_dot[m])
     s, b = mode_screw(model, work, m, i, k)
-    _, th = shape(markers.psi[o : o + 6 * n], n, k)
+    _, th = shape(markers.psi[model.markers.psi0[m] :], n, k)
     slope = left_jacobian_derivative(vector(markers.angle[m]), th, 1.0)
-    b_1 = turned(slope, vector(markers.angle_dot[m]))
-    s_1 = (0.0, 0.0, 0.0)
+    s_1, b_1 = (0.0, 0.0, 0.0), turned(slope, vector(markers.angle_dot[m]))
     if model.markers.bend0[m] >= 0:  # the rate of Psi(q)
         d_1, th_1 = shape(markers.bend_dot, n, k)
         s_1, b_1 = sub(s_1, d_1), sub(b_1, turned(T, th_1))
-    return (s, b), (add(s_1, add(cross(rho_1, b), cross(rho, b_1))), b_1)
-
-
-@inner
-def mode_second_rate(model, work, m, i, k, screw, screw_1, rho_2, angle_2):
-    """Return the second rate of the screw of `mode_rate`; rho_2, angle_2: `second_rates` of the marker."""
-    markers, n, o = work.markers, model.bodies.n_q[i], model.markers.psi0[m]
-    T, rho, rho_1 = markers.T_left[m], vector(markers.rho[m]), vector(markers.rho_dot[m])
-    angle, angle_1, b, b_1 = vector(markers.angle[m]), vector(markers.angle_dot[m]), screw[1], screw_1[1]
-    _, th = shape(markers.psi[o : o + 6 * n], n, k)
-    slope = left_jacobian_derivative(angle, th, 1.0)
-    b_2 = second_turning(angle, angle_1, vector(markers.spin[m]), th, b, turned(slope, angle_1))
-    b_2, s_2 = add(b_2, turned(slope, angle_2)), (0.0, 0.0, 0.0)
-    if model.markers.bend0[m] >= 0:
-        _, th_1 = shape(markers.bend_dot, n, k)
-        d_2, th_2 = shape(markers.bend_ddot, n, k)
-        by_bending = turned(left_jacobian_derivative(angle, th_1, 1.0), angle_1)
-        s_2, b_2 = sub(s_2, d_2), sub(b_2, add(scaled(2.0, by_bending), turned(T, th_2)))
-    return add(s_2, add(cross(rho_2, b), add(scaled(2.0, cross(rho_1, b_1)), cross(rho, b_2)))), b_2
+    return (s, b), (add(s_1, add(cross(rho_1, b), cross(rho, b_1))), b_1), slope
 
 
 @inner
@@ -78,14 +59,25 @@ def second_rates(model, work, m, i):
 
 @inner
 def mode_screws(model, work, m, i, k, held):
-    """Return the screw of mode k at marker m and its rates relative to body i, ground axes.
+    """Return the screw of mode k at marker m and its two rates relative to body i, ground axes.
 
     held: axes R and origin p of the body, its motion V, V', and the `second_rates` of the marker.
     """
     R, p, _, _, rho_2, angle_2 = held
-    s, s_1 = mode_rate(model, work, m, i, k)
-    s_2 = mode_second_rate(model, work, m, i, k, s, s_1, rho_2, angle_2)
-    return world_screw(R, p, s), world_screw(R, p, s_1), world_screw(R, p, s_2)
+    markers, n = work.markers, model.bodies.n_q[i]
+    rho, rho_1 = vector(markers.rho[m]), vector(markers.rho_dot[m])
+    angle, angle_1 = vector(markers.angle[m]), vector(markers.angle_dot[m])
+    (s, b), (s_1, b_1), slope = mode_rate(model, work, m, i, k)
+    _, th = shape(markers.psi[model.markers.psi0[m] :], n, k)
+    b_2 = second_turning(angle, angle_1, vector(markers.spin[m]), th, b, turned(slope, angle_1))
+    s_2, b_2 = (0.0, 0.0, 0.0), add(b_2, turned(slope, angle_2))
+    if model.markers.bend0[m] >= 0:
+        _, th_1 = shape(markers.bend_dot, n, k)
+        d_2, th_2 = shape(markers.bend_ddot, n, k)
+        by_bending = turned(left_jacobian_derivative(angle, th_1, 1.0), angle_1)
+        s_2, b_2 = sub(s_2, d_2), sub(b_2, add(scaled(2.0, by_bending), turned(markers.T_left[m], th_2)))
+    s_2 = add(s_2, add(cross(rho_2, b), add(scaled(2.0, cross(rho_1, b_1)), cross(rho, b_2))))
+    return world_screw(R, p, (s, b)), world_screw(R, p, (s_1, b_1)), world_screw(R, p, (s_2, b_2))
 
 
 @inner

@@ -9,35 +9,35 @@ since all bodies of a subtree move alike by what moves its first. Derivatives of
 of the forces that stay in axes of bodies or ground are all there.
 """
 
-from floatframe.engine.kernels.body import (
-    block,
-    column,
-    coupling,
-    inertia_rate,
-    newton_block,
-    put_rigid_blocks,
-    put_rigid_row,
-)
-from floatframe.engine.kernels.compiler.compilation import inner, loops, small
+from floatframe.engine.kernels.body import moved_inertia, newton_block, put_block
+from floatframe.engine.kernels.compiler.compilation import inner, small
 from floatframe.engine.kernels.connections.connection import connection_derivatives
 from floatframe.engine.kernels.evaluation import tangent_of_body
 from floatframe.engine.kernels.marker import bent_rate
-from floatframe.engine.kernels.model import C2, C3
 from floatframe.engine.kernels.vector import (
     add,
+    congruent,
     cross,
     dot,
     matrix,
     matrix_sum,
+    product,
     put,
     put_matrix,
     scaled,
+    scaled_matrix,
     sub,
-    transposed,
+    tilde,
     turned,
     turned_back,
     unit_matrix,
     vector,
+)
+from floatframe.engine.tree.kernels.body_jets import (
+    mode_row,
+    moments_of_body,
+    momentum_of_modes,
+    turning_of_momentum,
 )
 from floatframe.engine.tree.kernels.jets import carrier, put_mode_jet, write_jets
 from floatframe.engine.tree.kernels.mode_screws import add_second_order, mode_rate, mode_screws
@@ -59,26 +59,9 @@ __all__ = [
     "body_frame",
     "inner_product",
     "product_of",
-    "rigid_columns",
     "unit_of",
     "write_tangent",
 ]
-
-
-@loops
-def rigid_columns(model, work, i, A):
-    """Write the derivative of the residual of body i by a, alpha, omega, body axes, into A, (6 + n, 9)."""
-    bodies, t, n, q0 = work.bodies, model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i]
-    for r in range(6 + n):
-        put(A[r], 6, (0.0, 0.0, 0.0))
-    put_rigid_blocks(model, work, i, 1.0, 1.0, 6, A)
-    omega, first = vector(work.state.u[model.bodies.u0[i] + 3 :]), bodies.C1[3 * q0 : 3 * (q0 + n)]
-    W, Y = bodies.W[9 * q0 : 9 * (q0 + n)], bodies.Y[3 * q0 : 3 * (q0 + n)]
-    second, third = block(model.body_types, t, C2, 3 * n), block(model.body_types, t, C3, 9 * n)
-    for k in range(n):
-        D_k, b, B_k = inertia_rate(third, W, n, k), column(first, n, k), coupling(second, W, n, k)
-        J_omega = turned(matrix_sum(D_k, transposed(D_k)), omega)
-        put_rigid_row(A[6 + k], 1.0, 1.0, 6, b, B_k, column(Y, n, k), J_omega)
 
 
 @inner
@@ -121,42 +104,46 @@ def write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k):
 
 @inner
 def of_body(model, work, joints, tangent, i, c_m, c_d, c_k):
-    """Write D, F and the derivatives of the modal residual of body i alone, and H with the columns of its modes."""
+    """Write D, F and the derivatives of the modal residual of body i alone, and H with the columns of its modes.
+
+    D and the rows of the modes are those of body_jets.py, and what turns with the body but for `by_turn` and the
+    acceleration a, which stay in the ground.
+    """
     n, u0, q0 = model.bodies.n_q[i], model.bodies.u0[i], model.bodies.q0[i]
     turning = work.bodies.T_right[i]
     put_matrix(turning, unit_matrix())
-    H = newton_block(model, work, i)
-    tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning)
-    A, turn = tangent.rigid, work.bodies.by_turn[u0 : u0 + 6 + n]
-    rigid_columns(model, work, i, A)
-    R, residual = matrix(work.state.R[i]), joints.own[u0 : u0 + 6 + n]
-    p = sub(vector(work.state.r[i]), vector(tangent.origin))
-    v, omega = vector(work.state.u[u0:]), turned(R, work.state.u[u0 + 3 :])
-    a = vector(work.state.u_dot[u0:])
-    f, tau = turned(R, residual), turned(R, residual[3:])
+    tangent_of_body(model, work, i, c_m, c_d, c_k, newton_block(model, work, i), turning)
+    turn, residual = work.bodies.by_turn[u0 : u0 + 6 + n], joints.own[u0 : u0 + 6 + n]
+    R, p = body_frame(work, tangent, i)
+    v, omega_B, a = vector(work.state.u[u0:]), vector(work.state.u[u0 + 3 :]), vector(work.state.u_dot[u0:])
+    f = turned(R, residual)
+    tau = add(turned(R, residual[3:]), cross(p, f))
     put(tangent.F[i], 0, f)
-    put(tangent.F[i], 3, add(tau, cross(p, f)))
-    y, out, D = tangent.y, tangent.by_jet, tangent.D[i]
-    for e in range(18):
-        xi, xi_w = unit_of(e, 0), unit_of(e, 3)
-        _, one_w, two, two_w = unit_of(e, 6), unit_of(e, 9), unit_of(e, 12), unit_of(e, 15)
-        change = add(add(two, cross(two_w, p)), add(scaled(2.0, cross(one_w, v)), cross(xi_w, a)))
-        put(y, 0, turned_back(R, change))
-        put(y, 3, turned_back(R, sub(two_w, cross(omega, one_w))))
-        put(y, 6, turned_back(R, one_w))
-        put(y, 9, turned_back(R, xi_w))
-        for r in range(6 + n):
-            total = turn[r, 0] * y[9] + turn[r, 1] * y[10] + turn[r, 2] * y[11]
-            for k in range(9):
-                total += A[r, k] * y[k]
-            out[r] = total
-        moved = add(xi, cross(xi_w, p))
-        df = add(cross(xi_w, f), turned(R, out))
-        dm = add(add(cross(xi_w, tau), turned(R, out[3:])), add(cross(moved, f), cross(p, df)))
-        D[0, e], D[1, e], D[2, e] = df[0], df[1], df[2]
-        D[3, e], D[4, e], D[5, e] = dm[0], dm[1], dm[2]
-        for k in range(n):
-            tangent.modal[q0 + k, e] = out[6 + k]
+    put(tangent.F[i], 3, tau)
+    m, s, J = moments_of_body(model, work, i, R)
+    momentum, Q = turning_of_momentum(m, s, J, momentum_of_modes(model, work, i, R), p, v, turned(R, omega_B))
+    by_f = matrix_sum(congruent(R, matrix(turn)), tilde(scaled(-m, a)))
+    by_tau = matrix_sum(congruent(R, matrix(turn[3:])), scaled_matrix(-1.0, product(tilde(s), tilde(a))))
+    s, J = moved_inertia(m, s, J, p)
+    D = tangent.D[i]
+    D[:, :] = 0.0
+    put_block(D, 3, 0, tilde(scaled(-1.0, f)))
+    put_block(D, 0, 3, matrix_sum(by_f, tilde(scaled(-1.0, f))))
+    put_block(D, 3, 3, matrix_sum(by_tau, matrix_sum(product(tilde(p), by_f), tilde(scaled(-1.0, tau)))))
+    put_block(D, 0, 9, tilde(scaled(-2.0, momentum)))
+    put_block(D, 3, 9, Q)
+    put_block(D, 0, 12, scaled_matrix(m, unit_matrix()))
+    put_block(D, 0, 15, tilde(scaled(-1.0, s)))
+    put_block(D, 3, 12, tilde(s))
+    put_block(D, 3, 15, J)
+    for k in range(n):
+        b, B, by_turning = mode_row(model, work, i, k, R, turned_back(R, v), omega_B)
+        row = tangent.modal[q0 + k]
+        row[:] = 0.0
+        put(row, 3, add(turned(R, turn[6 + k]), cross(a, b)))
+        put(row, 9, by_turning)
+        put(row, 12, b)
+        put(row, 15, add(B, cross(p, b)))
 
 
 @small
@@ -318,7 +305,7 @@ def kept_marker(model, work, tree, tangent, m, first, rate):
     if model.markers.bend0[m] >= 0:
         bent_rate(model, work, m, i, work.markers.bend_dot[: 6 * model.bodies.n_q[i]])
     for k in range(model.bodies.n_q[i]):
-        s, s_1 = mode_rate(model, work, m, i, k)
+        s, s_1, _ = mode_rate(model, work, m, i, k)
         unit = world_screw(R, origin, s)
         own = world_screw(R, origin, s_1)
         xi_dot = pair_sum(pair_sum(scaled_pair(rate, unit), own), spatial_cross(V, unit))

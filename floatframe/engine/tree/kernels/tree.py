@@ -108,9 +108,6 @@ class TangentWork(NamedTuple):
     D: Array = real(n_b, 6, 18)  #: derivative of the force of a body, with its subtree, by jets
     F: Array = real(n_b, 6, unit="N, N m")  #: force of a body with its subtree
     modal: Array = real(Size("n_q"), 18)  #: derivative of the modal residual by jets
-    rigid: Array = real(Size("n_most") + 6, 9)  #: residual of one body by accelerations and angular velocity
-    y: Array = real(12)
-    by_jet: Array = real(Size("n_most") + 6)
     f: Array = real(6)
     motion: Array = real(12)
     own: Array = real(18)  #: jet of a mode at a marker of its body

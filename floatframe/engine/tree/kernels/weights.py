@@ -6,19 +6,8 @@ turn of a joint near the root that those behind it take back is no large one.
 
 from floatframe.engine.kernels.body import moved_inertia
 from floatframe.engine.kernels.compiler.compilation import inner
-from floatframe.engine.kernels.vector import (
-    add,
-    congruent,
-    cross,
-    dot,
-    matrix,
-    put,
-    put_sum,
-    sub,
-    turned,
-    turned_back,
-    vector,
-)
+from floatframe.engine.kernels.vector import add, cross, dot, put, put_sum, sub, turned, turned_back, vector
+from floatframe.engine.tree.kernels.body_jets import moments_of_body
 
 __all__ = ["sizes_of_step", "squared_size", "weigh"]
 
@@ -31,8 +20,8 @@ def weigh(model, work, tree, joints, tangent):
     """
     mass, origin = tangent.mass, vector(work.state.r[tree.order[0]])
     for i in range(tree.parent.shape[0]):
-        R, p, m = matrix(work.state.R[i]), sub(work.state.r[i], origin), model.body_types.mass[model.bodies.kind[i]]
-        s, J = moved_inertia(m, turned(R, work.bodies.s[i]), congruent(R, matrix(work.bodies.J[i])), p)
+        m, s, J = moments_of_body(model, work, i, work.state.R[i])
+        s, J = moved_inertia(m, s, J, sub(work.state.r[i], origin))
         mass[i, 0, 0] = m
         put(mass[i, 1], 0, s)
         for a in range(3):

@@ -31,11 +31,13 @@ from floatframe.engine.kernels.vector import (
     turned,
     vector,
 )
+from floatframe.engine.tree.kernels.body_jets import moments_of_body
 
 __all__ = [
     "add_carried",
     "along",
     "along_rate",
+    "body_moments",
     "evaluate_flexible",
     "flexible_column",
     "mass_matrix",
@@ -44,25 +46,26 @@ __all__ = [
 ]
 
 
+@small
+def body_moments(nodes, work, model, marker_work, k):
+    """Return mass, first moment and inertia of the body of node k about its origin, ground axes; zero without one."""
+    R, zero = work.R_G[k], (0.0, 0.0, 0.0)
+    if nodes.n_q[k] > 0:
+        return moments_of_body(model, marker_work, nodes.body[k], R)
+    if nodes.body[k] >= 0:
+        return nodes.mass[k], turned(R, nodes.s[k]), congruent(R, matrix(nodes.J[k]))
+    return 0.0, zero, (zero, zero, zero)
+
+
 @loops
 def moments_in_ground(nodes, work, model, marker_work, k):
     """Write mass, s, J of the body of node k alone, and H if it is flexible; its forces have been evaluated."""
-    R = matrix(work.R_G[k])
+    m, s, J = body_moments(nodes, work, model, marker_work, k)
+    work.mass[k] = m
+    put(work.s[k], 0, s)
+    put_matrix(work.J[k], J)
     if nodes.n_q[k] > 0:
-        i = nodes.body[k]
-        work.mass[k] = model.body_types.mass[model.bodies.kind[i]]
-        put(work.s[k], 0, turned(R, vector(marker_work.bodies.s[i])))
-        put_matrix(work.J[k], congruent(R, matrix(marker_work.bodies.J[i])))
         flexible_mass(nodes, work, model, marker_work, k)
-    elif nodes.body[k] >= 0:
-        work.mass[k] = nodes.mass[k]
-        put(work.s[k], 0, turned(R, vector(nodes.s[k])))
-        put_matrix(work.J[k], congruent(R, matrix(nodes.J[k])))
-    else:
-        zero = (0.0, 0.0, 0.0)
-        work.mass[k] = 0.0
-        put(work.s[k], 0, zero)
-        put_matrix(work.J[k], (zero, zero, zero))
 
 
 @loops

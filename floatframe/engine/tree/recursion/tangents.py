@@ -20,37 +20,23 @@ turning), and seen from the ground by S ×* f more. So
 Sources: Carpentier & Mansard (2018); Singh, Russell & Wensing (2022) for rigid bodies; derived anew for flexible ones.
 """
 
-from floatframe.engine.kernels.body import (
-    block,
-    body_tangent,
-    column,
-    column_sum,
-    coupling,
-    inertia_rate,
-    moved_inertia,
-)
+from floatframe.engine.kernels.body import body_tangent, moved_inertia
 from floatframe.engine.kernels.compiler.compilation import loops, small
-from floatframe.engine.kernels.model import C2, C3
 from floatframe.engine.kernels.vector import (
     add,
-    congruent,
     cross,
     dot,
     matrix,
-    matrix_sum,
-    product,
     put,
     put_matrix,
     put_sum,
     scaled,
-    scaled_matrix,
     sub,
-    tilde,
-    transposed,
     turned,
     turned_back,
     vector,
 )
+from floatframe.engine.tree.kernels.body_jets import mode_row, momentum_of_modes, turning_of_momentum
 from floatframe.engine.tree.kernels.mode_screws import add_second_order, mode_screws, screw_rates, second_rates
 from floatframe.engine.tree.kernels.spatial import (
     pair,
@@ -62,7 +48,7 @@ from floatframe.engine.tree.kernels.spatial import (
     turned_power,
     wrench_of_column,
 )
-from floatframe.engine.tree.recursion.composite import along
+from floatframe.engine.tree.recursion.composite import along, body_moments
 from floatframe.engine.tree.recursion.newton_euler import elastic_carrier
 
 __all__ = ["force_tangents"]
@@ -155,26 +141,13 @@ def put_mode_changes(work, model, marker_work, k, m, sign, out, change):
 @loops
 def body_by_turning(nodes, work, dense, model, marker_work, k):
     """Write p and Q of the body of node k alone, and the wrench, inertia of its subtree (1)."""
-    R, r, v, omega = work.R_G[k], vector(work.r_G[k]), vector(work.motion[k]), vector(work.motion[k, 3:])
-    zero = (0.0, 0.0, 0.0)
-    m, s, J, D, p = 0.0, zero, (zero, zero, zero), (zero, zero, zero), zero
-    i = nodes.body[k]
+    R, r, zero = work.R_G[k], vector(work.r_G[k]), (0.0, 0.0, 0.0)
+    by_modes = zero, (zero, zero, zero)
     if nodes.n_q[k] > 0:
-        n, q0, u0 = nodes.n_q[k], nodes.q0[k], nodes.u0[k] + 6
-        m = model.body_types.mass[model.bodies.kind[i]]
-        s, J = turned(R, vector(marker_work.bodies.s[i])), congruent(R, matrix(marker_work.bodies.J[i]))
-        D = congruent(R, matrix(marker_work.bodies.D_q_dot[i]))
-        q_dot = marker_work.state.u[u0 : u0 + n]
-        p = turned(R, column_sum(marker_work.bodies.C1[3 * q0 : 3 * (q0 + n)], n, q_dot))
-    elif i >= 0:
-        m, s, J = nodes.mass[k], turned(R, vector(nodes.s[k])), congruent(R, matrix(nodes.J[k]))
-    p = add(p, add(scaled(m, v), cross(omega, s)))
-    W = tilde(omega)
-    JW = product(J, W)
-    Q = matrix_sum(scaled_matrix(-2.0, product(tilde(s), tilde(v))), scaled_matrix(-1.0, JW))
-    Q = matrix_sum(Q, matrix_sum(product(W, J), tilde(scaled(-1.0, turned(J, omega)))))
-    Q = matrix_sum(Q, scaled_matrix(2.0, D))
-    Q = matrix_sum(Q, scaled_matrix(-2.0, product(tilde(r), tilde(p))))
+        by_modes = momentum_of_modes(model, marker_work, nodes.body[k], R)
+    m, s, J = body_moments(nodes, work, model, marker_work, k)
+    v, omega = vector(work.motion[k]), vector(work.motion[k, 3:])
+    p, Q = turning_of_momentum(m, s, J, by_modes, r, v, omega)
     put(dense.momentum[k], 0, p)
     put_matrix(dense.Q[k], Q)
     f = turned(R, vector(work.f[k]))
@@ -208,21 +181,13 @@ def force_cross(v, w, f, t):
 @loops
 def mode_rows(nodes, work, dense, model, marker_work, k):
     """Write the rows of the modes of flexible node k for motions of its body alone (2)."""
-    i, n, vq, q0 = nodes.body[k], nodes.n_q[k], nodes.vq[k], nodes.q0[k]
-    types, t, bodies = model.body_types, model.bodies.kind[i], marker_work.bodies
-    R, r = work.R_G[k], vector(work.r_G[k])
-    v, omega = turned_back(R, vector(work.motion[k])), vector(work.omega[k])
-    W, Y, first = bodies.W[9 * q0 : 9 * (q0 + n)], bodies.Y[3 * q0 : 3 * (q0 + n)], bodies.C1[3 * q0 : 3 * (q0 + n)]
-    second, third = block(types, t, C2, 3 * n), block(types, t, C3, 9 * n)
-    for j in range(n):
-        b, D, B = column(first, n, j), inertia_rate(third, W, n, j), coupling(second, W, n, j)
-        turning = turned(matrix_sum(D, transposed(D)), omega)
-        # 2 b·(y × v) - B·(omega × y) + 2 Y·y - omega·(D + Dᵀ) y
-        row = add(scaled(2.0, cross(v, b)), sub(scaled(2.0, column(Y, n, j)), add(cross(B, omega), turning)))
-        b, B = turned(R, b), turned(R, B)
+    vq, R, r, omega = nodes.vq[k], work.R_G[k], vector(work.r_G[k]), vector(work.omega[k])
+    v = turned_back(R, work.motion[k])
+    for j in range(nodes.n_q[k]):
+        b, B, by_turning = mode_row(model, marker_work, nodes.body[k], j, R, v, omega)
         put(dense.row_a[vq + j], 0, b)
         put(dense.row_a[vq + j], 3, add(B, cross(r, b)))
-        put(dense.row_b[vq + j], 0, turned(R, row))
+        put(dense.row_b[vq + j], 0, by_turning)
 
 
 @small

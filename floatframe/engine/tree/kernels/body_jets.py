@@ -1,0 +1,68 @@
+"""How the forces of one body change with the motion of what carries it, ground axes, moments about one point O.
+
+With mass m, first moment s, inertia J and momentum p about O, D = Σ q_dot_k D_k of the modes (kernels/body.py), the
+residual of the body, seen from what carries it, changes by
+
+    I xi_ddot + N xi_dot,   I = [[m, -s~], [s~, J]],   N = [[0, -2 p~], [0, Q]]
+    Q y = 2 s × (y × v) - J (omega × y) + y × J omega + omega × J y + 2 D y about its origin, less 2 r~ p~ for O
+
+and that of mode k by (b, B)·xi_ddot and the turning of xi_dot with 2 v × b - B × omega + 2 Y - (D_k + D_kᵀ) omega.
+"""
+
+from floatframe.engine.kernels.body import block, column, column_sum, coupling, inertia_rate
+from floatframe.engine.kernels.compiler.compilation import inner, small
+from floatframe.engine.kernels.model import C2, C3
+from floatframe.engine.kernels.vector import (
+    add,
+    congruent,
+    cross,
+    matrix,
+    matrix_sum,
+    product,
+    scaled,
+    scaled_matrix,
+    sub,
+    tilde,
+    transposed,
+    turned,
+)
+
+__all__ = ["mode_row", "moments_of_body", "momentum_of_modes", "turning_of_momentum"]
+
+
+@small
+def moments_of_body(model, work, i, R):
+    """Return mass, first moment and inertia of body i about its origin, ground axes; its forces have been evaluated."""
+    m = model.body_types.mass[model.bodies.kind[i]]
+    return m, turned(R, work.bodies.s[i]), congruent(R, matrix(work.bodies.J[i]))
+
+
+@inner
+def momentum_of_modes(model, work, i, R):
+    """Return the momentum of the modes of body i and Σ q_dot_k D_k, ground axes."""
+    n, q0, u0 = model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i] + 6
+    p = column_sum(work.bodies.C1[3 * q0 : 3 * (q0 + n)], n, work.state.u[u0 : u0 + n])
+    return turned(R, p), congruent(R, matrix(work.bodies.D_q_dot[i]))
+
+
+@inner
+def turning_of_momentum(m, s, J, by_modes, r, v, omega):
+    """Return p, and Q about O, of a body at r from O; m, s, J about its origin, by_modes: its `momentum_of_modes`."""
+    p = add(by_modes[0], add(scaled(m, v), cross(omega, s)))
+    W = tilde(omega)
+    Q = matrix_sum(scaled_matrix(-2.0, product(tilde(s), tilde(v))), scaled_matrix(-1.0, product(J, W)))
+    Q = matrix_sum(Q, matrix_sum(product(W, J), tilde(scaled(-1.0, turned(J, omega)))))
+    Q = matrix_sum(Q, scaled_matrix(2.0, by_modes[1]))
+    return p, matrix_sum(Q, scaled_matrix(-2.0, product(tilde(r), tilde(p))))
+
+
+@inner
+def mode_row(model, work, i, k, R, v, omega):
+    """Return b, B and the row by turning of mode k of body i, about its origin; v, omega: its motion, body axes."""
+    bodies, t, n, q0 = work.bodies, model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i]
+    W, Y = bodies.W[9 * q0 : 9 * (q0 + n)], bodies.Y[3 * q0 : 3 * (q0 + n)]
+    b, B = column(bodies.C1[3 * q0 : 3 * (q0 + n)], n, k), coupling(block(model.body_types, t, C2, 3 * n), W, n, k)
+    D = inertia_rate(block(model.body_types, t, C3, 9 * n), W, n, k)
+    turning = add(cross(B, omega), turned(matrix_sum(D, transposed(D)), omega))
+    row = add(scaled(2.0, cross(v, b)), sub(scaled(2.0, column(Y, n, k)), turning))
+    return turned(R, b), turned(R, B), turned(R, row)
