@@ -75,8 +75,8 @@ def cluster_here(ranks):
 def main():
     from cms.linear_algebra.solvers.factorization import lower_triangle
     from cms.linear_algebra.solvers.petsc.factor import PetscFactor
-    from fe_models.body.couplings.submatrix import nearby_order, principal_block
     from fe_models.foundation.ranks.mpi import MpiRanks
+    from fe_models.foundation.sparse.submatrix import nearby_order, principal_block
 
     ranks = MpiRanks()
     if ranks.rank:

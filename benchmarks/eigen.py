@@ -28,8 +28,8 @@ import scipy.sparse.linalg as sla
 import cms.linear_algebra.solvers.mode_search as mode_search
 from cms.linear_algebra.solvers.eigen import eigenmodes
 from cms.linear_algebra.solvers.factorization import factorize
-from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
-from fe_models.body.couplings.submatrix import principal_block
+from fe_models.foundation.sparse.sparse_product import SymmetricProduct
+from fe_models.foundation.sparse.submatrix import principal_block
 from fe_models.foundation.threads import one_blas_thread
 
 TOLERANCE = 1e-5

@@ -33,7 +33,7 @@ def one(name, path):
     from cms.linear_algebra.solvers.factorization import lower_triangle
     from cms.linear_algebra.solvers.registry import SOLVERS
     from cms.linear_algebra.sparse_cholesky.factor import CholeskyFactor
-    from fe_models.body.couplings.submatrix import principal_block
+    from fe_models.foundation.sparse.submatrix import principal_block
 
     *_, (_, body) = solid(Path(path))
     lower = lower_triangle(principal_block(body.K, body.i))
@@ -70,7 +70,7 @@ def blocks(million, name):
     from benchmarks import large_solid
     from cms.linear_algebra.solvers.factorization import lower_triangle
     from cms.linear_algebra.solvers.registry import SOLVERS
-    from fe_models.body.couplings.submatrix import principal_block
+    from fe_models.foundation.sparse.submatrix import principal_block
 
     *_, (_, body) = large_solid.solid(large_solid.mesh_file(million))
     lower = lower_triangle(principal_block(body.K, body.i))

@@ -119,7 +119,7 @@ def bare(size):
     from cms.jobs.job import read_job
     from cms.linear_algebra.solvers.factorization import lower_triangle
     from cms.linear_algebra.solvers.pardiso import PardisoFactor
-    from fe_models.body.couplings.submatrix import principal_block
+    from fe_models.foundation.sparse.submatrix import principal_block
     from fe_models.foundation.stages import Stages
 
     with tempfile.TemporaryDirectory(dir=OUT) as folder:

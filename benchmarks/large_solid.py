@@ -82,7 +82,7 @@ def bare(path):
     """One factorisation of K_II, one solve of 60 columns."""
     from cms.linear_algebra.solvers.factorization import lower_triangle
     from cms.linear_algebra.solvers.pardiso import PardisoFactor
-    from fe_models.body.couplings.submatrix import principal_block
+    from fe_models.foundation.sparse.submatrix import principal_block
 
     *_, (_, body) = solid(path)
     lower = lower_triangle(principal_block(body.K, body.i))

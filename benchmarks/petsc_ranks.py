@@ -66,7 +66,7 @@ class Stages:
 def factored(body, solver, stage):
     """The factor of K_II, after a solve of 60 columns."""
     from cms.linear_algebra.solvers.factorization import factorize
-    from fe_models.body.couplings.submatrix import nearby_order, principal_block
+    from fe_models.foundation.sparse.submatrix import nearby_order, principal_block
 
     with stage("factor"):
         K_ii = principal_block(body.K, nearby_order(body.K, body.dofs, body.i))

@@ -15,9 +15,9 @@ import numpy as np
 import scipy.linalg as la
 from scipy.linalg.lapack import dpstrf
 
-from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.sparse.sparse_product import SymmetricProduct
 from fe_models.foundation.tall.columns import beside, combine, dots, inner, squares
 
 __all__ = [

@@ -166,7 +166,7 @@ def shell():
 
 @pytest.mark.parametrize("make", [shell, lambda: couple(beam()), lambda: couple(bar())])
 def test_a_body_made_by_rank_0_is_reduced_on_all_ranks(make, monkeypatch):
-    monkeypatch.setattr("fe_models.body.couplings.submatrix.FEW_DOFS", 0)  # in an order of its own
+    monkeypatch.setattr("fe_models.foundation.sparse.submatrix.FEW_DOFS", 0)  # in an order of its own
     one = make()
     spread = spread_body(one, ThreadRanks(3))
     assert (spread.K.whole() != one.K).nnz == 0

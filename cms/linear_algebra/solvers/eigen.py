@@ -6,23 +6,23 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cms.errors import EigenError
 from cms.linear_algebra.solvers.factorization import Factorization, Matrix, factorize, matrix_of, shifted_matrix
 from cms.linear_algebra.solvers.inverse import Inverse
 from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
 from cms.linear_algebra.solvers.mode_search import DenseSearch, KrylovSearch
-from cms.linear_algebra.solvers.shift_inverted import ArraySpace, ModeRequest, Modes, ShiftInverted
+from cms.linear_algebra.solvers.shift_inverted import ArraySpace, Modes, ShiftInverted
 from cms.linear_algebra.solvers.slepc_modes import SlepcSearch, search_on_ranks
-from fe_models.body.couplings.submatrix import PrincipalBlock
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 from fe_models.foundation.solver import Solver
-from fe_models.foundation.tall.columns import combine, frozen_columns, in_memory, of_this_process
+from fe_models.foundation.sparse.submatrix import PrincipalBlock
+from fe_models.foundation.tall.columns import combine, elsewhere, frozen_columns, in_memory, of_this_process
+from fe_models.foundation.tall.on_disk import row_slices
 from fe_models.foundation.threads import one_blas_thread
 
-__all__ = ["EigenResult", "FactorMismatchError", "eigenmodes", "no_modes", "orientation", "turn"]
+__all__ = ["EigenResult", "FactorMismatchError", "eigenmodes", "no_modes", "orientation", "turn_in_place"]
 
 
 SMALL = 300  #: number of dofs up to which dense matrices are faster
@@ -122,15 +122,14 @@ def eigenmodes(
     n = K.shape[0]
     if K.shape != (n, n) or M.shape != (n, n):
         raise EigenError(f"eigenmodes: expected K and M of one square shape, got {K.shape} and {M.shape}")
-    asked = mode_count(n_modes)
-    wanted = ModeRequest.of(asked)
-    if wanted.count is not None and wanted.count < 1:
-        raise EigenError(f"eigenmodes: n_modes = {wanted.count}; expected at least 1")
-    if wanted.count is not None and wanted.count > n:
-        raise EigenError(f"eigenmodes: {asked.description}, but there are {n} dofs; choose n_modes <= {n}")
+    wanted = mode_count(n_modes)
+    if wanted.n is not None and wanted.n < 1:
+        raise EigenError(f"eigenmodes: n_modes = {wanted.n}; expected at least 1")
+    if wanted.n is not None and wanted.n > n:
+        raise EigenError(f"eigenmodes: {wanted.description}, but there are {n} dofs; choose n_modes <= {n}")
     if not TIGHTEST <= tolerance <= LOOSEST:
         raise EigenError(f"eigenmodes: tolerance = {tolerance:g}; expected {TIGHTEST:g} to {LOOSEST:g}")
-    is_large_part = wanted.count is not None and 3 * wanted.count > n
+    is_large_part = wanted.n is not None and 3 * wanted.n > n
     is_dense = n <= SMALL or (is_large_part and n <= LARGEST_DENSE)
     scale = frequency_scale(K, M)
     if shift is None:
@@ -150,9 +149,9 @@ def eigenmodes(
         operator = ShiftInverted(mass, shift, factorization, tolerance, progress, space or ArraySpace(n, numbering))
         search = kind(operator, wanted)
         modes = search.modes(wanted)
-        if asked.verify:
+        if wanted.verify:
             modes = _proven_modes(K, M, search, modes, wanted)
-        k = wanted.count if wanted.omega2 is None else int((modes.omega2[: modes.n_wanted] <= wanted.omega2).sum())
+        k = wanted.n if wanted.omega2 is None else int((modes.omega2[: modes.n_wanted] <= wanted.omega2).sum())
         residuals, method = modes.residuals, search.description
         n_solves, solver = operator.n_solves, factorization.description
         # if K itself is factorised, there is no rigid-body mode, however far the mesh's omega² exceed those of the
@@ -176,7 +175,7 @@ def eigenmodes(
     _require_match(K, M, Phi, omega2, shift, tolerance)
     method = f"{method}; shift {shift:.6g}, tolerance {tolerance:g}, {n_solves} columns solved by {solver}"
     return EigenResult(
-        omega2, np.sqrt(omega2) / (2 * np.pi), Phi, residuals[:k], n_solves, method, is_proven=asked.verify
+        omega2, np.sqrt(omega2) / (2 * np.pi), Phi, residuals[:k], n_solves, method, is_proven=wanted.verify
     )
 
 
@@ -190,7 +189,7 @@ def frequency_scale(K: Matrix, M: Matrix) -> float:
 
 
 def _proven_modes(
-    K: Matrix, M: Matrix, search: KrylovSearch | DenseSearch | SlepcSearch, modes: Modes, wanted: ModeRequest
+    K: Matrix, M: Matrix, search: KrylovSearch | DenseSearch | SlepcSearch, modes: Modes, wanted: ModeCount
 ) -> Modes:
     """Return the modes when their number agrees with the inertia; search for more modes while it is larger."""
     operator = search.operator
@@ -210,7 +209,7 @@ def _proven_modes(
     )
 
 
-def counting_shift(omega2: Array, k: int, wanted: ModeRequest, shift: float) -> tuple[int, float]:
+def counting_shift(omega2: Array, k: int, wanted: ModeCount, shift: float) -> tuple[int, float]:
     """Return the number of modes below a shift, and the shift, in a gap at or after the last wanted mode."""
     levels = np.concatenate([[shift], omega2])  # levels[j] is mode j, counted from 1
     for j in range(k, len(omega2)):
@@ -265,7 +264,6 @@ def _hertz(omega2: float) -> float:
 # unique choice among equivalent bases: signs of modes, and directions within multiple frequencies ---------------------
 
 
-SLICE = 8192  #: number of rows transformed at a time
 MULTIPLE = 1e-10  #: relative gap of omega² below which modes count as one multiple mode
 
 
@@ -315,22 +313,15 @@ def _standard_rotation(group: Array) -> Array:
     return Q * np.where(np.diag(R) < 0, -1.0, 1.0)
 
 
-def turn(Phi: Array, Z: Array) -> None:
-    """Overwrite Phi, (n, k), with Phi Z; the Z of `orientation` is diagonal except for small blocks."""
-    signs = np.diag(Z)
-    groups = np.split(np.arange(len(Z)), np.flatnonzero(_new_block(Z)))
-    for first in range(0, len(Phi), SLICE):
-        part = Phi[first : first + SLICE]
-        turned = [(group, part[:, group] @ Z[np.ix_(group, group)]) for group in groups if len(group) > 1]
-        part *= signs
-        for group, columns in turned:
-            part[:, group] = columns
-
-
-def _new_block(Z: Array) -> NDArray[np.bool_]:
-    """Return whether a diagonal block begins at each column of a block-diagonal matrix, (k,); False for the first."""
-    row, column = np.nonzero(Z)
-    last = np.arange(len(Z))
-    np.maximum.at(last, row, column)
-    np.maximum.at(last, column, row)
-    return np.arange(len(Z)) > np.concatenate([[len(Z)], np.maximum.accumulate(last)[:-1]])
+def turn_in_place(Phi: Any, turn: Array) -> None:
+    """Replace Phi, (n, k), by Phi turn, (k, k); modes of which only the sign changes are not mixed with others."""
+    if (far := elsewhere(Phi)) is not None:
+        far.on_rows(turn_in_place, Phi, turn)
+        return
+    is_mixed = np.count_nonzero(turn, axis=0) > 1
+    mixed = np.flatnonzero(is_mixed | (np.count_nonzero(turn, axis=1) > 1))
+    signs, turn_mixed = np.diag(turn), turn[np.ix_(mixed, mixed)]
+    for rows in row_slices(len(Phi), Phi):
+        turned = Phi[rows, mixed] @ turn_mixed
+        Phi[rows] *= signs
+        Phi[rows, mixed] = turned

@@ -10,10 +10,10 @@ import scipy.sparse as sp
 
 from cms.errors import FactorizationError
 from cms.linear_algebra.solvers.registry import solver_of
-from fe_models.body.couplings.submatrix import PrincipalBlock, principal_block, spread_block
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix, spread_sum, whole_matrix
 from fe_models.foundation.solver import Factor, Solver
+from fe_models.foundation.sparse.submatrix import PrincipalBlock, principal_block, spread_block
 
 __all__ = [
     "EmptyFactor",

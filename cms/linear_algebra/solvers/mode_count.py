@@ -59,6 +59,11 @@ class ModeCount:
             raise ModeSetError(f"n_modes: cutoff = {self.cutoff}: expected a finite frequency above 0")
 
     @property
+    def omega2(self) -> float | None:
+        """Squared angular frequency of the cutoff; None if a number is given."""
+        return None if self.cutoff is None else (2 * math.pi * self.cutoff) ** 2
+
+    @property
     def description(self) -> str:
         """Description for messages and records."""
         return f"n_modes = {self.n}" if self.cutoff is None else f"cutoff = {self.cutoff:g}"

@@ -8,8 +8,8 @@ import numpy as np
 import scipy.linalg as la
 
 from cms.errors import EigenError
+from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.linear_algebra.solvers.shift_inverted import (
-    ModeRequest,
     Modes,
     ShiftInverted,
     TallProduct,
@@ -217,9 +217,9 @@ MASSLESS = 1e-13  #: eigenvalue of M relative to the largest, below which a dire
 class KrylovSearch:
     """Block Lanczos, extended until the wanted modes have converged; more modes can be requested afterwards."""
 
-    def __init__(self, operator: ShiftInverted, wanted: ModeRequest) -> None:
+    def __init__(self, operator: ShiftInverted, wanted: ModeCount) -> None:
         self.operator = operator
-        guess = wanted.count or FIRST_GUESS
+        guess = wanted.n or FIRST_GUESS
         block = WIDE if guess >= MANY else BLOCK
         self.description = f"block Lanczos, block {block}"
         self._lanczos = BlockLanczos(
@@ -227,7 +227,7 @@ class KrylovSearch:
         )
         self._is_clean = operator.has_mass_everywhere  # otherwise S removes rounding in massless dofs
 
-    def modes(self, wanted: ModeRequest, at_least: int = 0) -> Modes:
+    def modes(self, wanted: ModeCount, at_least: int = 0) -> Modes:
         """Return the wanted modes, or at least `at_least`, improved; their true residuals are below the tolerance."""
         operator, tolerance = self.operator, self.operator.tolerance
         for _ in range(MOST_REFINEMENTS):
@@ -249,7 +249,7 @@ class KrylovSearch:
             "K is too ill-conditioned for this tolerance: allow a larger one, or correct units and stiffness contrasts"
         )
 
-    def _converge(self, wanted: ModeRequest, at_least: int, tolerance: float) -> tuple[RitzPairs, int]:
+    def _converge(self, wanted: ModeCount, at_least: int, tolerance: float) -> tuple[RitzPairs, int]:
         """Iterate until the wanted pairs have converged according to the recurrence; return all pairs and how many."""
         lanczos = self._lanczos
         next_look = 0
@@ -274,12 +274,12 @@ class KrylovSearch:
             lanczos.advance()
         raise EigenError(f"eigenmodes: no convergence after {lanczos.n_solves} columns; allow a larger tolerance")
 
-    def _judge(self, ritz: RitzPairs, wanted: ModeRequest, at_least: int, tolerance: float) -> tuple[int, bool]:
+    def _judge(self, ritz: RitzPairs, wanted: ModeCount, at_least: int, tolerance: float) -> tuple[int, bool]:
         """Return how many pairs are wanted according to present knowledge, and whether all of them have converged."""
         is_exhausted = self._lanczos.is_exhausted
         theta, residuals = ritz.theta, ritz.residuals
         if wanted.omega2 is None:
-            k = max(wanted.count or 0, at_least)
+            k = max(wanted.n or 0, at_least)
             n_finite = leading_count(theta, 1, len(theta)) if len(theta) else 0
             if is_exhausted and n_finite < k:
                 raise EigenError(
@@ -296,7 +296,7 @@ class KrylovSearch:
                 and residuals[k] < 0.1
             )
         is_converged = residuals[:k] <= tolerance
-        self.operator.report(int(np.argmin(np.append(is_converged, False))), wanted.count or 0)
+        self.operator.report(int(np.argmin(np.append(is_converged, False))), wanted.n or 0)
         return k, bool(len(theta) >= k and is_converged.all() and is_bounded)
 
 
@@ -330,7 +330,7 @@ class DenseSearch:
 
     description = "dense matrices"
 
-    def __init__(self, operator: ShiftInverted, wanted: ModeRequest) -> None:
+    def __init__(self, operator: ShiftInverted, wanted: ModeCount) -> None:
         self.operator = operator
         M = operator.M_product @ np.eye(operator.n)
         size = np.sqrt(np.where(M.diagonal() > 0, M.diagonal(), 1.0))
@@ -345,12 +345,12 @@ class DenseSearch:
         self._theta, self._Q = theta[::-1], Q[:, ::-1]
         refuse_negative(self._theta)
 
-    def modes(self, wanted: ModeRequest, at_least: int = 0) -> Modes:
+    def modes(self, wanted: ModeCount, at_least: int = 0) -> Modes:
         """Return the wanted modes, or at least `at_least`, refined."""
         operator, theta = self.operator, self._theta
         n_finite = leading_count(theta, 1, len(theta))
         if wanted.omega2 is None:
-            k = max(wanted.count or 0, at_least)
+            k = max(wanted.n or 0, at_least)
         else:
             k = max(int((theta > 1 / (wanted.omega2 - operator.shift)).sum()), at_least)
         if k > n_finite:
@@ -368,7 +368,7 @@ class DenseSearch:
                 f"eigenmodes: residuals are {modes.residuals.max():.1e}, expected {operator.tolerance:.1e}; "
                 "allow a larger tolerance"
             )
-        operator.report(k, wanted.count or 0)
+        operator.report(k, wanted.n or 0)
         return modes
 
 

@@ -13,13 +13,12 @@ import scipy.linalg as la
 
 from cms.linear_algebra.solvers.factorization import Matrix
 from cms.linear_algebra.solvers.inverse import Inverse
-from cms.linear_algebra.solvers.mode_count import ModeCount
-from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.sparse.sparse_product import SymmetricProduct
 from fe_models.foundation.tall.columns import combine, inner, subtract
 
 __all__ = [
-    "ArraySpace", "ModeRequest", "Modes", "ShiftInverted", "TallProduct", "TallSpace", "measured_residual",
+    "ArraySpace", "Modes", "ShiftInverted", "TallProduct", "TallSpace", "measured_residual",
     "refined_modes",
 ]  # fmt: skip
 
@@ -78,19 +77,6 @@ class ArraySpace:
 
 
 # the operator ---------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class ModeRequest:
-    """The wanted modes: the first `count`, or all up to `omega2`."""
-
-    count: int | None
-    omega2: float | None
-
-    @classmethod
-    def of(cls, wanted: ModeCount) -> "ModeRequest":
-        """Convert a mode count to the quantities of the pencil."""
-        return cls(wanted.n, None if wanted.cutoff is None else (2 * np.pi * wanted.cutoff) ** 2)
 
 
 class ShiftInverted:

@@ -9,11 +9,10 @@ import scipy.sparse as sp
 from cms.errors import EigenError
 from cms.linear_algebra.solvers.factorization import Factorization, Matrix, lower_triangle, matrix_of
 from cms.linear_algebra.solvers.inverse import Inverse
+from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.linear_algebra.solvers.petsc.factor import CHUNK, PetscFactor, communicator, rows_here, solved_rows
 from cms.linear_algebra.solvers.petsc.libraries import petsc, slepc
-from cms.linear_algebra.solvers.shift_inverted import ModeRequest, Modes, ShiftInverted
-from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
-from fe_models.body.couplings.submatrix import spread_block
+from cms.linear_algebra.solvers.shift_inverted import Modes, ShiftInverted
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.ranks.product import RowsProduct
 from fe_models.foundation.ranks.ranks import Ranks
@@ -21,6 +20,8 @@ from fe_models.foundation.ranks.row_layout import RowLayout, new_key
 from fe_models.foundation.ranks.rows import Rows, collected, spread
 from fe_models.foundation.ranks.spread_columns import Part, SpreadColumns, own_part, spread_columns, spread_parts
 from fe_models.foundation.ranks.trim import give_back
+from fe_models.foundation.sparse.sparse_product import SymmetricProduct
+from fe_models.foundation.sparse.submatrix import spread_block
 
 __all__ = ["RankSpace", "SlepcSearch", "search_on_ranks"]
 
@@ -149,7 +150,7 @@ SHARPER = 1e-6
 class SlepcSearch:
     """Krylov-Schur with distributed vectors; rank 0 receives the modes."""
 
-    def __init__(self, operator: ShiftInverted, wanted: ModeRequest) -> None:
+    def __init__(self, operator: ShiftInverted, wanted: ModeCount) -> None:
         assert isinstance(operator.factorization, Factorization)
         factor = operator.factorization.factor
         assert isinstance(factor, PetscFactor)
@@ -161,10 +162,10 @@ class SlepcSearch:
         factor.ranks.store[self.key] = lower_triangle(operator.M_product.A)
         factor.ranks.everywhere(spread_mass, self.key, factor.rows)
 
-    def modes(self, wanted: ModeRequest, at_least: int = 0) -> Modes:
+    def modes(self, wanted: ModeCount, at_least: int = 0) -> Modes:
         """Return the wanted modes, or at least `at_least`."""
         operator = self.operator
-        n_asked = max(wanted.count or FIRST_GUESS, at_least) + GUARDS
+        n_asked = max(wanted.n or FIRST_GUESS, at_least) + GUARDS
         while True:
             n_asked = min(n_asked, operator.n)
             tolerance = max(1e-13, SHARPER * operator.tolerance)
@@ -177,10 +178,10 @@ class SlepcSearch:
             if wanted.omega2 is None or omega2[-1] > wanted.omega2 or n_asked == operator.n:
                 break
             n_asked *= 2
-        k = max(wanted.count or int((omega2 <= wanted.omega2).sum()), at_least)
+        k = max(wanted.n or int((omega2 <= wanted.omega2).sum()), at_least)
         if len(omega2) < k:
             raise EigenError(f"eigenmodes: SLEPc found {len(omega2)} of {k} modes to {tolerance:.1e}")
-        operator.report(k, wanted.count or 0)
+        operator.report(k, wanted.n or 0)
         return Modes(omega2, k, errors[:k], Phi, np.eye(len(omega2)))
 
 

@@ -9,19 +9,18 @@ import numpy as np
 import scipy.sparse as sp
 
 from cms.errors import EigenError, ModeSetError
-from cms.linear_algebra.solvers.eigen import EigenResult, counting_shift, eigenmodes, orientation, turn
+from cms.linear_algebra.solvers.eigen import EigenResult, counting_shift, eigenmodes, orientation, turn_in_place
 from cms.linear_algebra.solvers.factorization import Factorization, factorize, require_regular
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.linear_algebra.solvers.registry import solver_of
-from cms.linear_algebra.solvers.shift_inverted import ModeRequest
 from cms.linear_algebra.substructures.dissection import Dissection, dissect, node_graph
 from cms.linear_algebra.substructures.reduced_mass import ReducedMass
 from cms.linear_algebra.substructures.reduced_modes import ApproximateModes, reduced_modes, reduced_omega2
 from cms.linear_algebra.substructures.tree import SubstructureTree, substructure_tree
-from fe_models.body.couplings.submatrix import principal_block
 from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.ranks.trim import give_back
 from fe_models.foundation.solver import Solver
+from fe_models.foundation.sparse.submatrix import principal_block
 from fe_models.foundation.tasks.task_map import TaskMap
 from fe_models.foundation.threads import one_blas_thread
 
@@ -246,7 +245,7 @@ def multilevel_modes(
     modes.X = np.empty((0, 0))
     if k:
         with one_blas_thread():
-            turn(Phi, orientation(Phi, omega2))
+            turn_in_place(Phi, orientation(Phi, omega2))
     method = (
         f"multilevel substructures: {dissection.n} in a tree, {kept.sum()} modes up to {factor:g} times the "
         f"highest wanted frequency, {n_steps} steps of inverse iteration"
@@ -328,7 +327,7 @@ def _improved(modes: ApproximateModes, Z: Array, count: int, tolerance: float, h
 
 def _require_all(interior: Interior, omega2: Array, k: int, wanted: ModeCount, solver: Solver | None) -> None:
     """Count the modes below a gap after the wanted ones by Sylvester's law of inertia."""
-    last, sigma = counting_shift(omega2[: k + GUARDS], k, ModeRequest.of(wanted), 0.0)
+    last, sigma = counting_shift(omega2[: k + GUARDS], k, wanted, 0.0)
     A = sp.csc_array(interior.K - sigma * interior.M)
     with factorize(A, definite=False, solver=solver) as factorization:
         inertia = factorization.inertia

@@ -9,10 +9,10 @@ from scipy.special import gammaincinv
 from cms.linear_algebra.solvers.eigen import eigenmodes
 from cms.linear_algebra.solvers.factorization import Inertia
 from cms.linear_algebra.solvers.registry import solver_of
-from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
 from cms.linear_algebra.substructures.reduced_mass import ReducedMass
 from cms.linear_algebra.substructures.tree import SubstructureTree
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.sparse.sparse_product import SymmetricProduct
 from fe_models.foundation.tall.columns import combine, combined, inner
 
 __all__ = ["COLUMNS", "PROBES", "SLICE", "ApproximateModes", "reduced_modes", "reduced_omega2"]

@@ -14,8 +14,8 @@ from cms.linear_algebra.solvers.eigen import EigenResult, no_modes
 from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
 from cms.linear_algebra.solvers.registry import solver_of
 from cms.modes.families.cost import large_interfaces
-from cms.modes.families.fixed_interface import FixedInterfaceBody, fix_interfaces, fixed_interface_modes
-from cms.modes.families.flexibility import BoundaryConditions, CondensedBody, Flexibility, elastic_modes
+from cms.modes.families.fixed_interface import CondensedBody, FixedInterfaceBody, fix_interfaces, fixed_interface_modes
+from cms.modes.families.flexibility import BoundaryConditions, Flexibility, elastic_modes
 from cms.modes.families.rigid_modes import determinate_partition, independent_rigid_modes
 from cms.modes.families.static_modes import (
     attachment_modes,

@@ -1,8 +1,9 @@
-"""The body with all boundary dofs held: its interior stiffness, factorised once for many columns, and its modes."""
+"""The body with all boundary dofs held: interior stiffness, factorised once; its modes; stiffness condensed to B."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.linalg as la
 import scipy.sparse as sp
 
 from cms.errors import BodyError, EigenError, FactorizationError, ModeSetError
@@ -10,13 +11,13 @@ from cms.linear_algebra.solvers.eigen import EigenResult, eigenmodes, no_modes
 from cms.linear_algebra.solvers.factorization import EmptyFactor, Factorization, factorize, matrix_of
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.linear_algebra.solvers.registry import solver_of
-from cms.modes.families.rigid_modes import WITHIN_ROUNDING, moving_nodes
-from fe_models.body.couplings.submatrix import PrincipalBlock, nearby_order, principal_block
+from cms.modes.families.rigid_modes import WITHIN_ROUNDING, free_motions, mechanism_words, moving_nodes
 from fe_models.body.fe_body import MULTIPLIER, FEBody
-from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.solver import Solver
+from fe_models.foundation.sparse.submatrix import PrincipalBlock, nearby_order, principal_block
 
-__all__ = ["FixedInterfaceBody", "fix_interfaces", "fixed_interface_modes"]
+__all__ = ["CondensedBody", "FixedInterfaceBody", "fix_interfaces", "fixed_interface_modes", "held_factor"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,3 +116,46 @@ def _mechanism_message(body: FEBody, i: IntArray, K_ii: sp.csc_array, M_ii: sp.c
         f"at {moving_nodes(body, i, modes.Phi[:, is_free])}; hold these nodes by an interface, join the parts, or "
         "repair the mesh"
     )
+
+
+# the stiffness condensed to the held dofs -----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class CondensedBody:
+    """A body with its held dofs h: the boundary B, and further dofs needed to hold it (`determinate_partition`)."""
+
+    fixed: FixedInterfaceBody  #: interior factorisation; `fixed.b` are the held dofs h
+    Psi_C: Array  #: constraint modes, (n_dof, n_h); `SpreadColumns` if the body is distributed
+    S: Array  #: Psi_Cᵀ K Psi_C = K_hh + K_hI Psi_C,I, (n_h, n_h) [N/m]
+    Psi_R: Array  #: independent rigid-body modes, (n_dof, n_r)
+
+
+def held_factor(
+    condensed: CondensedBody, Z: Array, S_z: Array, e: IntArray, K_load: Array | None = None
+) -> tuple[Array, tuple[Array, bool]]:
+    """Factorise S_ee, scaled by its diagonal: the scale, (n_e,), and the Cholesky factor.
+
+    S_z = Zᵀ (S + K_load) Z.
+
+    Raises
+    ------
+    BodyError
+        If a motion of z_e costs neither the body nor its load any energy: a mechanism.
+    """
+    S_ee = S_z[np.ix_(e, e)]
+    if not len(e):
+        return np.zeros(0), (S_ee, True)
+    body = condensed.fixed.body
+    terms = np.abs(body.K.diagonal()[condensed.fixed.b])
+    free = free_motions(body, condensed.Psi_C, Z[:, e], S_ee, terms, K_load)
+    if free.shape[1]:
+        raise BodyError(mechanism_words(body, free))
+    size = 1 / np.sqrt(np.where(np.diag(S_ee) > 0, np.diag(S_ee), 1.0))
+    try:
+        return size, la.cho_factor(S_ee * np.outer(size, size), lower=True)
+    except la.LinAlgError as error:
+        raise BodyError(
+            f"body {body.name!r}: its stiffness seen from the interfaces is lost in the rounding of much larger terms; "
+            "give stiff springs and stiff short members stiffnesses nearer to those of their neighbours"
+        ) from error

@@ -16,31 +16,20 @@ from cms.errors import BodyError, EigenError
 from cms.linear_algebra.solvers.eigen import EigenResult, FactorMismatchError, counting_shift, eigenmodes
 from cms.linear_algebra.solvers.factorization import Inertia, factorize, shifted_matrix
 from cms.linear_algebra.solvers.mode_count import ModeCount
-from cms.linear_algebra.solvers.shift_inverted import ModeRequest
-from cms.modes.families.fixed_interface import FixedInterfaceBody
-from cms.modes.families.rigid_modes import free_motions, mechanism_words, rounding_of_energy, without_energy
+from cms.modes.families.fixed_interface import CondensedBody, FixedInterfaceBody, held_factor
+from cms.modes.families.rigid_modes import rounding_of_energy, without_energy
 from fe_models.body.couplings.coupling_on_ranks import spread_extension
-from fe_models.body.couplings.submatrix import PrincipalBlock, principal_block
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 from fe_models.foundation.solver import Solver
+from fe_models.foundation.sparse.submatrix import PrincipalBlock, principal_block
 from fe_models.foundation.tall.columns import combine, inner, of_this_process
 
-__all__ = ["BoundaryConditions", "CondensedBody", "Flexibility", "elastic_modes", "held_factor"]
+__all__ = ["BoundaryConditions", "Flexibility", "elastic_modes"]
 
 RIGID_MOTION = 1e-7  #: motion against the conditions, below which a rigid-body motion is free
 COUNTED = 1e-11  #: eigenvalue of the scaled boundary block relative to its largest, above which its sign is certain
-
-
-@dataclass(frozen=True, eq=False)
-class CondensedBody:
-    """A body with its held dofs h: the boundary B, and further dofs needed to hold it (`determinate_partition`)."""
-
-    fixed: FixedInterfaceBody  #: interior factorisation; `fixed.b` are the held dofs h
-    Psi_C: Array  #: constraint modes, (n_dof, n_h); `SpreadColumns` if the body is distributed
-    S: Array  #: Psi_Cᵀ K Psi_C = K_hh + K_hI Psi_C,I, (n_h, n_h) [N/m]
-    Psi_R: Array  #: independent rigid-body modes, (n_dof, n_r)
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,36 +262,6 @@ def _pivots(motions: Array) -> IntArray:
     return np.sort(pivots[:n]).astype(np.int64)
 
 
-def held_factor(
-    condensed: CondensedBody, Z: Array, S_z: Array, e: IntArray, K_load: Array | None = None
-) -> tuple[Array, tuple[Array, bool]]:
-    """Factorise S_ee, scaled by its diagonal: the scale, (n_e,), and the Cholesky factor.
-
-    S_z = Zᵀ (S + K_load) Z.
-
-    Raises
-    ------
-    BodyError
-        If a motion of z_e costs neither the body nor its load any energy: a mechanism.
-    """
-    S_ee = S_z[np.ix_(e, e)]
-    if not len(e):
-        return np.zeros(0), (S_ee, True)
-    body = condensed.fixed.body
-    terms = np.abs(body.K.diagonal()[condensed.fixed.b])
-    free = free_motions(body, condensed.Psi_C, Z[:, e], S_ee, terms, K_load)
-    if free.shape[1]:
-        raise BodyError(mechanism_words(body, free))
-    size = 1 / np.sqrt(np.where(np.diag(S_ee) > 0, np.diag(S_ee), 1.0))
-    try:
-        return size, la.cho_factor(S_ee * np.outer(size, size), lower=True)
-    except la.LinAlgError as error:
-        raise BodyError(
-            f"body {body.name!r}: its stiffness seen from the interfaces is lost in the rounding of much larger terms; "
-            "give stiff springs and stiff short members stiffnesses nearer to those of their neighbours"
-        ) from error
-
-
 def _boundary_entries(A: SpreadMatrix, fixed: FixedInterfaceBody, Z: Array) -> sp.csc_array:
     """Return Tᵀ A T without its interior block, (n_i + n_z, n_i + n_z)."""
     n_i, n_z = len(fixed.i), Z.shape[1]
@@ -374,7 +333,7 @@ def _proven(flexibility: Flexibility, modes: EigenResult, asked: ModeCount) -> E
     neither mass nor stiffness, only multipliers, so that its pivots there are zero.
     """
     k = len(modes.omega2)
-    wanted = ModeRequest(k, None) if asked.cutoff is None else ModeRequest.of(asked)
+    wanted = ModeCount(k) if asked.cutoff is None else asked
     last, sigma = counting_shift(modes.omega2, k, wanted, 0.0)
     for n_extra in (4, 12, 36):  # a gap for counting lies beyond the requested modes
         try:

@@ -7,10 +7,10 @@ import numpy as np
 import scipy.linalg as la
 
 from cms.errors import BodyError
-from fe_models.body.couplings.submatrix import principal_block
 from fe_models.body.fe_body import FEBody
 from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.sparse.submatrix import principal_block
 from fe_models.foundation.tall.columns import combine, dots, of_this_process, squares
 from fe_models.foundation.words import node_list
 

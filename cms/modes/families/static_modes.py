@@ -6,12 +6,12 @@ import numpy as np
 
 from cms.linear_algebra.independent import gram_in_blocks
 from cms.linear_algebra.solvers.eigen import EigenResult
-from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
 from cms.modes.families.fixed_interface import FixedInterfaceBody
 from cms.modes.families.flexibility import Flexibility
 from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
 from fe_models.foundation.ranks.spread_columns import spread_parts
+from fe_models.foundation.sparse.sparse_product import SymmetricProduct
 from fe_models.foundation.tall.columns import combine, of_this_process
 from fe_models.foundation.tall.on_disk import on_disk, release
 

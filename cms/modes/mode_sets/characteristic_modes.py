@@ -9,11 +9,11 @@ import scipy.sparse as sp
 from cms.errors import ModeSetError
 from cms.linear_algebra.independent import gram_in_blocks
 from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
-from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
 from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.modes.mode_set import ModeSet
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.sparse.sparse_product import SymmetricProduct
 from fe_models.foundation.tall.columns import combine, in_memory, of_this_process
 from fe_models.foundation.tall.on_disk import release
 

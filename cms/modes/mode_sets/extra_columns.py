@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from cms.errors import ModeSetError
-from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
 from cms.modes.centrifugal import CENTRIFUGAL, centrifugal_loads
 from cms.modes.families.families import Families, body_of, families_of
 from cms.modes.families.rigid_modes import without_energy
@@ -14,6 +13,7 @@ from cms.modes.mode_set import ModeSet
 from fe_models.body.fe_body import FEBody
 from fe_models.body.load_cases import LoadCase, load_columns
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.sparse.sparse_product import SymmetricProduct
 from fe_models.foundation.tall.columns import in_memory
 from fe_models.foundation.words import nearest, quoted
 

@@ -11,14 +11,14 @@ from scipy.linalg.lapack import dpstrf
 from cms.errors import FactorizationError, ModeSetError
 from cms.linear_algebra.independent import DisplacementColumns, gram
 from cms.linear_algebra.solvers.factorization import factorize, shifted_matrix
-from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
 from cms.modes.centrifugal import CENTRIFUGAL
 from cms.modes.families.families import Families, body_of, families_of
 from cms.modes.families.receptance import boundary_scale, largest_error, receptance_of_pencil
 from cms.modes.mode_set import Block, ModeSet, mode_set, require_interfaces, rigid_block
-from fe_models.body.couplings.submatrix import PrincipalBlock
 from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.sparse.sparse_product import SymmetricProduct
+from fe_models.foundation.sparse.submatrix import PrincipalBlock
 
 __all__ = ["krylov"]
 

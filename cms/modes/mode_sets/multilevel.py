@@ -21,8 +21,8 @@ from cms.modes.mode_set import (
     rigid_block,
     vibration_block,
 )
-from fe_models.body.couplings.submatrix import principal_block
 from fe_models.body.fe_body import MULTIPLIER, FEBody
+from fe_models.foundation.sparse.submatrix import principal_block
 from fe_models.foundation.tasks.workers import Workers, tasks_of
 
 __all__ = ["multilevel"]

@@ -1,7 +1,6 @@
 """The finishing step of every mode set: rank, body frame, M-orthonormal shapes (docs/theory.md §3)."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy.linalg as la
@@ -17,14 +16,13 @@ from cms.linear_algebra.independent import (
     orthonormal_basis,
     within,
 )
-from cms.linear_algebra.solvers.eigen import orientation
+from cms.linear_algebra.solvers.eigen import orientation, turn_in_place
 from cms.modes.families.rigid_modes import mechanism_words, rounding_of_energy, without_energy
 from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.frames import FrameCondition
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.tall.columns import combine, combined, copied, elsewhere, in_memory, inner, squares, subtract
-from fe_models.foundation.tall.on_disk import row_slices
+from fe_models.foundation.tall.columns import combine, combined, copied, in_memory, inner, squares, subtract
 
 __all__ = ["IN_SPAN", "FinishedBasis", "elastic_directions", "finish", "orthonormal_motions"]
 
@@ -196,20 +194,6 @@ def elastic_pencil(
     return ElasticPencil(
         X, Z, elastic, is_massive, free_omega2, defect, float(np.finfo(float).eps * (lengths**2).max())
     )
-
-
-def turn_in_place(Phi: Any, turn: Array) -> None:
-    """Replace Phi by Phi turn; modes of which only the sign changes are not mixed with others."""
-    if (far := elsewhere(Phi)) is not None:
-        far.on_rows(turn_in_place, Phi, turn)
-        return
-    is_mixed = np.count_nonzero(turn, axis=0) > 1
-    mixed = np.flatnonzero(is_mixed | (np.count_nonzero(turn, axis=1) > 1))
-    signs, turn_mixed = np.diag(turn), turn[np.ix_(mixed, mixed)]
-    for rows in row_slices(len(Phi), Phi):
-        turned = Phi[rows, mixed] @ turn_mixed
-        Phi[rows] *= signs
-        Phi[rows, mixed] = turned
 
 
 def first_elastic(where: str, body: FEBody, V: Array, G_K: Array, G_M: Array, condition: FrameCondition) -> float:

@@ -17,7 +17,7 @@ from cms.body.geometric_stiffness import SPIN_PAIRS
 from cms.body.reduced_body import BodyFrame
 from cms.errors import BodyError
 from cms.modes.families.families import Families, body_of, families_of
-from cms.modes.families.flexibility import held_factor
+from cms.modes.families.fixed_interface import held_factor
 from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.frames import Frame, FrameCondition, HeldFrame, TisserandFrame, frame_condition
 from cms.reduction.basis.node_motion import node_weights, reference_motion, weighted_rigid_modes

@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
-from fe_models.body.couplings.submatrix import nearby_order
 from fe_models.body.fe_body import FEBody, Recovery
 from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.ranks.ranks import Ranks
 from fe_models.foundation.ranks.rows import Rows, even_rows, spread
 from fe_models.foundation.ranks.spread_matrix import OwnRows, SpreadMatrix
 from fe_models.foundation.ranks.trim import give_back
+from fe_models.foundation.sparse.submatrix import nearby_order
 
 __all__ = ["spread_body", "spread_extension"]
 

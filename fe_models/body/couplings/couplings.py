@@ -15,13 +15,13 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_models.body.couplings.coupling_on_ranks import spread_extension
-from fe_models.body.couplings.submatrix import principal_block
 from fe_models.body.fe_body import MULTIPLIER, FEBody, Interface, Recovery
 from fe_models.body.rigid_motion import rigid_motion_of_dofs, rigid_motion_of_points
 from fe_models.errors import InterfaceError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
+from fe_models.foundation.sparse.submatrix import principal_block
 
 __all__ = ["check_overlap", "couple", "mean_motion", "require_spread"]
 

@@ -1,11 +1,9 @@
 """The finite element body of a mesh of solid cells."""
 
-from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
-from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
@@ -32,9 +30,9 @@ from fe_models.foundation.ranks.row_layout import RowLayout
 from fe_models.foundation.ranks.rows import Rows
 from fe_models.foundation.ranks.spread_columns import Part, own_part, spread_columns
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
+from fe_models.foundation.sparse.sparse_product import SymmetricProduct
 from fe_models.foundation.tall.columns import elsewhere, in_memory
 from fe_models.foundation.tall.on_disk import row_slices
-from fe_models.foundation.threads import n_threads
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.boundary import boundary_triangles
@@ -131,7 +129,10 @@ class SolidModel:
         """Return ∫ a aᵀ dm with a = [1, c, u_x, u_y, u_z], (4 + 3 k, 4 + 3 k), exact; u is (3 n_nodes, k)."""
         if isinstance(self.M_s, SpreadMatrix):
             return spread_mass_gram(self.M_s, self.mesh.nodes, u)
-        return scalar_mass_gram(self.M_s, self.mesh.nodes, np.asarray(u).reshape(len(self.mesh.nodes), 3, -1))
+        n_nodes = len(self.mesh.nodes)
+        return scalar_mass_gram(
+            SymmetricProduct(self.M_s), self.mesh.nodes, np.asarray(u).reshape(n_nodes, -1), n_nodes
+        )
 
     def nodal_stress(self, u: Array, *, nodes: IntArray | None = None) -> Array:
         """Return the stress at the nodes, (n_nodes, 6, k) [Pa], xx yy zz yz xz xy, of columns u, (3 n_nodes, k).
@@ -293,37 +294,16 @@ def solid_body(
     )
 
 
-def scalar_mass_gram(M_s: sp.csr_array, nodes: Array, u: Array) -> Array:
+def scalar_mass_gram(M_s: SymmetricProduct | RowsProduct, nodes: Array, columns: Array, n_rows: int) -> Array:
     """Return Aᵀ M_s A with A = [1, X, u_x, u_y, u_z] (docs/theory.md §5), (4 + 3 k, 4 + 3 k).
 
     Parameters
     ----------
     M_s
-        Scalar mass, (n_nodes, n_nodes) [kg].
-    nodes
-        Positions X, (n_nodes, 3) [m].
-    u
-        Translations of the nodes, (n_nodes, 3, k) [m].
-    """
-    n_parts = n_threads()
-    cuts = np.linspace(0, len(nodes), n_parts + 1).astype(int)
-    parts = [M_s[a:b] for a, b in pairwise(cuts)]
-    with ThreadPoolExecutor(n_parts) as pool:  # threads for sparse products; dense products have their own threads
-
-        def multiply(block: Array) -> Array:
-            return np.concatenate(list(pool.map(lambda part: part @ block, parts)))
-
-        return gram_by_products(multiply, nodes, u.reshape(len(nodes), -1), len(nodes))
-
-
-def gram_by_products(multiply: Callable[[Array], Array], nodes: Array, columns: Array, n_rows: int) -> Array:
-    """Return Aᵀ M_s A with A = [1, X, columns] from products x -> M_s x of a few columns at a time.
-
-    Parameters
-    ----------
+        Product with the scalar mass, (n_nodes, n_nodes) [kg]; it is made with a few columns at a time.
     nodes, columns
-        Rows of X and of u_x, u_y, u_z for all nodes. On one of several ranks: for its own nodes; the results of all
-        ranks are then summed.
+        Rows of X and of u_x, u_y, u_z for all nodes, (n_nodes, 3 k) [m]. On one of several ranks: for its own nodes;
+        the results of all ranks are then summed.
     n_rows
         Number of rows of M_s, on all ranks.
     """
@@ -331,11 +311,11 @@ def gram_by_products(multiply: Callable[[Array], Array], nodes: Array, columns: 
     width = max(16, int(GRAM_BYTES / (8 * n_rows)))
     linear = np.hstack([np.ones((n_nodes, 1)), nodes])
     gram = np.zeros((4 + k, 4 + k))
-    first = linear.T @ multiply(linear)
+    first = linear.T @ (M_s @ linear)
     gram[:4, :4] = (first + first.T) / 2
     for begin in range(0, k, width):
         end = min(begin + width, k)
-        product = multiply(np.ascontiguousarray(in_memory(columns[:, begin:end])))
+        product = M_s @ np.ascontiguousarray(in_memory(columns[:, begin:end]))
         own = slice(4 + begin, 4 + end)
         gram[:4, own] = linear.T @ product
         for rows in row_slices(n_nodes, columns):
@@ -363,7 +343,7 @@ def gram_here(ranks: Ranks, key: str, nodes: Part, u: Part, n_rows: int) -> Arra
     product: RowsProduct = ranks.store[key]
     own = own_part(ranks, u)
     columns = np.ascontiguousarray(own).reshape(product.n_own, 3 * own.shape[1])
-    return gram_by_products(product.__matmul__, own_part(ranks, nodes), columns, n_rows)
+    return scalar_mass_gram(product, own_part(ranks, nodes), columns, n_rows)
 
 
 def node_volumes(mesh: Mesh) -> Array:

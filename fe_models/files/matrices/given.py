@@ -23,6 +23,7 @@ from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.digest import file_digest
 from fe_models.foundation.errors import BodyError
+from fe_models.foundation.sparse.sparse_product import SymmetricProduct
 from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.numbering import Numbering
@@ -53,7 +54,8 @@ class ScalarMassModel:
         """Return ∫ a aᵀ dm with a = [1, c, u_x, u_y, u_z], (4 + 3 k, 4 + 3 k); u is (n_dof, k)."""
         translations = np.zeros((len(self.nodes), 3, u.shape[1]))
         put_translations(translations, self.dofs, u)
-        return scalar_mass_gram(self.M_s, self.nodes, translations)
+        n_nodes = len(self.nodes)
+        return scalar_mass_gram(SymmetricProduct(self.M_s), self.nodes, translations.reshape(n_nodes, -1), n_nodes)
 
     def nodal_stress(self, u: Array, *, nodes: IntArray | None = None) -> Array:
         """Raise `BodyError`, because bare matrices do not know the elements."""

@@ -18,8 +18,8 @@ from cms.assessment.quality.reference.free_basis import FreeBasis, ritz_basis
 from cms.assessment.quality.reference.port_model import PortModel
 from cms.assessment.quality.reference.ports import Ports
 from cms.linear_algebra.solvers.mode_count import ModeCount
-from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
 from cms.modes.families.families import Families
+from fe_models.foundation.sparse.sparse_product import SymmetricProduct
 
 __all__ = ["RESPONSE_TOLERANCE", "ReferenceResponse", "reference_response"]
 

@@ -16,9 +16,9 @@ from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.linear_algebra.solvers.mode_search import BlockLanczos, improved_modes
 from cms.linear_algebra.solvers.pardiso import mkl_runtime
 from cms.linear_algebra.solvers.shift_inverted import ArraySpace, ShiftInverted, measured_residual
-from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
 from fe_models.body.couplings.couplings import couple
-from fe_models.body.couplings.submatrix import PrincipalBlock
+from fe_models.foundation.sparse.sparse_product import SymmetricProduct
+from fe_models.foundation.sparse.submatrix import PrincipalBlock
 from tests.bodies import STEEL, bar, beam
 
 ROUNDOFF = 1e-12

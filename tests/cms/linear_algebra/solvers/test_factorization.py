@@ -19,8 +19,8 @@ from cms.linear_algebra.solvers.factorization import factorize, lower_triangle, 
 from cms.linear_algebra.solvers.pardiso import CHUNK, mkl_runtime
 from cms.linear_algebra.solvers.superlu import SuperLuFactor
 from fe_models.body.couplings.couplings import couple
-from fe_models.body.couplings.submatrix import PrincipalBlock
 from fe_models.foundation.solver import Solver
+from fe_models.foundation.sparse.submatrix import PrincipalBlock
 from tests.bodies import bar
 from tests.cms.linear_algebra.solvers.examples import clamped_bar
 from tests.thread_ranks import ThreadRanks

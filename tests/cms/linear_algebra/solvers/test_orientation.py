@@ -2,7 +2,7 @@ import numpy as np
 from numpy.testing import assert_allclose
 from scipy.stats import ortho_group
 
-from cms.linear_algebra.solvers.eigen import orientation, turn
+from cms.linear_algebra.solvers.eigen import orientation, turn_in_place
 
 
 def test_any_rotation_of_a_multiple_mode_gives_the_same_basis():
@@ -33,5 +33,5 @@ def test_turning_in_place_is_the_product():
     Phi = rng.normal(size=(20, 6))
     Z = orientation(Phi, np.array([1.0, 2.0, 2.0, 2.0, 5.0, 5.0]))
     product = Phi @ Z
-    turn(Phi, Z)
+    turn_in_place(Phi, Z)
     assert_allclose(Phi, product, rtol=0, atol=1e-14)

@@ -13,8 +13,8 @@ from cms.linear_algebra.solvers.mode_search import BlockLanczos
 from cms.linear_algebra.solvers.shift_inverted import ArraySpace
 from cms.linear_algebra.solvers.slepc_modes import RankSpace
 from fe_models.body.couplings.couplings import couple
-from fe_models.body.couplings.submatrix import PrincipalBlock, spread_block
 from fe_models.foundation.ranks.rows import collected, even_rows, own_rows
+from fe_models.foundation.sparse.submatrix import PrincipalBlock, spread_block
 from fe_models.foundation.tall.columns import combine, inner, put, subtract
 from tests.bodies import bar
 from tests.thread_ranks import ThreadRanks

@@ -8,7 +8,7 @@ from cms.linear_algebra.substructures.modes import Interior
 from cms.linear_algebra.substructures.reduced_modes import ApproximateModes
 from cms.linear_algebra.substructures.tree import substructure_tree
 from fe_models.body.couplings.couplings import couple
-from fe_models.body.couplings.submatrix import principal_block
+from fe_models.foundation.sparse.submatrix import principal_block
 from tests.bodies import bar
 
 COUNT = 6

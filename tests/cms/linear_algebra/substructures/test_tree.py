@@ -11,8 +11,8 @@ from cms.linear_algebra.substructures.modes import Interior
 from cms.linear_algebra.substructures.reduced_modes import reduced_modes
 from cms.linear_algebra.substructures.tree import substructure_tree
 from fe_models.body.couplings.couplings import couple
-from fe_models.body.couplings.submatrix import principal_block
 from fe_models.body.fe_body import MULTIPLIER
+from fe_models.foundation.sparse.submatrix import principal_block
 from fe_models.foundation.tasks.workers import ThisProcess
 from tests.bodies import bar
 from tests.cms.linear_algebra.substructures.shells import between

@@ -8,12 +8,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from cms.linear_algebra import independent
 from cms.linear_algebra.independent import Products, gram_in_blocks, independent_basis
-from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
 from cms.modes.mode_sets.classical import craig_bampton, unrestrained_attachment
 from cms.reduction.basis import finishing
 from cms.reduction.basis.finishing import finish
 from cms.reduction.basis.frames import NodalFrame, TisserandFrame, frame_condition
 from fe_models.body.couplings.couplings import couple
+from fe_models.foundation.sparse.sparse_product import SymmetricProduct
 from fe_models.foundation.tall import columns
 from tests.bodies import bar
 

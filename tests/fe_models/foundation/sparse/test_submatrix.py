@@ -3,7 +3,7 @@ import pytest
 import scipy.sparse as sp
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fe_models.body.couplings.submatrix import PrincipalBlock, principal_block, scalar_part
+from fe_models.foundation.sparse.submatrix import PrincipalBlock, principal_block, scalar_part
 
 
 @pytest.mark.parametrize("index", [[0, 1, 2], [1, 4, 5, 9], [9], list(range(10)), [0, 9]])
@@ -23,7 +23,7 @@ def symmetric(n, density, seed=0):
 @pytest.mark.parametrize("limit", [0, 10**9])  # compiled, and by SciPy
 @pytest.mark.parametrize("n_parts", [1, 3])
 def test_a_principal_block_in_any_order_is_sorted_and_what_indexing_gives(monkeypatch, limit, n_parts):
-    monkeypatch.setattr("fe_models.body.couplings.submatrix.SMALL", limit)
+    monkeypatch.setattr("fe_models.foundation.sparse.submatrix.SMALL", limit)
     monkeypatch.setattr("fe_models.foundation.threads.n_threads", lambda: n_parts)
     A = sp.kron(symmetric(40, 0.1), np.ones((3, 3)), format="csc")  # rows come in runs
     index = np.random.default_rng(1).permutation(120)[:95]

@@ -6,7 +6,7 @@ A kernel works on one share of the columns, `part` of `n_parts`, and writes only
 import numpy as np
 from numba import njit
 
-__all__ = ["column_counts", "column_entries", "n_scalar_nodes", "scalar_entries"]
+__all__ = ["column_counts", "column_entries", "multiply_rows", "n_scalar_nodes", "scalar_entries"]
 
 jit = njit(cache=True, nogil=True, error_model="numpy")
 
@@ -88,3 +88,33 @@ def scalar_entries(indptr, indices, data, p, new_indptr, new_indices, new_data):
                     new_indices[at], new_data[at] = indices[e] // 3, data[e]
                 at += 1
         new_indptr[node + 1] = at
+
+
+@jit
+def multiply_rows(indptr, indices, data, first, last, n_components, wide, y):
+    """Write rows c first to c last of y = (S ⊗ 1_c) x, (n, k), with any strides, from the compressed rows of S.
+
+    SciPy's own product allocates new memory in every call, and passes over the output row once for every entry.
+    wide: x, (n, k), as rows of c k numbers. Four entries are added at a time, so the output row stays in the nearest
+    cache. The order of summation is that of SciPy.
+    """
+    width = wide.shape[1]
+    k = width // n_components
+    total = np.empty(width)
+    for row in range(first, last):
+        e, end = indptr[row], indptr[row + 1]
+        total[:] = 0.0
+        while e + 4 <= end:
+            a, b, c, d = data[e], data[e + 1], data[e + 2], data[e + 3]
+            x_a, x_b, x_c, x_d = wide[indices[e]], wide[indices[e + 1]], wide[indices[e + 2]], wide[indices[e + 3]]
+            for j in range(width):
+                total[j] = (((total[j] + a * x_a[j]) + b * x_b[j]) + c * x_c[j]) + d * x_d[j]
+            e += 4
+        while e < end:
+            a, x_a = data[e], wide[indices[e]]
+            for j in range(width):
+                total[j] += a * x_a[j]
+            e += 1
+        for component in range(n_components):
+            for j in range(k):
+                y[n_components * row + component, j] = total[component * k + j]

@@ -3,8 +3,8 @@ import pytest
 import scipy.sparse as sp
 from numpy.testing import assert_allclose, assert_array_equal
 
-from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
 from fe_models.body.couplings.couplings import couple
+from fe_models.foundation.sparse.sparse_product import SymmetricProduct
 from tests.bodies import bar
 
 ROUNDOFF = 1e-12
@@ -13,7 +13,7 @@ ROUNDOFF = 1e-12
 @pytest.fixture
 def eager(monkeypatch):
     """Whatever is only worth while for large matrices is done for small ones."""
-    monkeypatch.setattr("cms.linear_algebra.solvers.sparse_product.SMALL", 1)
+    monkeypatch.setattr("fe_models.foundation.sparse.sparse_product.SMALL", 1)
 
 
 @pytest.mark.parametrize("order", ["C", "F"])
@@ -34,7 +34,7 @@ def test_products_with_a_scalar_mass_repeat_bit_for_bit_whatever_the_threads(eag
     x = np.random.default_rng(0).standard_normal((M.shape[0], 16))
     results = []
     for n in (1, 3):
-        monkeypatch.setattr("cms.linear_algebra.solvers.sparse_product.n_threads", lambda n=n: n)
+        monkeypatch.setattr("fe_models.foundation.sparse.sparse_product.n_threads", lambda n=n: n)
         results.append(SymmetricProduct(M) @ x)
     assert_array_equal(results[0], results[1])
     assert_array_equal(results[0], M @ x)

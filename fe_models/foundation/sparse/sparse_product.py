@@ -8,8 +8,8 @@ from typing import Any, Literal
 import numpy as np
 import scipy.sparse as sp
 
-from fe_models.body.couplings.submatrix import scalar_part
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.sparse.submatrix import scalar_part
 from fe_models.foundation.tall.columns import elsewhere, in_memory, ordered
 from fe_models.foundation.threads import n_threads
 
@@ -70,7 +70,7 @@ class SymmetricProduct:
         if rows.nnz <= SMALL or wide.shape[1] < NARROW:
             target[:] = (rows @ wide).reshape(target.shape)
             return
-        from cms.linear_algebra.solvers.product_kernels import multiply_rows
+        from fe_models.foundation.sparse.sparse_kernels import multiply_rows
 
         def multiply(share: tuple[int, int]) -> None:
             multiply_rows(rows.indptr, rows.indices, rows.data, *share, n_components, wide, target)

@@ -67,7 +67,7 @@ def principal_block(A: sp.csc_array, index: IntArray) -> sp.csc_array:
         block = sp.csc_array(A[:, index])[index]
         block.sort_indices()
         return block
-    from fe_models.body.couplings.sparse_kernels import column_counts, column_entries
+    from fe_models.foundation.sparse.sparse_kernels import column_counts, column_entries
 
     new_row = np.full(A.shape[0], -1, A.indices.dtype)
     new_row[index] = np.arange(n)
@@ -91,7 +91,7 @@ def scalar_part(A: sp.csc_array) -> sp.csr_array:
         Symmetric, (n, n), dofs node by node. p is 0 if the first three dofs do not form such a block, or if the row
         indices are not sorted.
     """
-    from fe_models.body.couplings.sparse_kernels import n_scalar_nodes, scalar_entries
+    from fe_models.foundation.sparse.sparse_kernels import n_scalar_nodes, scalar_entries
 
     p = n_scalar_nodes(A.indptr, A.indices, A.data) if A.has_sorted_indices else 0
     indptr = np.zeros(p + 1, A.indptr.dtype)

@@ -3,7 +3,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from fe_models.body.couplings.couplings import couple
-from fe_models.body.couplings.submatrix import nearby_order, principal_block, scalar_part
+from fe_models.foundation.sparse.submatrix import nearby_order, principal_block, scalar_part
 from tests.bodies import bar
 
 
@@ -15,7 +15,7 @@ def shuffled():
 
 
 def test_neighbours_come_near_and_the_mass_keeps_its_scalar_part(monkeypatch, shuffled):
-    monkeypatch.setattr("fe_models.body.couplings.submatrix.FEW_DOFS", 0)
+    monkeypatch.setattr("fe_models.foundation.sparse.submatrix.FEW_DOFS", 0)
     body, number = shuffled
     dofs = np.stack([number[body.dofs[:, 0]], body.dofs[:, 1]], axis=1)
     by_number = np.lexsort((dofs[:, 1], dofs[:, 0]))  # the dofs as a program would have them that numbers so
