@@ -10,10 +10,7 @@
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -104,18 +101,17 @@ def assemble(
     kinds = require_assemblable(mesh)
     lists = {kind: np.ascontiguousarray(mesh.cells[kind], dtype=np.int32) for kind in kinds}
     graph = node_graph(list(lists.values()), len(mesh.nodes))
-    with ThreadPoolExecutor(n_threads()) as pool:
-        K_data, M_data = assembled_data(
-            mesh.nodes,
-            lists,
-            Elasticity.of(materials),
-            of_cell,
-            graph,
-            pool,
-            incompatible,
-            (integration, mass),
-            progress,
-        )
+    K_data, M_data = assembled_data(
+        mesh.nodes,
+        lists,
+        Elasticity.of(materials),
+        of_cell,
+        graph,
+        incompatible=incompatible,
+        integration=integration,
+        mass=mass,
+        progress=progress,
+    )
     row_start = graph.row_start.astype(np.int32) if len(M_data) <= LARGEST_INT32 else graph.row_start
     M_s = sp.csr_array((M_data, graph.columns, row_start), shape=2 * (len(mesh.nodes),))
     return expanded_stiffness(graph, K_data), M_s
@@ -169,86 +165,48 @@ def assembled_data(
     elasticity: "Elasticity",
     of_cell: Mapping[str, IntArray],
     graph: NodeGraph,
-    pool: ThreadPoolExecutor,
+    *,
     incompatible: bool,
-    rules: tuple[str, str],
+    integration: str,
+    mass: str,
     progress: Progress | None,
 ) -> tuple[Array, Array]:
     """Compute the entries of K, row by row, and of M_s: steps (3) and (4)."""
     from fe_models.elements.solids.assembly_kernels import element_matrices, scatter_elements, tensor_stiffness
 
-    n_parts = n_threads()
     K_data, M_data = np.zeros(9 * len(graph.columns)), np.zeros(len(graph.columns))
-    where = np.zeros((n_parts, len(nodes)), np.int32)
+    workspace = np.zeros((n_threads(), len(nodes)), np.int32)
     cursor = graph.start[:-1].copy()
     first_place = 0
     for kind, cells in lists.items():
-        element = reference_element(kind, *rules)
-        tables = kernel_tables(element)
+        tables = kernel_tables(reference_element(kind, integration, mass))
+        _, of_stiffness, _ = tables
         n_a = len(CELL_SHAPES[kind].nodes)
         # 9 + 1 numbers for each pair of nodes
-        n_batch = min(len(cells), max(n_parts, int(BATCH_BYTES / (80 * n_a**2))))
+        n_batch = min(len(cells), max(n_threads(), int(BATCH_BYTES / (80 * n_a**2))))
         K_e, M_e = np.empty((n_batch, 3 * n_a, 3 * n_a)), np.empty((n_batch, n_a, n_a))
         is_inverted = np.zeros(len(cells), bool)
         materials = np.asarray(of_cell[kind])
         for begin in range(0, len(cells), n_batch):
-            batch = cells[begin : begin + n_batch]
-            cuts = [len(batch) * part // n_parts for part in range(n_parts + 1)]
-            shares = [(slice(a, b), slice(begin + a, begin + b)) for a, b in pairwise(cuts)]
-            run(
-                pool,
-                [
-                    (
-                        element_matrices,
-                        nodes,
-                        cells[rows],
-                        elasticity.properties,
-                        materials[rows],
-                        *tables,
-                        K_e[at],
-                        M_e[at],
-                        is_inverted[rows],
-                    )
-                    for at, rows in shares
-                ],
+            own = slice(begin, begin + n_batch)
+            batch, of_batch = cells[own], materials[own]
+            in_threads(
+                element_matrices,
+                (nodes, batch, elasticity.properties, of_batch, *tables),
+                (K_e, M_e, is_inverted[own]),
             )
-            if incompatible and kind == KIND and not is_inverted[begin : begin + len(batch)].any():
-                of_batch = elasticity.tensors[materials[begin : begin + len(batch)]]
+            if incompatible and kind == KIND and not is_inverted[own].any():
                 for rows, _ in brick_chunks(batch):
-                    K_e[rows] = brick_stiffness(nodes[batch[rows]], of_batch[rows])
-            elif elasticity.is_general[materials[begin : begin + len(batch)]].any():
-                run(
-                    pool,
-                    [
-                        (tensor_stiffness, nodes, cells[rows], elasticity.tensors, elasticity.is_general,
-                         materials[rows], *tables[1], K_e[at])
-                        for at, rows in shares
-                    ],
-                )  # fmt: skip
-            if rules[1] == "lumped":
+                    K_e[rows] = brick_stiffness(nodes[batch[rows]], elasticity.tensors[of_batch[rows]])
+            elif elasticity.is_general[of_batch].any():
+                general = (elasticity.tensors, elasticity.is_general)
+                in_threads(tensor_stiffness, (nodes, batch, *general, of_batch, *of_stiffness), (K_e,))
+            if mass == "lumped":
                 M_e[: len(batch)] = lumped_mass(M_e[: len(batch)])
-            run(
-                pool,
-                [
-                    (
-                        scatter_elements,
-                        batch,
-                        first_place,
-                        graph.start,
-                        graph.places,
-                        cursor,
-                        graph.row_start,
-                        graph.columns,
-                        K_e,
-                        M_e,
-                        part,
-                        n_parts,
-                        where[part],
-                        K_data,
-                        M_data,
-                    )
-                    for part in range(n_parts)
-                ],
+            in_threads(
+                scatter_elements,
+                (batch, first_place, graph.start, graph.places, graph.row_start, graph.columns, K_e, M_e),
+                (cursor, workspace, K_data, M_data),
             )
             first_place += batch.size
             if progress is not None:
@@ -294,13 +252,6 @@ def sorted_csc(data: Array, indices: np.ndarray, indptr: np.ndarray) -> sp.csc_a
     matrix = sp.csc_array((data, indices, indptr), shape=2 * (len(indptr) - 1,))
     matrix.has_canonical_format = True
     return matrix
-
-
-def run(pool: ThreadPoolExecutor, calls: list[tuple[Any, ...]]) -> None:
-    """Run the calls (function, *arguments) in threads, and wait for all of them."""
-    futures = [pool.submit(function, *arguments) for function, *arguments in calls]
-    for future in futures:
-        future.result()
 
 
 def require_assemblable(mesh: Mesh) -> list[str]:

@@ -231,7 +231,7 @@ def curved_element(x, lam, mu, rho, dN_K, w_K, N_M, dN_M, w_M, g, K, M):
 
 
 @jit
-def element_matrices(nodes, cells, properties, of_cell, affine, stiffness, mass, K, M, is_inverted):
+def element_matrices(nodes, cells, properties, of_cell, affine, stiffness, mass, part, n_parts, K, M, is_inverted):
     """Compute stiffness K, (n, 3 n_a, 3 n_a), and scalar mass M, (n, n_a, n_a), of the n elements `cells`, (n, n_a).
 
     properties: lam, mu, rho of every material, (n_materials, 3); of_cell: the material of each element;
@@ -242,7 +242,7 @@ def element_matrices(nodes, cells, properties, of_cell, affine, stiffness, mass,
     dN_K, w_K = stiffness
     N_M, dN_M, w_M = mass
     x, J, g = np.empty((n_a, 3)), np.empty((3, 3)), np.empty((w_K.size, 3 * n_a))
-    for e in range(cells.shape[0]):
+    for e in range(part * cells.shape[0] // n_parts, (part + 1) * cells.shape[0] // n_parts):
         for a in range(n_a):
             for i in range(3):
                 x[a, i] = nodes[cells[e, a], i]
@@ -256,14 +256,15 @@ def element_matrices(nodes, cells, properties, of_cell, affine, stiffness, mass,
 
 @jit
 def scatter_elements(
-    cells, first_place, start, places, cursor, row_start, columns, K, M, part, n_parts, where, K_data, M_data
+    cells, first_place, start, places, row_start, columns, K, M, part, n_parts, cursor, workspace, K_data, M_data
 ):
     """Add the element matrices of the consecutive elements `cells` to the rows of the nodes of this part.
 
     Row 3 i + c of the stiffness has 3 entries for each of the m_i neighbours of node i. Entry (c, d) of the p-th
     neighbour is therefore at 9 row_start[i] + 3 m_i c + 3 p + d of K_data, and no conversion is needed.
-    cursor: for each node, its first place in `places` that has not been added yet; where: workspace, (n_nodes,).
+    cursor: for each node, its first place in `places` that has not been added yet; workspace: (n_parts, n_nodes).
     """
+    where = workspace[part]  # place of a node among the neighbours of another one
     n_nodes = row_start.size - 1
     n_a = cells.shape[1]
     end_place = first_place + cells.size
@@ -326,7 +327,7 @@ PLACE = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])  #: index of component i, j 
 
 
 @jit
-def tensor_stiffness(nodes, cells, tensors, is_general, of_cell, dN, w, K):
+def tensor_stiffness(nodes, cells, tensors, is_general, of_cell, dN, w, part, n_parts, K):
     """Write K, (n, 3 n_a, 3 n_a), of the elements whose material is not isotropic; leave the other entries unchanged.
 
     (1) T_j = Σ_l C_ij,kl g_bl: the stress in row i, column j from a unit displacement of node b along k
@@ -337,7 +338,7 @@ def tensor_stiffness(nodes, cells, tensors, is_general, of_cell, dN, w, K):
     n_a = cells.shape[1]
     x, g = np.empty((n_a, 3)), np.empty((n_a, 3))
     J, Q, T = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3, 3))
-    for e in range(cells.shape[0]):
+    for e in range(part * cells.shape[0] // n_parts, (part + 1) * cells.shape[0] // n_parts):
         if not is_general[of_cell[e]]:
             continue
         C = tensors[of_cell[e]]
