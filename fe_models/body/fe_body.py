@@ -469,8 +469,8 @@ class FEBody:
 
     @property
     def length(self) -> float:
-        """Diagonal of the bounding box of the nodes [m]; the length that scales rotations."""
-        return float(np.linalg.norm(np.ptp(self.nodes, axis=0)))
+        """Diagonal of the bounding box of the nodes, or 1 if it has none [m]; the length that scales rotations."""
+        return float(np.linalg.norm(np.ptp(self.nodes, axis=0))) or 1.0
 
     def interface(self, name: str) -> Interface:
         """Return the interface of that name; raise `BodyError` with the known names if there is none."""

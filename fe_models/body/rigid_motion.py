@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array, IntArray, frozen, require_finite, require_shape
+from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["MassLoads", "rigid_motion_of_dofs", "rigid_motion_of_points", "rotation_work"]
 
@@ -55,14 +55,6 @@ class MassLoads:
 
     A: Array  #: (k, 3, 3) [1/s² per unit of the load]
     b: Array  #: (k, 3) [m/s² per unit of the load]
-
-    def __post_init__(self) -> None:
-        k = len(np.asarray(self.A))
-        for name, shape in {"A": (k, 3, 3), "b": (k, 3)}.items():
-            array = frozen(getattr(self, name))
-            require_shape(f"mass loads: {name}", array, shape)
-            require_finite(f"mass loads: {name}", array)
-            object.__setattr__(self, name, array)
 
     @classmethod
     def none(cls, k: int) -> "MassLoads":

@@ -166,7 +166,7 @@ class _ResponseError:
 
     def __init__(self, reference: FullReference, band: tuple[float, float]) -> None:
         body = reference.body
-        self.time, self.length, self.names = body.units.time, body.length or 1.0, reference.ports.names
+        self.time, self.length, self.names = body.units.time, body.length, reference.ports.names
         low = band[0] or min(LOWEST * float(reference.frequencies[0]), band[1] / 2)
         self.grid = frequency_grid(low, band[1])
         self.full = modal_response(reference.response.model, self.grid, damping=DAMPING, time=self.time)

@@ -103,7 +103,7 @@ def reference_of(families: Families, full: FullModel, damping: float) -> Referen
         damping=damping,
         port_names=names,
         static_labels=static_labels(families, full),
-        length=body.length or 1.0,
+        length=body.length,
         time=time_,
     )
 

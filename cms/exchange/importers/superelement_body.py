@@ -275,7 +275,7 @@ def require_rigid_recovery(body: FEBody, element: Superelement) -> None:
     """Raise `ForeignBodyError` unless recovered nodes follow a rigid motion of the boundary."""
     assert body.recovery is not None
     center = body.nodes.mean(axis=0)
-    length = body.length or 1.0
+    length = body.length
     scale = np.array([1.0, 1, 1, 1 / length, 1 / length, 1 / length])
     found = body.recovery.matrix @ (geometric_rigid_modes(body, origin=center) * scale)
     expected = rigid_motion_of_dofs(body.nodes, body.recovery.dofs, center) * scale

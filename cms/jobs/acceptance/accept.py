@@ -341,7 +341,7 @@ def nodes_in_common(body: FEBody, reduced: ReducedBody) -> tuple[IntArray, IntAr
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     places = reduced.frame.origin + np.asarray(reduced.nodes) @ reduced.frame.axes.T
     distance, nearest = cKDTree(body.nodes).query(places)
-    there = np.flatnonzero(distance <= SAME_PLACE * (body.length or 1.0))
+    there = np.flatnonzero(distance <= SAME_PLACE * body.length)
     return np.asarray(nearest[there], np.int64), there.astype(np.int64)
 
 

@@ -250,7 +250,7 @@ def _lengths(body: FEBody, h: IntArray, Z: Array) -> Array:
     """Return the unit of every direction: 1 for translations, 1 / body length for rotations, (n_z,)."""
     is_rotation = (body.dofs[h, 1] >= 3).astype(float)
     turned = Z.T**2 @ is_rotation > 0.5
-    return np.where(turned, 1 / (body.length or 1.0), 1.0)
+    return np.where(turned, 1 / body.length, 1.0)
 
 
 def _pivots(motions: Array) -> IntArray:

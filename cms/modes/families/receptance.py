@@ -16,7 +16,7 @@ def boundary_scale(body: FEBody) -> Array:
 
     A rotation times this length is comparable to a translation, and a moment divided by it is comparable to a force.
     """
-    return np.where(body.dofs[body.b, 1] >= 3, body.length or 1.0, 1.0)
+    return np.where(body.dofs[body.b, 1] >= 3, body.length, 1.0)
 
 
 @dataclass(frozen=True, eq=False)

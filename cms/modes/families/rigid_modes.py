@@ -94,7 +94,7 @@ def independent_rigid_modes(body: FEBody) -> tuple[Array, IntArray]:
         return np.zeros((body.n_dof, 0)), np.zeros(0, np.int64)
     Psi_R = geometric_rigid_modes(body, origin=body.nodes.mean(axis=0))
     scaled = _in_lengths(body, Psi_R)
-    scaled[:, 3:] /= body.length or 1.0
+    scaled[:, 3:] /= body.length
     _, R, pivots = la.qr(scaled, mode="economic", pivoting=True)
     sizes = np.abs(np.diag(R))
     rank = int((sizes > RANK_TOLERANCE * sizes.max(initial=0.0)).sum()) if sizes.any() else 0
@@ -142,7 +142,7 @@ def determinate_partition(body: FEBody, Psi_R: Array) -> tuple[IntArray, IntArra
 def _in_lengths(body: FEBody, Psi_R: Array) -> Array:
     """Return rigid-body modes in which a rotational dof counts as the translation at one body length."""
     scaled = Psi_R.copy()
-    scaled[body.dofs[:, 1] >= 3] *= body.length or 1.0
+    scaled[body.dofs[:, 1] >= 3] *= body.length
     return scaled
 
 

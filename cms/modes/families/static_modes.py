@@ -114,7 +114,7 @@ def inertia_relief_modes(fixed: FixedInterfaceBody, Psi_R: Array) -> Array:
     F = (fixed.body.M @ Psi_R)[fixed.i]
     Psi_H[fixed.i] = fixed.factorization.solve(F)
     is_rotation = np.arange(Psi_R.shape[1]) >= 3
-    energy = np.einsum("nk,nk->k", F, Psi_H[fixed.i]) / _unit(fixed.body, is_rotation)
+    energy = np.einsum("nk,nk->k", F, Psi_H[fixed.i]) / np.where(is_rotation, fixed.body.length**2, 1.0)
     Psi_H[:, energy <= ROUNDING_ENERGY * energy.max(initial=0.0)] = 0.0
     return Psi_H
 
@@ -138,7 +138,7 @@ def unrestrained_attachment_modes(free: Flexibility) -> Array:
     u -= combine(free.held(free.M_N), free.N[h[:n_b]].T)
     u = u - combine(free.N, free.M_N.T @ u)
     body, b = free.condensed.fixed.body, h[:n_b]
-    compliance = u[b, np.arange(n_b)] * _unit(body, body.dofs[b, 1] >= 3)
+    compliance = u[b, np.arange(n_b)] * np.where(body.dofs[b, 1] >= 3, body.length**2, 1.0)
     u[:, compliance <= STIFF * compliance.max(initial=0.0)] = 0.0
     return u
 
@@ -179,11 +179,6 @@ def without_rounding(body: FEBody, residual: Array, Psi_U: Array) -> Array:
     values, vectors = np.linalg.eigh(gram_in_blocks(residual, K) * np.outer(size, size))
     kept = vectors[:, values > RESIDUAL]
     return np.asarray(combine(residual, (size[:, None] * kept) @ (kept.T / size)))
-
-
-def _unit(body: FEBody, is_rotation: np.ndarray) -> Array:
-    """Return the factors that make compliances comparable: the body length squared for rotations, else 1."""
-    return np.where(is_rotation, body.length**2 or 1.0, 1.0)
 
 
 def boundary_names(body: FEBody, family: str) -> tuple[list[str], list[str]]:

@@ -86,7 +86,7 @@ class Case:
     @cached_property
     def length(self) -> float:
         """Size of the body [m]."""
-        return self.body.length or 1.0
+        return self.body.length
 
     @cached_property
     def reach(self) -> float:

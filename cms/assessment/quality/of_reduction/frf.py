@@ -143,7 +143,7 @@ def response_comparison(
     time = body.units.time
     full = modal_response(known.model, frequencies, damping=damping, time=time)
     reduced = modal_response(model, frequencies, damping=damping, time=time)
-    return ResponseComparison(full, reduced, compare_responses(full, reduced, body.length or 1.0), known.error)
+    return ResponseComparison(full, reduced, compare_responses(full, reduced, body.length), known.error)
 
 
 def peaks(frequencies: Array, magnitude: Array) -> list[tuple[float, float]]:

@@ -137,7 +137,7 @@ def known_interfaces(body: FEBody, reduced: ReducedBody) -> list[ReducedInterfac
 
 def motion_scale(body: FEBody, reduced: ReducedBody) -> Array:
     """1 for translations, the body length for rotations, one per kept motion, (n,)."""
-    length = body.length or 1.0
+    length = body.length
     ports = [np.repeat([1.0, length], 3)] * len(known_interfaces(body, reduced))
     return np.concatenate([np.ones(3 * len(reduced.nodes)), *ports])
 

@@ -52,7 +52,7 @@ def held_mass(reference: FullReference, basis: FreeBasis) -> HeldMass:
     d = geometric_rigid_modes(body, origin=body.nodes.mean(axis=0))
     b = body.M @ d
     X = np.hstack([basis.N, basis.Phi])
-    rows = X[families.h] * np.where(body.dofs[families.h, 1] < 3, 1.0, body.length or 1.0)[:, None]
+    rows = X[families.h] * np.where(body.dofs[families.h, 1] < 3, 1.0, body.length)[:, None]
     size = np.linalg.norm(rows, axis=0)
     size = np.where(size > 1e-12 * size.max(initial=0.0), size, 1.0)
     _, singular, Vt = np.linalg.svd(rows / size)

@@ -38,7 +38,7 @@ def check_mass_properties(body: FEBody, reduced: ReducedBody) -> QualityRecord:
 
     First moments over m L, inertia over m L², both about the centre of the nodes, L the length of the body.
     """
-    center, length = body.nodes.mean(axis=0), body.length or 1.0
+    center, length = body.nodes.mean(axis=0), body.length
     Psi_R = geometric_rigid_modes(body, origin=center)
     full = Psi_R.T @ (body.M @ Psi_R)
     shift = geometric_shift(center)
@@ -78,7 +78,7 @@ def check_grounding(body: FEBody) -> QualityRecord:
     Row by row would be sharper, but the rows of a rigid interface are sums that cancel, and keep their rounding.
     """
     Psi_R = geometric_rigid_modes(body, origin=body.nodes.mean(axis=0))
-    Psi_R[:, 3:] /= body.length or 1.0
+    Psi_R[:, 3:] /= body.length
     size = np.abs(Psi_R).max(axis=0)
     stiffest = largest_entry(body.K) or 1.0
     force = np.abs(body.K @ Psi_R)

@@ -43,7 +43,7 @@ class ShapeRounding:
 
 def shape_rounding(body: FEBody, V: Array, A: Array) -> ShapeRounding:
     """Return the rounding of the shapes V A."""
-    motion = np.where(body.dofs[:, 1] < 3, 1.0, (body.length or 1.0) ** 2)
+    motion = np.where(body.dofs[:, 1] < 3, 1.0, body.length**2)
     diagonals = (motion, np.abs(body.M.diagonal()), np.abs(body.K.diagonal()))
     of_columns = ShapeRounding(*(np.finfo(float).eps * np.sqrt(squares(each, V)) for each in diagonals))
     return of_columns.of_combinations(A)

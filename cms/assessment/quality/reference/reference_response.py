@@ -60,7 +60,7 @@ def reference_response(families: Families, ports: Ports, band: float) -> Referen
     X = np.hstack([modes.Phi, static, families.flexibility(M @ static)])
     N = families.free.N
     F_elastic = families.project(F)
-    size = np.tile(np.repeat([1.0, body.length or 1.0], 3), len(ports.names))
+    size = np.tile(np.repeat([1.0, body.length], 3), len(ports.names))
     for _ in range(MOST_ROUNDS):
         basis = ritz_basis(body, X, N)  # (3)
         omega2 = between_modes(basis, (2 * np.pi * band) ** 2)  # (4)
