@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from cms.errors import BodyError
-from fe_models.foundation.arrays import SYMMETRY_DEFECT, Array, IntArray, frozen, require_finite, require_shape
+from fe_models.foundation.arrays import Array, IntArray, require_shape
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.records import checked_fields, frozen_copies
+from fe_models.foundation.records import checked_fields, frozen_copies, put_arrays
 from fe_models.foundation.units import Units
 
 __all__ = ["SPIN_PAIRS", "UNIT_LOADS", "GeometricStiffness", "RotatedLoads", "SpreadLoads", "stiffness_of_loads"]
@@ -51,8 +51,7 @@ class RotatedLoads:
     def __post_init__(self) -> None:
         n, n_loaded = np.asarray(self.translation).shape[-1], len(np.asarray(self.interfaces))
         shapes = {"translation": (3, 3, n), "rotation": (3, 3, n), "spin": (6, 3, n), "interfaces": (n_loaded, 6, 3, n)}
-        for name, shape in shapes.items():
-            put_array(self, f"turned loads: {name}", name, shape)
+        put_arrays(self, "turned loads", shapes)
 
 
 @presented
@@ -82,9 +81,8 @@ class SpreadLoads:
 
     def __post_init__(self) -> None:
         n = np.asarray(self.K).shape[-1]
-        put_array(self, "spread loads: K", "K", (6, n, n), is_symmetric=True)
-        put_array(self, "spread loads: turned", "turned", (6, 3, n))
-        put_array(self, "spread loads: turned_rigid", "turned_rigid", (6, 3, 3))
+        put_arrays(self, "spread loads", {"K": (6, n, n)}, is_symmetric=True)
+        put_arrays(self, "spread loads", {"turned": (6, 3, n), "turned_rigid": (6, 3, 3)})
 
 
 @presented
@@ -137,8 +135,7 @@ class GeometricStiffness:
         if sum(self.is_loaded) != n_loaded:
             raise BodyError(f"geometric stiffness: {sum(self.is_loaded)} loaded interfaces, but matrices of {n_loaded}")
         shapes = {"translation": (3, n, n), "rotation": (3, n, n), "spin": (6, n, n), "interfaces": (n_loaded, 6, n, n)}
-        for name, shape in shapes.items():
-            put_array(self, f"geometric stiffness: {name}", name, shape, is_symmetric=True)
+        put_arrays(self, "geometric stiffness", shapes, is_symmetric=True)
         if self.turned is not None:
             require_shape("turned loads: interfaces", self.turned.interfaces, (n_loaded, 6, 3, n))
         if self.spread is not None:
@@ -196,26 +193,6 @@ class GeometricStiffness:
             spread = SpreadLoads(spread.K * by, spread.turned * by * q, spread.turned_rigid * by * q**2)
         of_loads: dict[str, Any] = {name: getattr(self, name) * by for name, by in by_load.items()}
         return replace(self, **of_loads, turned=turned, spread=spread)
-
-
-def put_array(record: object, where: str, name: str, shape: tuple[int, ...], *, is_symmetric: bool = False) -> None:
-    """Set a field of a frozen record after a check: shape, finite numbers and, if required, symmetry in the modes.
-
-    The antisymmetric part of matrices that must be symmetric is rounding, and is removed.
-    """
-    array = np.ascontiguousarray(getattr(record, name), dtype=np.float64)
-    require_shape(where, array, shape)
-    require_finite(where, array)
-    if is_symmetric:
-        other = np.swapaxes(array, -1, -2)
-        defect, scale = np.abs(array - other).max(initial=0.0), np.abs(array).max(initial=0.0)
-        if defect > SYMMETRY_DEFECT * scale:
-            raise BodyError(
-                f"{where}: expected symmetric matrices over the modes, got |K - K.T| = {defect / scale:.2e} |K|; "
-                "check that all are projected on both sides by the same modes"
-            )
-        array = (array + other) / 2
-    object.__setattr__(record, name, frozen(array))
 
 
 def stiffness_of_loads(

@@ -7,10 +7,10 @@ from functools import cached_property
 import numpy as np
 
 from cms.errors import BodyError
-from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
+from fe_models.foundation.arrays import Array, frozen, require_finite
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.records import checked_fields, frozen_copies
+from fe_models.foundation.records import checked_fields, frozen_copies, put_arrays
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["INERTIA_TERMS", "NEGATIVITY", "Moments", "NodalSums", "known_P", "known_S_kl", "moments_from_gram"]
@@ -77,11 +77,7 @@ class Moments:
         lost = {*self.missing, "5C"} if "4C" in self.missing else {*self.missing}  # 4C is contained in 5C
         missing = tuple(term for term in INERTIA_TERMS if term in lost)
         object.__setattr__(self, "missing", missing)
-        for name, shape in {"S": (3,), "R": (3, 3), "C1": (3, n), "P": (3, 3, n), "S_kl": (3, 3, n, n)}.items():
-            array = frozen(getattr(self, name))
-            require_shape(f"moments: {name}", array, shape)
-            require_finite(f"moments: {name}", array)
-            object.__setattr__(self, name, array)
+        put_arrays(self, "moments", {"S": (3,), "R": (3, 3), "C1": (3, n), "P": (3, 3, n), "S_kl": (3, 3, n, n)})
         if missing:
             object.__setattr__(self, "P", frozen(known_P(self.P, missing)))
             object.__setattr__(self, "S_kl", frozen(known_S_kl(self.S_kl, missing)))
@@ -289,8 +285,4 @@ class NodalSums:
         if not self.w > 0:
             raise BodyError(f"nodal sums: w: expected a positive sum of weights, got {self.w:g}")
         n = np.asarray(self.U1).shape[-1]
-        for name, shape in {"S": (3,), "R": (3, 3), "U1": (3, n), "U2": (3, n)}.items():
-            array = frozen(getattr(self, name))
-            require_shape(f"nodal sums: {name}", array, shape)
-            require_finite(f"nodal sums: {name}", array)
-            object.__setattr__(self, name, array)
+        put_arrays(self, "nodal sums", {"S": (3,), "R": (3, 3), "U1": (3, n), "U2": (3, n)})

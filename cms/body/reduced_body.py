@@ -13,11 +13,10 @@ from cms.body.source_columns import SourceColumns
 from cms.body.stress import PointStress
 from cms.errors import BodyError
 from fe_models.body.load_cases import ReducedLoadCase
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, require_finite, require_shape
+from fe_models.foundation.arrays import Array, IntArray, frozen_int, require_shape
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import Summary, listed, presented
-from fe_models.foundation.records import FrozenMapping, checked_fields, frozen_copies
-from fe_models.foundation.tall.on_disk import row_slices
+from fe_models.foundation.records import FrozenMapping, checked_fields, frozen_copies, put_arrays
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.numbering import NONE, Numbering
@@ -25,12 +24,6 @@ from fe_models.meshes.numbering import NONE, Numbering
 __all__ = ["BodyFrame", "ReducedBody", "ReducedInterface"]
 
 ORTHONORMAL = 1e-6  #: defect of axes that counts as rounding of printed digits
-
-
-def require_finite_rows(where: str, array: Array) -> None:
-    """Raise `BodyError` unless all numbers are finite; an array on disk is read in slices of rows."""
-    for rows in row_slices(len(array), array):
-        require_finite(where, array[rows])
 
 
 def require_orthonormal(where: str, axes: Array) -> None:
@@ -69,15 +62,10 @@ class BodyFrame:
     dofs: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "origin", frozen(self.origin))
-        object.__setattr__(self, "axes", frozen(self.axes))
         object.__setattr__(self, "dofs", frozen_int(self.dofs))
         if self.dofs.shape != (len(self.dofs), 2):
             raise BodyError(f"body frame: dofs: expected (n, 2) of (node, component), got {self.dofs.shape}")
-        require_shape("body frame: origin", self.origin, (3,))
-        require_shape("body frame: axes", self.axes, (3, 3))
-        require_finite("body frame: origin", self.origin)
-        require_finite("body frame: axes", self.axes)
+        put_arrays(self, "body frame", {"origin": (3,), "axes": (3, 3)})
         require_orthonormal("body frame: axes", self.axes)
         if np.linalg.det(self.axes) < 0:
             raise BodyError("body frame: axes: expected right-handed axes as columns")
@@ -119,12 +107,8 @@ class ReducedInterface:
 
     def __post_init__(self) -> None:
         where = f"interface {self.name!r}"
-        for name in ("position", "triad", "Psi"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
-            require_finite(f"{where}: {name}", getattr(self, name))
+        put_arrays(self, where, {"position": (3,), "triad": (3, 3), "Psi": (6, np.asarray(self.Psi).shape[-1])})
         object.__setattr__(self, "members", frozen_int(self.members))
-        require_shape(f"{where}: position", self.position, (3,))
-        require_shape(f"{where}: triad", self.triad, (3, 3))
         require_orthonormal(f"{where}: triad", self.triad)
 
 
@@ -228,36 +212,30 @@ class ReducedBody:
     def __post_init__(self) -> None:
         where = f"reduced body {self.name!r}"
         put = object.__setattr__
-        for name in ("M", "K", "D", "energy_shares", "free_frequencies", "nodes", "Phi"):
-            put(self, name, frozen(getattr(self, name)))
-            require_finite_rows(f"{where}: {name}", getattr(self, name))
         for name in ("node_ids", "surface"):
             put(self, name, frozen_int(getattr(self, name)))
-        if self.stress is not None:
-            put(self, "stress", frozen(self.stress))
-            require_shape(f"{where}: stress", self.stress, (len(self.nodes), 6, self.n_q))
-            require_finite_rows(f"{where}: stress", self.stress)
-        if self.quadratic is not None:
-            put(self, "quadratic", frozen(self.quadratic))
-            require_shape(f"{where}: quadratic", self.quadratic, (len(self.nodes), 3, self.n_q, self.n_q))
-            require_finite(f"{where}: quadratic", self.quadratic)
-            if self.geometric is None:
-                raise BodyError(f"{where}: quadratic modes without the geometric stiffness that is their inertia")
         for name in ("labels", "sources", "interfaces", "load_cases"):
             put(self, name, tuple(getattr(self, name)))
         put(self, "provenance", FrozenMapping(dict(self.provenance)))
         put(self, "recovery", FrozenMapping(dict(self.recovery)))
         n, n_kept = self.n_q, len(self.nodes)
-        for name, shape in {
+        shapes: dict[str, tuple[int, ...]] = {
             "M": (n, n),
             "K": (n, n),
             "D": (n, n),
             "nodes": (n_kept, 3),
             "Phi": (n_kept, 3, n),
-            "node_ids": (n_kept,),
             "energy_shares": (n, len(self.sources)),
-        }.items():
-            require_shape(f"{where}: {name}", getattr(self, name), shape)
+            "free_frequencies": (len(self.free_frequencies),),
+        }
+        if self.stress is not None:
+            shapes["stress"] = (n_kept, 6, n)
+        if self.quadratic is not None:
+            shapes["quadratic"] = (n_kept, 3, n, n)
+            if self.geometric is None:
+                raise BodyError(f"{where}: quadratic modes without the geometric stiffness that is their inertia")
+        put_arrays(self, where, shapes)
+        require_shape(f"{where}: node_ids", self.node_ids, (n_kept,))
         if len(self.labels) != n:
             raise BodyError(f"{where}: {n} modes need as many labels, got {len(self.labels)}")
         if self.moments.n_q != n:

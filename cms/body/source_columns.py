@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cms.errors import BodyError
-from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
-from fe_models.foundation.records import frozen_copies
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.records import frozen_copies, put_arrays
 
 __all__ = ["SourceColumns", "source_columns"]
 
@@ -32,11 +32,8 @@ class SourceColumns:
             object.__setattr__(self, name, tuple(getattr(self, name)))
         if len(self.groups) != n:
             raise BodyError(f"source columns: {n} labels, but {len(self.groups)} groups")
-        for name in ("A", "F"):
-            array = frozen(getattr(self, name))
-            require_shape(f"source columns: {name}", array, (n, np.asarray(self.A).shape[-1]))
-            require_finite(f"source columns: {name}", array)
-            object.__setattr__(self, name, array)
+        shape = (n, np.asarray(self.A).shape[-1])
+        put_arrays(self, "source columns", {"A": shape, "F": shape})
 
     @property
     def sources(self) -> tuple[str, ...]:

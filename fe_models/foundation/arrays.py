@@ -59,7 +59,7 @@ def require_finite(where: str, array: Array) -> None:
         raise BodyError(f"{where}: expected finite numbers, got {int(bad.sum())} NaN or infinite, first at {first}")
 
 
-def require_shape(where: str, array: Array, shape: tuple[int, ...]) -> None:
+def require_shape(where: str, array: Array | IntArray, shape: tuple[int, ...]) -> None:
     """Raise `BodyError` that names `where` unless the array has that shape."""
     if array.shape != shape:
         raise BodyError(f"{where}: expected shape {shape}, got {array.shape}")

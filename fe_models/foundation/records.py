@@ -17,10 +17,14 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike
 from typing_extensions import get_protocol_members, is_protocol
 
-from fe_models.foundation.errors import ReportedError
+from fe_models.foundation.arrays import SYMMETRY_DEFECT, frozen, require_finite, require_shape
+from fe_models.foundation.errors import BodyError, ReportedError
+from fe_models.foundation.tall.on_disk import row_slices
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["FrozenMapping", "MismatchError", "Takes", "at_door", "checked_fields", "conformed", "frozen_copies"]
+__all__ = [
+    "FrozenMapping", "MismatchError", "Takes", "at_door", "checked_fields", "conformed", "frozen_copies", "put_arrays",
+]  # fmt: skip
 
 MOST_KINDS = 3  #: named in a message
 
@@ -75,6 +79,44 @@ def read_only(value: Any) -> Any:
         for name in ("data", "indices", "indptr"):
             read_only(getattr(value, name, None))
     return value
+
+
+def put_arrays(
+    record: object, where: str, shapes: Mapping[str, tuple[int, ...]], *, is_symmetric: bool = False
+) -> None:
+    """Make fields of a frozen record read-only arrays of float64, after a check of shapes and for finite numbers.
+
+    Parameters
+    ----------
+    record
+        The record, in its `__post_init__`.
+    where
+        What the record is, for messages.
+    shapes
+        The shape of each field. A large array on disk is read in slices of rows.
+    is_symmetric
+        Whether matrices over the modes, the last two axes, must be symmetric; what rounding left of them is removed.
+
+    Raises
+    ------
+    BodyError
+        If an array has another shape, holds a NaN or an infinity, or is not symmetric.
+    """
+    for name, shape in shapes.items():
+        array = frozen(getattr(record, name))
+        require_shape(f"{where}: {name}", array, shape)
+        for rows in row_slices(len(array), array):
+            require_finite(f"{where}: {name}", array[rows])
+        if is_symmetric:
+            other = np.swapaxes(array, -1, -2)
+            defect, scale = np.abs(array - other).max(initial=0.0), np.abs(array).max(initial=0.0)
+            if defect > SYMMETRY_DEFECT * scale:
+                raise BodyError(
+                    f"{where}: {name}: expected symmetric matrices over the modes, got |K - K.T| = "
+                    f"{defect / scale:.2e} |K|; check that all are projected on both sides by the same modes"
+                )
+            array = frozen((array + other) / 2)
+        object.__setattr__(record, name, array)
 
 
 # checked inputs -------------------------------------------------------------------------------------------------------

@@ -13,7 +13,8 @@ from cms.modes.families.static_modes import boundary_names
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets.free_interface import rubin
 from fe_models.body.fe_body import FEBody
-from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.records import put_arrays
 from fe_models.foundation.tall.columns import in_memory
 
 __all__ = [
@@ -46,15 +47,10 @@ class ReducedPencil:
     is_dual: bool = False
 
     def __post_init__(self) -> None:
-        where = f"reduced pencil {self.name!r}"
-        for name in ("M", "K", "interface"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
-            require_finite(f"{where}: {name}", getattr(self, name))
         object.__setattr__(self, "labels", tuple(self.labels))
         n = len(self.labels)
-        require_shape(f"{where}: M", self.M, (n, n))
-        require_shape(f"{where}: K", self.K, (n, n))
-        require_shape(f"{where}: interface", self.interface, (len(self.interface), n))
+        shapes = {"M": (n, n), "K": (n, n), "interface": (len(self.interface), n)}
+        put_arrays(self, f"reduced pencil {self.name!r}", shapes)
 
 
 def pencil_of_modes(body: FEBody, modes: ModeSet) -> ReducedPencil:
