@@ -7,16 +7,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cms.cli.console import output_path, say
+from fe_models.foundation.documents.document import Document
 from fe_models.foundation.documents.table import TABLE_SUFFIXES, Table
+from fe_models.foundation.documents.write import document_content
+from fe_models.foundation.extras import extra_module
 from fe_models.foundation.paths import replace_files
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["PICTURES", "TABLES", "json_text", "output_file", "output_files", "write_outputs"]
+__all__ = ["DOCUMENTS", "PICTURES", "TABLES", "json_text", "output_file", "output_files", "write_outputs"]
 
 TABLES = TABLE_SUFFIXES
 PICTURES = (".png", ".svg", ".pdf")
+DOCUMENTS = (".html", ".pdf")
 
 
 def output_files(
@@ -40,6 +44,8 @@ def output_files(
     for path in paths:
         if path.suffix.lower() not in endings:
             raise error(f"--output {path}: expected a file name that ends in {', '.join(endings)}")
+        if path.suffix.lower() == ".pdf" and ".html" in endings:
+            extra_module("reportlab", extra="pdf", purpose="write a document as PDF")
     return paths
 
 
@@ -60,6 +66,7 @@ def write_outputs(
     *,
     table: Callable[[], Table] | None = None,
     record: Any = None,
+    document: Callable[[], Document] | None = None,
     figure: Callable[[], "Figure"] | None = None,
     dpi: int = 130,
     others: Mapping[str, Callable[[Path], bytes | Mapping[Path, bytes]]] | None = None,
@@ -75,6 +82,8 @@ def write_outputs(
         Returns the table, for `TABLES`.
     record
         Plain types, for .json; None: the table.
+    document
+        Returns the document, for `DOCUMENTS`.
     figure
         Returns the figure, for `PICTURES`.
     dpi
@@ -92,6 +101,8 @@ def write_outputs(
             contents |= {path: made} if isinstance(made, bytes) else made
         elif ending == ".json" and record is not None:
             contents[path] = json_text(record).encode()
+        elif ending in DOCUMENTS and document is not None:
+            contents[path] = document_content(document(), ending)
         elif ending in TABLES and table is not None:
             contents[path] = table().content(ending, str(path))
         else:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cms.cli.console import guarded, output_path, print_table, say, stages
-from cms.cli.outputs import TABLES, json_text, output_files, write_outputs
+from cms.cli.outputs import DOCUMENTS, TABLES, json_text, output_files, write_outputs
 
 if TYPE_CHECKING:
     from floatframe.durability.shaking.loads.levels import Level
@@ -25,7 +25,7 @@ def fatigue_command(
     file: Annotated[Path, typer.Argument(help="Fatigue file (TOML), see docs/fatigue.md.")],
     outputs: Annotated[
         list[Path],
-        typer.Option("--output", "-o", help="A .html, .json, .vtu or .png file, or a table (.csv, ...); repeatable."),
+        typer.Option("--output", "-o", help="A .html, .pdf, .json, .vtu or .png file, or a table (.csv, ...)."),
     ] = [],  # noqa: B006
     json: Annotated[bool, typer.Option("--json", help="Write the same record as JSON, for other programs.")] = False,
 ) -> None:
@@ -44,13 +44,13 @@ def fatigue_command(
     from floatframe.durability.fatigue.assessment import assess
     from floatframe.durability.fatigue.fatigue_file import read_fatigue
     from floatframe.durability.fatigue.outputs import fatigue_record, render_fatigue, vtu_of, worst_table
-    from floatframe.durability.fatigue.report import fatigue_html
+    from floatframe.durability.fatigue.report import fatigue_document
     from floatframe.errors import FatigueError
 
     given = read_fatigue(file)
     inputs = (file, *files_named(given))
     default = [] if json else [file.with_suffix(ending) for ending in (".html", ".json", ".csv", ".vtu")]
-    endings = (".html", ".vtu", ".png", *TABLES)
+    endings = (*DOCUMENTS, ".vtu", ".png", *TABLES)
     paths = output_files(outputs, default, endings, FatigueError, overwrite_of=inputs)
     with stages(remaining=True) as clock, clock("damage on the surface") as advance:
         made = assess(given, progress=advance)
@@ -67,8 +67,8 @@ def fatigue_command(
         if not json:
             say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
     write_outputs(
-        paths, table=lambda: worst_table(made), record=record, is_quiet=json,
-        others={".html": lambda _: fatigue_html(made).encode(), ".vtu": lambda _: vtu_of(made)},
+        paths, table=lambda: worst_table(made), record=record, document=lambda: fatigue_document(made), is_quiet=json,
+        others={".vtu": lambda _: vtu_of(made)},
     )  # fmt: skip
 
 
@@ -124,9 +124,7 @@ def shake_command(
     file: Annotated[Path, typer.Argument(help="A shake file (TOML), see docs/shake.md, or a modal file (.h5).")],
     outputs: Annotated[
         list[Path],
-        typer.Option(
-            "--output", "-o", help="A .html or .json file, or a table (.csv, ...); repeatable; default: three."
-        ),
+        typer.Option("--output", "-o", help="A .html, .pdf or .json file, or a table (.csv, ...); repeatable."),
     ] = [],  # noqa: B006
     base: Annotated[str | None, typer.Option(help="Of a modal file: the interface on the base.")] = None,
     q_factor: Annotated[
@@ -160,7 +158,7 @@ def shake_command(
     20:0.01,80:0.04,350:0.04,2000:0.007
     """
     from floatframe.durability.shaking.light_record import light_record
-    from floatframe.durability.shaking.page import shake_html
+    from floatframe.durability.shaking.page import shake_document
     from floatframe.durability.shaking.record import shake_record, shake_table
     from floatframe.durability.shaking.shake import shake
     from floatframe.errors import ModelError
@@ -177,7 +175,7 @@ def shake_command(
         job = job_of_options(file, base, q_factor, sine, rate, random, shock, directions, at)
     inputs = (file, Path(job.source)) if job.source else (file,)
     default = [] if json else [file.with_suffix(f".shake{ending}") for ending in (".html", ".json", ".csv")]
-    paths = output_files(outputs, default, (".html", *TABLES), ModelError, overwrite_of=inputs)
+    paths = output_files(outputs, default, (*DOCUMENTS, *TABLES), ModelError, overwrite_of=inputs)
     with stages() as clock, clock(f"{job.structure.name}: shaken"):
         result = shake(job)
     if json:
@@ -198,8 +196,8 @@ def shake_command(
         return files
 
     write_outputs(
-        paths, table=lambda: shake_table(result), is_quiet=json,
-        others={".html": lambda _: shake_html(result).encode(), ".json": with_curves},
+        paths, table=lambda: shake_table(result), document=lambda: shake_document(result), is_quiet=json,
+        others={".json": with_curves},
     )  # fmt: skip
 
 

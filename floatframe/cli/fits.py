@@ -7,7 +7,7 @@ import typer
 
 from cms.cli.arguments import Journal, Workers
 from cms.cli.console import guarded, output_path, print_table, say, stages
-from cms.cli.outputs import PICTURES, TABLES, json_text, output_files, write_outputs
+from cms.cli.outputs import DOCUMENTS, PICTURES, TABLES, json_text, output_files, write_outputs
 from fe_models.foundation.documents.table import Table
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def identify_command(
     data: Annotated[Path, typer.Argument(help="Measured motion (.csv, .mat, ...), see docs/identification.md.")],
     outputs: Annotated[
         list[Path],
-        typer.Option("--output", "-o", help="A .html or .json file; repeatable."),
+        typer.Option("--output", "-o", help="A .html, .pdf or .json file; repeatable."),
     ] = [],  # noqa: B006
     terms: Annotated[
         str,
@@ -59,7 +59,7 @@ def identify_command(
     Example: floatframe identify robot.toml measured.csv --cutoff 10 -o report.html
     """
     from floatframe.design.identification.estimation import estimate
-    from floatframe.design.identification.identify_report import identification_html, identification_record
+    from floatframe.design.identification.identify_report import identification_document, identification_record
     from floatframe.design.identification.measured_file import measured_coordinates, read_measured
     from floatframe.design.identification.next_motion import next_motion
     from floatframe.design.identification.physical import real_parameters
@@ -70,7 +70,7 @@ def identify_command(
     described = read_system(system)[0]
     inputs = tuple(path for path in (system, data, check) if path is not None)
     default = [] if json else [data.with_suffix(".html")]
-    paths = output_files(outputs, default, (".html", ".json"), ModelError, overwrite_of=inputs)
+    paths = output_files(outputs, default, (*DOCUMENTS, ".json"), ModelError, overwrite_of=inputs)
     motions = output_files([] if motion is None else [motion], [], TABLES, ModelError, overwrite_of=inputs)
     named = [term.strip() for term in terms.split(",") if term.strip() not in ("", "none")]
     with stages() as clock:
@@ -102,8 +102,7 @@ def identify_command(
         typer.echo(json_text(record), nl=False)
     else:
         print_estimate(record)
-    page = {".html": lambda _: identification_html(made, record, other).encode()}
-    write_outputs(paths, record=record, others=page, is_quiet=json)
+    write_outputs(paths, record=record, document=lambda: identification_document(made, record, other), is_quiet=json)
     if better is not None:
         write_outputs(motions, table=lambda: motion_table(better.motion, form), is_quiet=json)
     elif motions and not json:

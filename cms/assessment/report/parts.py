@@ -4,8 +4,9 @@ from cms.assessment.compare.comparison import Comparison
 from cms.assessment.quality.limits import LIMITS
 from cms.assessment.quality.record import QualityRecord
 from cms.assessment.report.formatting import share
-from cms.assessment.report.html import Cell, text
 from cms.assessment.report.palette import style_of
+from fe_models.foundation.documents.document import Cell, Paragraph
+from fe_models.foundation.documents.html import text
 
 __all__ = [
     "COLUMNS",
@@ -48,11 +49,9 @@ def verdict_cell(record: QualityRecord) -> Cell:
     return Cell(share(record.value) if record.verdict != "info" else "n/a", f"n {kind}")
 
 
-def swatch(k: int) -> str:
-    """Return the line style of a set as in the charts."""
-    style = style_of(k)
-    dash = {"solid": "solid", "dot": "dotted"}.get(style.dash, "dashed")
-    return f'<span class="swatch" style="border-color:{style.color};border-top-style:{dash}"></span>'
+def swatch(k: int) -> tuple[str, str]:
+    """Return the line of a set as in the charts: colour and dash."""
+    return style_of(k).color, style_of(k).dash
 
 
 def sentence_case(words: str) -> str:
@@ -90,7 +89,7 @@ GLYPHS = {
 }
 
 
-def nothing_to_show() -> str:
+def nothing_to_show() -> Paragraph:
     """Return the text shown if no set could be made."""
     words = "No set could be made, so there is nothing to show here; the reasons stand with the verdicts."
-    return f'<p class="notice">{words}</p>'
+    return Paragraph(words, "notice")

@@ -44,9 +44,9 @@ def encoded(values: np.ndarray) -> str:
     return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode()
 
 
-def still_pictures(comparison: Comparison, modes: int) -> list[tuple[str, str]]:
-    """Return the first modes as pictures, (title, PNG in base64); fewer if some cannot be drawn."""
-    pictures: list[tuple[str, str]] = []
+def still_pictures(comparison: Comparison, modes: int) -> list[tuple[str, bytes]]:
+    """Return the first modes as pictures, (title, PNG); fewer if some cannot be drawn."""
+    pictures: list[tuple[str, bytes]] = []
     with tempfile.TemporaryDirectory(prefix="report-") as folder:
         for k in range(min(modes, len(comparison.drawing.shapes))):
             title = f"mode {k + 1}, {comparison.full.frequencies_hz[k]:.5g} Hz"
@@ -56,7 +56,7 @@ def still_pictures(comparison: Comparison, modes: int) -> list[tuple[str, str]]:
             except RenderError as error:
                 log.warning("the report goes without still pictures: %s", error)
                 return pictures
-            pictures.append((title, base64.b64encode(path.read_bytes()).decode()))
+            pictures.append((title, path.read_bytes()))
     return pictures
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["CompareRequest", "parse_load", "parse_sets", "run_compare"]
 
 LOAD_KEYS = ("mass", "inertia", "stiffness", "rotational_stiffness")
-FILES = {"html": "comparison.html", "json": "comparison.json", "csv": "comparison.csv"}
+FILES = {kind: f"comparison.{kind}" for kind in ("html", "json", "csv", "pdf")}
 CACHE = "full_model.npz"
 #: headings of the deciding records in the table
 SHORT = {
@@ -242,16 +243,19 @@ def read_motion(path: Path, body: "FEBody") -> "Snapshots":
 
 
 def write_report(folder: Path, comparison: "Comparison", stills: int) -> list[Path]:
-    """Write HTML, JSON and CSV; return their paths."""
-    from cms.assessment.report import comparison_html, comparison_json, comparison_table
+    """Write HTML, JSON, CSV, and PDF if reportlab is there; return their paths."""
+    from cms.assessment.report import comparison_document, comparison_json, comparison_table
+    from fe_models.foundation.documents.write import document_content
     from fe_models.foundation.paths import replace_files
 
-    texts = {
-        "html": comparison_html(comparison, stills=stills),
-        "json": comparison_json(comparison),
+    document = comparison_document(comparison, stills=stills)
+    contents = {
+        folder / FILES["html"]: document_content(document, ".html"),
+        folder / FILES["json"]: comparison_json(comparison).encode(),
+        folder / FILES["csv"]: comparison_table(comparison).content(".csv"),
     }
-    contents = {folder / FILES[kind]: text.encode() for kind, text in texts.items()}
-    contents[folder / FILES["csv"]] = comparison_table(comparison).content(".csv")
+    if find_spec("reportlab") is not None:
+        contents[folder / FILES["pdf"]] = document_content(document, ".pdf")
     replace_files(contents)
     return list(contents)
 

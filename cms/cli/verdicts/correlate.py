@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from cms.cli.console import output_path, print_table, say, stages
+from cms.cli.outputs import DOCUMENTS, output_file
 
 if TYPE_CHECKING:
     from cms.assessment.correlation.correlate import Correlation
@@ -31,18 +32,16 @@ def run_correlate(request: CorrelateRequest) -> None:
     """Compare, update if the file has [update], print pairs and parameters, and write page and updated job."""
     from cms.assessment.correlation.errors import CorrelationError
     from cms.jobs.studies.correlation_file import read_correlation, run_correlation
-    from cms.jobs.studies.correlation_report import correlation_page
+    from cms.jobs.studies.correlation_report import correlation_document
+    from fe_models.foundation.documents.write import document_content
     from fe_models.foundation.paths import replace_files
 
     asked = read_correlation(request.file)
     inputs = [path for path in (request.file, asked.test.file, asked.model.job, asked.model.body) if path is not None]
     page = None
     if request.output is not None or not request.as_json:
-        page = output_path(
-            request.output, request.file.with_suffix(".html"), CorrelationError, overwrite_of=inputs, needs_file=True
-        )
-        if page.suffix.lower() != ".html":
-            raise CorrelationError(f"--output {page}: expected .html")
+        default = request.file.with_suffix(".html")
+        page = output_file(request.output, default, DOCUMENTS, CorrelationError, overwrite_of=inputs, needs_file=True)
     job = None
     if request.updated is not None:
         if asked.update is None or asked.model.job is None:
@@ -56,7 +55,7 @@ def run_correlate(request: CorrelateRequest) -> None:
         result = run_correlation(asked, clock)
     contents = {}
     if page is not None:
-        contents[page] = correlation_page(result).encode()
+        contents[page] = document_content(correlation_document(result), page.suffix)
     if job is not None and result.update is not None and asked.model.job is not None:
         contents[job] = updated_text(asked.model.job, result.update.parameters, result.update.values).encode()
     try:

@@ -1,9 +1,8 @@
-"""The document of an acceptance as sections of paragraphs, tables and pictures, before it becomes a page or a PDF."""
+"""The document of an acceptance."""
 
-import io
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,67 +17,23 @@ from cms.body.reduced_body import ReducedBody
 from cms.jobs.acceptance.acceptance import VERDICT_WORDS, Acceptance
 from cms.jobs.acceptance.origin import origin_groups
 from cms.jobs.acceptance.range_of_use import RangeOfUse
+from fe_models.foundation.documents.charts import Axis, Chart, Line
+from fe_models.foundation.documents.document import (
+    Answer,
+    Block,
+    Document,
+    Figure,
+    Paragraph,
+    Picture,
+    Section,
+    TextTable,
+)
 
-__all__ = ["Document", "Paragraph", "Part", "Picture", "Table", "body_picture", "document_of", "mass_picture"]
+__all__ = ["body_picture", "document_of", "mass_chart"]
 
 
 MOST_MODES = 40  #: rows of a table of modes; the JSON file has all
 SIGNATURES = ("prepared", "checked", "released")
-
-
-@dataclass(frozen=True)
-class Paragraph:
-    """A sentence or some."""
-
-    words: str
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table of text; a heading that ends in '>' is right-aligned; `verdict` is the column coloured by its text."""
-
-    headings: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    widths: tuple[float, ...]  #: shares of the width of the page
-    verdict: int | None = None
-    caption: str = ""
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A picture with its caption."""
-
-    png: bytes
-    caption: str
-    share: float = 1.0  #: of the width of the page
-
-
-Block = Paragraph | Table | Picture
-
-
-@dataclass(frozen=True)
-class Part:
-    """A numbered section."""
-
-    key: str
-    title: str
-    short: str  #: in the contents
-    blocks: tuple[Block, ...]
-
-
-@dataclass(frozen=True)
-class Document:
-    """What is printed."""
-
-    title: str
-    subtitle: str
-    verdict: str  #: "pass", "warn", "fail" or "info"
-    verdict_words: str
-    answer: str  #: the verdict in a sentence
-    figures: tuple[tuple[str, str], ...]  #: number and what it is
-    signatures: tuple[str, ...]
-    parts: tuple[Part, ...]
-    footer: str
 
 
 def document_of(acceptance: Acceptance) -> Document:
@@ -97,7 +52,7 @@ def document_of(acceptance: Acceptance) -> Document:
     answer = a.words + "."
     if worst_of:
         answer += f" To be looked at: {', '.join(record.title for record in worst_of)}."
-    parts = [
+    sections = [
         identity_part(a),
         origin_part(a),
         checks_part(a),
@@ -109,20 +64,23 @@ def document_of(acceptance: Acceptance) -> Document:
         mesh_part(a),
     ]
     footer = f"{a.file or a.body.name}{f', digest {a.digest}' if a.digest else ''}; made {a.made} by cms accept."
+    made_by = a.body.provenance.get("mode set") or a.body.provenance.get("source", "unknown mode set")
     return Document(
         f"Acceptance of the reduced body {a.body.name}",
-        f"units {u.name}; {a.body.provenance.get('mode set') or a.body.provenance.get('source', 'unknown mode set')}",
-        a.verdict,
-        VERDICT_WORDS[a.verdict],
-        answer,
-        tuple(figures),
+        f"units {u.name}; {made_by}",
+        Answer(answer, a.verdict, VERDICT_WORDS[a.verdict], tuple(figures)),
+        tuple(
+            replace(each, title=f"{k}. {each.title}", short=each.short or each.title)
+            for k, each in enumerate(sections, 1)
+        ),
+        a.body.name,
+        "acceptance",
         SIGNATURES,
-        tuple(parts),
         footer,
     )
 
 
-def identity_part(a: Acceptance) -> Part:
+def identity_part(a: Acceptance) -> Section:
     """What the body is."""
     body, u = body_record(a.body), a.body.units
     size, inertia = body_size(a.body), f"{u.mass_symbol} {u.length_symbol}²"
@@ -146,11 +104,11 @@ def identity_part(a: Acceptance) -> Part:
         ("stress of the modes", "yes" if body["stress"]["nodal"] or body["stress"]["points"] else "none"),
         ("kept nodes", f"{body['kept_nodes']}, {body['surface_triangles']} triangles of surface"),
     ]
-    blocks: list[Block] = [Table(("", ""), tuple(rows), (0.32, 0.68))]
+    blocks: list[Block] = [TextTable(("", ""), tuple(rows), (0.32, 0.68))]
     picture = body_picture(a.body)
     if picture is not None:
         blocks.insert(0, Picture(picture, "The body with its interfaces, undeformed.", 0.8))
-    return Part("identity", "What it is", "What it is", tuple(blocks))
+    return Section("identity", "What it is", tuple(blocks))
 
 
 def moments_words(a: Acceptance) -> str:
@@ -161,7 +119,7 @@ def moments_words(a: Acceptance) -> str:
     return "1C to 5C, exact integrals" if moments.is_exact else "1C to 5C, approximate (from matrices without elements)"
 
 
-def origin_part(a: Acceptance) -> Part:
+def origin_part(a: Acceptance) -> Section:
     """Where the body came from."""
     rows = [(source.path, source.digest, source.state) for source in a.sources]
     blocks: list[Block] = []
@@ -169,15 +127,15 @@ def origin_part(a: Acceptance) -> Part:
         blocks.append(Paragraph(f"Modal file {a.file}; digest of its contents {a.digest}."))
     if rows:
         caption = "Files the body was made from, as its file has them on record, and whether they are still the same."
-        blocks.append(Table(("file", "sha256", "today"), tuple(rows), (0.3, 0.52, 0.18), 2, caption))
+        blocks.append(TextTable(("file", "sha256", "today"), tuple(rows), (0.3, 0.52, 0.18), 2, caption))
     else:
         blocks.append(Paragraph("The file has no digest of a file that it was made from."))
     for title, words in origin_groups(a.body.provenance).items():
-        blocks.append(Table((title, ""), tuple(words.items()), (0.32, 0.68)))
-    return Part("origin", "Where it came from", "Origin", tuple(blocks))
+        blocks.append(TextTable((title, ""), tuple(words.items()), (0.32, 0.68)))
+    return Section("origin", "Where it came from", tuple(blocks), short="Origin")
 
 
-def checks_part(a: Acceptance) -> Part:
+def checks_part(a: Acceptance) -> Section:
     """Every check."""
     order = {"fail": 0, "warn": 1, "pass": 2, "info": 3}
     rows = tuple(
@@ -187,8 +145,8 @@ def checks_part(a: Acceptance) -> Part:
     against = f"Compared with {a.compared_with}." if a.compared_with else (
         "No full model was given: frequencies, statics and responses are not compared with anything."
     )  # fmt: skip
-    table = Table(("verdict", "check", "value>", "limit>", "found"), rows, (0.08, 0.24, 0.09, 0.08, 0.51), 0)
-    return Part("checks", "Checks", "Checks", (Paragraph(against), table))
+    table = TextTable(("verdict", "check", "value>", "limit>", "found"), rows, (0.08, 0.24, 0.09, 0.08, 0.51), 0)
+    return Section("checks", "Checks", (Paragraph(against), table))
 
 
 def reason_of(record: QualityRecord) -> str:
@@ -196,7 +154,7 @@ def reason_of(record: QualityRecord) -> str:
     return record.reason + (f". To do: {record.action}" if record.action else "")
 
 
-def modes_part(a: Acceptance) -> Part:
+def modes_part(a: Acceptance) -> Section:
     """Modes of the file, and the free frequencies compared with those of the full model."""
     modes = body_record(a.body)["modes"]
     rows = tuple(
@@ -210,7 +168,7 @@ def modes_part(a: Acceptance) -> Part:
     )
     caption = "Modes with the body frame held" + more_words(len(modes))
     blocks: list[Block] = [
-        Table(("mode>", "Hz>", "damping %>", "energy from"), rows, (0.08, 0.16, 0.14, 0.62), None, caption)
+        TextTable(("mode>", "Hz>", "damping %>", "energy from"), rows, (0.08, 0.16, 0.14, 0.62), None, caption)
     ]
     compared = next((record for record in a.records if record.name == "frequency-error" and record.data), None)
     if compared is not None:
@@ -223,9 +181,9 @@ def modes_part(a: Acceptance) -> Part:
         )  # fmt: skip
         caption = "Elastic frequencies of the free body, in the band that was compared" + more_words(len(full))
         blocks.append(
-            Table(("mode>", "full model Hz>", "reduced Hz>", "error %>"), free, (0.1, 0.3, 0.3, 0.3), None, caption)
+            TextTable(("mode>", "full model Hz>", "reduced Hz>", "error %>"), free, (0.1, 0.3, 0.3, 0.3), None, caption)
         )
-    return Part("modes", "Modes", "Modes", tuple(blocks))
+    return Section("modes", "Modes", tuple(blocks))
 
 
 def more_words(n: int) -> str:
@@ -233,7 +191,7 @@ def more_words(n: int) -> str:
     return "." if n <= MOST_MODES else f"; the first {MOST_MODES} of {n}, the JSON file has all."
 
 
-def interfaces_part(a: Acceptance) -> Part:
+def interfaces_part(a: Acceptance) -> Section:
     """Interfaces with the nodes they are made of."""
     size, length = body_size(a.body), a.body.units.length_symbol
     rows = []
@@ -242,18 +200,16 @@ def interfaces_part(a: Acceptance) -> Part:
         shown = ", ".join(nodes[:8]) + (", ..." if len(nodes) > 8 else "")
         rows.append((interface.name, interface.kind, vector(record["position_mesh"], size), str(len(nodes)), shown))
     if not rows:
-        return Part("interfaces", "Interfaces", "Interfaces", (Paragraph("The body has no interface."),))
+        return Section("interfaces", "Interfaces", (Paragraph("The body has no interface."),))
     headings = ("name", "kind", f"place in mesh coordinates [{length}]", "nodes>", "which")
-    return Part(
-        "interfaces", "Interfaces", "Interfaces", (Table(headings, tuple(rows), (0.17, 0.13, 0.3, 0.08, 0.32)),)
-    )
+    return Section("interfaces", "Interfaces", (TextTable(headings, tuple(rows), (0.17, 0.13, 0.3, 0.08, 0.32)),))
 
 
-def mass_part(a: Acceptance) -> Part:
+def mass_part(a: Acceptance) -> Section:
     """Effective masses with their sums."""
     if not a.masses:
         words = "No interface can be held and driven, so there is no effective mass."
-        return Part("mass", "Effective mass", "Effective mass", (Paragraph(words),))
+        return Section("mass", "Effective mass", (Paragraph(words),))
     blocks: list[Block] = [
         Paragraph(
             "Share of mass and inertia that each mode puts into motion while one interface is held and driven, axes of "
@@ -262,12 +218,12 @@ def mass_part(a: Acceptance) -> Part:
         )
     ]
     for found in a.masses:
-        blocks += [Picture(mass_picture(found), f"Sum of the effective mass, {found.at} held and driven.", 0.8)]
-        blocks += [mass_table(found)]
-    return Part("mass", "Effective mass", "Effective mass", tuple(blocks))
+        words = f"Sum of the effective mass, {found.at} held and driven."
+        blocks += [Figure(f"mass-{len(blocks)}", mass_chart(found), words), mass_table(found)]
+    return Section("mass", "Effective mass", tuple(blocks))
 
 
-def mass_table(found: EffectiveMass) -> Table:
+def mass_table(found: EffectiveMass) -> TextTable:
     """Return the shares and sums of one interface."""
     rows = [
         (str(k + 1), f"{found.frequencies[k]:.5g}",
@@ -277,10 +233,10 @@ def mass_table(found: EffectiveMass) -> Table:
     rows.append(("", "in no mode", *(f"{100 * rest:.1f}" for rest in found.remainder)))
     headings = ("mode>", "Hz>", *(f"{name} %>" for name in DIRECTIONS))
     caption = f"{found.at} held and driven" + more_words(len(found.frequencies))
-    return Table(headings, tuple(rows), (0.08, 0.16, *[0.76 / 6] * 6), None, caption)
+    return TextTable(headings, tuple(rows), (0.08, 0.16, *[0.76 / 6] * 6), None, caption)
 
 
-def range_part(a: Acceptance) -> Part:
+def range_part(a: Acceptance) -> Section:
     """What the body is good for."""
     r, u = a.range, a.body.units
     blocks: list[Block] = [Paragraph(f"Frequencies: up to {hertz(r.band.highest)} Hz ({r.band.words}).")]
@@ -311,8 +267,8 @@ def range_part(a: Acceptance) -> Part:
              "" if load.stiffened is None else magnitude(load.stiffened), f"{load.deflection:.3g}", load.governed_by)
             for load in loads
         )  # fmt: skip
-        blocks.append(Table(headings, rows, (0.18, 0.2, 0.14, 0.18, 0.13, 0.17)))
-    return Part("range", "What it is good for", "Range of use", tuple(blocks))
+        blocks.append(TextTable(headings, rows, (0.18, 0.2, 0.14, 0.18, 0.13, 0.17)))
+    return Section("range", "What it is good for", tuple(blocks), short="Range of use")
 
 
 def stiffened_words(r: RangeOfUse) -> str:
@@ -328,24 +284,24 @@ def magnitude(value: float) -> str:
     return f"{value:.3g}" if math.isfinite(value) else "any"
 
 
-def deck_part(a: Acceptance) -> Part:
+def deck_part(a: Acceptance) -> Section:
     """What the deck has and the model not."""
     if a.left_out is None:
         words = "There is no deck beside the body, so nothing can be said of what was left out of it."
-        return Part("deck", "Left out of the deck", "Left out", (Paragraph(words),))
+        return Section("deck", "Left out of the deck", (Paragraph(words),), short="Left out")
     if not a.left_out:
         words = "Every card of the deck is taken over."
-        return Part("deck", "Left out of the deck", "Left out", (Paragraph(words),))
+        return Section("deck", "Left out of the deck", (Paragraph(words),), short="Left out")
     rows = tuple(
         ("warn" if each.is_body else "info", each.name, str(each.count), each.consequence)
         for each in sorted(a.left_out, key=lambda each: not each.is_body)
     )
     words = "Cards that the full model does not take over; those marked carry mass or stiffness."
-    table = Table(("", "card", "count>", "consequence"), rows, (0.08, 0.24, 0.1, 0.58), 0)
-    return Part("deck", "Left out of the deck", "Left out", (Paragraph(words), table))
+    table = TextTable(("", "card", "count>", "consequence"), rows, (0.08, 0.24, 0.1, 0.58), 0)
+    return Section("deck", "Left out of the deck", (Paragraph(words), table), short="Left out")
 
 
-def mesh_part(a: Acceptance) -> Part:
+def mesh_part(a: Acceptance) -> Section:
     """What the mesh costs."""
     error = a.mesh_error
     blocks: list[Block] = [Paragraph(error.words[0].upper() + error.words[1:] + ".")]
@@ -356,8 +312,8 @@ def mesh_part(a: Acceptance) -> Part:
             for k, (f_1, f_2, e) in enumerate(zip(first, second, error.estimate.error, strict=True))
         )
         labels = [f"{n} dofs, Hz>" for n in error.estimate.n_dof]
-        blocks.append(Table(("mode>", *labels, "estimated error %>"), rows, (0.1, 0.3, 0.3, 0.3)))
-    return Part("mesh", "Error of the mesh", "Mesh", tuple(blocks))
+        blocks.append(TextTable(("mode>", *labels, "estimated error %>"), rows, (0.1, 0.3, 0.3, 0.3)))
+    return Section("mesh", "Error of the mesh", tuple(blocks), short="Mesh")
 
 
 def number(value: float | None) -> str:
@@ -380,7 +336,6 @@ def vector(values: Sequence[float] | Iterable[float], scale: float | None = None
 
 SIZE = (1280, 640)  #: of the picture of a body [px]
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#56B4E9", "#E69F00", "#CC79A7")
-DPI = 160
 
 
 def body_picture(body: ReducedBody) -> bytes | None:
@@ -404,25 +359,15 @@ def body_picture(body: ReducedBody) -> bytes | None:
     return png_of(lambda path: render_picture(scene, path), "the acceptance")
 
 
-def mass_picture(found: EffectiveMass) -> bytes:
-    """Draw the sum of effective mass over frequency, one line a direction (PNG)."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.6, 2.7), dpi=DPI, layout="constrained")
-    axes = figure.add_subplot()
+def mass_chart(found: EffectiveMass) -> Chart:
+    """Return the sum of effective mass over frequency, one line a direction."""
     frequencies, sums = np.asarray(found.frequencies), 100 * found.cumulative
     last = float(frequencies[-1]) * 1.05 if len(frequencies) else 1.0
-    for k, name in enumerate(DIRECTIONS):
-        if found.total[k] > 0:
-            x, y = np.concatenate([[0.0], frequencies, [last]]), np.concatenate([[0.0], sums[:, k], sums[-1:, k]])
-            style = "-" if k < 3 else "--"
-            axes.step(x, y, where="post", color=COLORS[k], label=name, linewidth=1.5, linestyle=style)
-    axes.set(xlabel="frequency with the interface held [Hz]", ylabel="sum of effective mass [%]", xlim=(0, last))
-    axes.set_ylim(0, 105)
-    axes.grid(color="#e3e7eb")
-    axes.legend(ncols=6, frameon=False, fontsize=8, loc="lower right")
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
-    target = io.BytesIO()
-    figure.savefig(target, format="png")
-    return target.getvalue()
+    x = np.concatenate([[0.0], frequencies, [last]])
+    lines = [
+        Line(x, np.concatenate([[0.0], sums[:, k], sums[-1:, k]]), name, COLORS[k], "solid" if k < 3 else "dash", 1.5,
+             is_step=True)
+        for k, name in enumerate(DIRECTIONS) if found.total[k] > 0
+    ]  # fmt: skip
+    across = Axis("frequency with the interface held [Hz]", range=(0.0, last))
+    return Chart(across, (Axis("sum of effective mass [%]", range=(0.0, 105.0)),), tuple(lines), 280)

@@ -1,4 +1,4 @@
-"""The report of a correlation as one HTML page that works offline."""
+"""The report of a correlation as a document."""
 
 from typing import Any
 
@@ -6,13 +6,21 @@ import numpy as np
 
 from cms.assessment.correlation.correlate import Correlation
 from cms.assessment.correlation.update import Update
-from cms.assessment.quality.record import plain
-from cms.assessment.report.charts import Chart, base_layout, dtick
 from cms.assessment.report.formatting import hertz, signed_percent
-from cms.assessment.report.html import Cell, Section, figure, page, table, text
 from cms.jobs.studies.correlation_file import CorrelationResult
+from fe_models.foundation.documents.charts import Axis, Chart, Matrix
+from fe_models.foundation.documents.document import (
+    Answer,
+    Cell,
+    Document,
+    Figure,
+    Gallery,
+    Paragraph,
+    Section,
+    TextTable,
+)
 
-__all__ = ["correlation_page"]
+__all__ = ["correlation_document"]
 
 GOOD_MAC, POOR_MAC = 0.9, 0.7  #: customary limits of the MAC
 GOOD_ERROR, POOR_ERROR = 0.02, 0.05
@@ -20,20 +28,19 @@ GOOD_CROSS = 0.1  #: customary limit of the largest off-diagonal entry of an ort
 MOST_POINTS = 20
 
 
-def correlation_page(result: CorrelationResult) -> str:
-    """Return the page."""
+def correlation_document(result: CorrelationResult) -> Document:
+    """Return the document."""
     last = result.correlation if result.update is None else result.update.after
     sections = [pairs_section(result), mac_section(result), orthogonality_section(last), points_section(last)]
     if result.update is not None:
         sections.insert(1, update_section(result.update))
     if result.damping:
         sections.append(damping_section(result))
-    header = (
-        f'<h1>Test and model of {text(last.model.name)}</h1><p class="facts">{text(facts(last))}</p>{answer(result)}'
+    footer = "Written by cms correlate. The same numbers stand in the JSON file where one was asked for."
+    name = last.model.name
+    return Document(
+        f"Test and model of {name}", facts(last), answer(result), sections, name, "test and model", footer=footer
     )
-    brand = f"{text(last.model.name)}<small>test and model</small>"
-    footer = text("Written by cms correlate. The same numbers stand in the JSON file where one was asked for.")
-    return page(f"{last.model.name}: test and model", brand, header, sections, {}, footer)
 
 
 def facts(c: Correlation) -> str:
@@ -46,12 +53,12 @@ def facts(c: Correlation) -> str:
     )
 
 
-def answer(result: CorrelationResult) -> str:
+def answer(result: CorrelationResult) -> Answer:
     """Return the main result in a sentence, with its numbers."""
     first = result.correlation
     last = first if result.update is None else result.update.after
     if not last.pairs:
-        words, kind = "No measured mode has a partner in the model.", " none"
+        words, verdict = "No measured mode has a partner in the model.", "fail"
     else:
         macs = [pair.mac for pair in last.pairs]
         error = float(np.abs(last.errors).max())
@@ -64,8 +71,8 @@ def answer(result: CorrelationResult) -> str:
             if not result.update.is_converged:
                 words += " The update did not converge."
         is_good = len(last.pairs) == last.measured.n_modes and error <= GOOD_ERROR and min(macs) >= GOOD_MAC
-        kind = "" if is_good else " doubtful"
-    return f'<section class="answer{kind}"><p>{text(words)}</p></section>'
+        verdict = "pass" if is_good else "warn"
+    return Answer(words, verdict)
 
 
 def graded(value: float, good: float, poor: float, words: str) -> Cell:
@@ -104,24 +111,12 @@ def pairs_section(result: CorrelationResult) -> Section:
     headings += ["error before>"] if result.update is not None else []
     lead = "Pairs by the greatest sum of MAC; errors are those of the model. Green, amber, red: within "
     lead += f"{100 * GOOD_ERROR:g} %, {100 * POOR_ERROR:g} %, beyond; MAC above {GOOD_MAC:g}, {POOR_MAC:g}, below."
-    return Section("pairs", "Pairs of modes", "Pairs", table(headings, rows), lead)
+    return Section("pairs", "Pairs of modes", (TextTable(headings, rows),), lead, "Pairs")
 
 
 def heat(values: Any, across: str, down: str) -> Chart:
     """Return a matrix from 0 to 1 as a chart."""
-    matrix = np.asarray(values)
-    trace: Chart = {
-        "type": "heatmap", "z": plain(matrix), "x": list(range(1, matrix.shape[1] + 1)),
-        "y": list(range(1, matrix.shape[0] + 1)), "zmin": 0, "zmax": 1,
-        "colorscale": [[0, "#f7fafc"], [0.5, "#6ea3cf"], [1, "#08306b"]], "showscale": False, "xgap": 1, "ygap": 1,
-        "hovertemplate": f"{down} %{{y}}<br>{across} %{{x}}<br>%{{z:.3f}}<extra></extra>",
-    }  # fmt: skip
-    layout = base_layout(across, down)
-    layout["xaxis"] |= {"tick0": 1, "dtick": dtick(matrix.shape[1]), "showgrid": False, "constrain": "domain"}
-    layout["yaxis"] |= {"autorange": "reversed", "tick0": 1, "dtick": dtick(matrix.shape[0]), "showgrid": False,
-                        "scaleanchor": "x", "constrain": "domain"}  # fmt: skip
-    layout |= {"height": 330, "showlegend": False}
-    return {"data": [trace], "layout": layout}
+    return Chart(Axis(across), (Axis(down),), (Matrix(np.asarray(values), down, across),), has_legend=False)
 
 
 def mac_section(result: CorrelationResult) -> Section:
@@ -130,33 +125,35 @@ def mac_section(result: CorrelationResult) -> Section:
     if result.update is not None:
         shown["mac-after"] = ("test and updated model", result.update.after.mac, "computed mode")
     shown["auto-mac"] = ("test with itself", result.correlation.auto_mac, "measured mode")
-    charts = {key: heat(values, across, "measured mode") for key, (_, values, across) in shown.items()}
-    body = "".join(figure(key, title) for key, (title, _, _) in shown.items())
+    figures = [
+        Figure(key, heat(values, across, "measured mode"), title) for key, (title, values, across) in shown.items()
+    ]
     lead = (
         "Dark is 1, the same shape. Dark off the diagonal of the test with itself: shapes that its points do not tell "
         "apart; add points before you trust a pair."
     )
-    return Section("mac-section", "MAC", "MAC", f'<div class="grid">{body}</div>', lead, charts)
+    return Section("mac-section", "MAC", (Gallery(figures),), lead)
 
 
 def orthogonality_section(c: Correlation) -> Section:
     """Return the section about orthogonality of the measured shapes in the mass of the model."""
     if c.orthogonality is None or c.cross_orthogonality is None:
-        words = f'<p class="notice">Not known: {text(c.why_not)}.</p>'
-        return Section("orthogonality", "Orthogonality", "Orthogonality", words)
+        return Section("orthogonality", "Orthogonality", (Paragraph(f"Not known: {c.why_not}.", "notice"),))
     own = np.abs(c.orthogonality)
     off = own - np.diag(np.diag(own))
     k, j = np.unravel_index(int(np.argmax(off)), off.shape) if off.size > 1 else (0, 0)
     words = "measured, of the pairs"
-    charts = {"own": heat(own, words, words),
-              "cross": heat(np.abs(c.cross_orthogonality), "computed, of the pairs", words)}  # fmt: skip
     verdict = "within" if off[k, j] <= GOOD_CROSS else "beyond"
     lead = (
         f"By the mass of the model at the measured rows. Largest coupling of two measured shapes {off[k, j]:.3f}, "
         f"modes {c.pairs[k].measured + 1} and {c.pairs[j].measured + 1}: {verdict} the custom of {GOOD_CROSS:g}."
     )
-    body = figure("own", "measured shapes with each other") + figure("cross", "measured shapes with their partners")
-    return Section("orthogonality", "Orthogonality", "Orthogonality", f'<div class="grid">{body}</div>', lead, charts)
+    partners = heat(np.abs(c.cross_orthogonality), "computed, of the pairs", words)
+    figures = [
+        Figure("own", heat(own, words, words), "measured shapes with each other"),
+        Figure("cross", partners, "measured shapes with their partners"),
+    ]
+    return Section("orthogonality", "Orthogonality", (Gallery(figures),), lead)
 
 
 def points_section(c: Correlation) -> Section:
@@ -164,12 +161,12 @@ def points_section(c: Correlation) -> Section:
     rows = [[Cell(str(point), "n"), Cell(node, "n"), graded(value, GOOD_MAC, POOR_MAC, f"{value:.3f}")]
             for point, node, value in c.point_comac()[:MOST_POINTS]]  # fmt: skip
     if not rows:
-        return Section("points", "Points", "Points", '<p class="notice">No modes are paired.</p>')
+        return Section("points", "Points", (Paragraph("No modes are paired.", "notice"),))
     lead = (
         "COMAC of each point over all pairs, the least of its directions, worst first: a sensor that is rotated, "
         "exchanged or wrongly scaled, or a place where the model is wrong."
     )
-    return Section("points", "Points", "Points", table(["point>", "node>", "COMAC>"], rows), lead)
+    return Section("points", "Points", (TextTable(["point>", "node>", "COMAC>"], rows),), lead)
 
 
 def update_section(update: Update) -> Section:
@@ -194,7 +191,7 @@ def update_section(update: Update) -> Section:
     )
     if pairs:
         lead += f" The test hardly tells apart: {'; '.join(pairs)}."
-    return Section("update", "Updated parameters", "Update", table(headings, rows), lead)
+    return Section("update", "Updated parameters", (TextTable(headings, rows),), lead, "Update")
 
 
 def damping_section(result: CorrelationResult) -> Section:
@@ -206,4 +203,4 @@ def damping_section(result: CorrelationResult) -> Section:
         rows.append([Cell(fit.kind, "name"), Cell(words, note=fit.table().replace("\n", "; ")),
                      Cell(f"{100 * fit.misfit:.2g} %", "n")])  # fmt: skip
     lead = "Least squares over the measured ratios; the misfit is their root mean square distance, of critical damping."
-    return Section("damping", "Damping", "Damping", table(["law", "constants", "misfit>"], rows), lead)
+    return Section("damping", "Damping", (TextTable(["law", "constants", "misfit>"], rows),), lead)

@@ -1,12 +1,13 @@
-"""An estimate as one HTML page that works offline, and as a record for JSON."""
+"""An estimate as a document, and as a record for JSON."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from cms.assessment.report.charts import base_layout, line
-from cms.assessment.report.html import Cell, Section, figure, page, table, text
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.documents.charts import INK, Axis, Chart, Limit, Line, thinned
+from fe_models.foundation.documents.document import Answer, Block, Cell, Document, Figure, Paragraph, Section, TextTable
 from floatframe.design.identification.base_parameters import base_parameters
 from floatframe.design.identification.estimation import Estimate, Measured
 from floatframe.design.identification.excitation import ExcitingMotion
@@ -15,7 +16,7 @@ from floatframe.design.identification.physical import RealParameters
 from floatframe.design.identification.regressors import LinearForm
 from floatframe.engine.tree.topology import tree_of
 
-__all__ = ["identification_html", "identification_record", "verdict_of"]
+__all__ = ["identification_document", "identification_record", "verdict_of"]
 
 SURE, DOUBTFUL = 0.05, 0.3  #: relative deviations up to which a parameter is well known, and from which it is not known
 UNREAL = (
@@ -27,7 +28,7 @@ NEARER = 0.7  #: share of its deviation that another motion leaves where it help
 MOST_NAMES = 8  #: combinations that a list names
 VERDICTS = {"well known": "pass", "roughly known": "", "not known": "fail", "zero within its deviation": "warn"}
 COLORS = {
-    "measured": "#1b1f24", "modelled": "#0072B2", "predicted": "#0072B2", "residual": "#CC79A7", "position": "#0072B2",
+    "measured": INK, "modelled": "#0072B2", "predicted": "#0072B2", "residual": "#CC79A7", "position": "#0072B2",
 }  # fmt: skip
 
 
@@ -157,9 +158,9 @@ def channel_units(made: Estimate) -> list[str]:
     return [force if name.endswith("force") or name.startswith("base F") else moment for name in channel_words(made)]
 
 
-def identification_html(made: Estimate, record: dict[str, Any], check: Measured | None) -> str:
-    """Return the page of an estimate whose record was made."""
-    sections = [parameter_section(record), fit_section(made, record), residual_section(made, record)]
+def identification_document(made: Estimate, record: dict[str, Any], check: Measured | None) -> Document:
+    """Return the document of an estimate whose record was made."""
+    sections = [parameter_section(record), fit_section(made, record), residual_section(made)]
     if check is not None:
         sections.append(validation_section(made, record, check))
     sections.append(unseen_section(record))
@@ -167,18 +168,14 @@ def identification_html(made: Estimate, record: dict[str, Any], check: Measured 
         sections.append(next_section(made, record))
     if record["real_bodies"] is not None:
         sections.append(real_section(made, record))
-    return page(
-        f"{record['system']}: identification",
-        f"{text(record['system'])}<small>identification</small>",
-        header(record),
-        sections,
-        {},
-        text("Written by floatframe identify."),
-    )
+    facts, answer = head(record)
+    title = f"{record['system']}: what the measurement tells"
+    footer = "Written by floatframe identify."
+    return Document(title, facts, answer, sections, record["system"], "identification", footer=footer)
 
 
-def header(record: dict[str, Any]) -> str:
-    """Return the title, the facts, and the answer."""
+def head(record: dict[str, Any]) -> tuple[str, Answer]:
+    """Return the facts, and the answer."""
     n = {words: sum(each["verdict"] == words for each in record["parameters"]) for words in VERDICTS}
     facts = [
         f"{record['n_base']} combinations of {record['n_parameters']} parameters from {record['source']} at "
@@ -196,11 +193,8 @@ def header(record: dict[str, Any]) -> str:
         answer += f" {len(off)} differ from the system file by more than {OFF:g} deviations."
     elif record["parameters"]:
         answer += f" None differs from the system file by more than {OFF:g} deviations."
-    warned = "".join(f"<p>{text(words)}</p>" for words in record["warnings"])
-    return (
-        f'<h1>{text(record["system"])}: what the measurement tells</h1><p class="facts">{text("; ".join(facts))}</p>'
-        f'<section class="answer{" none" if record["warnings"] else ""}"><p>{text(answer)}</p>{warned}</section>'
-    )
+    verdict = "fail" if record["warnings"] else "pass"
+    return "; ".join(facts), Answer(answer, verdict, notes=record["warnings"])
 
 
 def parameter_section(record: dict[str, Any]) -> Section:
@@ -222,9 +216,9 @@ def parameter_section(record: dict[str, Any]) -> Section:
     ]
     heads = ("combination", "value>", "deviation>", "unit", "", "in the system file>", "off it, deviations>")
     return Section(
-        "parameters", "What the motion tells", "Parameters", table(heads, rows),
+        "parameters", "What the motion tells", (TextTable(heads, rows),),
         "A combination is all that can be told, its parts are not. Deviations are standard deviations; three times as "
-        "much is nearly sure. The system file knows no drives.",
+        "much is nearly sure. The system file knows no drives.", "Parameters",
     )  # fmt: skip
 
 
@@ -253,36 +247,32 @@ def fit_section(made: Estimate, record: dict[str, Any]) -> Section:
         )
         for each in record["channels"]
     ]
-    drawn = figure("fit", "Measured (black) and modelled (blue).", height=160 * len(rows) + 60)
+    drawn = Figure("fit-chart", fit_chart(made), "Measured and modelled (blue).")
     heads = ("channel", "noise>", "unit", "misfit>", "neighbours correlate>")
     return Section(
-        "fit", "How well it fits", "Fit", drawn + table(heads, rows),
-        "Noise is the standard deviation of the residual, misfit its rms over that of what was measured.",
-        {"fit": fit_chart(made)},
+        "fit", "How well it fits", (drawn, TextTable(heads, rows)),
+        "Noise is the standard deviation of the residual, misfit its rms over that of what was measured.", "Fit",
     )  # fmt: skip
 
 
-def residual_section(made: Estimate, record: dict[str, Any]) -> Section:
+def residual_section(made: Estimate) -> Section:
     """What is left, in its own scale."""
-    drawn = figure(
-        "residuals", "Measured less modelled; grey: two standard deviations, where 95 % of noise lies.",
-        height=160 * len(record["channels"]) + 60,
-    )  # fmt: skip
+    words = "Measured less modelled; grey: two standard deviations, where 95 % of noise lies."
+    drawn = Figure("residuals-chart", residual_chart(made), words)
     return Section(
-        "residuals", "What is left", "Residuals", drawn,
+        "residuals", "What is left", (drawn,),
         "Noise has no shape. Waves, steps at reversals of a joint or drifts are something that the model lacks: "
-        "elasticity, friction of another kind, a wrong zero.",
-        {"residuals": residual_chart(made)},
+        "elasticity, friction of another kind, a wrong zero.", "Residuals",
     )  # fmt: skip
 
 
 def validation_section(made: Estimate, record: dict[str, Any], check: Measured) -> Section:
     """A motion that the estimate has not seen."""
     rows = [(Cell(name, "name"), Cell(f"{misfit:.2%}", "n")) for name, misfit in record["validation"].items()]
-    drawn = figure("check", "Measured (black) and predicted (blue).", height=160 * len(rows) + 60)
+    drawn = Figure("check", prediction_chart(made, check), "Measured and predicted (blue).")
     return Section(
-        "validation", "Another motion", "Validation", drawn + table(("channel", "misfit>"), rows),
-        "A motion that was not used for the estimate.", {"check": prediction_chart(made, check)},
+        "validation", "Another motion", (drawn, TextTable(("channel", "misfit>"), rows)),
+        "A motion that was not used for the estimate.", "Validation",
     )  # fmt: skip
 
 
@@ -298,11 +288,10 @@ def unseen_section(record: dict[str, Any]) -> Section:
         for source, each in record["told_by_other_sources"].items()
     ]
     heads = ("measured instead", "combinations>", "among them, in other combinations than here")
-    more = f"<p>{text('Other sensors tell other combinations:')}</p>{table(heads, rows)}" if rows else ""
-    return Section(
-        "unseen", "What no motion tells", "Unseen",
-        f"<p>{text('Parameters without any effect on what was measured: ' + words)}.</p>{more}", "",
-    )  # fmt: skip
+    blocks: list[Block] = [Paragraph(f"Parameters without any effect on what was measured: {words}.")]
+    if rows:
+        blocks += [Paragraph("Other sensors tell other combinations:"), TextTable(heads, rows)]
+    return Section("unseen", "What no motion tells", blocks, "", "Unseen")
 
 
 def next_section(made: Estimate, record: dict[str, Any]) -> Section:
@@ -323,25 +312,24 @@ def next_section(made: Estimate, record: dict[str, Any]) -> Section:
         for each in each_helped
     ]
     heads = ("combination", "deviation now>", "with this motion>", "unit", "then")
-    told = (
-        table(heads, rows)
-        if rows
-        else "<p>No combination that is doubtful now would be told much better: measure longer, with less noise, or "
-        "with larger accelerations.</p>"
+    nothing = (
+        "No combination that is doubtful now would be told much better: measure longer, with less noise, or with "
+        "larger accelerations."
     )
+    blocks: list[Block] = [TextTable(heads, rows) if rows else Paragraph(nothing)]
     worse = sum(each["deviation_of_next_motion"] > each["deviation"] / NEARER for each in record["parameters"])
     if worse:
-        told += (
-            f"<p>{text(f'It tells {worse} of the combinations less well than this one did: measure it besides')}.</p>"
-        )
+        told = f"It tells {worse} of the combinations less well than this one did: measure it besides."
+        blocks.append(Paragraph(told))
     n = record["next_motion"]
-    drawn = figure("next", "Positions of the coordinates over one period.", height=100 * len(n["coordinates"]) + 60)
+    chart = next_chart(n, [column.unit for column in made.base.form.columns])
+    blocks.append(Figure("next-chart", chart, "Positions of the coordinates over one period."))
     return Section(
-        "next", "Which motion would help", "Next motion", told + drawn,
+        "next", "Which motion would help", blocks,
         f"A Fourier series of {n['period']:.3g} {made.base.form.system.units.time_symbol} within the positions, rates "
         f"and accelerations of this measurement, chosen for its condition number ({n['condition']:.3g} against "
         f"{record['condition']:.3g}), with as many rows and the same noise. Write it with --motion FILE.csv.",
-        {"next": next_chart(n, [column.unit for column in made.base.form.columns])},
+        "Next motion",
     )  # fmt: skip
 
 
@@ -367,10 +355,10 @@ def real_section(made: Estimate, record: dict[str, Any]) -> Section:
         *(f"J_{ab}>" for ab in ("xx", "yy", "zz", "xy", "xz", "yz")),
     )  # fmt: skip
     return Section(
-        "real", "Bodies that could be built", "Bodies", table(heads, rows),
+        "real", "Bodies that could be built", (TextTable(heads, rows),),
         "Positive masses and inertias that fit the measurements (squared misfit "
         f"{record['real_bodies']['excess']:+.2%} over the best), near the system file where nothing was measured. "
-        f"J about the origin of the body, elements of the tensor [{second}].",
+        f"J about the origin of the body, elements of the tensor [{second}].", "Bodies",
     )  # fmt: skip
 
 
@@ -379,58 +367,46 @@ def plain_number(value: float, size: float) -> str:
     return "0" if abs(value) < 1e-9 * size else f"{value:.4g}"
 
 
-def fit_chart(made: Estimate) -> dict[str, Any]:
+def fit_chart(made: Estimate) -> Chart:
     """Return the channels over time, below each other."""
     _, y = made.measured.rows(made.base.form)
     return stacked(made, made.measured.times, {"measured": y, "modelled": y - made.residuals})
 
 
-def residual_chart(made: Estimate) -> dict[str, Any]:
+def residual_chart(made: Estimate) -> Chart:
     """Return the residuals over time, with the band of their noise."""
     chart = stacked(made, made.measured.times, {"residual": made.residuals})
-    chart["layout"]["shapes"] = [
-        {
-            "type": "rect", "xref": "paper", "x0": 0, "x1": 1, "yref": "y" if k == 0 else f"y{k + 1}",
-            "y0": -2 * sigma, "y1": 2 * sigma, "fillcolor": "#9aa5b1", "opacity": 0.18, "line": {"width": 0},
-        }
-        for k, sigma in enumerate(made.sigma.tolist())
-    ]  # fmt: skip
-    return chart
+    bands = tuple(Limit(2 * sigma, low=-2 * sigma, panel=k) for k, sigma in enumerate(made.sigma.tolist()))
+    return replace(chart, limits=bands)
 
 
-def prediction_chart(made: Estimate, check: Measured) -> dict[str, Any]:
+def prediction_chart(made: Estimate, check: Measured) -> Chart:
     """Return the channels of another motion."""
     _, y = check.rows(made.base.form)
     return stacked(made, check.times, {"measured": y, "predicted": made.predicted(check)})
 
 
-def next_chart(motion: dict[str, Any], units: list[str]) -> dict[str, Any]:
+def next_chart(motion: dict[str, Any], units: list[str]) -> Chart:
     """Return the positions of a motion over its period."""
     rows = np.array(list(motion["coordinates"].values()))
     t = np.linspace(0, motion["period"], 201)
     made = ExcitingMotion(tuple(motion["coordinates"]), motion["period"], rows, motion["condition"])
-    names = [f"{name}<br>[{unit}]" for name, unit in zip(motion["coordinates"], units, strict=True)]
-    return panels(t, {"position": made.at(t)[0]}, names)
+    names = [f"{name}\n[{unit}]" for name, unit in zip(motion["coordinates"], units, strict=True)]
+    return panels(t, {"position": made.at(t)[0]}, names, height=100)
 
 
-def stacked(made: Estimate, t: Array, curves: dict[str, Array]) -> dict[str, Any]:
+def stacked(made: Estimate, t: Array, curves: dict[str, Array]) -> Chart:
     """Return a chart with a panel for each channel."""
-    names = [f"{name}<br>[{unit}]" for name, unit in zip(channel_words(made), channel_units(made), strict=True)]
+    names = [f"{name}\n[{unit}]" for name, unit in zip(channel_words(made), channel_units(made), strict=True)]
     return panels(t, curves, names)
 
 
-def panels(t: Array, curves: dict[str, Array], names: list[str]) -> dict[str, Any]:
+def panels(t: Array, curves: dict[str, Array], names: list[str], height: int = 160) -> Chart:
     """Return a chart with a panel for each name, below each other; curves: (n_t, n) by what they are."""
-    traces, layout, n = [], base_layout("time [s]", ""), len(names)
-    for k, name in enumerate(names):
-        for label, values in curves.items():
-            trace = line(t, values[:, k], label, COLORS[label], width=1.3, hover="%{y:.4g}")
-            trace |= {"yaxis": "y" if k == 0 else f"y{k + 1}", "showlegend": k == 0 and len(curves) > 1}
-            traces.append(trace)
-        axis = dict(base_layout("", "")["yaxis"])
-        axis |= {"domain": [1 - (k + 0.88) / n, 1 - k / n], "title": {"text": name, "font": {"size": 10}}}
-        layout["yaxis" if k == 0 else f"yaxis{k + 1}"] = axis
-    layout["xaxis"] |= {"anchor": f"y{n}" if n > 1 else "y"}
-    layout.pop("height")
-    layout["autosize"] = True
-    return {"data": traces, "layout": layout}
+    lines = [
+        thinned(Line(t, values[:, k], label, COLORS[label], width=1.3, panel=k))
+        for k in range(len(names))
+        for label, values in curves.items()
+    ]
+    axes = tuple(Axis(name) for name in names)
+    return Chart(Axis("time [s]"), axes, tuple(lines), height * len(names) + 60, has_legend=len(curves) > 1)

@@ -1,16 +1,15 @@
-"""The fatigue report as one HTML page that works offline: first the life, then the data it is based on."""
+"""The fatigue report as a document: first the life, then the data it is based on."""
 
-import base64
 from collections.abc import Sequence
 from itertools import cycle
 from typing import Any
 
 import numpy as np
 
-from cms.assessment.report.charts import base_layout
-from cms.assessment.report.html import Cell, Section, figure, page, table, text
 from cms.assessment.report.png import png_of
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.documents.charts import INK, Axis, Chart, Line
+from fe_models.foundation.documents.document import Answer, Cell, Document, Figure, Picture, Section, TextTable
 from floatframe.durability.fatigue.assessment import Assessment
 from floatframe.durability.fatigue.criteria import CRITERIA
 from floatframe.durability.fatigue.kernels.cycle_kernels import collect, cycle_rule, equivalent_amplitude
@@ -20,7 +19,7 @@ from floatframe.durability.fatigue.places import Places, frames_of_places, stres
 from floatframe.durability.fatigue.surface_damage import FatigueResult
 from floatframe.errors import FatigueError
 
-__all__ = ["cycles_at", "exceedances", "fatigue_html"]
+__all__ = ["cycles_at", "exceedances", "fatigue_document"]
 
 
 # the cycles at one place: the load spectrum next to the S-N curve
@@ -80,25 +79,27 @@ def exceedances(cycles: Array, n_points: int = 200) -> tuple[Array, Array]:
 
 
 MOST_CYCLES = 1e10  #: largest number of cycles in the plot of S-N curves
-COLORS = ("#1b1f24", "#0072B2", "#009E73", "#CC79A7", "#56B4E9")  #: colours of the S-N curves of materials
+COLORS = (INK, "#0072B2", "#009E73", "#CC79A7", "#56B4E9")  #: colours of the S-N curves of materials
 
 
-def fatigue_html(made: Assessment) -> str:
-    """Return the page."""
+def fatigue_document(made: Assessment) -> Document:
+    """Return the document."""
     record = fatigue_record(made)
     sections = [picture_section(made), worst_section(record), curve_section(made, record), method_section(record)]
-    return page(
-        f"{record['body']}: fatigue",
-        f"{text(record['body'])}<small>fatigue</small>",
-        header(record),
+    facts, answer = head(record)
+    return Document(
+        f"How long does {record['body']} last?",
+        facts,
+        answer,
         [section for section in sections if section is not None],
-        {},
-        text("Written by floatframe fatigue. The same numbers stand in the JSON and CSV files beside this page."),
+        record["body"],
+        "fatigue",
+        footer="Written by floatframe fatigue. The same numbers stand in the JSON and CSV files beside this page.",
     )
 
 
-def header(record: dict[str, Any]) -> str:
-    """Return the title, the summary data, and the result in one sentence."""
+def head(record: dict[str, Any]) -> tuple[str, Answer]:
+    """Return the summary data, and the result in one sentence."""
     worst = record["worst"][0] if record["worst"] else None
     unit, target = record["life_unit"], record["programme"]["target"]
     n_points = record["n_points"]
@@ -109,26 +110,21 @@ def header(record: dict[str, Any]) -> str:
         f"stress: {record['mean_stress']}; {record['method']}"
     )
     if worst is None or worst["life"] is None:
-        answer, kind = "No damage: no cycle reaches the S-N curve.", ""
+        answer, verdict = "No damage: no cycle reaches the S-N curve.", "pass"
     else:
         answer = f"The worst place, {worst['place']}, lasts {worst['life']:.4g} {unit}: "
         answer += f"damage {worst['damage']:.3g} a programme."
-        kind = " none" if target is not None and worst["life"] < target else ""
+        verdict = "fail" if target is not None and worst["life"] < target else "pass"
         if target is not None:
-            answer += f" The aim of {target:.4g} {unit} is {'missed' if kind else 'reached'}."
-    figures = ""
+            answer += f" The aim of {target:.4g} {unit} is {'missed' if verdict == 'fail' else 'reached'}."
+    figures: list[tuple[str, str]] = []
     if worst is not None:
-        values = [
+        figures = [
             (f"{worst['damage']:.3g}", "damage of a programme"),
             ("no end" if worst["life"] is None else f"{worst['life']:.4g}", f"life [{unit}]"),
             (f"{worst['largest_amplitude']:.4g}", f"largest amplitude [{record['stress_unit']}]"),
         ]
-        shown = "".join(f"<div><b>{text(value)}</b>{text(words)}</div>" for value, words in values)
-        figures = f'<div class="figures">{shown}</div>'
-    return (
-        f'<h1>How long does {text(record["body"])} last?</h1><p class="facts">{text(facts)}</p>'
-        f'<section class="answer{kind}"><p>{text(answer)}</p>{figures}</section>'
-    )
+    return facts, Answer(answer, verdict, figures=figures)
 
 
 def picture_section(made: Assessment) -> Section | None:
@@ -136,13 +132,11 @@ def picture_section(made: Assessment) -> Section | None:
     drawn = png_of(lambda path: render_fatigue(made, path), "the page")
     if drawn is None:
         return None
-    png = base64.b64encode(drawn).decode()
-    picture = f'<img src="data:image/png;base64,{png}" alt="damage on the surface" style="width:100%">'
-    return Section(
-        "surface", "Where it fails", "Surface", picture,
+    words = (
         "Damage on the surface, in powers of ten; numbers are ranks of the table below. Nodes that were left out lie "
-        "below the scale; a stress point is shown at the node nearest to it, the worst of several.",
-    )  # fmt: skip
+        "below the scale; a stress point is shown at the node nearest to it, the worst of several."
+    )
+    return Section("surface", "Where it fails", (Picture(drawn),), words, "Surface")
 
 
 def worst_section(record: dict[str, Any]) -> Section:
@@ -166,39 +160,28 @@ def worst_section(record: dict[str, Any]) -> Section:
         cells += [Cell(f"{share:.0%}", "n") for share in shares] if len(names) > 1 else []
         rows.append(cells)
     lead = "The worst nodes" + (", with the share of each block in their damage." if len(names) > 1 else ".")
-    return Section("worst", "Worst nodes", "Worst nodes", table(headings, rows), lead)
+    return Section("worst", "Worst nodes", (TextTable(headings, rows),), lead)
 
 
 def curve_section(made: Assessment, record: dict[str, Any]) -> Section:
     """Return the section with the S-N curves and the load spectrum of the worst place."""
     unit = record["stress_unit"]
-    traces: list[dict[str, Any]] = []
+    lines = []
     for material, color in zip(made.result.materials, cycle(COLORS), strict=False):
         curve = material.curve
         low = curve.fatigue_limit or 0.2 * float(curve.bottom[curve.bottom > 0].min(initial=curve.amplitude.min()))
         S = np.geomspace(curve.greatest, low, 240)
         S = S[curve.life(S) <= MOST_CYCLES]
-        traces.append(
-            {"type": "scatter", "mode": "lines", "name": f"S-N curve {material.name}".strip(),
-             "x": list(map(float, curve.life(S))), "y": list(map(float, S)), "line": {"color": color, "width": 2}}
-        )  # fmt: skip
+        lines.append(Line(curve.life(S), S, f"S-N curve {material.name}".strip(), color))
     words = "S-N curves as they were used, with their factors, in units of the body."
     if made.blocks and not made.result.criterion.is_shear and record["worst"]:
         cycles = cycles_at(made.result, made.blocks, int(made.result.worst()[0]))
-        count, amplitude = exceedances(cycles)
-        traces.append(
-            {"type": "scatter", "mode": "lines",
-             "name": f"{record['worst'][0]['place']}: cycles of at least this amplitude",
-             "x": list(map(float, count)), "y": list(map(float, amplitude)), "line": {"color": "#D55E00", "width": 2}}
-        )  # fmt: skip
+        name = f"{record['worst'][0]['place']}: cycles of at least this amplitude"
+        lines.append(Line(*exceedances(cycles), name, "#D55E00"))
         words += " Beside it the equivalent amplitudes of the worst place in one programme, mean stress included."
-    layout = base_layout("cycles", f"stress amplitude [{unit}]")
-    layout["xaxis"] |= {"type": "log", "exponentformat": "power", "dtick": 1}
-    layout["yaxis"] |= {"type": "log"}
-    return Section(
-        "curve", "S-N curve and load spectrum", "S-N curve", figure("sn", words, height=380), "",
-        {"sn": {"data": traces, "layout": {**layout, "height": 380}}},
-    )  # fmt: skip
+    upwards = Axis(f"stress amplitude [{unit}]", is_log=True)
+    chart = Chart(Axis("cycles", is_log=True), (upwards,), tuple(lines), 380)
+    return Section("curve", "S-N curve and load spectrum", (Figure("sn", chart, words),), "", "S-N curve")
 
 
 def method_section(record: dict[str, Any]) -> Section:
@@ -218,7 +201,7 @@ def method_section(record: dict[str, Any]) -> Section:
         *(("note", note) for note in record["notes"]),
     ]  # fmt: skip
     cells = [[Cell(name, "name"), Cell(words)] for name, words in rows]
-    return Section("method", "What it rests on", "Method", table(["", ""], cells))
+    return Section("method", "What it rests on", (TextTable(["", ""], cells),), "", "Method")
 
 
 def curve_words(material: dict[str, Any], unit: str) -> str:

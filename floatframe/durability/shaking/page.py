@@ -1,11 +1,22 @@
-"""A shake result as one HTML page that works offline: first the main results, then each test with its curves."""
+"""A shake result as a document: first the main results, then each test with its curves."""
 
 import math
 
 import numpy as np
 
-from cms.assessment.report.charts import Chart
-from cms.assessment.report.html import Cell, Section, figure, page, table, text
+from fe_models.foundation.documents.document import (
+    Answer,
+    Block,
+    Cell,
+    Document,
+    Figure,
+    Gallery,
+    Heading,
+    Paragraph,
+    Section,
+    Terms,
+    TextTable,
+)
 from floatframe.durability.shaking.loads.notching import NotchedRun
 from floatframe.durability.shaking.loads.random_vibration import RandomRun
 from floatframe.durability.shaking.loads.shock import TimeRun
@@ -21,28 +32,23 @@ from floatframe.durability.shaking.page_charts import (
 from floatframe.durability.shaking.record import conversions, in_tables, level_scale, reported_rows, worst_nodes
 from floatframe.durability.shaking.shake import ShakeResult
 
-__all__ = ["shake_html"]
+__all__ = ["shake_document"]
 
 KINDS = ("acceleration", "displacement", "force", "moment", "stress", "von Mises")  #: kinds of outputs with charts
 MOST_MODES = 40  #: largest number of modes in the table of effective masses
 
 
-def shake_html(result: ShakeResult) -> str:
-    """Return the page."""
+def shake_document(result: ShakeResult) -> Document:
+    """Return the document."""
     title = result.job.title or f"{result.model.name} on its base"
     sections = [summary_section(result), mass_section(result)]
     sections += [sine_section(result, run, k) for k, run in enumerate(result.sine)]
     sections += [random_section(result, run, k) for k, run in enumerate(result.random)]
     sections += [time_section(result, run, k) for k, run in enumerate(result.time)]
     sections.append(method_section(result))
-    return page(
-        f"{title}: shaken",
-        f"{text(result.model.name)}<small>base shaking</small>",
-        header(result, title),
-        sections,
-        {},
-        text("Written by floatframe shake. The same numbers stand in the JSON and CSV files beside this page."),
-    )
+    facts, answer = head(result)
+    footer = "Written by floatframe shake. The same numbers stand in the JSON and CSV files beside this page."
+    return Document(title, facts, answer, sections, result.model.name, "base shaking", footer=footer)
 
 
 def number(value: float | None, digits: int = 4) -> str:
@@ -50,8 +56,8 @@ def number(value: float | None, digits: int = 4) -> str:
     return "" if value is None or not math.isfinite(value) else f"{value:.{digits}g}"
 
 
-def header(result: ShakeResult, title: str) -> str:
-    """Return the title, the summary data and the result in one sentence."""
+def head(result: ShakeResult) -> tuple[str, Answer]:
+    """Return the summary data, and the result in one sentence."""
     model, masses = result.model, result.masses
     held = "; ".join(f"{base.name} ({', '.join(base.holds) or 'ground'})" for base in model.bases)
     facts = (
@@ -73,11 +79,7 @@ def header(result: ShakeResult, title: str) -> str:
     depth = max((notch.depth for run in result.notched.values() for notch in run.notches), default=None)
     if depth is not None:
         figures.append((f"{depth:.1f} dB", "deepest notch"))
-    boxes = "".join(f"<div><b>{text(value)}</b>{text(words)}</div>" for value, words in figures)
-    return (
-        f"<h1>{text(title)}</h1><p class='facts'>{text(facts)}</p>"
-        f'<section class="answer"><p>{text(sentence(result))}</p><div class="figures">{boxes}</div></section>'
-    )
+    return facts, Answer(sentence(result), figures=figures)
 
 
 def sentence(result: ShakeResult) -> str:
@@ -120,13 +122,13 @@ def summary_section(result: ShakeResult) -> Section:
                     Cell(what),
                 ]
             )
-    notes = "".join(f'<p class="notice">{text(note)}</p>' for note in result.notes)
+    notes = [Paragraph(note, "notice") for note in result.notes]
     return Section(
         "summary",
         "What is largest",
-        "Summary",
-        table(["run", "output", "value>", "with uncertainty>", "unit", "what it is"], rows) + notes,
+        (TextTable(["run", "output", "value>", "with uncertainty>", "unit", "what it is"], rows), *notes),
         "The largest output of each kind in every run, before notching.",
+        "Summary",
     )
 
 
@@ -168,53 +170,42 @@ def mass_section(result: ShakeResult) -> Section:
     totals = [Cell(""), Cell("total", "name"), Cell("")] + [Cell(number(float(v)), "n") for v in masses.total]
     rows.append(totals)
     more = len(masses.frequencies) - MOST_MODES
-    after = f"<p>{more} more modes stand in the JSON file.</p>" if more > 0 else ""
-    chart = figure(
+    after = [Paragraph(f"{more} more modes stand in the JSON file.")] if more > 0 else []
+    chart = Figure(
         "masses",
-        "Effective mass of all modes up to a frequency, over that of the rigid structure; what is missing at the "
-        "end rides "
-        "on the base or vibrates above the last mode.",
-        title="Cumulative effective mass",
-        height=340,
+        mass_chart(masses),
+        "Effective mass of all modes up to a frequency, over that of the rigid structure; what is missing at the end "
+        "rides on the base or vibrates above the last mode.",
+        "Cumulative effective mass",
     )
     unit = f"{result.model.units.mass_symbol}, {result.model.units.mass_symbol} {result.model.units.length_symbol}²"
     return Section(
         "masses-section",
         "Modes with the base held",
-        "Effective masses",
-        chart + table(["mode>", "Hz>", "damping>", *(f"{name} [%]>" for name in names)], rows) + after,
+        (chart, TextTable(["mode>", "Hz>", "damping>", *(f"{name} [%]>" for name in names)], rows), *after),
         "Share of mass and inertia that each mode moves against the base, and its cumulative sum; totals in "
-        f"{unit}, about the point of "
-        "the base.",
-        {"masses": mass_chart(masses)},
+        f"{unit}, about the point of the base.",
+        "Effective masses",
     )
 
 
-def kind_charts(result: ShakeResult, run, peaks, key: str, chart) -> tuple[str, dict[str, Chart]]:
+def kind_charts(result: ShakeResult, run, peaks, key: str, chart) -> Gallery:
     """Return one figure for each kind of output that a run has."""
-    charts, figures = {}, []
+    figures = []
     for kind in KINDS:
         if not any(run.outputs[k].kind == kind for k in reported_rows(run.outputs, peaks)):
             continue
         if kind == "stress" and any(o.kind == "von Mises" for o in run.outputs):
             continue
-        name = f"{key}-{kind.replace(' ', '-')}"
-        charts[name] = chart(result.model, run, kind)
-        figures.append(
-            figure(
-                name,
-                "The largest outputs of this kind; all are in the table.",
-                title=kind[:1].upper() + kind[1:],
-                height=400,
-            )
-        )
-    return f'<div class="grid">{"".join(figures)}</div>', charts
+        name, words = f"{key}-{kind.replace(' ', '-')}", "The largest outputs of this kind; all are in the table."
+        figures.append(Figure(name, chart(result.model, run, kind), words, kind[:1].upper() + kind[1:]))
+    return Gallery(figures)
 
 
 def sine_section(result: ShakeResult, run: SineRun, number_: int) -> Section:
     """Return the section of a sine run."""
     key = f"sine-{number_}"
-    body, charts = kind_charts(result, run, run.peaks, key, sine_chart)
+    drawn = kind_charts(result, run, run.peaks, key, sine_chart)
     notched = result.notched.get(("sine", run.test, run.direction))
     static, swept = run.static.max(axis=0), run.swept_peaks
     headings = ["output", "amplitude>", "at Hz>", "amplification>", "quasi-static>", "with uncertainty>"]
@@ -247,21 +238,19 @@ def sine_section(result: ShakeResult, run: SineRun, number_: int) -> Section:
     return Section(
         key,
         f"Sine {run.test}, {run.direction}",
-        f"Sine {run.test} {run.direction.partition(':')[2]}",
-        notch_part(result, "sine", notched, key, charts) + body + table(headings, rows),
+        (*notch_part(result, "sine", notched, key), drawn, TextTable(headings, rows)),
         f"{words}. Amplitudes, 0 to peak.",
-        charts,
+        f"Sine {run.test} {run.direction.partition(':')[2]}",
     )
 
 
-def notch_part(result: ShakeResult, kind: str, notched: NotchedRun | None, key: str, charts: dict[str, Chart]) -> str:
+def notch_part(result: ShakeResult, kind: str, notched: NotchedRun | None, key: str) -> list[Block]:
     """Return the notches of a run: a chart, and a table with the cause of each."""
     if notched is None:
-        return ""
+        return []
     if not notched.notches:
-        return "<p>No limit is reached: the input is not notched.</p>"
-    name = f"{key}-notch"
-    charts[name] = notch_chart(result.model, kind, notched)
+        return [Paragraph("No limit is reached: the input is not notched.")]
+    drawn = notch_chart(result.model, kind, notched)
     rows = [
         [
             Cell(f"{n.first:.5g} to {n.last:.5g}", "name"),
@@ -273,21 +262,21 @@ def notch_part(result: ShakeResult, kind: str, notched: NotchedRun | None, key: 
         ]
         for n in notched.notches
     ]
-    after = ""
+    squared = ", squared per Hz" if kind == "random" else ""
+    blocks: list[Block] = [
+        Figure(f"{key}-notch", drawn, "Input as specified and as notched.", "Notched input"),
+        TextTable(["Hz", "deepest at>", "depth [dB]>", "reason", "limit>", "without the notch>"], rows),
+        Paragraph(f"limit and value in units of the model{squared}", "why"),
+    ]
     if notched.input_rms is not None:
-        after = f"<p>The notched input has {notched.input_rms / result.model.gravity:.4g} g rms.</p>"
-    return (
-        figure(name, "Input as specified and as notched.", title="Notched input", height=340)
-        + table(["Hz", "deepest at>", "depth [dB]>", "reason", "limit>", "without the notch>"], rows)
-        + f"<p class='why'>limit and value in units of the model{', squared per Hz' if kind == 'random' else ''}</p>"
-        + after
-    )
+        blocks.append(Paragraph(f"The notched input has {notched.input_rms / result.model.gravity:.4g} g rms."))
+    return blocks
 
 
 def random_section(result: ShakeResult, run: RandomRun, number_: int) -> Section:
     """Return the section of a random run."""
     key = f"random-{number_}"
-    body, charts = kind_charts(result, run, run.rms, key, density_chart)
+    drawn = kind_charts(result, run, run.rms, key, density_chart)
     notched = result.notched.get(("random", run.test, run.direction))
     headings = ["output", "rms>", "3 sigma>", "crossings [1/s]>"] + ["largest expected>"] * (run.expected is not None)
     headings += ["rms with uncertainty>"] + ["rms notched>"] * (notched is not None) + ["unit"]
@@ -316,28 +305,27 @@ def random_section(result: ShakeResult, run: RandomRun, number_: int) -> Section
         for name, value in zip(run.inputs, run.input_rms, strict=True)
     )
     parts = [
-        notch_part(result, "random", notched, key, charts),
-        body,
-        table(headings, rows),
-        miles_part(result, run),
-        worst_part(result, run),
+        *notch_part(result, "random", notched, key),
+        drawn,
+        TextTable(headings, rows),
+        *miles_part(result, run),
+        *worst_part(result, run),
     ]
     return Section(
         key,
         f"Random {run.test}, {run.direction}",
-        f"Random {run.test} {run.direction.partition(':')[2]}",
-        "".join(parts),
+        parts,
         f"Input {given}. Integrals over {len(run.band.frequencies)} frequencies; two nested rules differ by "
         f"{run.error.max():.1e} of an rms at most.",
-        charts,
+        f"Random {run.test} {run.direction.partition(':')[2]}",
     )
 
 
-def miles_part(result: ShakeResult, run: RandomRun) -> str:
+def miles_part(result: ShakeResult, run: RandomRun) -> list[Block]:
     """Return a table of Miles' estimates for the main modes and the computed mean acceleration."""
     main = sorted([m for m in run.miles if m.share > 0.01], key=lambda m: -m.share)[:5]
     if not main:
-        return ""
+        return []
     direction = run.direction.partition(":")[2]
     k = [o.name for o in run.outputs].index(f"mean acceleration {direction}")
     rms = run.rms[k] / result.model.gravity
@@ -358,37 +346,34 @@ def miles_part(result: ShakeResult, run: RandomRun) -> str:
         f"Computed mean acceleration (net base force over mass): {rms:.4g} g rms. Miles takes one mode for the whole "
         "mass and its density for all frequencies."
     )
-    return (
-        "<h3>Miles' equation</h3>"
-        + table([*headings, "over the computed mean acceleration>"], rows)
-        + f"<p class='why'>{text(words)}</p>"
-    )
+    return [
+        Heading("Miles' equation"),
+        TextTable([*headings, "over the computed mean acceleration>"], rows),
+        Paragraph(words, "why"),
+    ]
 
 
-def worst_part(result: ShakeResult, run: RandomRun) -> str:
+def worst_part(result: ShakeResult, run: RandomRun) -> list[Block]:
     """Return the nodes with the largest von Mises stress."""
     worst = worst_nodes(result.model, run)
     if not worst:
-        return ""
+        return []
     unit = result.model.units.stress_symbol
     rows = [[Cell(name, "name"), Cell(number(value), "n"), Cell(number(3 * value), "n")] for name, value in worst[:10]]
-    return f"<h3>Largest von Mises stress of all {len(result.model.field_labels)} kept nodes</h3>" + table(
-        ["node", f"rms [{unit}]>", f"3 rms [{unit}]>"], rows
-    )
+    return [
+        Heading(f"Largest von Mises stress of all {len(result.model.field_labels)} kept nodes"),
+        TextTable(["node", f"rms [{unit}]>", f"3 rms [{unit}]>"], rows),
+    ]
 
 
 def time_section(result: ShakeResult, run: TimeRun, number_: int) -> Section:
     """Return the section of a shock or transient."""
     key = f"time-{number_}"
-    body, charts = kind_charts(result, run, run.peaks, key, history_chart)
+    drawn = kind_charts(result, run, run.peaks, key, history_chart)
+    blocks: list[Block] = [drawn]
     if run.spectra:
-        charts[f"{key}-spectra"] = spectra_chart(result.model, run)
-        body += figure(
-            f"{key}-spectra",
-            "Largest answer of single masses to the accelerations, during and after them.",
-            title="Shock response spectra",
-            height=400,
-        )
+        words = "Largest answer of single masses to the accelerations, during and after them."
+        blocks.append(Figure(f"{key}-spectra", spectra_chart(result.model, run), words, "Shock response spectra"))
     rows = []
     for k in reported_rows(run.outputs, run.peaks):
         s, unit = in_tables(result.model, run.outputs[k])
@@ -414,10 +399,9 @@ def time_section(result: ShakeResult, run: TimeRun, number_: int) -> Section:
     return Section(
         key,
         f"{run.kind.capitalize()} {run.test}, {run.direction}",
-        f"{run.kind.capitalize()} {run.test} {run.direction.partition(':')[2]}",
-        body + table(["output", "largest>", "at ms>", "with uncertainty>", "unit"], rows),
+        (*blocks, TextTable(["output", "largest>", "at ms>", "with uncertainty>", "unit"], rows)),
         f"{run.words[:1].upper()}{run.words[1:]}. {left}.{made}",
-        charts,
+        f"{run.kind.capitalize()} {run.test} {run.direction.partition(':')[2]}",
     )
 
 
@@ -446,11 +430,5 @@ def method_section(result: ShakeResult) -> Section:
             "that allows least",
         ),
     ]
-    body = "".join(f"<dt>{text(term)}</dt><dd>{text(words)}</dd>" for term, words in terms)
-    return Section(
-        "method",
-        "What the numbers are",
-        "Method",
-        f'<dl class="terms">{body}</dl>',
-        "Formulas and conventions are in docs/shake.md.",
-    )
+    lead = "Formulas and conventions are in docs/shake.md."
+    return Section("method", "What the numbers are", (Terms(terms),), lead, "Method")

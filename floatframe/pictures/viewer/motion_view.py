@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from cms.assessment.report.html import asset as report_asset
-from cms.assessment.report.html import text
 from cms.body.modal_file.file import digest
 from cms.body.reduced_body import ReducedBody
 from cms.errors import CmsError
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.documents.html import asset as document_asset
+from fe_models.foundation.documents.html import text
 from fe_models.foundation.paths import replace_file
 from fe_models.foundation.units import Units
 from floatframe.analyses.equilibrium import Equilibrium
@@ -186,7 +186,7 @@ STYLES = ("uplot.min.css", "view.css")
 def page_of(record: dict[str, Any], block: Block) -> str:
     """Return the page with a record and its numbers."""
     head = json.dumps(record, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    styles = report_asset("page.css") + "".join(asset(name) for name in STYLES)
+    styles = document_asset("page.css") + "".join(asset(name) for name in STYLES)
     scripts = "".join(f"<script>{asset(name)}</script>\n" for name in (*LIBRARIES, *OWN_PARTS))
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
@@ -202,7 +202,7 @@ def page_of(record: dict[str, Any], block: Block) -> str:
 def fixed_size() -> int:
     """Return the size in bytes of an empty page."""
     names = (*LIBRARIES, *OWN_PARTS, *STYLES, "LICENSES.txt", "view.html")
-    return sum(len(asset(name)) for name in names) + len(report_asset("page.css"))
+    return sum(len(asset(name)) for name in names) + len(document_asset("page.css"))
 
 
 def asset(name: str) -> str:

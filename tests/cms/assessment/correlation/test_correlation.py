@@ -29,8 +29,9 @@ from cms.cli import main
 from cms.jobs import body_of_job
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
-from cms.jobs.studies import correlation_page, read_correlation, run_correlation
+from cms.jobs.studies import correlation_document, read_correlation, run_correlation
 from cms.pipeline import reduce_job
+from fe_models.foundation.documents.html import html_page
 from tests.bodies import box_mesh
 from tests.cms.assessment.correlation.synthetic_test import mode_table_text, universal_text, write
 from tests.decks import JOB, write_deck
@@ -355,7 +356,7 @@ def test_file_command_page_and_updated_job(folder, specimen, rows, tmp_path, cap
     plain = write(tmp_path / "plain.toml", FILE[: FILE.index("[update]")])
     result = run_correlation(read_correlation(plain))
     assert result.update is None
-    assert "Orthogonality" in correlation_page(result)
+    assert "Orthogonality" in html_page(correlation_document(result))
 
 
 def run(monkeypatch, arguments):

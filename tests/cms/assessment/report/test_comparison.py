@@ -17,10 +17,11 @@ from cms.assessment.compare.compare import compare
 from cms.assessment.compare.comparison import SetResult
 from cms.assessment.compare.verdicts import DECIDING, crossings
 from cms.assessment.quality.limits import LIMITS
-from cms.assessment.report import comparison_html, comparison_json, comparison_table
+from cms.assessment.report import comparison_document, comparison_json, comparison_table
 from cms.assessment.report.charts import convergence_chart, deformation_chart, mac_chart, response_chart
 from cms.assessment.report.formatting import factor, share, signed_percent
 from cms.assessment.report.palette import COLORS, style_of
+from fe_models.foundation.documents.html import html_page
 from tests.bodies import bar, beam
 from tests.cms.browser import browser, opened
 
@@ -41,7 +42,7 @@ def comparison():
 @pytest.fixture(scope="module")
 def page(comparison, tmp_path_factory):
     path = tmp_path_factory.mktemp("report") / "comparison.html"
-    path.write_text(comparison_html(comparison, stills=1), encoding="utf-8")
+    path.write_text(html_page(comparison_document(comparison, stills=1)), encoding="utf-8")
     return path
 
 
@@ -134,26 +135,27 @@ def test_condition_numbers_read_short():
 
 def test_convergence_charts_draw_the_values_of_the_records(comparison):
     for name in DECIDING:
-        for trace in convergence_chart(comparison, name)["data"]:
-            result = comparison.set(trace["name"])
+        for line in convergence_chart(comparison, name).lines:
+            result = comparison.set(line.name)
             finite = [p for p in result.points if math.isfinite(p.record(name).value)]
-            assert trace["x"] == [p.n_modes for p in finite]
-            assert [row[2] for row in trace["customdata"]] == [p.record(name).value for p in finite]
-            drawn, values = np.array(trace["y"]), np.array([p.record(name).value for p in finite])
+            assert line.x == [p.n_modes for p in finite]
+            assert [note.split("\n")[1] for note in line.notes] == [f"{p.record(name).value:.3g}" for p in finite]
+            drawn, values = np.array(line.y), np.array([p.record(name).value for p in finite])
             assert_allclose(drawn[drawn > drawn.min()], values[drawn > drawn.min()], rtol=0)
 
 
 def test_curves_are_those_of_the_records(comparison):
-    full, *sets = response_chart(comparison)["data"]
-    assert_allclose(full["y"], comparison.full.response, rtol=0)
+    full, *sets = response_chart(comparison).lines
+    assert_allclose(full.y, comparison.full.response, rtol=0)
     shown = [r for r in comparison.sets if r.detail is not None]
-    for trace, result in zip(sets, shown, strict=True):
-        assert_allclose(trace["y"], result.detail.record("frequency-response").data["drawn"], rtol=0)
-    for trace, result in zip(deformation_chart(comparison)["data"][1:], shown, strict=True):
+    for line, result in zip(sets, shown, strict=True):
+        assert_allclose(line.y, result.detail.record("frequency-response").data["drawn"], rtol=0)
+    for line, result in zip(deformation_chart(comparison).lines[1:], shown, strict=True):
         error = result.detail.record("deformation-error").data["error"]["K"]
-        assert_allclose(trace["y"], np.maximum(error, 1e-10), rtol=0)
+        assert_allclose(line.y, np.maximum(error, 1e-10), rtol=0)
     result = comparison.set("rubin")
-    drawn = np.array(mac_chart(result, result.detail, comparison.full.frequencies_hz)["data"][0]["z"])
+    (matrix,) = mac_chart(result, result.detail, comparison.full.frequencies_hz).items
+    drawn = matrix.values
     assert_allclose(drawn, result.detail.record("mac").data["mac"][:, : drawn.shape[1]], rtol=0)
 
 
@@ -186,7 +188,7 @@ def test_verdicts_stand_before_anything_else(page):
 
 
 def test_the_page_shows_only_what_was_judged(comparison):
-    tables = comparison_html(comparison, stills=0).split('id="method"')[0]
+    tables = html_page(comparison_document(comparison, stills=0)).split('id="method"')[0]
     assert all(point.record("static-load-cases").verdict == "info" for point in shown_points(comparison))
     assert "load cases" not in tables.lower()
     assert "No set has this number" not in tables
@@ -216,7 +218,7 @@ def test_names_cannot_break_the_page(comparison):
     name = "</script><script>alert(1)</script><b>&'\""
     first, *others = comparison.sets
     worse = replace(comparison, name=name, sets=(replace(first, sentence=name), *others))
-    text = comparison_html(worse, stills=0)
+    text = html_page(comparison_document(worse, stills=0))
     assert "<script>alert" not in text
     assert "</script><script>" not in text.replace("</script>\n<script>", "").replace("</script>\n", "")
     assert name in Text(text).words
@@ -225,7 +227,7 @@ def test_names_cannot_break_the_page(comparison):
 def test_a_comparison_in_which_no_set_could_be_made_is_still_a_report(comparison):
     failed = SetResult("rubin", "words", (), None, "error", "could not be made: <no reason>")
     nothing = replace(comparison, sets=(failed,), ranking=(), sentence="No mode set could be made.")
-    words = Text(comparison_html(nothing, stills=0)).words
+    words = Text(html_page(comparison_document(nothing, stills=0))).words
     assert "Could not be made: <no reason>." in words
     assert "there is nothing to show here" in words
     assert json.loads(comparison_json(nothing))["sets"][0]["points"] == []
@@ -271,7 +273,7 @@ def view(started, page):
 def test_the_page_opens_offline_and_shows_every_chart(view, page, tmp_path):
     text = page.read_text(encoding="utf-8")
     charts = json.loads(re.search(r'id="charts">(.*?)</script>', text, re.DOTALL).group(1))
-    drawn = view.evaluate("[...document.querySelectorAll('.chart')].filter(c => c.querySelector('svg')).map(c => c.id)")
+    drawn = view.evaluate("[...document.querySelectorAll('.chart:has(.drawing)')].map((c) => c.id)")
     assert sorted(drawn) == sorted(charts)
     assert view.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
     assert view.evaluate("[...document.images].map(i => i.naturalWidth)") == [900]
@@ -305,7 +307,7 @@ def test_mode_shapes_turn_change_and_move(view, tmp_path):
 
 
 def test_the_switch_puts_coordinates_across(comparison, view):
-    across = "document.getElementById('chart-mac').data.map(t => t.x)"
+    across = "(d => d.lines.map(line => d.across(line)))(document.getElementById('chart-mac').drawing)"
     by_modes = [[p.n_modes for p in r.points] for r in comparison.sets if r.points]
     assert view.evaluate(across) == by_modes
     view.click(".switch button:nth-child(2)")
@@ -317,7 +319,7 @@ def test_the_switch_puts_coordinates_across(comparison, view):
 def test_the_page_fits_a_narrow_screen_and_paper(view, tmp_path):
     view.set_viewport_size({"width": 600, "height": 900})
     view.wait_for_function("document.documentElement.scrollWidth <= window.innerWidth")
-    view.wait_for_function("[...document.querySelectorAll('.chart svg.main-svg')].every(s => s.clientWidth < 600)")
+    view.wait_for_function("[...document.querySelectorAll('.chart svg.drawing')].every(s => s.clientWidth < 600)")
     view.pdf(path=str(tmp_path / "report.pdf"), format="A4", print_background=True)
     view.set_viewport_size({"width": 1360, "height": 900})
     assert (tmp_path / "report.pdf").read_bytes().startswith(b"%PDF")
@@ -330,12 +332,12 @@ def test_paper_has_full_charts_no_tools_and_headings_beside_them(view):
     shown.emulate_media(media="print")
     shown.evaluate("window.dispatchEvent(new Event('beforeprint'))")
     shown.wait_for_function(
-        "[...document.querySelectorAll('.chart .main-svg')].every((s) => s.getBoundingClientRect().width <= 696)"
+        "[...document.querySelectorAll('.chart .drawing')].every((s) => s.getBoundingClientRect().width <= 696)"
     )
     assert shown.evaluate("document.documentElement.scrollWidth") == 695
     charts = shown.evaluate(
-        "[...document.querySelectorAll('.chart')].filter((c) => c.querySelector('.main-svg')).map((c) => ["
-        "c.querySelector('.main-svg').getBoundingClientRect().width, c.parentElement.getBoundingClientRect().width])"
+        "[...document.querySelectorAll('.chart')].filter((c) => c.querySelector('.drawing')).map((c) => ["
+        "c.querySelector('.drawing').getBoundingClientRect().width, c.parentElement.getBoundingClientRect().width])"
     )
     assert len(charts) > 8
     for drawn, column in charts:
@@ -344,7 +346,7 @@ def test_paper_has_full_charts_no_tools_and_headings_beside_them(view):
     for selector in ("h2", "h3", "p.lead", "ul.legend"):
         assert set(shown.evaluate(f"([s, n]) => ({style})(s, n)", [selector, "breakAfter"])) == {"avoid"}
     assert set(shown.evaluate(f"([s, n]) => ({style})(s, n)", ["figure", "breakInside"])) == {"avoid"}
-    assert set(shown.evaluate(f"([s, n]) => ({style})(s, n)", [".modebar-container", "display"])) == {"none"}
+    assert set(shown.evaluate(f"([s, n]) => ({style})(s, n)", [".save", "display"])) == {"none"}
 
 
 def test_the_tools_of_a_chart_lie_on_no_legend(view):
@@ -352,16 +354,17 @@ def test_the_tools_of_a_chart_lie_on_no_legend(view):
     shown.set_viewport_size({"width": 1360, "height": 900})
     shown.emulate_media(media="screen")
     shown.evaluate("window.dispatchEvent(new Event('afterprint'))")
-    shown.wait_for_function("document.querySelector('#response .main-svg').getBoundingClientRect().width > 700")
-    tools = "document.querySelector('#response .modebar').getBoundingClientRect().top"
-    legend = "document.querySelector('#response .legend').getBoundingClientRect().bottom"
-    assert shown.evaluate(f"{tools} > {legend}")
+    shown.wait_for_function("document.querySelector('#response .drawing').getBoundingClientRect().width > 700")
+    tools = "document.querySelector('#response .save').getBoundingClientRect().left"
+    legend = "[...document.querySelectorAll('#response .keys')[0].children].slice(0, -1)"
+    ends = f"Math.max(...{legend}.map((key) => key.getBoundingClientRect().right))"
+    assert shown.evaluate(f"{tools} > {ends}")
 
 
 def test_a_body_of_beams_is_drawn_by_lines_and_a_browser_without_webgl_is_told(started, tmp_path):
     result = compare(cms.couple(beam(n=6)), ["craig-bampton"], [2], n_reference=2)
     path = tmp_path / "beam.html"
-    path.write_text(comparison_html(result, stills=0), encoding="utf-8")
+    path.write_text(html_page(comparison_document(result, stills=0)), encoding="utf-8")
     shown, complaints = opened(started, path)
     shown.wait_for_selector("#viewer[data-ready]")
     assert ink(shown, tmp_path / "lines.png") > 200

@@ -8,12 +8,13 @@ from numpy.testing import assert_allclose
 
 import cms
 import fe_models as fm
+from fe_models.foundation.documents.html import html_page
 from floatframe import FatigueMaterial, MeanStress, assess, basquin_curve, history_damage, read_fatigue
 from floatframe.durability.fatigue.criteria import Criterion
 from floatframe.durability.fatigue.fatigue_file import FatigueFile
 from floatframe.durability.fatigue.load_blocks import LoadBlock
 from floatframe.durability.fatigue.outputs import fatigue_record, nodes_of_places, vtu_of, worst_table
-from floatframe.durability.fatigue.report import fatigue_html
+from floatframe.durability.fatigue.report import fatigue_document
 from floatframe.durability.fatigue.surface_damage import spectral_damage
 from floatframe.errors import FatigueError
 from tests.bodies import box_mesh
@@ -129,7 +130,7 @@ def test_a_file_names_the_places_of_a_material(folder, mast, where):
     record = fatigue_record(made)
     assert [each["name"] for each in record["materials"]] == ["tube", "weld"]
     if "sets" in where:  # drawing takes seconds
-        html = fatigue_html(made)
+        html = html_page(fatigue_document(made))
         assert "S-N curve weld" in html
         assert "stress points of elements" in html
     assert worst_table(made).names[:3] == ("rank", "node", "material")

@@ -11,9 +11,10 @@ from typer.testing import CliRunner
 
 import cms
 import floatframe as ff
+from fe_models.foundation.documents.html import html_page
 from floatframe.cli.app import app
 from floatframe.durability.shaking.light_record import light_record, size_of_curves
-from floatframe.durability.shaking.page import shake_html
+from floatframe.durability.shaking.page import shake_document
 from floatframe.durability.shaking.record import shake_record, shake_table
 from floatframe.errors import SystemFileError
 from tests.bodies import bar
@@ -185,7 +186,7 @@ def test_a_transient_takes_accelerations_and_forces_of_a_file(result):
 def test_names_are_escaped_on_the_page(result):
     from dataclasses import replace
 
-    assert "<b>bold" not in shake_html(replace(result, job=replace(result.job, title="<b>bold</b>")))
+    assert "<b>bold" not in html_page(shake_document(replace(result, job=replace(result.job, title="<b>bold</b>"))))
 
 
 @pytest.mark.parametrize(

@@ -1,15 +1,13 @@
-"""A comparison as one HTML page that works offline: verdicts first, then the evidence."""
+"""A comparison as a document: verdicts first, then the evidence."""
 
 import math
 from collections.abc import Sequence
+from importlib.resources import files
 
 from cms.assessment.compare.comparison import Comparison
 from cms.assessment.compare.verdicts import DECIDING, DOUBTS, crossings, modes_words
 from cms.assessment.quality.limits import LIMITS
 from cms.assessment.report.charts import (
-    CONVERGENCE_HEIGHT,
-    MAC_HEIGHT,
-    Chart,
     convergence_chart,
     deformation_chart,
     effective_mass_chart,
@@ -18,7 +16,6 @@ from cms.assessment.report.charts import (
     response_error_chart,
 )
 from cms.assessment.report.formatting import count, factor, hertz, seconds, share, signed_percent
-from cms.assessment.report.html import Cell, Section, figure, page, table, text
 from cms.assessment.report.parts import (
     COLUMNS,
     MARKS,
@@ -30,10 +27,25 @@ from cms.assessment.report.parts import (
     verdict_cell,
 )
 from cms.assessment.report.shapes import shapes_json, still_pictures
+from fe_models.foundation.documents.document import (
+    Answer,
+    Block,
+    Cell,
+    Document,
+    Figure,
+    Gallery,
+    Heading,
+    Markup,
+    Paragraph,
+    Picture,
+    Section,
+    Terms,
+    TextTable,
+)
 
 __all__ = [
     "columns_section",
-    "comparison_html",
+    "comparison_document",
     "convergence_section",
     "frequency_section",
     "mac_section",
@@ -45,8 +57,8 @@ __all__ = [
 ]
 
 
-def comparison_html(comparison: Comparison, *, stills: int = 4) -> str:
-    """Return the report.
+def comparison_document(comparison: Comparison, *, stills: int = 4) -> Document:
+    """Return the document.
 
     Parameters
     ----------
@@ -65,19 +77,20 @@ def comparison_html(comparison: Comparison, *, stills: int = 4) -> str:
         columns_section(comparison),
         method_section(comparison),
     ]
-    has_shapes = len(comparison.drawing.shapes) > 0
-    return page(
-        f"{comparison.name}: comparison of mode sets",
-        f"{text(comparison.name)}<small>comparison of mode sets</small>",
-        header(comparison),
-        [section for section in sections if section is not None],
-        {"shapes": shapes_json(comparison.drawing)} if has_shapes else {},
-        text("Written by cms compare. The same numbers stand in the JSON and CSV files beside this page."),
+    facts, answer = head(comparison)
+    return Document(
+        f"Which mode set is good enough for {comparison.name}?",
+        facts,
+        answer,
+        sections,
+        comparison.name,
+        "comparison of mode sets",
+        footer="Written by cms compare. The same numbers stand in the JSON and CSV files beside this page.",
     )
 
 
-def header(comparison: Comparison) -> str:
-    """Return the title, the facts, and the answer."""
+def head(comparison: Comparison) -> tuple[str, Answer]:
+    """Return the facts, and the answer."""
     full, units = comparison.full, comparison.units
     ends = ", ".join(f"{name} ({kind})" for name, kind, _ in comparison.interfaces)
     facts = (
@@ -86,9 +99,9 @@ def header(comparison: Comparison) -> str:
         f"up to {hertz(full.band_hz)} Hz; mass {full.mass[0]:.4g} {units.mass_symbol}"
     )
     best = comparison.set(comparison.ranking[0]).detail if comparison.ranking else None
-    figures = ""
+    figures: list[tuple[str, str]] = []
     if best is not None:
-        values = [
+        figures = [
             (comparison.ranking[0], "mode set"),
             (str(best.n_modes), "vibration modes"),
             (str(best.n_q), f"coordinates, of {count(comparison.n_dof)} dofs"),
@@ -96,14 +109,7 @@ def header(comparison: Comparison) -> str:
             (share(best.record("frequency-response").value), "response error"),
             (share(best.record("deformation-error").value), "deformation error"),
         ]
-        figures = "".join(f"<div><b>{text(value)}</b>{text(words)}</div>" for value, words in values)
-        figures = f'<div class="figures">{figures}</div>'
-    return (
-        f"<h1>Which mode set is good enough for {text(comparison.name)}?</h1>"
-        f'<p class="facts">{text(facts)}</p>'
-        f'<section class="answer{"" if best is not None else " none"}"><p>{text(comparison.sentence)}</p>{figures}'
-        "</section>"
-    )
+    return facts, Answer(comparison.sentence, "fail" if best is None else "pass", figures=figures)
 
 
 def judged(comparison: Comparison) -> list[str]:
@@ -118,24 +124,20 @@ def verdict_section(comparison: Comparison) -> Section:
     headings = ["set", "verdict", "modes>", "coordinates>", *(f"{COLUMNS[name]}>" for name in names)]
     limits = [Cell("limit", "name"), Cell(""), Cell(""), Cell("")]
     limits += [Cell(limit_words(name), "n") for name in names]
-    rows: list[tuple[str, Sequence[Cell]]] = [("", limits)]
+    rows: list[Sequence[Cell]] = [limits]
     for k, result in enumerate(comparison.sets):
         point = result.detail
-        badge = f'<span class="badge {result.verdict}">{MARKS[result.verdict]}</span>'
-        cells = [Cell(result.name, "name", markup=swatch(k)), Cell("", markup=badge)]
+        cells = [Cell(result.name, "name", line=swatch(k)), Cell(MARKS[result.verdict], badge=result.verdict)]
         if point is None:
             cells += [Cell("\u2013", "n blank") for _ in range(2 + len(names))]
         else:
             cells += [Cell(str(point.n_modes), "n"), Cell(str(point.n_q), "n")]
             cells += [verdict_cell(point.record(name)) for name in names]
-        rows.append(("has-why", cells))
-        reason = Cell("", note=sentence_case(result.sentence), span=len(headings))
-        rows.append(("why-row", [reason]))
+        rows += [cells, [Cell("", note=sentence_case(result.sentence), span=len(headings))]]
     return Section(
         "verdicts",
         "Verdicts",
-        "Verdicts",
-        table(headings, rows) + f"<p class=screen-only style='margin-top:12px;font-size:13px'>{text(VERDICT_NOTE)}</p>",
+        (TextTable(headings, rows), Paragraph(VERDICT_NOTE, "why")),
         "Every set at its fewest modes with which all numbers keep their limits; a set that never does, at its most.",
     )
 
@@ -150,7 +152,7 @@ def shape_section(comparison: Comparison, stills: int) -> Section:
     """Return the section with mode shapes of the full model, interactive and as pictures."""
     drawing, full = comparison.drawing, comparison.full
     if not len(drawing.nodes):
-        return Section("shapes-section", "Mode shapes", "Mode shapes", '<p class="notice">The body has no surface.</p>')
+        return Section("shapes-section", "Mode shapes", (Paragraph("The body has no surface.", "notice"),))
     buttons = "".join(
         f'<button aria-pressed="false"><span>mode {k + 1}</span><span>{hertz(full.frequencies_hz[k])} '
         f"Hz</span></button>"
@@ -171,11 +173,8 @@ def shape_section(comparison: Comparison, stills: int) -> Section:
         '</div><div class="hint">drag to turn \u00b7 ctrl + wheel to zoom \u00b7 arrow keys turn</div></div>'
         f'<div class="list">{buttons}</div></div>'
     )
-    pictures = "".join(
-        f'<figure><img alt="{text(comparison.name)}: {text(title)}" src="data:image/png;base64,{png}">'
-        f"<figcaption>{text(sentence_case(title))}</figcaption></figure>"
-        for title, png in still_pictures(comparison, stills)
-    )
+    pictures = [Picture(png, sentence_case(title)) for title, png in still_pictures(comparison, stills)]
+    data = {"shapes": shapes_json(drawing)} if len(drawing.shapes) else {}
     thinned = drawing.n_triangles_full > len(drawing.triangles)
     note = (
         f" {count(drawing.n_triangles_full)} triangles are thinned out to {count(len(drawing.triangles))}."
@@ -183,21 +182,19 @@ def shape_section(comparison: Comparison, stills: int) -> Section:
         else ""
     )
     lead = f"Elastic free modes of the full model in the band, coloured by displacement; thin lines: undeformed.{note}"
-    return Section(
-        "shapes-section", "Mode shapes", "Mode shapes", f'{viewer}<div class="stills">{pictures}</div>', lead
-    )
+    script = (files("cms.assessment.report") / "data" / "viewer.js").read_text(encoding="utf-8")
+    return Section("shapes-section", "Mode shapes", (Markup(viewer, script, data), Gallery(pictures)), lead)
 
 
 def columns_section(comparison: Comparison) -> Section:
     """Return the section about the columns of the sets."""
-    rows: list[tuple[str, Sequence[Cell]]] = []
+    rows: list[Sequence[Cell]] = []
     for k, result in enumerate(comparison.sets):
         point = result.detail
-        name = Cell(result.name, "name", markup=swatch(k))
+        name = Cell(result.name, "name", line=swatch(k))
         if point is None:
-            rows.append(
-                ("", [name, Cell(result.words, note=sentence_case(result.sentence)), *[Cell("\u2013", "n blank")] * 6])
-            )
+            why = Cell(result.words, note=sentence_case(result.sentence))
+            rows.append([name, why, *[Cell("\u2013", "n blank")] * 6])
             continue
         made = ", ".join(f"{count} {family}" for family, count in result.columns.items())
         dropped = f"Redundant and dropped: {', '.join(point.dropped)}." if point.dropped else ""
@@ -211,25 +208,27 @@ def columns_section(comparison: Comparison) -> Section:
             Cell(factor(point.record("conditioning").value), f"n {point.record('conditioning').verdict}"),
             Cell(seconds(result.seconds), "n"),
         ]
-        rows.append(("", cells))
+        rows.append(cells)
     headings = ["set", "columns", "columns>", "dropped>", "coordinates>", "residual bound>", "condition>", "time>"]
     lead = (
         "What every set consists of at its shown number of modes. Coordinates are the independent elastic shapes that "
         "are left when redundant columns and rigid-body motion are taken out; the time is that of the set with the "
         "most modes and of judging all numbers of modes."
     )
-    return Section("columns", "Columns, rank and conditioning", "Columns", table(headings, rows), lead)
+    return Section("columns", "Columns, rank and conditioning", (TextTable(headings, rows),), lead, "Columns")
 
 
 def method_section(comparison: Comparison) -> Section:
     """Return the section about the meaning and the source of the numbers."""
     terms = [(COLUMNS[name], name) for name in DECIDING] + [(DOUBTS[name], name) for name in DOUBTS]
-    meanings = "".join(
-        f"<dt>{text(sentence_case(title)[:-1])}</dt><dd>{text(sentence_case(LIMITS[name].title))} "
-        f"{text('Limit: ' + share(LIMITS[name].tolerance) + '.' if LIMITS[name].tolerance else 'Told, not judged.')} "  # type: ignore[arg-type]
-        f"{text('If missed: ' + LIMITS[name].action + '.' if LIMITS[name].tolerance else '')}</dd>"
-        for title, name in terms
-    )
+    meanings = []
+    for title, name in terms:
+        limit = LIMITS[name]
+        words = f"{sentence_case(limit.title)} "
+        words += f"Limit: {share(limit.tolerance)}. If missed: {limit.action}." if limit.tolerance else (
+            "Told, not judged."
+        )  # fmt: skip
+        meanings.append((sentence_case(title)[:-1], words))
     source = "taken from an earlier comparison" if comparison.full.was_cached else "solved for this comparison"
     facts = {
         "reference": f"full model, {source}; digest {comparison.full.digest[:16]}",
@@ -238,15 +237,12 @@ def method_section(comparison: Comparison) -> Section:
         **comparison.provenance,
     }
     rows = [[Cell(key, "name"), Cell(value)] for key, value in facts.items()]
-    body = (
-        f'<dl class="terms">{meanings}</dl><h3 style="margin:22px 0 8px">Provenance</h3>'
-        f"<details open><summary>Model, versions, times</summary>{table(['', ''], rows)}</details>"
-    )
     lead = (
         "A set is good enough when the first six numbers keep their limits; the others are told beside them. Every "
         "set is made once, with the most modes, from one factorisation; the sets with fewer modes are its subspaces."
     )
-    return Section("method", "What the numbers mean", "Method", body, lead)
+    blocks = (Terms(meanings), Heading("Provenance: model, versions, times"), TextTable(["", ""], rows))
+    return Section("method", "What the numbers mean", blocks, lead, "Method")
 
 
 # sections of a comparison with the evidence for its verdicts: convergence, frequencies, shapes, response, motion ------
@@ -275,18 +271,15 @@ SEEN = {
 
 def convergence_section(comparison: Comparison) -> Section:
     """Return the section with error against number of modes, one chart per record."""
-    charts: dict[str, Chart] = {}
-    figures = []
+    figures: list[Block] = []
     for name in (*judged(comparison), "residual-bound", "effective-mass"):
         chart = convergence_chart(comparison, name)
         title = {**COLUMNS, "residual-bound": "residual bound", "effective-mass": "missing effective mass"}[name]
-        if not chart["data"]:
-            figures.append(f"<figure><h3>{text(sentence_case(title)[:-1])}</h3><p>No set has this number.</p></figure>")
+        if not chart.items:
+            figures.append(Paragraph(f"{sentence_case(title)} No set has this number."))
             continue
-        charts[f"chart-{name}"] = chart
         caption = f"{SEEN[name]} {crossings(comparison.sets, name)}"
-        title = sentence_case(title)[:-1]
-        figures.append(figure(f"chart-{name}", caption, title=title, height=CONVERGENCE_HEIGHT, kind="convergence"))
+        figures.append(Figure(f"chart-{name}", chart, caption, sentence_case(title)[:-1]))
     switch = (
         '<div class="switch screen-only" role="group" aria-label="Horizontal axis">'
         '<button data-column="0" aria-pressed="true">by vibration modes</button>'
@@ -297,8 +290,8 @@ def convergence_section(comparison: Comparison) -> Section:
         "cover one another belong to sets of one span. By coordinates the sets are compared at equal size of the "
         "reduced body: some bring more static columns than others."
     )
-    body = f'<div class="row">{switch}{legend(comparison)}</div><div class="grid">{"".join(figures)}</div>'
-    return Section("convergence", "Error against number of modes", "Convergence", body, lead, charts)
+    row = Markup(f'<div class="row">{switch}{legend(comparison)}</div>')
+    return Section("convergence", "Error against number of modes", (row, Gallery(figures)), lead, "Convergence")
 
 
 def frequency_section(comparison: Comparison) -> Section:
@@ -320,7 +313,7 @@ def frequency_section(comparison: Comparison) -> Section:
         f"Elastic frequencies of the free body up to {hertz(full.band_hz)} Hz, recomputed from every reduced body at "
         "the number of modes that stands beside its name: the error, and below it the frequency [Hz]."
     )
-    return Section("frequencies", "Free-free frequencies", "Frequencies", table(headings, rows), lead)
+    return Section("frequencies", "Free-free frequencies", (TextTable(headings, rows),), lead, "Frequencies")
 
 
 def error_kind(error: float) -> str:
@@ -333,67 +326,64 @@ def error_kind(error: float) -> str:
 
 def mac_section(comparison: Comparison) -> Section:
     """Return the section with MAC matrices of every set at its shown point."""
-    charts: dict[str, Chart] = {}
     figures = []
     for k, result in enumerate(comparison.sets):
         point = result.detail
         if point is None or not point.record("mac").data["mac"].shape[1]:
             continue
-        key = f"mac-{k}"
-        charts[key] = mac_chart(result, point, comparison.full.frequencies_hz)
+        chart = mac_chart(result, point, comparison.full.frequencies_hz)
         caption = sentence_case(point.record("mac").reason)
-        figures.append(figure(key, caption, title=f"{result.name}, {modes_words(point.n_modes)}", height=MAC_HEIGHT))
+        figures.append(Figure(f"mac-{k}", chart, caption, f"{result.name}, {modes_words(point.n_modes)}"))
     lead = (
         "Down: the modes of the full model; across: those of the reduced body. Dark is 1, the same shape; white is 0. "
         "A dark diagonal says that shapes and order agree, dark off the diagonal that modes have changed places."
     )
-    body = f'<div class="grid three">{"".join(figures)}</div>' if figures else nothing_to_show()
-    return Section("mac", "Mode shapes: MAC", "MAC", body, lead, charts)
+    return Section("mac", "Mode shapes: MAC", (Gallery(figures, 3) if figures else nothing_to_show(),), lead, "MAC")
 
 
 def response_section(comparison: Comparison) -> Section:
     """Return the section with the frequency response: overlay and error."""
     full = comparison.full
     if not any(result.detail for result in comparison.sets):
-        return Section("response", "Frequency response", "Response", nothing_to_show())
+        return Section("response", "Frequency response", (nothing_to_show(),), short="Response")
     words = ", ".join(
         f"{result.name} {share(result.detail.record('frequency-response').value)}"
         for result in comparison.sets
         if result.detail is not None
     )
-    body = figure(
-        "response",
+    overlay = Figure(
+        "response-chart",
+        response_chart(comparison),
         f"{sentence_case(full.response_words)} The thick grey line is the full model; a set that is good enough covers "
         "it, peaks and valleys alike.",
-        title="Receptance from the first interface to the last",
-        height=430,
-    ) + figure(
+        "Receptance from the first interface to the last",
+    )
+    error = Figure(
         "response-error",
+        response_error_chart(comparison),
         f"Error of the whole receptance matrix of all interfaces at each frequency. Over the band: {words}. Narrow "
-        f"peaks "
-        "stand where a resonance is shifted.",
-        title="Error at each frequency",
+        "peaks stand where a resonance is shifted.",
+        "Error at each frequency",
     )
     lead = (
         f"The free body is driven at its interfaces with {100 * full.damping:.3g} % damping in every mode, full and "
         f"reduced "
         f"alike; the full model's own response is known to {share(full.response_error)}."
     )
-    charts = {"response": response_chart(comparison), "response-error": response_error_chart(comparison)}
-    return Section("response", "Frequency response at the interfaces", "Response", body, lead, charts)
+    return Section("response", "Frequency response at the interfaces", (overlay, error), lead, "Response")
 
 
 def motion_section(comparison: Comparison) -> Section:
     """Return the section with the deformation error over time."""
     if not any(result.detail for result in comparison.sets):
-        return Section("motion", "Deformation error", "Motion", nothing_to_show())
+        return Section("motion", "Deformation error", (nothing_to_show(),), short="Motion")
     rows = []
     for k, result in enumerate(comparison.sets):
         if result.detail is not None:
             error = result.detail.record("deformation-error").data["error"]
-            cells = [Cell(f"{result.name}, {result.detail.n_modes}", "name", markup=swatch(k))]
+            cells = [Cell(f"{result.name}, {result.detail.n_modes}", "name", line=swatch(k))]
             rows.append(cells + [Cell(share(float(max(error[norm]))), "n") for norm in ("K", "M", "nodal")])
-    norms = table(["largest \u03b5 over time", "energy (K)>", "mass (M)>", "nodes>"], rows)
+    norms = TextTable(["largest \u03b5 over time", "energy (K)>", "mass (M)>", "nodes>"], rows)
     lead = (
         f"\u03b5(t) is the part of the full model's deformation that no combination of the set's shapes can follow, "
         f"over "
@@ -405,15 +395,14 @@ def motion_section(comparison: Comparison) -> Section:
         if comparison.full.force is not None
         else "In the energy norm."
     )
-    charts = {"motion": deformation_chart(comparison)}
-    body = figure("motion", caption, height=400) + norms
-    return Section("motion-section", "Deformation error in a motion", "Motion", body, lead, charts)
+    drawn = Figure("motion", deformation_chart(comparison), caption)
+    return Section("motion-section", "Deformation error in a motion", (drawn, norms), lead, "Motion")
 
 
 def mass_section(comparison: Comparison) -> Section:
     """Return the section with the effective mass by direction."""
     if not any(result.detail for result in comparison.sets):
-        return Section("mass", "Effective mass", "Effective mass", nothing_to_show())
+        return Section("mass", "Effective mass", (nothing_to_show(),))
     full = comparison.full
     held = 100 * float(full.held_mass[0]) / float(full.mass[0]) if full.mass[0] > 0 else 0.0
     caption = (
@@ -421,8 +410,5 @@ def mass_section(comparison: Comparison) -> Section:
         "sits at the interfaces and moves with them). A low bar says that accelerations in this direction deform the "
         "body in ways the set leaves out; it decides nothing by itself."
     )
-    charts = {"effective-mass": effective_mass_chart(comparison)}
-    return Section(
-        "mass", "Effective mass with the interfaces held", "Effective mass",
-        figure("effective-mass", caption, height=360), "", charts,
-    )  # fmt: skip
+    drawn = Figure("effective-mass", effective_mass_chart(comparison), caption)
+    return Section("mass", "Effective mass with the interfaces held", (drawn,), "", "Effective mass")

@@ -1,0 +1,225 @@
+"""Documents: headings, text, tables, charts and pictures with a verdict, before they become a page, a PDF or JSON.
+
+document = Document("Rod", "rod.h5", answer=Answer("It holds.", "pass"), sections=(Section("mass", "Mass", blocks),))
+write_documents({Path("rod.html"): document, Path("rod.pdf"): document})
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fe_models.foundation.documents.charts import Chart, chart_record
+
+__all__ = [
+    "MARKS", "Answer", "Block", "Cell", "Document", "Figure", "Gallery", "Heading", "Markup", "Paragraph", "Picture",
+    "Section", "Terms", "TextTable", "cells_of", "document_record",
+]  # fmt: skip
+
+MARKS = {"pass": "\u2713", "warn": "!", "fail": "\u2715", "error": "!", "info": ""}  #: signs of verdicts
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell of a table."""
+
+    words: str
+    kind: str = ""  #: "n" for numbers, "name", "pass", "warn", "fail", "blank"; several separated by blanks
+    note: str = ""  #: smaller text below
+    badge: str = ""  #: verdict in whose colour the words stand in a badge
+    line: tuple[str, str] | None = None  #: colour and dash of a line before the words
+    span: int = 1
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """A table of text; a heading that ends in '>' is right-aligned.
+
+    Parameters
+    ----------
+    headings
+        Headings, (n_columns,).
+    rows
+        Text or cells; a second line of a text becomes a note.
+    widths
+        Shares of the width of a sheet; empty: as the text needs it.
+    verdict
+        Column that is coloured by its text, one of the verdicts.
+    caption
+        A sentence above.
+    """
+
+    headings: Sequence[str]
+    rows: Sequence[Sequence[str | Cell]]
+    widths: tuple[float, ...] = ()
+    verdict: int | None = None
+    caption: str = ""
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """A sentence or some; kind: "", "why" (small) or "notice" (framed)."""
+
+    words: str
+    kind: str = ""
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A heading inside a section."""
+
+    words: str
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture with its caption."""
+
+    png: bytes
+    caption: str = ""
+    share: float = 1.0  #: of the width
+
+
+@dataclass(frozen=True, eq=False)
+class Figure:
+    """A chart with its title and caption."""
+
+    key: str  #: of the element on the page
+    chart: Chart
+    caption: str
+    title: str = ""
+
+
+@dataclass(frozen=True)
+class Terms:
+    """Words and what they mean."""
+
+    items: Sequence[tuple[str, str]]
+
+
+@dataclass(frozen=True)
+class Gallery:
+    """Blocks side by side."""
+
+    blocks: Sequence["Block"]
+    columns: int = 2
+
+
+@dataclass(frozen=True)
+class Markup:
+    """HTML of a page alone, such as a view in 3D, with its script, and data by id of the element that holds it."""
+
+    html: str
+    script: str = ""
+    data: dict[str, str] = field(default_factory=dict)
+
+
+Block = TextTable | Paragraph | Heading | Picture | Figure | Terms | Gallery | Markup
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section with its entry in the contents."""
+
+    key: str
+    title: str
+    blocks: Sequence[Block]
+    lead: str = ""  #: first sentence
+    short: str = ""  #: in the contents; empty: the title
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The answer at the top.
+
+    Parameters
+    ----------
+    words
+        In a sentence.
+    verdict
+        "pass", "warn", "fail" or "info"; its colour.
+    badge
+        The verdict in words; empty: none.
+    figures
+        Numbers and what they are.
+    notes
+        More sentences.
+    """
+
+    words: str
+    verdict: str = "pass"
+    badge: str = ""
+    figures: Sequence[tuple[str, str]] = ()
+    notes: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class Document:
+    """What is shown and printed."""
+
+    title: str
+    facts: str  #: what was looked at, in a sentence
+    answer: Answer
+    sections: Sequence[Section]
+    brand: str = ""  #: name of what it is about, above the contents
+    kind: str = ""  #: kind of document, below it
+    signatures: Sequence[str] = ()  #: lines to sign
+    footer: str = ""
+
+    def blocks(self) -> Iterator[Block]:
+        """Yield all blocks, those of galleries one by one."""
+        for section in self.sections:
+            for block in section.blocks:
+                yield from block.blocks if isinstance(block, Gallery) else (block,)
+
+
+def cells_of(table: TextTable) -> list[list[Cell]]:
+    """Return the cells of a table: numbers under headings that say so, names first, verdicts in their colours."""
+    is_number = [heading.endswith(">") for heading in table.headings]
+    rows = []
+    for row in table.rows:
+        cells = []
+        for k, words in enumerate(row):
+            if isinstance(words, Cell):
+                cells.append(words)
+                continue
+            first, _, second = words.partition("\n")
+            kind = "n" if is_number[k] else "name" if k == 0 and table.verdict != 0 else ""
+            cells.append(Cell(first, verdict_kind(words) if table.verdict == k else kind, second))
+        rows.append(cells)
+    return rows
+
+
+def verdict_kind(words: str) -> str:
+    """Return the colour of a word."""
+    return words if words in MARKS else {"": "", "unchanged": "pass", "not found": "warn"}.get(words, "fail")
+
+
+def document_record(document: Document) -> dict[str, Any]:
+    """Return a document in plain types: text, tables and charts; pictures with their captions alone."""
+    return {
+        "title": document.title,
+        "facts": document.facts,
+        "answer": plain(document.answer),
+        "sections": [
+            {"title": each.title, "lead": each.lead, "blocks": [plain(block) for block in each.blocks]}
+            for each in document.sections
+        ],
+        "footer": document.footer,
+    }
+
+
+def plain(value: Any) -> Any:
+    """Return a block in plain types."""
+    if isinstance(value, Chart):
+        return chart_record(value)
+    if isinstance(value, bytes):
+        return f"{len(value)} bytes"
+    if hasattr(value, "__dataclass_fields__"):
+        return {"block": type(value).__name__, **{name: plain(each) for name, each in vars(value).items()}}
+    if isinstance(value, dict):
+        return {key: plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(each) for each in value]
+    return value.item() if isinstance(value, np.generic) else value

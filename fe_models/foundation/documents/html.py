@@ -1,0 +1,60 @@
+"""A document as one HTML page that works offline, light and dark, and prints on A4; its template is data/page.html."""
+
+import base64
+import json
+from functools import cache
+from importlib.resources import files
+from typing import TYPE_CHECKING
+
+from fe_models.foundation.documents.charts import chart_record
+from fe_models.foundation.documents.document import MARKS, Document, Figure, Markup, cells_of
+
+if TYPE_CHECKING:
+    from jinja2 import Template
+
+__all__ = ["asset", "html_page", "text"]
+
+
+def html_page(document: Document) -> str:
+    """Return the page; the script and the data of charts are carried if there is one."""
+    charts = {block.key: chart_record(block.chart) for block in document.blocks() if isinstance(block, Figure)}
+    extras = [block for block in document.blocks() if isinstance(block, Markup)]
+    data = {key: words for block in extras for key, words in block.data.items()}
+    if charts:
+        data["charts"] = json.dumps(charts, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    scripts = [*([asset("chart.js")] if charts else []), asset("page.js"), *(e.script for e in extras if e.script)]
+    return template().render(
+        document=document, style=asset("page.css") + asset("dark.css"), scripts=scripts,
+        # '<' is escaped, so that no text of a name can end the script
+        data={key: words.replace("<", "\\u003c") for key, words in data.items()},
+    )  # fmt: skip
+
+
+@cache
+def template() -> "Template":
+    """Return the template of a page."""
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["unbroken"] = unbroken
+    environment.filters["base64"] = lambda content: base64.b64encode(content).decode()
+    environment.globals |= {"marks": MARKS, "cells_of": cells_of}
+    environment.tests["kind"] = lambda block, name: type(block).__name__ == name
+    return environment.from_string(asset("page.html"))
+
+
+def unbroken(words: object) -> str:
+    """Return text in which numbers are not separated from their percent signs."""
+    return str(words).replace(" %", "\u00a0%")
+
+
+def text(words: object) -> str:
+    """Return text as HTML."""
+    from html import escape
+
+    return escape(unbroken(words))
+
+
+def asset(name: str) -> str:
+    """Return a file that is included with documents."""
+    return (files("fe_models.foundation.documents") / "data" / name).read_text(encoding="utf-8")
