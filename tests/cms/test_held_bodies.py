@@ -16,11 +16,11 @@ from cms.assessment.quality.body_check import check_body
 from cms.assessment.quality.of_body.effective_mass import effective_mass
 from cms.assessment.quality.reduction_check import check_reduction
 from cms.assessment.quality.reference.port_model import file_response
+from cms.body.modal_file.file import read_sealed
 from cms.cli.app import app
 from cms.errors import BodyError
 from cms.reduction.basis.frames import HeldFrame, TisserandFrame
 from fe_models.files.matrices.given import body_from_matrices
-from fe_models.foundation.sealed_hdf5 import read_sealed
 from fe_models.foundation.units import unit_system
 from fe_models.meshes.numbering import Numbering
 from floatframe.errors import ModelError

@@ -9,7 +9,7 @@ import numpy as np
 from cms.body.geometric_stiffness import UNIT_LOADS, GeometricStiffness, RotatedLoads, SpreadLoads
 from cms.body.invariants import Moments, NodalSums
 from cms.body.kept_points import KeptPoints
-from cms.body.modal_file.contents import Contents
+from cms.body.modal_file.contents import Attribute, Content, Contents, Dataset
 from cms.body.modal_file.entries import ENTRIES, entry_of, unit_of
 from cms.body.modal_file.recovery import recovery_attributes, recovery_of, recovery_values
 from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
@@ -18,7 +18,6 @@ from cms.body.stress import PointStress
 from cms.errors import ModalFileError
 from fe_models.body.load_cases import ReducedLoadCase
 from fe_models.foundation.arrays import require_shape
-from fe_models.foundation.sealed_hdf5 import Attribute, Content, Dataset
 from fe_models.foundation.units import UNIT_SYSTEMS, Units
 from fe_models.meshes.numbering import NO_NUMBERS, NamedSet, Numbering
 

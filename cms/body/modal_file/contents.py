@@ -1,14 +1,35 @@
-"""Access to the datasets and attributes of a file by path."""
+"""The content of a file, datasets and attributes by path, and access to it by a reader."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from cms.errors import ModalFileError
 from fe_models.foundation.arrays import require_shape
-from fe_models.foundation.sealed_hdf5 import Content
+from fe_models.foundation.hdf5_file import Attribute
 
-__all__ = ["Contents"]
+__all__ = ["Attribute", "Content", "Contents", "Dataset"]
+
+
+@dataclass(frozen=True, eq=False)
+class Dataset:
+    """An array with its unit and description in the file."""
+
+    values: Any  #: float64 or int64 array, or a tuple of strings
+    unit: str = "1"
+    description: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """Content of a file: datasets by path, and attributes by name for each group path."""
+
+    format: str
+    version: int
+    datasets: Mapping[str, Dataset]
+    attributes: Mapping[str, Mapping[str, Attribute]] = field(default_factory=dict)
 
 
 class Contents:

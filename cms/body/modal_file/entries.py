@@ -9,11 +9,10 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from cms.body.modal_file.contents import Contents
+from cms.body.modal_file.contents import Content, Contents, Dataset
 from cms.body.modal_file.recovery import GROUP as RECOVERY
 from cms.body.modal_file.recovery import recovery_of, recovery_values
 from cms.errors import ModalFileError
-from fe_models.foundation.sealed_hdf5 import Content, Dataset
 from fe_models.foundation.units import Dimensions, Units, unit_text
 
 __all__ = ["ENTRIES", "Dimensions", "Entry", "entry_of", "in_units", "unit_text"]

@@ -1,20 +1,42 @@
-"""The modal file: a reduced body as self-describing HDF5 (specified in docs/modal_file.md)."""
+"""The modal file: a reduced body as self-describing HDF5 (specified in docs/modal_file.md).
 
+A file reveals every change of a byte and never exists half written. There are two checks: the seal
+(fe_models/foundation/seal.py), compared before HDF5 opens the file, and the digest over all contents
+(fe_models/foundation/hdf5_file.py), which survives repacking and shows whether two files have equal contents.
+"""
+
+import io
 import os
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from cms.body.modal_file.content import FORMAT, body_of, content_of, require_same_frequencies, require_same_invariants
+from cms.body.modal_file.contents import Attribute, Content, Dataset
 from cms.body.modal_file.entries import in_units
 from cms.body.reduced_body import ReducedBody
 from cms.errors import CmsError, ModalFileError
-from fe_models.foundation.paths import is_stream
-from fe_models.foundation.seal import Kind
-from fe_models.foundation.sealed_hdf5 import read_sealed, write_sealed
+from fe_models.foundation.hdf5_file import (
+    DIGEST,
+    SHA256,
+    Manifest,
+    as_attribute,
+    described,
+    digest_of_lines,
+    opened,
+    own_items,
+    write_sealed_file,
+)
+from fe_models.foundation.paths import is_stream, part_of, replace_file
+from fe_models.foundation.seal import SEAL_SIZE, Kind, altered, check_seal, newer, reason, seal_of
+from fe_models.foundation.tall.on_disk import release
 from fe_models.foundation.units import Units, unit_system
 
 __all__ = ["FORMAT", "VERSION", "convert_units", "digest", "read", "write"]
 
 SUFFIXES = (".h5", ".hdf5")
+LARGE = 1 << 26  #: bytes of numbers above which the file is written directly, not first in memory
 VERSION = 6  #: version of the format; a reader rejects later versions and reads all earlier ones
 KIND = Kind(FORMAT, VERSION, ModalFileError, "`cms reduce` or `cms.write`")
 
@@ -112,9 +134,113 @@ def convert_units(reduced: ReducedBody, units: Units | str) -> ReducedBody:
     content = in_units(content_of(reduced, VERSION), reduced.units, new)
     provenance = {"/provenance": dict(reduced.provenance) | record}
     attributes = dict(content.attributes) | provenance
-    return body_of(type(content)(content.format, content.version, content.datasets, attributes))
+    return body_of(Content(content.format, content.version, content.datasets, attributes))
 
 
 def digest(path: str | os.PathLike[str]) -> str:
     """Return the digest of a modal file: equal for equal contents (sha256, 64 hexadecimal digits)."""
     return str(read_sealed(path, KIND).attributes["/"]["digest"])
+
+
+# sealed files ---------------------------------------------------------------------------------------------------------
+
+
+def write_sealed(content: Content, path: str | os.PathLike[str]) -> None:
+    """Write the content to a temporary file in the same folder, flush it to disk, and rename it.
+
+    Raises
+    ------
+    ModalFileError
+        If the file cannot be written (no folder, no permission, disk full). An existing file is unchanged.
+    """
+    import h5py
+
+    path = Path(path)
+    kind = Kind(content.format, content.version, ModalFileError, "")
+    try:
+        size = sum(each.values.nbytes for each in content.datasets.values() if isinstance(each.values, np.ndarray))
+        if size >= LARGE and not is_stream(path):  # a large image in memory would be wasteful
+            whole = path.resolve()  # resolve a link, so that it remains a link
+            write_sealed_file(whole, kind, lambda file: fill(file, content), part=part_of(whole))
+            return
+        image = io.BytesIO()
+        with h5py.File(image, "w", userblock_size=SEAL_SIZE, libver=("v108", "v108")) as file:  # readable by every tool
+            fill(file, content)
+        seal = seal_of(image, kind)
+        with image.getbuffer() as data:
+            replace_file(path, seal, data[SEAL_SIZE:])
+    except ValueError as error:  # a text that cannot be stored
+        raise ModalFileError(str(error)) from error
+    except OSError as error:
+        old = "; the file that was there is unchanged" if path.is_file() else "; nothing was written"
+        raise ModalFileError(f"{path}: cannot be written: {reason(error)}{old}") from error
+
+
+def read_sealed(path: str | os.PathLike[str], kind: Kind) -> Content:
+    """Read a file of this kind, up to its version, after checks of its seal and its digest.
+
+    Raises
+    ------
+    Exception
+        The error of the kind, if the file is missing, of another kind, of a later version, truncated or altered.
+    """
+    path = Path(path)
+    with opened(path, kind, has_seal=check_seal(path, kind)) as file:
+        found = as_attribute(file.attrs.get("format"))
+        if found != kind.format:
+            what = f"a {str(found)[:80]!r}" if found else "HDF5 of another program"
+            raise kind.error(f"{path}: not a {kind.format}: {what}")
+        stated = as_attribute(file.attrs.get("version"))
+        if isinstance(stated, int) and stated > kind.version:
+            raise newer(path, kind, stated)
+        return Content(kind.format, int(stated or 0), *walk(file, path, kind))
+
+
+def fill(file: Any, content: Content) -> None:
+    """Write the content into an open `h5py.File`; memory of arrays on disk is released after use."""
+    attributes = {name: dict(group) for name, group in content.attributes.items()}
+    attributes["/"] = {"format": content.format, "version": content.version, **attributes.get("/", {})}
+    manifest = Manifest(file)
+    for path, dataset in content.datasets.items():
+        manifest.dataset(path, dataset.values, {"unit": dataset.unit, "description": dataset.description})
+        release(dataset.values)
+    for path, group in attributes.items():
+        manifest.attributes(path, group)
+    manifest.close()
+
+
+def walk(file: Any, path: Path, kind: Kind) -> tuple[dict[str, Dataset], dict[str, dict[str, Attribute]]]:
+    """Return all datasets and all group attributes; raise the error of the kind if one differs from its digest."""
+    import h5py
+
+    datasets, groups, lines = {}, {}, []
+    for name, item in own_items(file, path, kind).items():
+        attributes = {key: as_attribute(item.attrs[key]) for key in item.attrs}
+        written = {"/": DIGEST}.get(name) if not isinstance(item, h5py.Dataset) else SHA256
+        expected = attributes.pop(written, None) if written else None
+        lines += [described(f"{name}@{key}", value)[3] for key, value in attributes.items()]
+        if isinstance(item, h5py.Dataset):
+            values = as_values(item[()])
+            _, _, sha256, line = described(name, values)
+            if sha256 != expected:
+                raise altered(path, kind, f"dataset {name} does not have its sha256")
+            datasets[name] = Dataset(values, str(attributes.get("unit", "1")), str(attributes.get("description", "")))
+            lines.append(line)
+        else:
+            groups[name] = attributes
+            if name == "/":
+                digest = expected
+    if digest_of_lines(lines) != digest:
+        raise altered(
+            path, kind, "its contents do not have its digest (an attribute or a name was changed, or one is missing)"
+        )
+    groups["/"][DIGEST] = str(digest)
+    return datasets, groups
+
+
+def as_values(value: Any) -> Any:
+    """Return a dataset as a float64 or int64 array, or as a tuple of strings."""
+    array = np.asarray(value)
+    if array.dtype.kind in "SO":
+        return tuple(word.decode("utf-8") if isinstance(word, bytes) else str(word) for word in array.ravel())
+    return array

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from cms.body.modal_file.contents import Attribute
 from cms.body.recovery_table import RecoveryTable
 from cms.errors import ModalFileError
-from fe_models.foundation.sealed_hdf5 import Attribute
 from fe_models.foundation.units import Units
 
 if TYPE_CHECKING:

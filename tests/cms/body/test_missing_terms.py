@@ -98,7 +98,7 @@ def test_a_file_of_a_whole_body_stays_one_that_older_programs_read(body, tmp_pat
 
 def test_a_false_word_about_what_is_missing_is_refused(body, tmp_path):
     from cms.body.modal_file.content import content_of
-    from fe_models.foundation.sealed_hdf5 import write_sealed
+    from cms.body.modal_file.file import write_sealed
 
     content = content_of(lacking(body, ("3C",)), 4)
     attributes = {**content.attributes, "/moments": {"is_exact": 1, "missing": "3C 9C"}}

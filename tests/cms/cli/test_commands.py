@@ -15,13 +15,13 @@ from typer.testing import CliRunner
 
 import cms
 from cms.assessment.quality.body_record import body_record, central_inertia
-from cms.body.modal_file.file import VERSION, read, write
+from cms.body.modal_file.contents import Content
+from cms.body.modal_file.file import VERSION, read, write, write_sealed
 from cms.cli.app import app
 from cms.jobs.job import read_job
 from cms.pipeline import reduce_job
 from cms.reduction.basis.frames import TisserandFrame
 from cms.reduction.frame_conversion import convert_frame
-from fe_models.foundation.sealed_hdf5 import Content, write_sealed
 from tests.bodies import box_mesh
 from tests.decks import JOB, write_deck
 from tests.root import ROOT, heed_signals

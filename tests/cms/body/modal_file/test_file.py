@@ -13,6 +13,7 @@ import pytest
 from cms.body.invariants import Moments
 from cms.body.modal_file import content as modal_content
 from cms.body.modal_file import file as modal_file
+from cms.body.modal_file.contents import Dataset
 from cms.body.modal_file.file import convert_units, digest, read, write
 from cms.body.reduced_body import ReducedBody
 from cms.errors import ModalFileError, UnitsError
@@ -25,7 +26,6 @@ from fe_models.body.fe_body import Interface
 from fe_models.body.loads import gravity_load, interface_load
 from fe_models.body.material import Material
 from fe_models.elements.solids.body import solid_body
-from fe_models.foundation import sealed_hdf5
 from fe_models.foundation.units import UNIT_SYSTEMS, unit_system
 from tests.bodies import box_mesh, distorted
 from tests.cms.body.modal_file.examples import differences
@@ -294,7 +294,7 @@ def test_other_files_are_refused_with_words(tmp_path, path):
 
 def test_a_large_file_that_is_not_made_in_memory_first_says_the_same(body, tmp_path, monkeypatch):
     write(body, tmp_path / "small.h5")
-    monkeypatch.setattr("fe_models.foundation.sealed_hdf5.LARGE", 0)
+    monkeypatch.setattr("cms.body.modal_file.file.LARGE", 0)
     (tmp_path / "link.h5").symlink_to(tmp_path / "large.h5")
     write(body, tmp_path / "link.h5")
     assert (tmp_path / "link.h5").is_symlink()
@@ -317,7 +317,7 @@ def test_a_newer_version_is_refused_by_its_number(body, tmp_path, monkeypatch):
 
 
 def written_with(content, path):
-    sealed_hdf5.write_sealed(content, path)
+    modal_file.write_sealed(content, path)
     return read(path)
 
 
@@ -328,13 +328,13 @@ def test_a_missing_dataset_and_a_wrong_invariant_are_refused_even_when_sealed(bo
         rest = {path: d for path, d in content.datasets.items() if path != name}
         with pytest.raises(ModalFileError, match=f"dataset {name} is missing"):
             written_with(replace(content, datasets=rest), tmp_path / "a.h5")
-    flipped = {**content.datasets, "/invariants/C4": sealed_hdf5.Dataset(-body.moments.C4)}
+    flipped = {**content.datasets, "/invariants/C4": Dataset(-body.moments.C4)}
     with pytest.raises(ModalFileError, match="/invariants/C4 does not follow from the moments"):
         written_with(replace(content, datasets=flipped), tmp_path / "a.h5")
-    short = {**content.datasets, "/modes/K": sealed_hdf5.Dataset(body.K[:2])}
+    short = {**content.datasets, "/modes/K": Dataset(body.K[:2])}
     with pytest.raises(ModalFileError, match=r"a\.h5: .*expected shape"):
         written_with(replace(content, datasets=short), tmp_path / "a.h5")
-    bad = {**content.datasets, "/nodes/Phi": sealed_hdf5.Dataset(body.Phi * np.nan)}
+    bad = {**content.datasets, "/nodes/Phi": Dataset(body.Phi * np.nan)}
     with pytest.raises(ModalFileError, match="expected finite numbers"):
         written_with(replace(content, datasets=bad), tmp_path / "a.h5")
     units = {**content.attributes, "/units": {**content.attributes["/units"], "length": 1.0}}
@@ -491,7 +491,7 @@ def test_a_count_that_is_not_that_of_the_groups_is_refused_before_any_work(body,
 def test_a_mass_of_several_numbers_is_refused(body, tmp_path):
     content = modal_content.content_of(body, modal_file.VERSION)
     for name in ("/moments/m", "/nodal_sums/w"):
-        several = {**content.datasets, name: sealed_hdf5.Dataset(np.ones(2))}
+        several = {**content.datasets, name: Dataset(np.ones(2))}
         with pytest.raises(ModalFileError, match=rf"dataset {name}: expected shape \(\)"):
             written_with(replace(content, datasets=several), tmp_path / "a.h5")
 

@@ -7,10 +7,9 @@ import pytest
 
 import cms
 from cms.assessment.quality.body_check import check_body
-from cms.body.modal_file.file import KIND, read
+from cms.body.modal_file.file import KIND, read, read_sealed, write_sealed
 from cms.errors import ModalFileError
 from cms.reduction.basis.frames import NodalFrame
-from fe_models.foundation.sealed_hdf5 import read_sealed, write_sealed
 from tests.bodies import bar
 
 

@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from cms.body.modal_file.contents import Content, Dataset
+from cms.body.modal_file.file import read_sealed, write_sealed
 from fe_models.foundation.errors import ModalFileError
 from fe_models.foundation.hdf5_file import LARGE, chunk_of
 from fe_models.foundation.seal import Kind
-from fe_models.foundation.sealed_hdf5 import Content, Dataset, read_sealed, write_sealed
 
 KIND = Kind("sample", 1, ModalFileError, "this test")
 N = 400  #: 1.28 MB a matrix
