@@ -114,7 +114,7 @@ class Recursion:
                 self.moments[k] = found = ModalMoments.of(graph, link.modes, tree.x)
                 self.nodes.s[k], self.nodes.P[k] = link.s + found.s, link.P + found.second
         self.call = Traced(graph, {name: getattr(self, name) for name in (
-            "own_marker", "marker_acceleration", "add_modal_forces", "flexible_wrench",
+            "own_marker", "marker_rates", "add_modal_forces", "flexible_wrench",
             "matrix_of_euler_parameters")})  # fmt: skip
         rest = self.zeros(len(tree.v))
         self.placed = self.arguments(rest, rest, tree.gravity)
@@ -191,7 +191,7 @@ class Recursion:
         """Return the rotation of a marker."""
         return self.places[m].E
 
-    def marker_acceleration(self, model: None, marker_work: Any, m: int) -> tuple[Terms, Terms]:
+    def marker_rates(self, model: None, marker_work: Any, m: int) -> tuple[Terms, Terms]:
         """Return rho_ddot and nu_dot of a marker."""
         return marker_work.markers.rho_ddot[m], marker_work.markers.nu_dot[m]
 

@@ -182,21 +182,13 @@ def marker_acceleration(model, work, m, out):
     if i < 0:
         return
     R, u_dot = work.state.R[i], work.state.u_dot[model.bodies.u0[i] :]
-    omega_dot = vector(u_dot[3:])
-    d, turn = elastic_acceleration(model, work, m, i)
-    put_sum(out, 0, add(vector(u_dot), turned(R, add(cross(omega_dot, vector(work.markers.rho[m])), d))))
-    put_sum(out, 3, turned(R, add(omega_dot, turn)))
-
-
-@loops
-def elastic_acceleration(model, work, m, i):
-    """Return the contribution of q_ddot to acceleration and angular acceleration of marker m of body i, body axes."""
-    o = model.markers.psi0[m]
-    if o < 0:
-        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    n, first = model.bodies.n_q[i], model.bodies.u0[i] + 6
-    d, th = shape_sum(work.markers.psi[o : o + 6 * n], n, work.state.u_dot[first : first + n])
-    return d, turned(work.markers.T_left[m], th)
+    turn, o, n = vector(u_dot[3:]), model.markers.psi0[m], model.bodies.n_q[i]
+    move = cross(turn, vector(work.markers.rho[m]))
+    if o >= 0:
+        d, th = shape_sum(work.markers.psi[o : o + 6 * n], n, u_dot[6 : 6 + n])
+        move, turn = add(move, d), add(turn, turned(work.markers.T_left[m], th))
+    put_sum(out, 0, add(vector(u_dot), turned(R, move)))
+    put_sum(out, 3, turned(R, turn))
 
 
 @loops

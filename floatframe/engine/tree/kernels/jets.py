@@ -16,7 +16,7 @@ theta = T(x) dx, and the rates z_dot, z_ddot, in axes of B, change by d(z_dot) =
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.vector import add, cross, put, scaled, sub, turned, vector
 from floatframe.engine.tree.kernels.kinematics import end_acceleration, end_motion
-from floatframe.engine.tree.kernels.mode_screws import mode_screws, screw_rates, second_rates
+from floatframe.engine.tree.kernels.mode_screws import mode_screws, second_rates, variation_rates
 from floatframe.engine.tree.kernels.spatial import (
     pair_sum,
     put_pair_of,
@@ -34,7 +34,7 @@ __all__ = ["carrier", "put_jets", "put_mode_jet", "write_jets"]
 @inner
 def put_jets(out, S_0, S_1, S_2, V, V_dot):
     """Write xi, xi_dot, xi_ddot, (18,), of a variation with S theta = S_0, S theta_dot = S_1, S theta_ddot = S_2."""
-    xi_dot, xi_ddot = screw_rates(S_0, S_1, S_2, V, V_dot)
+    xi_dot, xi_ddot = variation_rates(S_0, S_1, S_2, V, V_dot)
     put_pair_of(out, 0, S_0)
     put_pair_of(out, 6, xi_dot)
     put_pair_of(out, 12, xi_ddot)

@@ -38,6 +38,7 @@ from floatframe.engine.kernels.vector import (
     unit_matrix,
     vector,
 )
+from floatframe.engine.tree.kernels.kinematics import column_screw
 from floatframe.engine.tree.kernels.mode_screws import mode_screw
 from floatframe.engine.tree.kernels.projection import subtract_slopes
 
@@ -151,26 +152,13 @@ def write_front(H, S, Z, F, n, n_l):
 @inner
 def pose_columns(work, tree, joints, tangent, i):
     """Write the screws by which the columns of the joint of body i move it, body axes about its origin."""
-    near, far = tree.near[i], tree.far[i]
-    R, origin = work.state.R[i], vector(work.state.r[i])
-    at_near, at_far = (0.0, 0.0, 0.0), origin
-    if near >= 0:
-        at_near = vector(work.markers.r[near])
-    if far >= 0:
-        at_far = vector(work.markers.r[far])
-    sense = -1.0 if tree.is_reversed[i] != 0 else 1.0
+    R, sense = work.state.R[i], -1.0 if tree.is_reversed[i] != 0 else 1.0
     for k in range(tree.column0[i], tree.column0[i + 1]):
         s = tree.unknown[k]
-        if s < 0:
-            continue
-        is_far = tree.side[k] != tree.is_reversed[i]
-        point = at_far if is_far else at_near
-        a = scaled(sense, vector(joints.a[k]))
-        t = cross(a, sub(origin, point))
-        if tree.side[k] == 0:
-            t = add(t, scaled(sense, vector(joints.t[k])))
-        put(tangent.J[s], 0, turned_back(R, t))
-        put(tangent.J[s], 3, turned_back(R, a))
+        if s >= 0:
+            t, a = column_screw(work, tree, joints, i, k, vector(work.state.r[i]))
+            put(tangent.J[s], 0, scaled(sense, turned_back(R, t)))
+            put(tangent.J[s], 3, scaled(sense, turned_back(R, a)))
 
 
 @matrix_loops

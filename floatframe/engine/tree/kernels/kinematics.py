@@ -12,13 +12,7 @@ at A. Deformations of both bodies, their rates and accelerations are those of `s
 """
 
 from floatframe.engine.kernels.compiler.compilation import inner, loops
-from floatframe.engine.kernels.marker import (
-    elastic_acceleration,
-    elastic_motion,
-    marker_acceleration,
-    marker_acceleration_bias,
-    marker_motion,
-)
+from floatframe.engine.kernels.marker import elastic_motion, marker_acceleration, marker_motion
 from floatframe.engine.kernels.rotation import exp_matrix
 from floatframe.engine.kernels.vector import (
     add,
@@ -36,9 +30,10 @@ from floatframe.engine.kernels.vector import (
     unit_matrix,
     vector,
 )
+from floatframe.engine.tree.kernels.elastic_turning import elastic_body_in_joint
 from floatframe.engine.tree.kernels.spins import turn_spinning_joint
 
-__all__ = ["end_acceleration", "end_motion", "joint_motion", "move_joints", "place_bodies"]
+__all__ = ["column_screw", "end_acceleration", "end_motion", "joint_motion", "move_joints", "place_bodies"]
 
 
 @loops
@@ -102,6 +97,21 @@ def turning_of_columns(tree, joints, i, omega_a, omega_b):
 
 
 @inner
+def column_screw(work, tree, joints, i, k, origin):
+    """Return translation at a point and rotation for column k of the joint of body i, of B against A, ground axes."""
+    m, point = tree.far[i], vector(work.state.r[i])
+    if tree.side[k] == tree.is_reversed[i]:  # fixed in the marker on the parent
+        m, point = tree.near[i], (0.0, 0.0, 0.0)
+    if m >= 0:
+        point = vector(work.markers.r[m])
+    a = vector(joints.a[k])
+    t = cross(a, sub(origin, point))
+    if tree.side[k] == 0:
+        t = add(t, vector(joints.t[k]))
+    return t, a
+
+
+@inner
 def place_bodies(model, work, tree, joints):
     """Write r, R, u, u_dot of all bodies from d, Q, z_dot, z_ddot of their joints and their modal coordinates."""
     for place in range(tree.order.shape[0]):
@@ -161,26 +171,21 @@ def put_body(model, work, tree, i, r, A, v, omega, a, alpha):
     put_matrix(work.markers.A[m], A)
     put(work.markers.v[m], 0, v)
     put(work.markers.omega[m], 0, omega)
-    triad, zero = matrix(model.markers.triad[m]), (0.0, 0.0, 0.0)
+    triad = matrix(model.markers.triad[m])
     put(work.markers.rho[m], 0, vector(model.markers.position[m]))
-    rho_dot, nu = zero, zero
     if model.markers.psi0[m] >= 0:
         elastic_motion(model, work, m, i)
         triad = product(exp_matrix(vector(work.markers.angle[m])), triad)
-        rho_dot, nu = vector(work.markers.rho_dot[m]), vector(work.markers.spin[m])
     R = product(A, transposed(triad))
-    rho = vector(work.markers.rho[m])
-    own = sub(turned_back(R, omega), nu)
+    rho, rho_dot = vector(work.markers.rho[m]), vector(work.markers.rho_dot[m])
+    omega, alpha, a = turned_back(R, omega), turned_back(R, alpha), turned_back(R, a)
+    omega, alpha, a = elastic_body_in_joint(model, work, m, omega, alpha, a)
     put(state.r[i], 0, sub(r, turned(R, rho)))
     put_matrix(state.R[i], R)
-    put(u, 0, sub(v, turned(R, add(cross(own, rho), rho_dot))))
-    put(u, 3, own)
-    bias = work.markers.bias[m]
-    marker_acceleration_bias(model, work, m, bias)
-    by_modes, turn = elastic_acceleration(model, work, m, i)
-    own_dot = sub(turned_back(R, sub(alpha, vector(bias[3:]))), turn)
-    put(u_dot, 3, own_dot)
-    put(u_dot, 0, sub(sub(a, vector(bias)), turned(R, add(cross(own_dot, rho), by_modes))))
+    put(u, 0, sub(v, turned(R, add(cross(omega, rho), rho_dot))))
+    put(u, 3, omega)
+    put(u_dot, 0, turned(R, a))
+    put(u_dot, 3, alpha)
 
 
 @inner

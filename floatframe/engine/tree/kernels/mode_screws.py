@@ -15,7 +15,7 @@ from floatframe.engine.kernels.vector import add, cross, dot, scaled, sub, turne
 from floatframe.engine.tree.kernels.elastic_turning import deformation_accelerations, second_turning
 from floatframe.engine.tree.kernels.spatial import pair_sum, scaled_pair, spatial_cross, world_screw
 
-__all__ = ["add_second_order", "mode_rate", "mode_screw", "mode_screws", "screw_rates", "second_rates"]
+__all__ = ["add_second_order", "mode_rate", "mode_screw", "mode_screws", "second_rates", "variation_rates"]
 
 
 @small
@@ -81,7 +81,7 @@ def mode_screws(model, work, m, i, k, held):
 
 
 @inner
-def screw_rates(S_0, S_1, S_2, V, V_dot):
+def variation_rates(S_0, S_1, S_2, V, V_dot):
     """Return xi_dot and xi_ddot of a variation with S theta = S_0 and the rates S_1, S_2 of it in a moving frame."""
     turned_once = spatial_cross(V, S_0)
     own = pair_sum(scaled_pair(2.0, spatial_cross(V, S_1)), spatial_cross(V_dot, S_0))

@@ -52,13 +52,14 @@ from floatframe.engine.tree.kernels.spatial import (
     world_screw,
     wrench_of_column,
 )
-from floatframe.engine.tree.kernels.tree import COLUMN, NEAR_MODE
+from floatframe.engine.tree.kernels.tree import COLUMN, FAR_MODE, NEAR_MODE
 
 __all__ = [
     "assemble",
     "body_frame",
     "inner_product",
     "product_of",
+    "sum_forces",
     "unit_of",
     "write_tangent",
 ]
@@ -175,26 +176,38 @@ def inner_product(x, y):
 
 
 @inner
-def assemble(model, work, tree, tangent, c_d, c_k):
-    """Write the matrix K of the unknowns and kept wrenches; sums over subtrees overwrite D and F."""
-    K = tangent.K
-    for r in range(K.shape[0]):
-        for s in range(K.shape[0]):
-            K[r, s] = 0.0
+def sum_forces(model, work, tree, tangent, c_k):
+    """Sum F over subtrees; write the forces of bodies by their modes, and add what their screws change by to H."""
     for place in range(tree.order.shape[0] - 1, -1, -1):
         i = tree.order[place]
-        of_modes(model, work, tree, tangent, i)
-        of_subtree(tree, tangent, i)
-        turning_columns(model, tree, tangent, i)
-        turning_modes(model, work, tree, tangent, i, c_k)
-        subtract_slopes(model, work, tree, i, tangent.K, 0, c_d, c_k)
-        parent = tree.parent[i]
-        if parent >= 0:
+        if tree.parent[i] >= 0:
             for r in range(6):
-                tangent.F[parent, r] += tangent.F[i, r]
-                for e in range(18):
-                    tangent.D[parent, r, e] += tangent.D[i, r, e]
-    n_s = tree.s0[tree.s0.shape[0] - 1]
+                tangent.F[tree.parent[i], r] += tangent.F[i, r]
+    for i in range(tree.parent.shape[0]):
+        H = newton_block(model, work, i)
+        R, p = body_frame(work, tangent, i)
+        for k in range(model.bodies.n_q[i]):
+            put_pair_of(tangent.by_mode[model.bodies.q0[i] + k], 0, wrench_of_column(H, 6 + k, R, p))
+        for j in range(tree.jet0[i], tree.jet0[i + 1]):
+            k = tree.jet_item[j]
+            if tree.jet_kind[j] == FAR_MODE:
+                add_second_order(model, work, tree.far[i], k, R, p, -c_k, tangent.F[i], H[6 + k, 6:])
+            elif tree.jet_kind[j] == NEAR_MODE:
+                R_P, p_P = body_frame(work, tangent, tree.parent[i])
+                of_parent = newton_block(model, work, tree.parent[i])
+                add_second_order(model, work, tree.near[i], k, R_P, p_P, c_k, tangent.F[i], of_parent[6 + k, 6:])
+
+
+@inner
+def assemble(model, work, tree, tangent, c_d, c_k):
+    """Write the matrix K of the unknowns and kept wrenches."""
+    K, n_s = tangent.K, tree.slot.shape[0]
+    K[:, :] = 0.0
+    sum_forces(model, work, tree, tangent, c_k)
+    for s in range(n_s):
+        matrix_column(model, work, tree, tangent, s)
+    for i in range(tree.parent.shape[0]):
+        subtract_slopes(model, work, tree, i, K, 0, c_d, c_k)
     for r in range(tangent.V.shape[0]):
         for k in range(tangent.V.shape[0]):
             K[n_s + r, n_s + k] = tangent.V[r, k]
@@ -204,83 +217,55 @@ def assemble(model, work, tree, tangent, c_d, c_k):
 
 
 @inner
-def of_modes(model, work, tree, tangent, i):
-    """Add rows and columns of the modes of body i, its frame and those of its children being fixed or moved by jets."""
-    n, q0, m0, K = model.bodies.n_q[i], model.bodies.q0[i], tree.m0[i], tangent.K
-    if n == 0:
-        return
-    H = newton_block(model, work, i)
-    (R, p), f = body_frame(work, tangent, i), tangent.f
-    for k in range(n):
-        put_pair_of(f, 0, wrench_of_column(H, 6 + k, R, p))
-        b = i
-        while b >= 0:
-            for j in range(tree.jet0[b], tree.jet0[b + 1]):
-                K[tree.jet_s[j], m0 + k] += inner_product(tangent.screw[j], f)
-                total = 0.0
-                for e in range(18):
-                    total += tangent.modal[q0 + k, e] * tangent.jet[j, e]
-                K[m0 + k, tree.jet_s[j]] += total
-            b = tree.parent[b]
-        for l in range(n):  # noqa: E741
-            K[m0 + k, m0 + l] += H[6 + k, 6 + l]
-
-
-@inner
-def of_subtree(tree, tangent, i):
-    """Add J · D jet of all pairs with one in the joint of body i and the other in it or before it."""
-    K, f, D = tangent.K, tangent.f, tangent.D[i]
-    b = i
-    while b >= 0:
-        for j in range(tree.jet0[b], tree.jet0[b + 1]):
-            product_of(D, tangent.jet[j], f)
-            for k in range(tree.jet0[i], tree.jet0[i + 1]):
-                K[tree.jet_s[k], tree.jet_s[j]] += inner_product(tangent.screw[k], f)
-            if b == i:
-                a = tree.parent[i]
-                while a >= 0:
-                    for k in range(tree.jet0[a], tree.jet0[a + 1]):
-                        K[tree.jet_s[k], tree.jet_s[j]] += inner_product(tangent.screw[k], f)
-                    a = tree.parent[a]
-        b = tree.parent[b]
-
-
-@inner
-def turning_columns(model, tree, tangent, i):
-    """Add (xi × J) · F of the columns of the joint of body i, with xi of the frame in which J is fixed."""
-    K, F = tangent.K, tangent.F[i]
+def add_jets(tree, tangent, i, s, kind, X):
+    """Add the jets of unknown s at the joint of body i that are of a kind."""
     for j in range(tree.jet0[i], tree.jet0[i + 1]):
-        if tree.jet_kind[j] != COLUMN:
-            continue
-        s, screw = tree.jet_s[j], tangent.screw[j]
-        is_far = tree.side[tree.jet_item[j]] != tree.is_reversed[i]  # fixed in the marker on the body
-        b = i
-        while b >= 0:
-            for k in range(tree.jet0[b], tree.jet0[b + 1]):
-                of_marker = b != i or tree.jet_kind[k] == NEAR_MODE or (is_far and tree.jet_kind[k] == COLUMN)
-                if of_marker:
-                    K[s, tree.jet_s[k]] += turned_power(pair(tangent.jet[k]), screw, F)
-            b = tree.parent[b]
+        if tree.jet_s[j] == s and tree.jet_kind[j] == kind:
+            for e in range(X.shape[0]):
+                X[e] += tangent.jet[j, e]
 
 
 @inner
-def turning_modes(model, work, tree, tangent, i, c_k):
-    """Add the changes of the screws of modes at both ends of the joint of body i, times the force of the subtree."""
-    K, F = tangent.K, tangent.F[i]
-    for j in range(tree.jet0[i], tree.jet0[i + 1]):
-        if tree.jet_kind[j] == COLUMN:
-            continue
-        s, screw, k = tree.jet_s[j], tangent.screw[j], tree.jet_item[j]
-        is_near = tree.jet_kind[j] == NEAR_MODE
-        body = tree.parent[i] if is_near else i
-        b = body
-        while b >= 0:
-            for e in range(tree.jet0[b], tree.jet0[b + 1]):
-                K[s, tree.jet_s[e]] += turned_power(pair(tangent.jet[e]), screw, F)
-            b = tree.parent[b]
-        m, sign = (tree.near[i], 1.0) if is_near else (tree.far[i], -1.0)
-        R, p = body_frame(work, tangent, body)
-        add_second_order(model, work, m, k, R, p, sign * c_k, F, K[s, tree.m0[body] :])
+def matrix_column(model, work, tree, tangent, s):
+    """Write column s of K: the motion by this unknown outwards, Y of near markers, X of bodies; forces b inwards."""
+    X, Y, b, n_b, K = tangent.X, tangent.Y, tangent.b, tree.order.shape[0], tangent.K
+    for place in range(n_b):
+        i = tree.order[place]
+        for e in range(18):
+            Y[i, e] = X[tree.parent[i], e] if tree.parent[i] >= 0 else 0.0
+        add_jets(tree, tangent, i, s, NEAR_MODE, Y[i])
+        for e in range(18):
+            X[i, e] = Y[i, e]
+        add_jets(tree, tangent, i, s, COLUMN, X[i])
+        add_jets(tree, tangent, i, s, FAR_MODE, X[i])
+        product_of(tangent.D[i], X[i], b[i])
+    for place in range(n_b - 1, -1, -1):
+        i = tree.order[place]
+        parent, m0, q0, F = tree.parent[i], tree.m0[i], model.bodies.q0[i], tangent.F[i]
+        H, is_own = newton_block(model, work, i), m0 <= s < tree.s0[i + 1]
+        for k in range(model.bodies.n_q[i]):
+            for e in range(18):
+                K[m0 + k, s] += tangent.modal[q0 + k, e] * X[i, e]
+            if is_own:
+                K[m0 + k, s] += H[6 + k, 6 + s - m0]
+        if is_own:
+            for r in range(6):
+                b[i, r] += tangent.by_mode[q0 + s - m0, r]
+        if parent >= 0:
+            for r in range(6):
+                b[parent, r] += b[i, r]
+        near = pair(Y[i])
+        add_jets(tree, tangent, i, s, COLUMN, Y[i])
+        for j in range(tree.jet0[i], tree.jet0[i + 1]):
+            screw, kind = tangent.screw[j], tree.jet_kind[j]
+            xi = near  # of the frame in which the screw is fixed
+            if kind == NEAR_MODE:
+                xi = pair(X[parent])
+            elif kind == FAR_MODE:
+                xi = pair(X[i])
+            elif tree.side[tree.jet_item[j]] != tree.is_reversed[i]:
+                xi = pair(Y[i])
+            K[tree.jet_s[j], s] += inner_product(screw, b[i]) + turned_power(xi, screw, F)
 
 
 @inner

@@ -15,10 +15,9 @@ Wrenches that are kept are found from V - C K⁻¹ B, a column of K⁻¹ B being
 from floatframe.engine.kernels.body import newton_block
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.dense import lu_factor, lu_solve, lu_solve_columns
-from floatframe.engine.tree.kernels.mode_screws import add_second_order
 from floatframe.engine.tree.kernels.projection import subtract_slopes
-from floatframe.engine.tree.kernels.spatial import pair, put_pair_of, turned_power, wrench_of_column
-from floatframe.engine.tree.kernels.tangent import body_frame, inner_product, product_of, unit_of
+from floatframe.engine.tree.kernels.spatial import pair, turned_power
+from floatframe.engine.tree.kernels.tangent import inner_product, product_of, sum_forces, unit_of
 from floatframe.engine.tree.kernels.tree import COLUMN, NEAR_MODE
 
 __all__ = ["factorize_tree", "solve_bordered", "solve_newton", "solve_wrenches"]
@@ -27,13 +26,7 @@ __all__ = ["factorize_tree", "solve_bordered", "solve_newton", "solve_wrenches"]
 @inner
 def factorize_tree(model, work, tree, tangent, c_d, c_k):
     """Factorise the Newton matrix from the parts of `write_tangent`; return whether it is regular."""
-    for place in range(tree.order.shape[0] - 1, -1, -1):  # forces of subtrees, which the matrices need
-        i = tree.order[place]
-        if tree.parent[i] >= 0:
-            for r in range(6):
-                tangent.F[tree.parent[i], r] += tangent.F[i, r]
-    for i in range(tree.parent.shape[0]):
-        modal_forces(model, work, tangent, i)
+    sum_forces(model, work, tree, tangent, c_k)
     for place in range(tree.order.shape[0] - 1, -1, -1):
         if not factorize_joint(model, work, tree, tangent, tree.order[place], c_d, c_k):
             return False
@@ -47,16 +40,6 @@ def factorize_tree(model, work, tree, tangent, c_d, c_k):
                 total += tangent.C[r, s] * tangent.B[k, s]
             tangent.V[r, k] -= total
     return n_rows == 0 or lu_factor(tangent.V, tangent.V_pivot)
-
-
-@inner
-def modal_forces(model, work, tangent, i):
-    """Write the force of body i by its own modes."""
-    n, q0 = model.bodies.n_q[i], model.bodies.q0[i]
-    H = newton_block(model, work, i)
-    R, p = body_frame(work, tangent, i)
-    for k in range(n):
-        put_pair_of(tangent.by_mode[q0 + k], 0, wrench_of_column(H, 6 + k, R, p))
 
 
 @inner
@@ -74,7 +57,6 @@ def factorize_joint(model, work, tree, tangent, i, c_d, c_k):
     H = newton_block(model, work, i)
     L = tangent.L[tree.l0[i] : tree.l0[i + 1]].reshape((n_l, n_l))
     R, W = tangent.G[s0 : s0 + n_l], tangent.W[s0 : s0 + n_l]
-    axes, origin = body_frame(work, tangent, i)
     for k in range(n_l):
         j, s = tree.own_jet[s0 + k], s0 + k
         for e in range(6):
@@ -95,7 +77,6 @@ def factorize_joint(model, work, tree, tangent, i, c_d, c_k):
             own_mode = s >= m0
             if own_mode:
                 add_turning(row, screw, F)  # with the jet of the body
-                add_second_order(model, work, tree.far[i], s - m0, axes, origin, -c_k, F, L[k, m0 - s0 :])
             for l in range(n_l):  # noqa: E741
                 o = tree.own_jet[s0 + l]
                 if o >= 0:
@@ -127,7 +108,7 @@ def factorize_joint(model, work, tree, tangent, i, c_d, c_k):
                 for e in range(18):
                     A[r, e] += W[k, r] * R[k, e]
     if tree.parent[i] >= 0:
-        add_to_parent(model, work, tree, tangent, i, c_k)
+        add_to_parent(model, work, tree, tangent, i)
     return True
 
 
@@ -142,12 +123,12 @@ def turning_far(tree, tangent, i, j, k, L, F):
 
 
 @inner
-def add_to_parent(model, work, tree, tangent, i, c_k):
+def add_to_parent(model, work, tree, tangent, i):
     """Add P of the joint of body i to its parent: to its force, and to the force and equations of its modes."""
     parent, P, F = tree.parent[i], tangent.D[i], tangent.F[i]
     q0 = model.bodies.q0[parent]
     H = newton_block(model, work, parent)
-    (R, p), f = body_frame(work, tangent, parent), tangent.f
+    f = tangent.f
     for j in range(tree.jet0[i], tree.jet0[i + 1]):
         if tree.jet_kind[j] != NEAR_MODE:
             continue
@@ -163,7 +144,6 @@ def add_to_parent(model, work, tree, tangent, i, c_k):
         for o in range(tree.jet0[i], tree.jet0[i + 1]):
             if tree.jet_kind[o] == NEAR_MODE:
                 H[6 + tree.jet_item[o], 6 + k] += inner_product(tangent.screw[o], f)
-        add_second_order(model, work, tree.near[i], k, R, p, c_k, F, H[6 + k, 6:])
     for r in range(6):
         for e in range(18):
             tangent.D[parent, r, e] += P[r, e]

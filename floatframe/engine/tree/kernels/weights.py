@@ -8,6 +8,7 @@ from floatframe.engine.kernels.body import moved_inertia
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.vector import add, cross, dot, put, put_sum, sub, turned, turned_back, vector
 from floatframe.engine.tree.kernels.body_jets import moments_of_body
+from floatframe.engine.tree.kernels.kinematics import column_screw
 
 __all__ = ["sizes_of_step", "squared_size", "weigh"]
 
@@ -28,18 +29,12 @@ def weigh(model, work, tree, joints, tangent):
             put(mass[i, 3 + a], 0, J[a])
     for place in range(tree.order.shape[0] - 1, -1, -1):
         i = tree.order[place]
-        near, far, parent = tree.near[i], tree.far[i], tree.parent[i]
+        parent = tree.parent[i]
         m, S, J = mass[i, 0, 0], vector(mass[i, 1]), mass[i, 3:]
         for k in range(tree.column0[i], tree.column0[i + 1]):
             if tree.unknown[k] < 0:
                 continue
-            point = vector(work.state.r[i]) if far < 0 else vector(work.markers.r[far])
-            if tree.side[k] == tree.is_reversed[i]:
-                point = (0.0, 0.0, 0.0) if near < 0 else vector(work.markers.r[near])
-            a = vector(joints.a[k])
-            v = cross(a, sub(origin, point))
-            if tree.side[k] == 0:
-                v = add(v, joints.t[k])
+            v, a = column_screw(work, tree, joints, i, k, origin)
             total = m * dot(v, v) + 2.0 * dot(v, cross(a, S)) + dot(a, turned(J, a))
             tangent.weight[tree.unknown[k]] = abs(total)
         if parent >= 0:

@@ -35,46 +35,10 @@ from floatframe.engine.kernels.vector import (
     unit_matrix,
     vector,
 )
-from floatframe.engine.tree.kernels.elastic_turning import deformation_accelerations, turning_bias
+from floatframe.engine.tree.kernels.elastic_turning import elastic_body_in_joint, elastic_carrier, spin_matrix
 from floatframe.engine.tree.recursion.nodes import ROTATION, SCREW, TRANSLATION
 
-__all__ = ["add_modal_forces", "elastic_carrier", "marker_acceleration", "newton_euler", "relative_acceleration"]
-
-
-# motion of a marker in its flexible body to second order: what a joint at it adds (docs/recursive.md §2) --------------
-# With Psi(q) = Psi - K_P q, th_dot = Psi_r q_dot, T the left Jacobian at th, all in axes of the body:
-#
-#     rho_ddot = Psi_t q_ddot - (K_P q_dot)_t q_dot        nu = T th_dot
-#     nu_dot   = T th_ddot + c,   th_ddot = Psi_r q_ddot - (K_P q_dot)_r q_dot,   c = (dT/dth [th_dot]) th_dot
-
-
-@loops
-def marker_acceleration(model, marker_work, m):
-    """Return rho_ddot and nu_dot of marker m, whose motion in its body is written."""
-    markers, zero = marker_work.markers, (0.0, 0.0, 0.0)
-    if model.markers.psi0[m] < 0:
-        return zero, zero
-    rho_ddot, th_ddot = deformation_accelerations(model, marker_work, m, model.markers.body[m])
-    c = turning_bias(vector(markers.angle[m]), vector(markers.angle_dot[m]))
-    return rho_ddot, add(turned(markers.T_left[m], th_ddot), c)
-
-
-@small
-def spin_matrix(omega, alpha):
-    """Return U = alpha~ + omega~ omega~."""
-    x, y, z = omega
-    xx, yy, zz, xy, xz, yz = x * x, y * y, z * z, x * y, x * z, y * z
-    return (
-        (-(yy + zz), xy - alpha[2], xz + alpha[1]),
-        (xy + alpha[2], -(xx + zz), yz - alpha[0]),
-        (xz - alpha[1], yz + alpha[0], -(xx + yy)),
-    )
-
-
-@small
-def relative_acceleration(omega, U, rho, rho_dot, rho_ddot):
-    """Return the acceleration of a point of a body less that of the frame origin, body axes."""
-    return add(add(turned(U, rho), scaled(2.0, cross(omega, rho_dot))), rho_ddot)
+__all__ = ["add_modal_forces", "newton_euler"]
 
 
 @loops
@@ -92,29 +56,6 @@ def add_modal_forces(model, marker_work, m, f, t, sign, out):
 
 
 # newton euler ---------------------------------------------------------------------------------------------------------
-
-
-@loops
-def elastic_carrier(model, marker_work, m, omega, alpha, a):
-    """Return omega, alpha of marker m and the acceleration of its point, body axes, from those of its body."""
-    markers = marker_work.markers
-    rho_ddot, nu_dot = marker_acceleration(model, marker_work, m)
-    nu, U = vector(markers.spin[m]), spin_matrix(omega, alpha)
-    moved = relative_acceleration(omega, U, vector(markers.rho[m]), vector(markers.rho_dot[m]), rho_ddot)
-    return add(omega, nu), add(alpha, add(cross(omega, nu), nu_dot)), add(a, moved)
-
-
-@loops
-def elastic_body_in_joint(model, marker_work, m, omega, alpha, a):
-    """Return omega, alpha, a of a flexible body from the motion of its marker m; all in body axes."""
-    markers = marker_work.markers
-    rho_ddot, nu_dot = marker_acceleration(model, marker_work, m)
-    nu = vector(markers.spin[m])
-    own = sub(omega, nu)
-    turning = sub(alpha, add(cross(own, nu), nu_dot))
-    U = spin_matrix(own, turning)
-    moved = relative_acceleration(own, U, vector(markers.rho[m]), vector(markers.rho_dot[m]), rho_ddot)
-    return own, turning, sub(a, moved)
 
 
 @small

@@ -37,7 +37,8 @@ from floatframe.engine.kernels.vector import (
     vector,
 )
 from floatframe.engine.tree.kernels.body_jets import mode_row, momentum_of_modes, turning_of_momentum
-from floatframe.engine.tree.kernels.mode_screws import add_second_order, mode_screws, screw_rates, second_rates
+from floatframe.engine.tree.kernels.elastic_turning import elastic_carrier
+from floatframe.engine.tree.kernels.mode_screws import add_second_order, mode_screws, second_rates, variation_rates
 from floatframe.engine.tree.kernels.spatial import (
     pair,
     pair_sum,
@@ -49,7 +50,6 @@ from floatframe.engine.tree.kernels.spatial import (
     wrench_of_column,
 )
 from floatframe.engine.tree.recursion.composite import along, body_moments
-from floatframe.engine.tree.recursion.newton_euler import elastic_carrier
 
 __all__ = ["force_tangents"]
 
@@ -131,7 +131,7 @@ def put_mode_changes(work, model, marker_work, k, m, sign, out, change):
     rho_2, angle_2 = second_rates(model, marker_work, m, i)
     for j in range(out.shape[0]):
         S, S_1, S_2 = mode_screws(model, marker_work, m, i, j, (R, r, V, A, rho_2, angle_2))
-        Y, X = screw_rates(S, S_1, S_2, V, A)
+        Y, X = variation_rates(S, S_1, S_2, V, A)
         put_pair_of(out[j], 0, scaled_pair(sign, S))
         put_pair_of(change[j], 0, scaled_pair(sign, Y))
         put_pair_of(change[j], 6, scaled_pair(sign, X))
