@@ -16,6 +16,7 @@ __all__ = [
     "left_jacobian",
     "left_jacobian_derivative",
     "matrix_of_euler_parameters",
+    "quaternion_of",
     "right_jacobian",
     "rotate_euler_parameters",
     "spin_jacobian",
@@ -210,6 +211,24 @@ def matrix_of_euler_parameters(p):
         (2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)),
         (2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z),
     )
+
+
+@inner
+def quaternion_of(R):
+    """Return w and (x, y, z) of a quaternion of a rotation matrix, of any length; w >= 0."""
+    w = 1.0 + R[0][0] + R[1][1] + R[2][2]  # 4 w², and 4 w times x
+    x = (R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1])
+    if w < 1.0:  # more than 90 degrees: the products of x, y, z with the largest of them, times 4
+        k = 0 if R[0][0] >= R[1][1] and R[0][0] >= R[2][2] else (1 if R[1][1] >= R[2][2] else 2)
+        symmetric = (
+            (2.0 + 2 * R[0][0] - w, R[0][1] + R[1][0], R[0][2] + R[2][0]),
+            (R[0][1] + R[1][0], 2.0 + 2 * R[1][1] - w, R[1][2] + R[2][1]),
+            (R[0][2] + R[2][0], R[1][2] + R[2][1], 2.0 + 2 * R[2][2] - w),
+        )
+        w, x = x[k], symmetric[k]
+        if w < 0.0:
+            w, x = -w, scaled(-1.0, x)
+    return w, x
 
 
 @inner

@@ -29,7 +29,7 @@ Described in `floatframe.model.forces.bushing`.
 import math
 
 from floatframe.engine.kernels.compiler.compilation import inner
-from floatframe.engine.kernels.rotation import exp_matrix
+from floatframe.engine.kernels.rotation import exp_matrix, quaternion_of
 from floatframe.engine.kernels.time_function import time_function
 from floatframe.engine.kernels.vector import (
     add,
@@ -60,20 +60,8 @@ B1, B2, B3, B4, B5 = 1 / 12, 1 / 720, 1 / 30240, 1 / 1209600, 1 / 47900160  # se
 
 @inner
 def rotation_vector(A, B):
-    """Return the rotation vector of R = Aᵀ B, at most pi long, from a quaternion (w, x) of any length."""
-    R = product(transposed(A), B)
-    w = 1.0 + R[0][0] + R[1][1] + R[2][2]  # 4 w², and 4 w times x
-    x = (R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1])
-    if w < 1.0:  # more than 90 degrees: the products of x, y, z with the largest of them, times 4
-        k = 0 if R[0][0] >= R[1][1] and R[0][0] >= R[2][2] else (1 if R[1][1] >= R[2][2] else 2)
-        symmetric = (
-            (2.0 + 2 * R[0][0] - w, R[0][1] + R[1][0], R[0][2] + R[2][0]),
-            (R[0][1] + R[1][0], 2.0 + 2 * R[1][1] - w, R[1][2] + R[2][1]),
-            (R[0][2] + R[2][0], R[1][2] + R[2][1], 2.0 + 2 * R[2][2] - w),
-        )
-        w, x = x[k], symmetric[k]
-        if w < 0.0:
-            w, x = -w, scaled(-1.0, x)
+    """Return the rotation vector of R = Aᵀ B, at most pi long."""
+    w, x = quaternion_of(product(transposed(A), B))
     length = norm(x)
     return scaled(2.0 * math.atan2(length, w) / length if length > 0.0 else 0.0, x)
 

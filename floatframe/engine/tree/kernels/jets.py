@@ -15,7 +15,7 @@ theta = T(x) dx, and the rates z_dot, z_ddot, in axes of B, change by d(z_dot) =
 
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.vector import add, cross, put, scaled, sub, turned, vector
-from floatframe.engine.tree.kernels.kinematics import end_acceleration, end_motion
+from floatframe.engine.tree.kernels.kinematics import end_motion, joint_ends
 from floatframe.engine.tree.kernels.mode_screws import mode_screws, second_rates, variation_rates
 from floatframe.engine.tree.kernels.spatial import (
     pair_sum,
@@ -75,12 +75,18 @@ def mode_jets(model, work, tree, tangent, i, kind, m, sign, c_m, c_d, c_k, rate)
 
 
 @inner
+def spatial_end(end, origin):
+    """Return p from the origin, axes, V and V' of a frame with the motion of `end_motion`."""
+    r, A, v, omega, a, alpha = end
+    p = sub(r, origin)
+    V, V_dot = spatial_motion(p, v, omega, a, alpha)
+    return p, A, V, V_dot
+
+
+@inner
 def carrier(model, work, tangent, m, i):
     """Return R, p, V, V' of the frame of body i, which carries marker m, and the `second_rates` of the marker there."""
-    r, R, v, omega = end_motion(model, work, -1, i)
-    a, alpha = end_acceleration(model, work, -1, i)
-    p = sub(r, vector(tangent.origin))
-    V, V_dot = spatial_motion(p, v, omega, a, alpha)
+    p, R, V, V_dot = spatial_end(end_motion(model, work, -1, i), vector(tangent.origin))
     rho_2, angle_2 = second_rates(model, work, m, i)
     return R, p, V, V_dot, rho_2, angle_2
 
@@ -99,16 +105,9 @@ def column_jets(model, work, tree, joints, tangent, i, c_m, c_d, c_k, rate):
     if tree.column0[i] == tree.column0[i + 1]:
         return
     origin, zero = vector(tangent.origin), (0.0, 0.0, 0.0)
-    r_a, A_a, v_a, omega_a = end_motion(model, work, tree.near[i], tree.parent[i])
-    a_a, alpha_a = end_acceleration(model, work, tree.near[i], tree.parent[i])
-    r_b, A_b, v_b, omega_b = end_motion(model, work, tree.far[i], i)
-    a_b, alpha_b = end_acceleration(model, work, tree.far[i], i)
-    if tree.is_reversed[i] != 0:
-        r_a, A_a, v_a, omega_a, r_b, A_b, v_b, omega_b = r_b, A_b, v_b, omega_b, r_a, A_a, v_a, omega_a
-        a_a, alpha_a, a_b, alpha_b = a_b, alpha_b, a_a, alpha_a
-    p_a, p_b = sub(r_a, origin), sub(r_b, origin)
-    V_a, V_a_dot = spatial_motion(p_a, v_a, omega_a, a_a, alpha_a)
-    V_b, V_b_dot = spatial_motion(p_b, v_b, omega_b, a_b, alpha_b)
+    end_a, end_b = joint_ends(model, work, tree, i)
+    p_a, A_a, V_a, V_a_dot = spatial_end(end_a, origin)
+    p_b, A_b, V_b, V_b_dot = spatial_end(end_b, origin)
     spin, spin_dot = zero, zero  # for rotations fixed in B, axes of B
     for k in range(tree.column0[i], tree.column0[i + 1]):
         if tree.side[k] != 0:

@@ -33,35 +33,32 @@ from floatframe.engine.kernels.vector import (
 from floatframe.engine.tree.kernels.elastic_turning import elastic_body_in_joint
 from floatframe.engine.tree.kernels.spins import turn_spinning_joint
 
-__all__ = ["column_screw", "end_acceleration", "end_motion", "joint_motion", "move_joints", "place_bodies"]
+__all__ = ["column_screw", "end_motion", "joint_ends", "joint_motion", "move_joints", "place_bodies"]
 
 
 @loops
 def end_motion(model, work, m, i):
-    """Return r, A, v, omega of marker m, of the frame of body i if m = -1, and of the ground if i = -1 too."""
+    """Return r, A, v, omega, a, alpha of marker m, of the frame of body i if m = -1, of the ground if i = -1 too."""
     zero = (0.0, 0.0, 0.0)
     if m >= 0:
+        markers, out = work.markers, work.markers.bias[m]
         marker_motion(model, work, m)
-        markers = work.markers
-        return vector(markers.r[m]), matrix(markers.A[m]), vector(markers.v[m]), vector(markers.omega[m])
-    if i < 0:
-        return zero, unit_matrix(), zero, zero
-    u, R = work.state.u[model.bodies.u0[i] :], matrix(work.state.R[i])
-    return vector(work.state.r[i]), R, vector(u), turned(R, u[3:])
-
-
-@loops
-def end_acceleration(model, work, m, i):
-    """Return acceleration and angular acceleration with the conventions of `end_motion`."""
-    zero = (0.0, 0.0, 0.0)
-    if m >= 0:
-        out = work.markers.bias[m]
         marker_acceleration(model, work, m, out)
-        return vector(out), vector(out[3:])
+        v, omega = vector(markers.v[m]), vector(markers.omega[m])
+        return vector(markers.r[m]), matrix(markers.A[m]), v, omega, vector(out), vector(out[3:])
     if i < 0:
-        return zero, zero
-    u_dot = work.state.u_dot[model.bodies.u0[i] :]
-    return vector(u_dot), turned(work.state.R[i], u_dot[3:])
+        return zero, unit_matrix(), zero, zero, zero, zero
+    u, u_dot, R = work.state.u[model.bodies.u0[i] :], work.state.u_dot[model.bodies.u0[i] :], matrix(work.state.R[i])
+    return vector(work.state.r[i]), R, vector(u), turned(R, u[3:]), vector(u_dot), turned(R, u_dot[3:])
+
+
+@inner
+def joint_ends(model, work, tree, i):
+    """Return the motions of the ends A and B of the joint of body i, as `end_motion`."""
+    near, far = end_motion(model, work, tree.near[i], tree.parent[i]), end_motion(model, work, tree.far[i], i)
+    if tree.is_reversed[i] == 0:
+        return near, far
+    return far, near
 
 
 @loops
@@ -121,37 +118,26 @@ def place_bodies(model, work, tree, joints):
 @loops
 def place_body(model, work, tree, joints, i):
     """Write the motion of the frame of body i; that of its parent is known."""
-    near, parent = tree.near[i], tree.parent[i]
-    r, A, v, omega = end_motion(model, work, near, parent)
-    a, alpha = end_acceleration(model, work, near, parent)
+    is_reversed = tree.is_reversed[i] != 0
+    r, A, v, omega, a, alpha = end_motion(model, work, tree.near[i], tree.parent[i])
     put(joints.near[i], 0, a)
     put(joints.near[i], 3, alpha)
     put(joints.near[i], 6, v)
     put(joints.near[i], 9, omega)
-    Q, d = matrix(joints.Q[i]), vector(joints.d[i])
-    if tree.is_reversed[i] == 0:
-        put_columns(tree, joints, i, A, product(A, Q))
-        D = turned(A, d)
-        s, w = sums(tree, joints, i, joints.rate)
-        s_dot, w_dot = sums(tree, joints, i, joints.acceleration)
-        own = add(cross(alpha, D), add(cross(omega, add(cross(omega, D), scaled(2.0, s))), s_dot))
-        a = add(a, own)
-        v = add(v, add(cross(omega, D), s))
-        spin = add(omega, w)
-        alpha = add(alpha, add(w_dot, turning_of_columns(tree, joints, i, omega, spin)))
-        put_body(model, work, tree, i, add(r, D), product(A, Q), v, spin, a, alpha)
-    else:
-        A_a = product(A, transposed(Q))
-        put_columns(tree, joints, i, A_a, A)
-        D = turned(A_a, d)
-        s, w = sums(tree, joints, i, joints.rate)
-        s_dot, w_dot = sums(tree, joints, i, joints.acceleration)
-        spin = sub(omega, w)
-        alpha = sub(alpha, add(w_dot, turning_of_columns(tree, joints, i, spin, omega)))
-        own = add(cross(alpha, D), add(cross(spin, add(cross(spin, D), scaled(2.0, s))), s_dot))
-        a = sub(a, own)
-        v = sub(v, add(cross(spin, D), s))
-        put_body(model, work, tree, i, sub(r, D), A_a, v, spin, a, alpha)
+    Q, sense = matrix(joints.Q[i]), -1.0 if is_reversed else 1.0
+    A_far = product(A, transposed(Q)) if is_reversed else product(A, Q)
+    A_a, A_b = (A_far, A) if is_reversed else (A, A_far)
+    put_columns(tree, joints, i, A_a, A_b)
+    D = turned(A_a, vector(joints.d[i]))
+    s, w = sums(tree, joints, i, joints.rate)
+    s_dot, w_dot = sums(tree, joints, i, joints.acceleration)
+    omega_far = add(omega, scaled(sense, w))
+    omega_a, omega_b = (omega_far, omega) if is_reversed else (omega, omega_far)
+    alpha_far = add(alpha, scaled(sense, add(w_dot, turning_of_columns(tree, joints, i, omega_a, omega_b))))
+    moved = add(cross(omega_a, D), s)
+    bent = add(cross(alpha_far if is_reversed else alpha, D), add(cross(omega_a, add(moved, s)), s_dot))
+    r, v, a = add(r, scaled(sense, D)), add(v, scaled(sense, moved)), add(a, scaled(sense, bent))
+    put_body(model, work, tree, i, r, A_far, v, omega_far, a, alpha_far)
 
 
 @loops
@@ -195,14 +181,9 @@ def joint_motion(model, work, tree, joints):
     Coordinates are those nearest to the motion, so that one that the joints do not allow is left out.
     """
     for i in range(tree.parent.shape[0]):
-        near, far, parent = tree.near[i], tree.far[i], tree.parent[i]
-        r_a, A_a, v_a, omega_a = end_motion(model, work, near, parent)
-        a_a, alpha_a = end_acceleration(model, work, near, parent)
-        r_b, A_b, v_b, omega_b = end_motion(model, work, far, i)
-        a_b, alpha_b = end_acceleration(model, work, far, i)
-        if tree.is_reversed[i] != 0:
-            r_a, A_a, v_a, omega_a, r_b, A_b, v_b, omega_b = r_b, A_b, v_b, omega_b, r_a, A_a, v_a, omega_a
-            a_a, alpha_a, a_b, alpha_b = a_b, alpha_b, a_a, alpha_a
+        end_a, end_b = joint_ends(model, work, tree, i)
+        r_a, A_a, v_a, omega_a, a_a, alpha_a = end_a
+        r_b, A_b, v_b, omega_b, a_b, alpha_b = end_b
         D = sub(r_b, r_a)
         put(joints.d[i], 0, turned_back(A_a, D))
         put_matrix(joints.Q[i], product(transposed(A_a), A_b))

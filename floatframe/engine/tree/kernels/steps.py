@@ -40,8 +40,9 @@ from floatframe.engine.kernels.generalized_alpha import (
     time_loop,
     write_row,
 )
+from floatframe.engine.kernels.rotation import quaternion_of
 from floatframe.engine.kernels.step_start import hold_states
-from floatframe.engine.kernels.vector import add, cross, dot, norm, put, put_sum, scaled, sub, turned, vector
+from floatframe.engine.kernels.vector import add, cross, dot, matrix, norm, put, put_sum, scaled, sub, turned, vector
 from floatframe.engine.tree.kernels.accelerations import accelerate
 from floatframe.engine.tree.kernels.evaluation import evaluate_placed, evaluate_tree
 from floatframe.engine.tree.kernels.kept_factors import factorize_poses, keep_bodies, solve_kept
@@ -476,24 +477,12 @@ def accept(model, work, memory, tree, joints, h, alpha_m, alpha_f):
 
 @inner
 def put_euler_parameters(R, p):
-    """Write the Euler parameters of a rotation matrix, with the sign nearer to the existing ones.
-
-    The largest of w², x², y², z² by the diagonal; the others from sums and differences across it.
-    """
-    trace = R[0, 0] + R[1, 1] + R[2, 2]
-    w, x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], 0.0
-    if trace >= R[0, 0] and trace >= R[1, 1] and trace >= R[2, 2]:
-        w, x, y, z = 1.0 + trace, w, x, y
-    elif R[0, 0] >= R[1, 1] and R[0, 0] >= R[2, 2]:
-        w, x, y, z = w, 1.0 + R[0, 0] - R[1, 1] - R[2, 2], R[1, 0] + R[0, 1], R[0, 2] + R[2, 0]
-    elif R[1, 1] >= R[2, 2]:
-        w, x, y, z = x, R[1, 0] + R[0, 1], 1.0 + R[1, 1] - R[0, 0] - R[2, 2], R[2, 1] + R[1, 2]
-    else:
-        w, x, y, z = y, R[0, 2] + R[2, 0], R[2, 1] + R[1, 2], 1.0 + R[2, 2] - R[0, 0] - R[1, 1]
-    scale = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
-    if w * p[0] + x * p[1] + y * p[2] + z * p[3] < 0.0:
-        scale = -scale
-    p[0], p[1], p[2], p[3] = scale * w, scale * x, scale * y, scale * z
+    """Write the Euler parameters of a rotation matrix, with the sign nearer to the existing ones."""
+    w, x = quaternion_of(matrix(R))
+    along = w * p[0] + dot(x, p[1:])
+    scale = (1.0 if along >= 0.0 else -1.0) / math.sqrt(w * w + dot(x, x))
+    p[0] = scale * w
+    put(p, 1, scaled(scale, x))
 
 
 @inner

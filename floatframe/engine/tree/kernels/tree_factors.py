@@ -50,6 +50,14 @@ def add_turning(row, screw, F):
 
 
 @inner
+def add_power(row, screw, A):
+    """Add J · A to a row over jets, A the derivative of a force by them."""
+    for e in range(18):
+        for r in range(6):
+            row[e] += screw[r] * A[r, e]
+
+
+@inner
 def factorize_joint(model, work, tree, tangent, i, c_d, c_k):
     """Eliminate the unknowns of body i, and add the remainder to its parent. Return whether its matrix is regular."""
     s0, n_l, m0, q0 = tree.s0[i], tree.s0[i + 1] - tree.s0[i], tree.m0[i], model.bodies.q0[i]
@@ -72,29 +80,20 @@ def factorize_joint(model, work, tree, tangent, i, c_d, c_k):
             row[e] = tangent.modal[q0 + s - m0, e] if s >= m0 else 0.0
         for l in range(n_l):  # noqa: E741
             L[k, l] = H[6 + s - m0, 6 + s0 + l - m0] if s >= m0 and s0 + l >= m0 else 0.0
+        if j >= 0 and s >= m0:
+            add_turning(row, tangent.screw[j], F)  # with the jet of the body
+        for l in range(n_l):  # noqa: E741
+            o = tree.own_jet[s0 + l]
+            if o >= 0:
+                for e in range(18):
+                    L[k, l] += row[e] * tangent.jet[o, e]
+            if j >= 0:
+                L[k, l] += inner_product(tangent.screw[j], W[l])
         if j >= 0:
-            screw = tangent.screw[j]
-            own_mode = s >= m0
-            if own_mode:
-                add_turning(row, screw, F)  # with the jet of the body
-            for l in range(n_l):  # noqa: E741
-                o = tree.own_jet[s0 + l]
-                if o >= 0:
-                    for e in range(18):
-                        L[k, l] += row[e] * tangent.jet[o, e]
-                L[k, l] += inner_product(screw, W[l])
-            for e in range(18):
-                for r in range(6):
-                    row[e] += screw[r] * A[r, e]
-            if not own_mode:
-                add_turning(row, screw, F)
+            add_power(row, tangent.screw[j], A)
+            if s < m0:
+                add_turning(row, tangent.screw[j], F)
                 turning_far(tree, tangent, i, j, k, L, F)
-        else:
-            for l in range(n_l):  # noqa: E741
-                o = tree.own_jet[s0 + l]
-                if o >= 0:
-                    for e in range(18):
-                        L[k, l] += row[e] * tangent.jet[o, e]
     subtract_slopes(model, work, tree, i, L, -s0, c_d, c_k)
     if n_l > 0:
         if not lu_factor(L, tangent.L_pivot[s0 : s0 + n_l]):
@@ -134,9 +133,7 @@ def add_to_parent(model, work, tree, tangent, i):
             continue
         k, screw = tree.jet_item[j], tangent.screw[j]
         row = tangent.modal[q0 + k]
-        for e in range(18):
-            for r in range(6):
-                row[e] += screw[r] * P[r, e]
+        add_power(row, screw, P)
         add_turning(row, screw, F)
         product_of(P, tangent.jet[j], f)
         for r in range(6):
