@@ -22,12 +22,15 @@ from floatframe.engine.kernels.dense import add_products
 from floatframe.engine.kernels.model import C1, C2, C3, C4, DAMPING, K_ROTATION, K_TRANSLATION, MASS, S_AB, STIFFNESS
 from floatframe.engine.kernels.vector import (
     add,
+    add_column,
     cross,
     dot,
     matrix,
     matrix_sum,
     product,
     put,
+    put_block,
+    put_column,
     put_matrix,
     put_sum,
     scaled,
@@ -52,8 +55,6 @@ __all__ = [
     "modal_term",
     "moved_inertia",
     "newton_block",
-    "put_block",
-    "put_column",
 ]
 
 
@@ -265,28 +266,6 @@ def body_mass_product(model, work, i, v, out):
             put_sum(out, 3, scaled(q_dot[k], B_k))
             out[6 + k] = dot(column(first, n, k), v_O) + dot(B_k, omega)
         modal_term(types, t, n, MASS, q_dot, out[6:])
-
-
-@loops
-def put_block(H, row, column, A):
-    """Write a matrix into H at (row, column)."""
-    put(H[row], column, A[0])
-    put(H[row + 1], column, A[1])
-    put(H[row + 2], column, A[2])
-
-
-@loops
-def put_column(H, row, column, x):
-    """Write a vector down a column of H."""
-    H[row, column], H[row + 1, column], H[row + 2, column] = x[0], x[1], x[2]
-
-
-@loops
-def add_column(H, row, column, x):
-    """Add a vector to a column of H."""
-    H[row, column] += x[0]
-    H[row + 1, column] += x[1]
-    H[row + 2, column] += x[2]
 
 
 @loops

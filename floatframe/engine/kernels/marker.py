@@ -14,11 +14,13 @@ from floatframe.engine.kernels.dense import add_products
 from floatframe.engine.kernels.rotation import exp_matrix, left_jacobian, left_jacobian_derivative
 from floatframe.engine.kernels.vector import (
     add,
+    add_column,
     cross,
     dot,
     matrix,
     product,
     put,
+    put_column,
     put_matrix,
     put_sum,
     scaled,
@@ -325,24 +327,8 @@ def marker_columns(model, work, m, rate, turning, column, row):
         bent_rate(model, work, m, i, bend_dot)
         for k in range(n):
             d, th = shape(bend_dot, n, k)
-            turn = turned(T, th)
-            for a in range(3):
-                row[6 + a, 6 + k] -= d[a]
-                row[9 + a, 6 + k] -= turn[a]
-
-
-@small
-def put_column(matrix, first, k, x):
-    """Write a vector into column k of a matrix, from row `first` on."""
-    matrix[first, k], matrix[first + 1, k], matrix[first + 2, k] = x[0], x[1], x[2]
-
-
-@small
-def take_column(matrix, first, k, x):
-    """Subtract a vector from column k of a matrix, from row `first` on."""
-    matrix[first, k] -= x[0]
-    matrix[first + 1, k] -= x[1]
-    matrix[first + 2, k] -= x[2]
+            add_column(row, 6, 6 + k, scaled(-1.0, d))
+            add_column(row, 9, 6 + k, scaled(-1.0, turned(T, th)))
 
 
 @loops
@@ -358,8 +344,8 @@ def marker_stiffness(model, work, m, c_k, H, turn):
     if not is_follower:
         for b in range(3):
             f_turned = cross(f, unit(b))
-            take_column(turn, 0, b, f_turned)
-            take_column(turn, 3, b, add(cross(rho, f_turned), cross(t, unit(b))))
+            add_column(turn, 0, b, scaled(-1.0, f_turned))
+            add_column(turn, 3, b, scaled(-1.0, add(cross(rho, f_turned), cross(t, unit(b)))))
     o = model.markers.psi0[m]
     if o < 0:
         return
@@ -376,12 +362,12 @@ def marker_stiffness(model, work, m, c_k, H, turn):
     for j in range(n):
         d, th = shape(psi, n, j)
         turned_by = turned(T, th)  # rotation of the marker in the body
-        take_column(H, 3, 6 + j, scaled(c_k, cross(d, f)))  # tau: drho × f
+        add_column(H, 3, 6 + j, scaled(-c_k, cross(d, f)))  # tau: drho × f
         df, ds = (0.0, 0.0, 0.0), turned(slope, th)  # h: Psi_rᵀ d(T m)
         if is_follower:
             df, dt = cross(turned_by, f), cross(turned_by, t)
-            take_column(H, 0, 6 + j, scaled(c_k, df))
-            take_column(H, 3, 6 + j, scaled(c_k, add(cross(rho, df), dt)))
+            add_column(H, 0, 6 + j, scaled(-c_k, df))
+            add_column(H, 3, 6 + j, scaled(-c_k, add(cross(rho, df), dt)))
             ds = add(ds, turned_back(T, dt))
         else:
             # row of mode j: Psi_t,j · (f × dphi) + (T' Psi_r,j) · (m × dphi) = dphi · (Psi × f + ...)

@@ -9,6 +9,8 @@ from floatframe.engine.kernels.compiler.compilation import small
 
 __all__ = [
     "add",
+    "add_block",
+    "add_column",
     "congruent",
     "cross",
     "dot",
@@ -17,6 +19,8 @@ __all__ = [
     "norm",
     "product",
     "put",
+    "put_block",
+    "put_column",
     "put_matrix",
     "put_sum",
     "scaled",
@@ -173,3 +177,33 @@ def put_matrix(out, A):
     put(out[0], 0, A[0])
     put(out[1], 0, A[1])
     put(out[2], 0, A[2])
+
+
+@small
+def put_block(H, row, column, A):
+    """Write a matrix into H at (row, column)."""
+    put(H[row], column, A[0])
+    put(H[row + 1], column, A[1])
+    put(H[row + 2], column, A[2])
+
+
+@small
+def add_block(H, row, column, A):
+    """Add a matrix to H at (row, column)."""
+    put_sum(H[row], column, A[0])
+    put_sum(H[row + 1], column, A[1])
+    put_sum(H[row + 2], column, A[2])
+
+
+@small
+def put_column(H, row, column, x):
+    """Write a vector down a column of H."""
+    H[row, column], H[row + 1, column], H[row + 2, column] = x[0], x[1], x[2]
+
+
+@small
+def add_column(H, row, column, x):
+    """Add a vector to a column of H."""
+    H[row, column] += x[0]
+    H[row + 1, column] += x[1]
+    H[row + 2, column] += x[2]

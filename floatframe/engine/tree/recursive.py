@@ -260,12 +260,9 @@ class RelativeModel:
         e, w = self.expansion, self.work
         r, p, q, u = [], [], [], []
         for i, k in enumerate(e.node_of):
-            F, origin = e.frame_of[i]
-            is_rigid = e.nodes.n_q[k] == 0
-            R = w.R_G[k] @ F.T if is_rigid else w.R_G[k]
-            arm = -R @ origin if is_rigid else np.zeros(3)
-            v, omega = w.motion[k, :3], w.motion[k, 3:]
-            r.append(w.r_G[k] + arm)
+            place, R = self.frame(i)
+            arm, v, omega = place - w.r_G[k], w.motion[k, :3], w.motion[k, 3:]
+            r.append(place)
             p.append(euler_parameters(R))
             q.append(w.x[e.xq_of[i]])
             u += [v + cross(omega, arm), R.T @ omega, w.v[e.vq_of[i]]]

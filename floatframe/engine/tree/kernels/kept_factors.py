@@ -17,7 +17,7 @@ Fronts are upper halves, their rows Uᵀ of the factors with inverse diagonals.
 
 import math
 
-from floatframe.engine.kernels.body import newton_block, put_block, put_column
+from floatframe.engine.kernels.body import newton_block
 from floatframe.engine.kernels.compiler.compilation import inner, loops, matrix_loops, view
 from floatframe.engine.kernels.evaluation import tangent_of_body
 from floatframe.engine.kernels.vector import (
@@ -27,6 +27,8 @@ from floatframe.engine.kernels.vector import (
     matrix_sum,
     product,
     put,
+    put_block,
+    put_column,
     put_matrix,
     scaled,
     scaled_matrix,

@@ -385,24 +385,19 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
         memory.n_iterations += 1
         if is_old and work.counted.factorisations > factorisations:
             is_old = False
-        if is_old and not norm <= max(SLOW * last, allowed):
-            work.solver.is_due = 1
+        is_lost = is_old and not norm <= max(SLOW * last, allowed)
+        if is_lost:
             is_old = False
             tangent.patience = min(2 * tangent.patience + 1, MOST_PATIENCE)
             tangent.left = tangent.patience
-            predict(model, work, tree, joints, tangent, memory, order, h)
-            last, last_of_states = math.inf, math.inf
-            iteration += 1
-            begun = iteration
-            continue
-        if (
+        elif (
             tangent.is_exact == 0
             and not norm <= last
             and (begun < made < iteration or iteration < begun + 2 or not math.isfinite(norm))
         ):
+            is_lost, tangent.exactly, tangent.n_known = True, EXACT_STEPS, 0
+        if is_lost:
             work.solver.is_due = 1
-            tangent.exactly = EXACT_STEPS
-            tangent.n_known = 0
             predict(model, work, tree, joints, tangent, memory, order, h)
             last, last_of_states = math.inf, math.inf
             iteration += 1

@@ -9,7 +9,7 @@ since all bodies of a subtree move alike by what moves its first. Derivatives of
 of the forces that stay in axes of bodies or ground are all there.
 """
 
-from floatframe.engine.kernels.body import moved_inertia, newton_block, put_block
+from floatframe.engine.kernels.body import moved_inertia, newton_block
 from floatframe.engine.kernels.compiler.compilation import inner, small
 from floatframe.engine.kernels.connections.connection import connection_derivatives
 from floatframe.engine.kernels.evaluation import tangent_of_body
@@ -23,6 +23,7 @@ from floatframe.engine.kernels.vector import (
     matrix_sum,
     product,
     put,
+    put_block,
     put_matrix,
     scaled,
     scaled_matrix,

@@ -6,7 +6,20 @@ turn of a joint near the root that those behind it take back is no large one.
 
 from floatframe.engine.kernels.body import moved_inertia
 from floatframe.engine.kernels.compiler.compilation import inner
-from floatframe.engine.kernels.vector import add, cross, dot, put, put_sum, sub, turned, turned_back, vector
+from floatframe.engine.kernels.vector import (
+    add,
+    add_block,
+    cross,
+    dot,
+    matrix,
+    put,
+    put_block,
+    put_sum,
+    sub,
+    turned,
+    turned_back,
+    vector,
+)
 from floatframe.engine.tree.kernels.body_jets import moments_of_body
 from floatframe.engine.tree.kernels.kinematics import column_screw
 
@@ -25,8 +38,7 @@ def weigh(model, work, tree, joints, tangent):
         s, J = moved_inertia(m, s, J, sub(work.state.r[i], origin))
         mass[i, 0, 0] = m
         put(mass[i, 1], 0, s)
-        for a in range(3):
-            put(mass[i, 3 + a], 0, J[a])
+        put_block(mass[i], 3, 0, J)
     for place in range(tree.order.shape[0] - 1, -1, -1):
         i = tree.order[place]
         parent = tree.parent[i]
@@ -40,8 +52,7 @@ def weigh(model, work, tree, joints, tangent):
         if parent >= 0:
             mass[parent, 0, 0] += m
             put_sum(mass[parent, 1], 0, S)
-            for a in range(3):
-                put_sum(mass[parent, 3 + a], 0, J[a])
+            add_block(mass[parent], 3, 0, matrix(J))
     for i in range(tree.parent.shape[0]):
         for k in range(model.bodies.n_q[i]):
             tangent.weight[tree.m0[i] + k] = work.solver.weight[model.bodies.u0[i] + 6 + k]

@@ -16,17 +16,18 @@ from floatframe.engine.kernels.compiler.compilation import loops, small
 from floatframe.engine.kernels.dense import lu_factor, lu_solve, lu_solve_columns
 from floatframe.engine.kernels.vector import (
     add,
+    add_block,
     cross,
     dot,
     matrix,
     matrix_sum,
     product,
     put,
+    put_block,
     put_matrix,
     put_sum,
     scaled,
     sub,
-    tilde,
     transposed,
     turned,
     vector,
@@ -37,6 +38,7 @@ from floatframe.engine.tree.recursion.composite import (
     along_rate,
     flexible_column,
     moments_in_ground,
+    rigid_blocks,
     shifted_blocks,
 )
 
@@ -88,9 +90,8 @@ def three_rates(work, k, v, A, B, C):
     D, d = inverse(matrix_sum(product(transposed(L), F), product(transposed(W), T)))
     put_matrix(work.D[k], D)
     F_t, T_t = transposed(F), transposed(T)
-    for j in range(3):
-        put(work.U[v + j], 0, F_t[0] if j == 0 else (F_t[1] if j == 1 else F_t[2]))
-        put(work.U[v + j], 3, T_t[0] if j == 0 else (T_t[1] if j == 1 else T_t[2]))
+    put_block(work.U, v, 0, F_t)
+    put_block(work.U, v, 3, T_t)
     F_D, T_D = product(F, D), product(T, D)
     return less(A, product(F_D, F_t)), less(B, product(F_D, T_t)), less(C, product(T_D, T_t)), d
 
@@ -124,10 +125,8 @@ def flexible(nodes, work, k):
 @loops
 def top_blocks(H):
     """Return the blocks of the first six rows and columns of H."""
-    A = vector(H[0]), vector(H[1]), vector(H[2])
     B = vector(H[0, 3:]), vector(H[1, 3:]), vector(H[2, 3:])
-    C = vector(H[3, 3:]), vector(H[4, 3:]), vector(H[5, 3:])
-    return A, B, C
+    return matrix(H), B, (vector(H[3, 3:]), vector(H[4, 3:]), vector(H[5, 3:]))
 
 
 @loops
@@ -137,9 +136,10 @@ def articulate(nodes, work, model, marker_work):
     for k in range(n_n):
         moments_in_ground(nodes, work, model, marker_work, k)
         m, s, J = work.mass[k], vector(work.s[k]), matrix(work.J[k])
-        put_matrix(work.I_ff[k], ((m, 0.0, 0.0), (0.0, m, 0.0), (0.0, 0.0, m)))
-        put_matrix(work.I_ft[k], tilde(scaled(-1.0, s)))
-        put_matrix(work.I_tt[k], J)
+        A, B, C = rigid_blocks(m, s, J)
+        put_matrix(work.I_ff[k], A)
+        put_matrix(work.I_ft[k], B)
+        put_matrix(work.I_tt[k], C)
     singular = -1
     for k in range(n_n - 1, -1, -1):
         A, B, C = matrix(work.I_ff[k]), matrix(work.I_ft[k]), matrix(work.I_tt[k])
@@ -164,10 +164,9 @@ def articulate(nodes, work, model, marker_work):
                 add_carried(H, A, B, C, p, work.above[nodes.c0[k] : nodes.c0[k + 1]])
             else:
                 A, B, C = shifted_blocks(A, B, C, p)
-                for a in range(3):
-                    put_sum(work.I_ff[above, a], 0, A[0] if a == 0 else (A[1] if a == 1 else A[2]))
-                    put_sum(work.I_ft[above, a], 0, B[0] if a == 0 else (B[1] if a == 1 else B[2]))
-                    put_sum(work.I_tt[above, a], 0, C[0] if a == 0 else (C[1] if a == 1 else C[2]))
+                add_block(work.I_ff[above], 0, 0, A)
+                add_block(work.I_ft[above], 0, 0, B)
+                add_block(work.I_tt[above], 0, 0, C)
     return singular
 
 

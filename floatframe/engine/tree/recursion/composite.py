@@ -15,6 +15,8 @@ from floatframe.engine.kernels.compiler.compilation import loops, small
 from floatframe.engine.kernels.model import C2, MASS
 from floatframe.engine.kernels.vector import (
     add,
+    add_block,
+    add_column,
     congruent,
     cross,
     dot,
@@ -22,6 +24,8 @@ from floatframe.engine.kernels.vector import (
     matrix_sum,
     product,
     put,
+    put_block,
+    put_column,
     put_matrix,
     put_sum,
     scaled,
@@ -42,7 +46,9 @@ __all__ = [
     "flexible_column",
     "mass_matrix",
     "moments_in_ground",
+    "rigid_blocks",
     "shifted_blocks",
+    "times_inertia",
 ]
 
 
@@ -75,20 +81,19 @@ def flexible_mass(nodes, work, model, marker_work, k):
     types, t, q0 = model.body_types, model.bodies.kind[i], nodes.q0[k]
     H = work.H[nodes.h0[k] : nodes.h0[k + 1]].reshape((6 + n, 6 + n))
     H[:, :] = 0.0
-    m, s_tilde = work.mass[k], tilde(vector(work.s[k]))
-    for a in range(3):
-        H[a, a] = m
-        put(H[a], 3, scaled(-1.0, s_tilde[a]))
-        put(H[3 + a], 0, s_tilde[a])
-        put(H[3 + a], 3, vector(work.J[k, a]))
+    A, B, C = rigid_blocks(work.mass[k], vector(work.s[k]), matrix(work.J[k]))
+    put_block(H, 0, 0, A)
+    put_block(H, 0, 3, B)
+    put_block(H, 3, 0, transposed(B))
+    put_block(H, 3, 3, C)
     first = marker_work.bodies.C1[3 * q0 : 3 * (q0 + n)]
     W, second, R = marker_work.bodies.W[9 * q0 : 9 * (q0 + n)], block(types, t, C2, 3 * n), work.R_G[k]
     for j in range(n):
         b, B = turned(R, column(first, n, j)), turned(R, coupling(second, W, n, j))
         put(H[6 + j], 0, b)
         put(H[6 + j], 3, B)
-        for a in range(3):
-            H[a, 6 + j], H[3 + a, 6 + j] = b[a], B[a]
+        put_column(H, 0, 6 + j, b)
+        put_column(H, 3, 6 + j, B)
     modal_block(types, t, n, MASS, 1.0, H)
 
 
@@ -118,11 +123,10 @@ def add_carried(H, A, B, C, p, above):
     """Add Jᵀ I J to H of a flexible parent, J = [shift, above], above (n, 6)."""
     n = above.shape[0]
     A_p, B_p, C_p = shifted_blocks(A, B, C, p)
-    for a in range(3):
-        put_sum(H[a], 0, A_p[a])
-        put_sum(H[a], 3, B_p[a])
-        put_sum(H[3 + a], 0, (B_p[0][a], B_p[1][a], B_p[2][a]))
-        put_sum(H[3 + a], 3, C_p[a])
+    add_block(H, 0, 0, A_p)
+    add_block(H, 0, 3, B_p)
+    add_block(H, 3, 0, transposed(B_p))
+    add_block(H, 3, 3, C_p)
     for j in range(n):
         v, w = vector(above[j]), vector(above[j, 3:])
         f, t = add(turned(A, v), turned(B, w)), add(turned(transposed(B), v), turned(C, w))
@@ -131,9 +135,8 @@ def add_carried(H, A, B, C, p, above):
         t = add(t, cross(p, f))
         put_sum(H[6 + j], 0, f)
         put_sum(H[6 + j], 3, t)
-        for a in range(3):
-            H[a, 6 + j] += f[a]
-            H[3 + a, 6 + j] += t[a]
+        add_column(H, 0, 6 + j, f)
+        add_column(H, 3, 6 + j, t)
 
 
 @loops
@@ -150,7 +153,7 @@ def add_to_parent(nodes, work, k):
     s_p, J_p = moved_inertia(m, s, J, p)
     work.mass[above] += m
     put_sum(work.s[above], 0, s_p)
-    put_matrix(work.J[above], matrix_sum(matrix(work.J[above]), J_p))
+    add_block(work.J[above], 0, 0, J_p)
 
 
 @small

@@ -24,6 +24,7 @@ from floatframe.engine.kernels.body import body_tangent, moved_inertia
 from floatframe.engine.kernels.compiler.compilation import loops, small
 from floatframe.engine.kernels.vector import (
     add,
+    add_block,
     cross,
     dot,
     matrix,
@@ -49,7 +50,7 @@ from floatframe.engine.tree.kernels.spatial import (
     turned_power,
     wrench_of_column,
 )
-from floatframe.engine.tree.recursion.composite import along, body_moments
+from floatframe.engine.tree.recursion.composite import along, body_moments, times_inertia
 
 __all__ = ["force_tangents"]
 
@@ -161,9 +162,8 @@ def body_by_turning(nodes, work, dense, model, marker_work, k):
 @small
 def wrench_of(m, s, J, p, Q, x, x_w, y_w):
     """Return I X + N Y."""
-    f = add(add(scaled(m, x), cross(x_w, s)), scaled(2.0, cross(y_w, p)))
-    t = add(add(cross(s, x), turned(J, x_w)), turned(Q, y_w))
-    return f, t
+    f, t = times_inertia(m, s, J, x, x_w)
+    return add(f, scaled(2.0, cross(y_w, p))), add(t, turned(Q, y_w))
 
 
 @small
@@ -201,8 +201,9 @@ def row_times(dense, i, change, first, turning):
 def put_rows(dense, k, v, S, m, s, J):
     """Add the row of a motion S of subtree k to that of rate v (2)."""
     move, w = vector(S), vector(S[3:])
-    put_sum(dense.row_a[v], 0, add(scaled(m, move), cross(w, s)))
-    put_sum(dense.row_a[v], 3, add(cross(s, move), turned(J, w)))
+    f, t = times_inertia(m, s, J, move, w)
+    put_sum(dense.row_a[v], 0, f)
+    put_sum(dense.row_a[v], 3, t)
     put_sum(dense.row_b[v], 0, by_turning(vector(dense.momentum[k]), dense.Q[k], move, w))
 
 
@@ -221,7 +222,6 @@ def change_of_wrench(dense, k, S, change, m, s, J):
 def go_up_tangents(nodes, dense, k, v, f_z, t_z, f_d, t_d):
     """Write both triangles between rate v of node k and the rates of all nodes above."""
     S, change, by_z, by_rate = dense.S, dense.change, dense.by_z, dense.by_rate
-    a, a_w, b = vector(dense.row_a[v]), vector(dense.row_a[v, 3:]), vector(dense.row_b[v])
     while True:
         above = nodes.parent[k]
         if above < 0:
@@ -231,16 +231,14 @@ def go_up_tangents(nodes, dense, k, v, f_z, t_z, f_d, t_d):
             C = change[j]
             by_z[j, v] = along(S[j], f_z, t_z)
             by_rate[j, v] = along(S[j], f_d, t_d)
-            by_z[v, j] = along(C[6:], a, a_w) + dot(b, vector(C[3:]))
-            by_rate[v, j] = along(C[12:], a, a_w) + dot(b, vector(S[j, 3:]))
+            by_z[v, j] = row_times(dense, v, C, 6, C[3:])
+            by_rate[v, j] = row_times(dense, v, C, 12, S[j, 3:])
         for j in range(n):
             i, C, E, T = vq + j, change[vq + j], dense.above_change[c0 + j], dense.above[c0 + j]
             by_z[i, v] = along(S[i], f_z, t_z) + along(T, f_z, t_z)
             by_rate[i, v] = along(S[i], f_d, t_d) + along(T, f_d, t_d)
-            turning = add(vector(C[3:]), vector(E[3:]))
-            by_z[v, i] = along(C[6:], a, a_w) + along(E[6:], a, a_w) + dot(b, turning)
-            turning = add(vector(S[i, 3:]), vector(T[3:]))
-            by_rate[v, i] = along(C[12:], a, a_w) + along(E[12:], a, a_w) + dot(b, turning)
+            by_z[v, i] = row_times(dense, v, C, 6, C[3:]) + row_times(dense, v, E, 6, E[3:])
+            by_rate[v, i] = row_times(dense, v, C, 12, S[i, 3:]) + row_times(dense, v, E, 12, T[3:])
         k = above
 
 
@@ -362,5 +360,4 @@ def force_tangents(nodes, work, dense, model, marker_work):
             if nodes.n_q[above] > 0:
                 give_to_flexible_parent(nodes, work, dense, model, marker_work, k)
             put_sum(dense.momentum[above], 0, vector(dense.momentum[k]))
-            for a in range(3):
-                put_sum(dense.Q[above, a], 0, vector(dense.Q[k, a]))
+            add_block(dense.Q[above], 0, 0, matrix(dense.Q[k]))
