@@ -88,7 +88,8 @@ def reduce_job(
     ranks = None if chosen.spread is None else all_ranks()
     body = job_body(job, stages, on_report=on_report, ranks=ranks)  # (2), (3)
     plan = Plan.of(job, body, chosen, budget)  # (4)
-    with Families(body, announce=not reduces_interfaces(job), solver=plan.solver, to_disk=plan.to_disk) as families:
+    announce = not job.reduction.reduces_interfaces  # what many boundary dofs cost, unless their number is reduced
+    with Families(body, announce=announce, solver=plan.solver, to_disk=plan.to_disk) as families:
         with stages(f"mode set {job.reduction.set}"):
             modes = job_mode_set(families, reduction_of(job, body))  # (5), (6)
         states = None
@@ -245,13 +246,8 @@ def expected_columns(job: Job, body: FEBody) -> int:
     from cms.modes.mode_sets import INTERFACE_SETS
 
     found = len(body.b)
-    if reduces_interfaces(job):
+    if job.reduction.reduces_interfaces:
         found = interface_reduction_size(body, job.reduction.interface_modes or 0)
     if job.reduction.set not in INTERFACE_SETS:
         found = 0
     return found + (job.reduction.n_modes if isinstance(job.reduction.n_modes, int) else 0)
-
-
-def reduces_interfaces(job: Job) -> bool:
-    """Return whether a job requests fewer modes for interfaces of kind "nodes"."""
-    return job.reduction.interface_modes is not None or job.reduction.interface_cutoff is not None

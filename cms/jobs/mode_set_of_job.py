@@ -48,7 +48,7 @@ def job_mode_set(body: FEBody | Families, reduction: ReductionSection) -> ModeSe
             return added(MODE_SETS[reduction.set](families, **options))
         from cms.assessment.compare.mode_selection import select_modes
 
-        has_additions = reduction.extra or reduction.interface_modes is not None or reduction.interface_cutoff
+        has_additions = reduction.extra or reduction.reduces_interfaces
         return select_modes(
             families,
             set=reduction.set,
@@ -79,7 +79,7 @@ def reduction_of(job: Job, body: FEBody) -> ReductionSection:
 
 def with_additions(families: Families, reduction: ReductionSection, modes: ModeSet) -> ModeSet:
     """Reduce interfaces of kind "nodes" to characteristic modes, and add extra columns, as the job requests."""
-    if reduction.interface_modes is not None or reduction.interface_cutoff is not None:
+    if reduction.reduces_interfaces:
         cutoff = None if reduction.interface_cutoff is None else reduction.interface_cutoff * families.body.units.time
         wanted = ModeCount(reduction.interface_modes, cutoff)
         modes = with_characteristic_modes(modes, families.body, wanted, together=bool(reduction.interfaces_together))

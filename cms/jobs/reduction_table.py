@@ -324,7 +324,7 @@ class ReductionSection(Table):
             raise ValueError(f"mode set {self.set!r} needs columns: the path of a .npy or .npz file")
         if self.interface_modes is not None and self.interface_cutoff is not None:
             raise ValueError("expected either interface_modes or interface_cutoff, got both")
-        if self.interfaces_together is not None and self.interface_modes is None and self.interface_cutoff is None:
+        if self.interfaces_together is not None and not self.reduces_interfaces:
             raise ValueError("interfaces_together belongs to interface_modes or interface_cutoff; got neither")
         if self.at is not None and self.frame != "nodal":
             raise ValueError(f'at = "{self.at}" belongs to frame = "nodal"; got frame = "{self.frame}"')
@@ -334,6 +334,11 @@ class ReductionSection(Table):
         if self.spread_loads and self.geometric_stiffness is False:
             raise ValueError("spread_loads = true belongs to the geometric stiffness; got geometric_stiffness = false")
         return self
+
+    @property
+    def reduces_interfaces(self) -> bool:
+        """Whether interfaces of kind "nodes" get fewer modes."""
+        return self.interface_modes is not None or self.interface_cutoff is not None
 
     def _options_of_auto(self) -> tuple[str, ...]:
         """Return the keys that n_modes = "auto" needs; raise `ValueError` if one is missing or needless."""

@@ -8,8 +8,8 @@ import pytest
 from tests.cms.path_of_a_job import functions_called
 from tests.root import ROOT
 
-MOST_FUNCTIONS = 499
-MOST_FILES = 82
+MOST_FUNCTIONS = 480  # one of them, the finaliser of the factor, runs when Python collects it
+MOST_FILES = 80
 
 
 def test_functions_called_counts_each_function_of_the_packages_once():

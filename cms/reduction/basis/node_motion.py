@@ -186,17 +186,12 @@ def node_weights(body: FEBody) -> Array:
 
     Reference nodes of couplings have weight 0, because they represent no material.
     """
-    dofs = mesh_dofs(body)
+    dofs = body.to_mesh.dofs
     has = np.zeros((len(body.nodes), 3), dtype=bool)
     translation = dofs[(dofs[:, 1] >= 0) & (dofs[:, 1] < 3)]
     has[translation[:, 0], translation[:, 1]] = True
     weights = np.ones(len(body.nodes)) if body.node_volumes is None else np.asarray(body.node_volumes)
     return np.where(has.all(axis=1), weights, 0.0)
-
-
-def mesh_dofs(body: FEBody) -> IntArray:
-    """Return (node, component) of the mesh dofs, (n_mesh_dof, 2)."""
-    return body.dofs if body.recovery is None else body.recovery.dofs
 
 
 def weighted_rigid_modes(body: FEBody, origin: Array) -> Array:
@@ -207,7 +202,7 @@ def weighted_rigid_modes(body: FEBody, origin: Array) -> Array:
     BodyError
         If no node has three translations, or all such nodes are collinear.
     """
-    weights, dofs = node_weights(body), mesh_dofs(body)
+    weights, dofs = node_weights(body), body.to_mesh.dofs
     used = weights > 0
     points = body.nodes[used]
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False) if used.sum() > 2 else np.zeros(3)
