@@ -9,8 +9,8 @@ import numpy as np
 from cms.body.geometric_stiffness import UNIT_LOADS, GeometricStiffness, RotatedLoads, SpreadLoads
 from cms.body.invariants import Moments, NodalSums
 from cms.body.kept_points import KeptPoints
-from cms.body.modal_file.contents import Attribute, Content, Contents, Dataset
-from cms.body.modal_file.entries import ENTRIES, entry_of, unit_of
+from cms.body.modal_file.contents import Attribute, Content, Contents
+from cms.body.modal_file.entries import dataset_of
 from cms.body.modal_file.recovery import recovery_attributes, recovery_of, recovery_values
 from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.body.source_columns import SourceColumns
@@ -48,13 +48,7 @@ INVARIANTS = ("J0", "C1", "C2", "C3", "C4", "C5")
 
 def content_of(body: ReducedBody, version: int) -> Content:
     """Return the content of the modal file of a body."""
-    values = values_of(body)
-    datasets = {}
-    for path, value in values.items():
-        known = entry_of(path)
-        if known is None:
-            raise ModalFileError(f"dataset {path} is not among those of a modal file: {', '.join(ENTRIES)}")
-        datasets[path] = Dataset(value, unit_of(path, body.units), known.description)
+    datasets = {path: dataset_of(path, values, body.units) for path, values in values_of(body).items()}
     return Content(FORMAT, version, datasets, attributes_of(body))
 
 

@@ -6,6 +6,7 @@ length.
 
 import re
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from cms.body.modal_file.recovery import recovery_of, recovery_values
 from cms.errors import ModalFileError
 from fe_models.foundation.units import Dimensions, Units, unit_text
 
-__all__ = ["ENTRIES", "Dimensions", "Entry", "entry_of", "in_units", "unit_text"]
+__all__ = ["ENTRIES", "Dimensions", "Entry", "dataset_of", "in_units", "unit_text"]
 
 
 NONE, MASS, LENGTH, RATE = Dimensions(), Dimensions(1), Dimensions(0, 1), Dimensions(0, 0, -1)
@@ -142,32 +143,32 @@ ENTRIES = {
 # fmt: on
 
 
-def entry_of(path: str) -> Entry | None:
-    """Return the entry of a dataset; None if this version does not know it."""
-    return ENTRIES.get(re.sub(r"/\d+/", "/<i>/", path))
+def entry_of(path: str) -> Entry:
+    """Return the entry of a dataset; raise `ModalFileError` if a modal file has no such dataset."""
+    found = ENTRIES.get(re.sub(r"/\d+/", "/<i>/", path))
+    if found is None:
+        raise ModalFileError(f"dataset {path} is not among those of a modal file: {', '.join(ENTRIES)}")
+    return found
 
 
-def unit_of(path: str, units: Units) -> str:
-    """Return the unit of a dataset in ASCII; both units if its rows differ."""
-    found = ENTRIES[re.sub(r"/\d+/", "/<i>/", path)]
-    if found.unit:
-        return found.unit
-    first = unit_text(units, found.dimensions)
-    return first if found.last_rows is None else f"{first} (rows 0-2), {unit_text(units, found.last_rows)} (rows 3-5)"
+def dataset_of(path: str, values: Any, units: Units) -> Dataset:
+    """Return a dataset with its description and its unit in ASCII; both units if its rows differ."""
+    known = entry_of(path)
+    unit = known.unit or unit_text(units, known.dimensions)
+    if known.last_rows is not None:
+        unit = f"{unit} (rows 0-2), {unit_text(units, known.last_rows)} (rows 3-5)"
+    return Dataset(values, unit, known.description)
 
 
 def in_units(content: Content, old: Units, new: Units) -> Content:
-    """Return the content of a modal file with its numbers converted to other units.
-
-    Datasets that this version does not know are left out, because their dimensions are unknown.
-    """
+    """Return the content of a modal file with its numbers converted to other units."""
     attributes = dict(content.attributes) | {"/units": {f.name: getattr(new, f.name) for f in fields(Units)}}
     weights = attributes.get("/nodal_sums", {})
     datasets = {}
     for path, dataset in content.datasets.items():
-        found = entry_of(path)
-        if found is None or path.startswith(f"{RECOVERY}/"):
+        if path.startswith(f"{RECOVERY}/"):
             continue
+        found = entry_of(path)
         values = dataset.values
         if isinstance(values, np.ndarray) and values.dtype.kind == "f":
             dimensions = found.dimensions
@@ -179,8 +180,7 @@ def in_units(content: Content, old: Units, new: Units) -> Content:
                 if len(values) != 6:
                     raise ModalFileError(f"dataset {path}: expected six rows, got {len(values)}")
                 values[3:] = dataset.values[3:] * found.last_rows.factor(old, new)
-        datasets[path] = Dataset(values, unit_of(path, new), found.description)
+        datasets[path] = dataset_of(path, values, new)
     tables = {name: table.in_units(new) for name, table in recovery_of(Contents(content), old).items()}
-    for path, values in recovery_values(tables).items():
-        datasets[path] = Dataset(values, unit_of(path, new), ENTRIES[re.sub(r"/\d+/", "/<i>/", path)].description)
+    datasets |= {path: dataset_of(path, values, new) for path, values in recovery_values(tables).items()}
     return Content(content.format, content.version, datasets, attributes)
