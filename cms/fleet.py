@@ -9,21 +9,20 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from cms.errors import JobError
 from cms.jobs.job import Job, read_job
 from cms.linear_algebra.solvers.registry import solver_of
 from fe_models.foundation.digest import file_digest
-from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.parametric_file import extended_files
 from fe_models.foundation.paths import file_identity, remove_parts
+from fe_models.foundation.tasks.campaign import Campaign, open_task_journal
 from fe_models.foundation.tasks.installation import source_mark
-from fe_models.foundation.tasks.journal import TaskJournal, open_task_journal
-from fe_models.foundation.tasks.task_map import ProcessError
-from fe_models.foundation.tasks.workers import Workers, tasks_of
+from fe_models.foundation.tasks.workers import Workers
 from fe_models.foundation.toml_file import files_named
 
-__all__ = ["FleetJob", "FleetRow", "failed_row", "inputs_of", "reduce_and_write_one", "reduce_fleet"]
+__all__ = ["FleetJob", "FleetRow", "inputs_of", "reduce_fleet"]
 
 
 # one job of a fleet: the request to a worker, its work, and its answer ------------------------------------------------
@@ -78,29 +77,46 @@ def recorded_notes() -> Iterator[list[str]]:
         root.handlers = before
 
 
-def reduce_and_write_one(job: FleetJob) -> FleetRow:
-    """Run a job and write its modal file; called in a worker."""
-    from cms.body.modal_file.file import write
-    from cms.pipeline import reduce_job
+class FleetTask:
+    """Reduces a job to its modal file, in a worker."""
 
-    began = time.perf_counter()
-    with recorded_notes() as notes:
-        reduced = reduce_job(job.job, solver=job.solver)
-        write(reduced, job.output)
-    return FleetRow(job, reduced.name, reduced.n_q, time.perf_counter() - began, tuple(notes))
+    def __call__(self, job: FleetJob) -> FleetRow:
+        """Run a job and write its modal file."""
+        from cms.body.modal_file.file import write
+        from cms.pipeline import reduce_job
 
+        began = time.perf_counter()
+        with recorded_notes() as notes:
+            reduced = reduce_job(job.job, solver=job.solver)
+            write(reduced, job.output)
+        return FleetRow(job, reduced.name, reduced.n_q, time.perf_counter() - began, tuple(notes))
 
-def failed_row(job: FleetJob, error: Exception) -> FleetRow:
-    """Return the row of a failed job, with the text of its error."""
-    words = str(error) if isinstance(error, ReportedError) else f"{type(error).__name__}: {error}"
-    is_lasting = isinstance(error, ReportedError) and not isinstance(error, ProcessError)
-    return FleetRow(job, error=" ".join(words.split()) or type(error).__name__, is_lasting=is_lasting)
+    def failed(self, job: FleetJob, words: str, is_lasting: bool) -> FleetRow:
+        """Return the row of a failed job."""
+        return FleetRow(job, error=words, is_lasting=is_lasting)
+
+    def key(self, job: FleetJob) -> tuple[str, str, str]:
+        """Return the files of a job, and the digest of what it reads."""
+        return str(job.job), str(job.output), job.digest
+
+    def record(self, row: FleetRow) -> dict[str, Any] | None:
+        """Return a finished row and the digest of its modal file; failed jobs are run again."""
+        made = {"made": file_digest(row.job.output), "name": row.name, "n_modes": row.n_modes, "seconds": row.seconds}
+        return None if row.error else {**made, "notes": row.notes}
+
+    def row(self, job: FleetJob, record: dict[str, Any]) -> FleetRow:
+        """Return the row of a record whose modal file is unchanged."""
+        if record["made"] != file_digest(job.output):
+            raise ValueError("another modal file")
+        notes = tuple(str(note) for note in record["notes"])
+        numbers = int(record["n_modes"]), float(record["seconds"])
+        return FleetRow(job, str(record["name"]), *numbers, notes, is_known=True)
 
 
 # fleet ----------------------------------------------------------------------------------------------------------------
 
 
-KIND = "cms reduce journal 1"
+KIND = "cms reduce journal 2"
 
 
 def reduce_fleet(
@@ -146,25 +162,14 @@ def reduce_fleet(
     made = [path.with_suffix(".h5") for path in paths] if outputs is None else [Path(path) for path in outputs]
     fleet = fleet_of(paths, made, solver)
     kept = None if journal is None else open_task_journal(Path(journal), KIND, source_mark(), "this call", JobError)
-    rows = {} if kept is None else known_rows(kept, fleet)
-    missing = [k for k in range(len(fleet)) if k not in rows]
-
-    def keep(i: int, row: FleetRow) -> None:
-        rows[missing[i]] = row
-        if kept is not None and not row.error:
-            kept.append(record_of(row))
-        if progress is not None:
-            progress(len(rows), len(fleet))
-
+    campaign = Campaign(FleetTask(), kept)
+    missing = [job for job in fleet if campaign.known(job) is None]
+    files = sorted({str(path) for job in missing for path in (job.job, job.output.parent)})
     try:
-        if missing:
-            files = sorted({str(folder) for k in missing for folder in (fleet[k].job, fleet[k].output.parent)})
-            with tasks_of(workers, len(missing), threads=None) as tasks:
-                tasks.map(reduce_and_write_one, [fleet[k] for k in missing], failed=failed_row, done=keep, files=files)
+        return campaign.rows(fleet, workers, threads=None, progress=progress, files=files)
     finally:  # a worker that was killed while writing could not clean up
-        for k in missing:
-            remove_parts(fleet[k].output)
-    return [rows[k] for k in range(len(fleet))]
+        for job in missing:
+            remove_parts(job.output)
 
 
 def fleet_of(jobs: Sequence[Path], outputs: Sequence[Path], solver: str | None = None) -> list[FleetJob]:
@@ -185,31 +190,6 @@ def fleet_of(jobs: Sequence[Path], outputs: Sequence[Path], solver: str | None =
         mark = hashlib.sha256(" ".join([*(digests[each] for each in files), solver or ""]).strip().encode()).hexdigest()
         found.append(FleetJob(Path(os.path.abspath(path)), Path(os.path.abspath(output)), mark, solver))
     return found
-
-
-def known_rows(journal: TaskJournal, fleet: Sequence[FleetJob]) -> dict[int, FleetRow]:
-    """Return the rows of jobs whose inputs and modal file agree with the journal, by index of the job."""
-    records = {(str(record.get("job")), str(record.get("output"))): record for record in journal.records}
-    rows = {}
-    for k, job in enumerate(fleet):
-        found = records.get((str(job.job), str(job.output)), {})
-        try:
-            if found["digest"] == job.digest and found["made"] == file_digest(job.output):
-                notes = tuple(str(note) for note in found["notes"])
-                name, n_modes, seconds = str(found["name"]), int(found["n_modes"]), float(found["seconds"])
-                rows[k] = FleetRow(job, name, n_modes, seconds, notes, is_known=True)
-        except (KeyError, TypeError, ValueError):
-            continue
-    return rows
-
-
-def record_of(row: FleetRow) -> dict[str, object]:
-    """Return a row as a record of the journal."""
-    return {
-        "job": str(row.job.job), "output": str(row.job.output), "digest": row.job.digest,
-        "made": file_digest(row.job.output), "name": row.name, "n_modes": row.n_modes, "seconds": row.seconds,
-        "notes": row.notes,
-    }  # fmt: skip
 
 
 def inputs_of(path: Path, job: Job) -> list[Path]:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import typer
 
-from cms.cli.console import output_path, print_table, say, stages, vector_words
+from cms.cli.console import print_table, say, stages, vector_words
+from cms.cli.outputs import output_file
 from cms.errors import JobError
 
 if TYPE_CHECKING:
@@ -102,9 +103,8 @@ def run_faces(request: FacesRequest) -> None:
     if request.output is None:
         part = read_cad(request.file, units=request.units)
     else:
-        output_path(request.output, "", JobError, overwrite_of=(request.file,), needs_file=True)
-        if request.output.suffix.lower() != ".png":
-            raise JobError(f"--output {request.output}: expected the name of a picture, .png")
+        inputs = (request.file,)
+        output_file(request.output, request.output, (".png",), JobError, overwrite_of=inputs, needs_file=True)
         surface = surface_of_cad(request.file, units=request.units)
         part = surface.part
     chosen = {face.number for text in request.select for face in chosen_faces(text, part.faces)}

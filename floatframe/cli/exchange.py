@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cms.cli.console import guarded, output_path, print_table, say, stages
+from cms.cli.console import guarded, print_table, say, stages
+from cms.cli.outputs import output_file
 
 if TYPE_CHECKING:
     from floatframe.files.importers.robot import Robot
@@ -352,9 +353,7 @@ def fmu_command(
     from floatframe.errors import ModelError
     from floatframe.files.cosimulation.archive import write_fmu
 
-    path = output_path(output, system.with_suffix(".fmu"), ModelError, overwrite_of=(system,))
-    if path.suffix.lower() != ".fmu":
-        raise ModelError(f"--output {path}: expected a file name that ends in .fmu")
+    path = output_file(output, system.with_suffix(".fmu"), (".fmu",), ModelError, overwrite_of=(system,))
     pairs = [text.partition("=") for text in parameters]
     for text, (name, equals, key) in zip(parameters, pairs, strict=True):
         if not (name and equals and key):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cms.cli.arguments import SetValues
-from cms.cli.console import guarded, output_path, print_table, say
+from cms.cli.console import guarded, print_table, say
 from cms.cli.outputs import PICTURES, TABLES, output_file, write_outputs
 from floatframe.cli.analyses import Axis, Center, Formulation, Speed, SystemArgument, linearized, read_in_formulation
 from floatframe.cli.channel_names import chosen
@@ -59,9 +59,8 @@ def linearize_command(
     from floatframe.errors import ModelError
 
     model, form = read_in_formulation(system, formulation, set_values)
-    path = output_path(output, system.with_suffix(".npz"), ModelError, overwrite_of=(system, *model.files))
-    if path.suffix.lower() not in WRITERS:
-        raise ModelError(f"--output {path}: expected a file name that ends in {', '.join(WRITERS)}")
+    read = (system, *model.files)
+    path = output_file(output, system.with_suffix(".npz"), tuple(WRITERS), ModelError, overwrite_of=read)
     linear = linearized(
         model,
         speed,

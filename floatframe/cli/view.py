@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from cms.cli.console import guarded, output_path, say, stages
+from cms.cli.console import guarded, say, stages
+from cms.cli.outputs import output_file
 from floatframe.cli.analyses import Axis, Center, Speed, linearized, read_in_formulation
 
 __all__ = ["view_command"]
@@ -88,7 +89,4 @@ def page_path(output: Path | None, file: Path, inputs: tuple[Path | str, ...]) -
     """Return the path of the page."""
     from floatframe.errors import ResultsError
 
-    path: Path = output_path(output, file.with_suffix(".html"), ResultsError, overwrite_of=inputs)
-    if path.suffix.lower() not in (".html", ".htm"):
-        raise ResultsError(f"--output {path}: expected a file name that ends in .html")
-    return path
+    return output_file(output, file.with_suffix(".html"), (".html", ".htm"), ResultsError, overwrite_of=inputs)

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 import cms
 from cms.cli.app import app
 from cms.errors import JobError
-from cms.fleet import fleet_of, inputs_of, reduce_and_write_one, reduce_fleet
+from cms.fleet import FleetTask, fleet_of, inputs_of, reduce_fleet
 from cms.jobs.job import read_job
 from fe_models.foundation.tasks.workers import ThisProcess
 
@@ -156,26 +156,30 @@ def test_bad_fleets_are_refused_before_any_work(jobs, tmp_path):
     assert not list(tmp_path.rglob("*.h5"))
 
 
-def killed_once(job):
-    """Reduce a job; the first worker that has written half of its file is killed."""
-    mark = job.output.with_name("killed")
-    if not mark.exists():
-        mark.write_text(str(os.getpid()))
-        job.output.with_name(f".{job.output.name}.0123abcd.part").write_bytes(b"half")
-        os.kill(os.getpid(), signal.SIGKILL)
-    return reduce_and_write_one(job)
+class KilledOnce(FleetTask):
+    """Reduces a job; the first worker that has written half of its file is killed."""
+
+    def __call__(self, job):
+        mark = job.output.with_name("killed")
+        if not mark.exists():
+            mark.write_text(str(os.getpid()))
+            job.output.with_name(f".{job.output.name}.0123abcd.part").write_bytes(b"half")
+            os.kill(os.getpid(), signal.SIGKILL)
+        return super().__call__(job)
 
 
-def interrupted(job):
-    """Stand for Ctrl-C while the second job is at its writing."""
-    if job.job.name == "rod_2.toml":
-        job.output.with_name(f".{job.output.name}.0123abcd.part").write_bytes(b"half")
-        raise KeyboardInterrupt
-    return reduce_and_write_one(job)
+class Interrupted(FleetTask):
+    """Stands for Ctrl-C while the second job is at its writing."""
+
+    def __call__(self, job):
+        if job.job.name == "rod_2.toml":
+            job.output.with_name(f".{job.output.name}.0123abcd.part").write_bytes(b"half")
+            raise KeyboardInterrupt
+        return super().__call__(job)
 
 
 def test_a_worker_killed_at_its_writing_loses_no_job(jobs, monkeypatch):
-    monkeypatch.setattr("cms.fleet.reduce_and_write_one", killed_once)
+    monkeypatch.setattr("cms.fleet.FleetTask", KilledOnce)
     rows = reduce_fleet(jobs, workers=2)
     assert (jobs[0].parent / "killed").is_file()
     assert not any(row.error for row in rows)
@@ -186,7 +190,7 @@ def test_a_worker_killed_at_its_writing_loses_no_job(jobs, monkeypatch):
 def test_an_interrupt_leaves_nothing_half_written_and_a_second_call_goes_on(jobs, monkeypatch):
     journal = jobs[0].with_name("reduce.journal")
     with monkeypatch.context() as patch:
-        patch.setattr("cms.fleet.reduce_and_write_one", interrupted)
+        patch.setattr("cms.fleet.FleetTask", Interrupted)
         with pytest.raises(KeyboardInterrupt):
             reduce_fleet(jobs, workers=1, journal=journal)
     assert not list(jobs[0].parent.glob(".*.part"))

@@ -1,6 +1,5 @@
 """One evaluation of a design: the values of objectives and constraints, or the reason why they do not exist."""
 
-import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,10 +9,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.errors import ReportedError
-from fe_models.foundation.tasks.installation import source_mark
-from fe_models.foundation.tasks.journal import TaskJournal, open_task_journal
-from fe_models.foundation.tasks.task_map import ProcessError
+from fe_models.foundation.tasks.campaign import TaskJournal, campaign_digest, open_task_journal
 from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.linear.frequency_response import resolved_frequencies
 from floatframe.analyses.linear.linearization import LinearSystem, linearize
@@ -27,8 +23,6 @@ from floatframe.results.trajectory import Trajectory
 __all__ = [
     "Evaluation",
     "EvaluationFunction",
-    "Journal",
-    "design_digest",
     "open_journal",
     "residuals",
     "response_number",
@@ -156,11 +150,25 @@ class EvaluationFunction:
                 raise ModelError(f"{q.output.name}: {q.output.of} is {each[int(np.argmin(np.isfinite(each)))]}")
         return Evaluation(values, tuple(numbers))
 
-    def failed(self, values: tuple[float, ...], error: Exception) -> Evaluation:
-        """Return a failed evaluation, with the text of its error."""
-        words = str(error) if isinstance(error, ReportedError) else f"{type(error).__name__}: {error}"
-        told = " ".join(words.split()) or type(error).__name__
-        return Evaluation(values, error=told, is_lasting=not isinstance(error, ProcessError))
+    def failed(self, values: tuple[float, ...], words: str, is_lasting: bool) -> Evaluation:
+        """Return a failed evaluation."""
+        return Evaluation(values, error=words, is_lasting=is_lasting)
+
+    def key(self, values: tuple[float, ...]) -> tuple[float, ...]:
+        """Return the values."""
+        return values
+
+    def record(self, row: Evaluation) -> dict[str, Any] | None:
+        """Return the numbers, unless another attempt may succeed."""
+        return {"numbers": row.numbers, "error": row.error} if row.is_lasting else None
+
+    def row(self, values: tuple[float, ...], record: dict[str, Any]) -> Evaluation:
+        """Return the evaluation of a record."""
+        numbers = tuple(tuple(float(v) for v in part) for part in record["numbers"])
+        expected = tuple(1 if q.times is None else len(q.times) for q in self.design.quantities)
+        if not record["error"] and tuple(map(len, numbers)) != expected:
+            raise ValueError("a record of another design")
+        return Evaluation(values, numbers, str(record["error"]))
 
 
 def numbers_of(quantity: Quantity, system: System, motion: Trajectory) -> tuple[float, ...]:
@@ -224,29 +232,7 @@ def violations(design: Design, evaluation: Evaluation) -> Array:
     return np.array(g)
 
 
-# the journal of an optimisation has one line for each evaluation, so that a later call can continue
-# ---------------------
-
-
-KIND = "floatframe optimize journal 1"
-
-
-class Journal:
-    """A file to which evaluations are appended, and its content when it was opened."""
-
-    def __init__(self, journal: TaskJournal, known: dict[tuple[float, ...], Evaluation]) -> None:
-        self.journal = journal
-        self.known = known
-
-    def append(self, evaluation: Evaluation) -> None:
-        """Write an evaluation, unless another attempt may succeed."""
-        if not evaluation.is_lasting:
-            return
-        self.journal.append({"values": evaluation.values, "numbers": evaluation.numbers, "error": evaluation.error})
-        self.known[evaluation.values] = evaluation
-
-
-def open_journal(path: Path, design: Design, files: tuple[str, ...]) -> Journal:
+def open_journal(path: Path, design: Design, files: tuple[str, ...]) -> TaskJournal:
     """Return the journal at a path, new or with its content.
 
     Raises
@@ -255,30 +241,12 @@ def open_journal(path: Path, design: Design, files: tuple[str, ...]) -> Journal:
         If the file is no journal, or one of another system, other numbers or another version of the program; it is left
         as it is.
     """
-    journal = open_task_journal(path, KIND, design_digest(design, files), design.source, ResultsError)
-    expected = tuple(1 if q.times is None else len(q.times) for q in design.quantities)
-    known: dict[tuple[float, ...], Evaluation] = {}
-    for record in journal.records:
-        try:
-            values = tuple(float(v) for v in record["values"])
-            numbers = tuple(tuple(float(v) for v in part) for part in record["numbers"])
-            error = str(record["error"])
-        except (ValueError, TypeError, KeyError):
-            continue
-        if len(values) == len(design.parameters) and (error or tuple(map(len, numbers)) == expected):
-            known[values] = Evaluation(values, numbers, error)
-    return Journal(journal, known)
-
-
-def design_digest(design: Design, files: tuple[str, ...]) -> str:
-    """Return the SHA-256 of what the numbers depend on: this program, files of the system, key paths, quantities."""
     asked = [
         (q.analysis, q.output.of, q.output.take, q.band, q.at, None if q.times is None else q.times.tolist())
         for q in design.quantities
     ]
-    text = repr((source_mark(), [(p.paths, p.factors) for p in design.parameters], asked))
-    digest = hashlib.sha256(text.encode())
-    for name in files:
-        data = Path(name).read_bytes()
-        digest.update(str(len(data)).encode() + b" " + data)
-    return digest.hexdigest()
+    digest = campaign_digest(([(p.paths, p.factors) for p in design.parameters], asked), files)
+    return open_task_journal(path, KIND, digest, design.source, ResultsError)
+
+
+KIND = "floatframe optimize journal 2"

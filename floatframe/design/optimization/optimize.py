@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.tasks.campaign import Campaign, TaskJournal
 from fe_models.foundation.tasks.task_map import TaskMap
 from fe_models.foundation.tasks.workers import Workers, tasks_of
 from floatframe.design.optimization.design import Design
@@ -21,7 +22,6 @@ from floatframe.design.optimization.design_file import SMALLEST_TOLERANCE
 from floatframe.design.optimization.evaluation import (
     Evaluation,
     EvaluationFunction,
-    Journal,
     open_journal,
     residuals,
     scalar,
@@ -163,16 +163,16 @@ class Evaluator:
         self,
         design: Design,
         tasks: TaskMap,
-        journal: Journal | None,
+        journal: TaskJournal | None,
         files: Sequence[str],
         progress: Callable[[Evaluated], None] | None,
     ) -> None:
         self.design = design
         self.tasks = tasks
-        self.journal = journal
         self.files = tuple(os.path.abspath(name) for name in files)
         self.progress = progress
-        self.function = EvaluationFunction(replace(design, study=sendable_study(design.study)))
+        function = EvaluationFunction(replace(design, study=sendable_study(design.study)))
+        self.campaign: Campaign[tuple[float, ...], Evaluation] = Campaign(function, journal)
         self.lower = np.array([p.lower for p in design.parameters])
         self.upper = np.array([p.upper for p in design.parameters])
         self.rows: dict[tuple[float, ...], Evaluated] = {}
@@ -189,13 +189,11 @@ class Evaluator:
         What is not known is computed by the workers.
         """
         values = [tuple(float(v) for v in self.values(z)) for z in points]
-        known = {} if self.journal is None else self.journal.known
-        is_known = {v: v in known for v in values if v not in self.rows}
-        missing = [v for v, found in is_known.items() if not found]
-        computed = dict(zip(missing, self.compute(missing), strict=True))
+        new = list(dict.fromkeys(v for v in values if v not in self.rows))
+        known = {v for v in new if self.campaign.known(v) is not None}
         trials = set(values[:n_trials])
-        for v, found in is_known.items():
-            row = self.row(known[v] if found else computed[v], v not in trials, found)
+        for v, evaluation in zip(new, self.campaign.rows(new, self.tasks, files=self.files), strict=True):
+            row = self.row(evaluation, v not in trials, v in known)
             self.rows[v] = row
             self.history.append(row)
             if self.progress is not None:
@@ -205,14 +203,6 @@ class Evaluator:
     def values(self, z: Array) -> Array:
         """Return the values of the parameters at a scaled point, within their bounds."""
         return np.clip(self.lower + z * (self.upper - self.lower), self.lower, self.upper)
-
-    def compute(self, values: list[tuple[float, ...]]) -> list[Evaluation]:
-        """Return new evaluations; each is written to the journal as soon as it is known."""
-        keep: Callable[[Evaluation], None] = (lambda _: None) if self.journal is None else self.journal.append
-        return self.tasks.map(
-            self.function, values, failed=self.function.failed, done=lambda _, evaluation: keep(evaluation),
-            files=self.files,
-        )  # fmt: skip
 
     def row(self, evaluation: Evaluation, is_difference: bool, is_known: bool) -> Evaluated:
         """Return an evaluation as a row of the history."""

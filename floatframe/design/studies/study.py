@@ -4,8 +4,6 @@ study = read_study("crank_study.toml")
 table = run_study(study)                     # rows: parameter values, and outputs or an error
 """
 
-import hashlib
-import json
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -18,10 +16,8 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.digest import file_digest
 from fe_models.foundation.documents.table import Table
 from fe_models.foundation.errors import ReportedError
-from fe_models.foundation.tasks.installation import source_mark
-from fe_models.foundation.tasks.journal import TaskJournal, open_task_journal
-from fe_models.foundation.tasks.task_map import ProcessError
-from fe_models.foundation.tasks.workers import Workers, tasks_of
+from fe_models.foundation.tasks.campaign import Campaign, campaign_digest, open_task_journal
+from fe_models.foundation.tasks.workers import Workers
 from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.driven.inverse_dynamics import inverse_dynamics
 from floatframe.analyses.driven.kinematics import kinematics
@@ -39,7 +35,7 @@ from floatframe.results.sensors import measured, sensor_of
 from floatframe.results.trajectory import Trajectory
 from floatframe.simulation.integrate import integrate
 
-__all__ = ["StudyJournal", "StudyRow", "StudyTable", "open_study_journal", "run_study", "sendable_study"]
+__all__ = ["StudyRow", "StudyTable", "run_study", "sendable_study"]
 
 
 # a point of a study and its result ------------------------------------------------------------------------------------
@@ -59,49 +55,6 @@ class StudyRow:
 # study ----------------------------------------------------------------------------------------------------------------
 
 
-# the journal of a study: every completed point is a line, so that a later call can continue ---------------------------
-
-
-KIND = "floatframe sweep journal 1"
-
-
-class StudyJournal:
-    """A file to which rows are appended, with the rows that it contained when opened."""
-
-    def __init__(self, journal: TaskJournal, study: Study) -> None:
-        self.journal = journal
-        self.folder = Path(study.system).parent
-        n = len(study.outputs)
-        self.known: dict[str, dict[str, Any]] = {}
-        for record in journal.records:
-            try:
-                if len(record["outputs"]) == len(record["units"]) == n and all(
-                    isinstance(value, float) for value in record["outputs"]
-                ):
-                    self.known[str(record["point"])] = record
-            except (KeyError, TypeError):
-                continue
-
-    def row(self, point: tuple[Any, ...]) -> StudyRow | None:
-        """Return the row of a point, if it is known."""
-        record = self.known.get(self.key(point))
-        if record is None:
-            return None
-        return StudyRow(point, tuple(record["outputs"]), tuple(record["units"]), str(record.get("error", "")))
-
-    def append(self, row: StudyRow) -> None:
-        """Write a row, unless a repeated attempt could give another result."""
-        if row.is_lasting:
-            outputs = [float(value) for value in row.outputs]
-            key = self.key(row.values)
-            self.journal.append({"point": key, "outputs": outputs, "units": row.units, "error": row.error})
-
-    def key(self, point: tuple[Any, ...]) -> str:
-        """Return the key of a point as text: its values, and digests of the files that they name."""
-        digests = [file_digest(self.folder / text) for text in texts(point)]
-        return json.dumps([point, [digest for digest in digests if digest]], default=str)
-
-
 def texts(value: Any) -> Iterator[str]:
     """Yield all texts in a value of a file that can be names of files."""
     if isinstance(value, str):
@@ -115,33 +68,11 @@ def texts(value: Any) -> Iterator[str]:
             yield from texts(each)
 
 
-def open_study_journal(path: Path, study: Study, files: tuple[str, ...]) -> StudyJournal:
-    """Return the journal at a path, either new or with its existing rows.
-
-    Raises
-    ------
-    ResultsError
-        If the file is not a journal, or belongs to another system, other outputs or another version of the program; it
-        is left unchanged.
-    """
-    digest = study_digest(study, files)
-    return StudyJournal(open_task_journal(path, KIND, digest, f"the study of {study.system}", ResultsError), study)
-
-
-def study_digest(study: Study, files: tuple[str, ...]) -> str:
-    """Return the SHA-256 of everything the results depend on: program, files of the system, key paths, outputs."""
-    asked = [(output.of, output.take) for output in study.outputs]
-    text = repr((source_mark(), study.analysis, [parameter.path for parameter in study.parameters], asked))
-    digest = hashlib.sha256(text.encode())
-    for name in files:
-        digest.update(file_digest(name).encode())
-    return digest.hexdigest()
-
-
 # study ----------------------------------------------------------------------------------------------------------------
 
 
 OF_MODES = {"frequency": "Hz", "damping": "-", "real": "1/s", "imaginary": "rad/s"}
+KIND = "floatframe sweep journal 2"
 EXTREMES: dict[str, Callable[[Array], float]] = {"least": np.nanmin, "greatest": np.nanmax}  #: over all modes
 
 
@@ -224,26 +155,17 @@ def run_study(
     points = list(study.points())
     check(study, points[0])
     files = read_system(study.system)[0].files
-    kept = None if journal is None else open_study_journal(Path(journal), study, files)
-    rows = {} if kept is None else {k: row for k, point in enumerate(points) if (row := kept.row(point)) is not None}
-    n_known = len(rows)
-    missing = [k for k in range(len(points)) if k not in rows]
-
-    def keep(i: int, row: StudyRow) -> None:
-        rows[missing[i]] = row
-        if kept is not None:
-            kept.append(row)
-        if progress is not None:
-            progress(len(rows), len(points))
-
-    if missing:
-        compute = StudyPoint(sendable_study(study))
-        with tasks_of(study.workers if workers is None else workers, len(missing)) as tasks:
-            tasks.map(
-                compute, [points[k] for k in missing], failed=compute.failed, done=keep,
-                files=[os.path.abspath(name) for name in files],
-            )  # fmt: skip
-    return StudyTable(study, tuple(rows[k] for k in range(len(points))), n_known)
+    kept = None
+    if journal is not None:
+        asked = study.analysis, [p.path for p in study.parameters], [(o.of, o.take) for o in study.outputs]
+        digest, source = campaign_digest(asked, files), f"the study of {study.system}"
+        kept = open_task_journal(Path(journal), KIND, digest, source, ResultsError)
+    campaign = Campaign(StudyPoint(sendable_study(study)), kept)
+    rows = campaign.rows(
+        points, study.workers if workers is None else workers, progress=progress,
+        files=[os.path.abspath(name) for name in files],
+    )  # fmt: skip
+    return StudyTable(study, tuple(rows), campaign.n_known)
 
 
 def sendable_study(study: Study) -> Study:
@@ -312,13 +234,27 @@ class StudyPoint:
             found = [output_value(output, system, motion) for output in self.study.outputs]
         return StudyRow(point, tuple(value for value, _ in found), tuple(unit for _, unit in found))
 
-    def failed(self, point: tuple[Any, ...], error: Exception) -> StudyRow:
-        """Return the row of a failed point, with its error as text."""
-        words = str(error) if isinstance(error, ReportedError) else f"{type(error).__name__}: {error}"
+    def failed(self, point: tuple[Any, ...], words: str, is_lasting: bool) -> StudyRow:
+        """Return the row of a failed point."""
         n = len(self.study.outputs)
-        told = " ".join(words.split()) or type(error).__name__
-        is_lasting = isinstance(error, ReportedError) and not isinstance(error, ProcessError)
-        return StudyRow(point, (float("nan"),) * n, ("",) * n, told, is_lasting)
+        return StudyRow(point, (float("nan"),) * n, ("",) * n, words, is_lasting)
+
+    def key(self, point: tuple[Any, ...]) -> Any:
+        """Return the values of a point, and digests of the files that they name."""
+        digests = [file_digest(Path(self.study.system).parent / text) for text in texts(point)]
+        return [point, [digest for digest in digests if digest]]
+
+    def record(self, row: StudyRow) -> dict[str, Any] | None:
+        """Return outputs and error of a row, unless a repeated attempt could give another result."""
+        outputs = [float(value) for value in row.outputs]
+        return {"outputs": outputs, "units": row.units, "error": row.error} if row.is_lasting else None
+
+    def row(self, point: tuple[Any, ...], record: dict[str, Any]) -> StudyRow:
+        """Return the row of a record."""
+        outputs, units = tuple(record["outputs"]), tuple(record["units"])
+        if not len(outputs) == len(units) == len(self.study.outputs) or not all(type(v) is float for v in outputs):
+            raise ValueError("a record of another study")
+        return StudyRow(point, outputs, units, str(record["error"]))
 
     def motion(self, system: System, given: RunOptions | None) -> Trajectory:
         """Return the motion of the analysis; an equilibrium is a motion with one time."""

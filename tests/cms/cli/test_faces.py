@@ -42,7 +42,7 @@ def test_json_has_the_faces_in_the_unit_that_is_asked_for_and_nothing_else_on_th
     [
         (["--select", "cylinder r=7"], "no face of the body is such; it has cylinder r=6 hole"),
         (["--units", "furlong"], "unknown unit system"),
-        (["-o", "faces.stl"], "expected the name of a picture, .png"),
+        (["-o", "faces.stl"], "expected a file name that ends in .png"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_message(plate, words, said):
