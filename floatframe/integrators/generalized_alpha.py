@@ -301,10 +301,9 @@ class GeneralizedAlpha(Integrator):
             words = f"the Newton matrix of body {name!r} is singular; check its mass, inertia and stiffness"
             return Failure(words, excess)
         if status == SINGULAR_CONNECTION:
-            name = compiled.connection_names[index]
             words = (
-                f"the constraints of joint {name!r} depend on others here (a singular position); choose a smaller h, "
-                "or check for a drive out of reach or an error in the system"
+                f"the equations of {compiled.connection_words(index)} depend on others here (a singular position); "
+                "choose a smaller h, or check for a drive out of reach or an error in the system"
             )
             return Failure(f"{words}; {fast_turn}" if fast_turn else words, excess)
         if status == TURNED:

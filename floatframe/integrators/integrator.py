@@ -286,8 +286,8 @@ def failure_of_element(
 
     if no_number := int(work.counted.no_number):
         words = (
-            f"element {compiled.connection_names[no_number - 1]!r} is not finite (NaN or infinity) for a finite "
-            "motion; check its law, or choose a smaller h if it is only known near the motion"
+            f"{compiled.connection_words(no_number - 1)} is not finite (NaN or infinity) for a finite motion; check "
+            "its law, or choose a smaller h if it is only known near the motion"
         )
         return Failure(words, outcome.excess)
     if outcome.status == STOPPED:

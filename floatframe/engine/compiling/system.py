@@ -29,6 +29,7 @@ from floatframe.engine.compiling.public_elements import PlacedLaw, add_public_el
 from floatframe.engine.kernels import model
 from floatframe.engine.kernels.model import (
     CONTACT,
+    ELEMENT,
     JOINT,
     Bodies,
     BodyTypes,
@@ -260,6 +261,12 @@ class CompiledSystem:
     def connection_names(self) -> tuple[str, ...]:
         """Names of joints, springs, couplers and user forces: the order of connections in the model."""
         return self.joint_names + self.spring_names + self.element_names
+
+    def connection_words(self, c: int) -> str:
+        """Return the kind and the name of connection c for messages."""
+        law = int(self.model.connections.law[c])
+        kind = {JOINT: "joint", ELEMENT: "element"}.get(law, "force")
+        return f"{kind} {self.connection_names[c]!r}"
 
 
 def compiled_system(system: System) -> CompiledSystem:

@@ -386,12 +386,12 @@ def work_from(model: Model, known: Array | None) -> Work:
 
 
 def require_numbers(compiled: CompiledSystem, work: Work) -> None:
-    """Raise `ModelError` with the name of an element whose law is not finite at the iterate."""
+    """Raise `ModelError` with the name of an element or user force whose law is not finite at the iterate."""
     no_number = int(work.counted.no_number)
     if no_number:
         raise ModelError(
-            f"element {compiled.connection_names[no_number - 1]!r} gives what is no number (NaN or infinity) where it "
-            "is placed; see its law, or place its bodies where it is known"
+            f"{compiled.connection_words(no_number - 1)} gives what is no number (NaN or infinity) where it is placed; "
+            "see its law, or place its bodies where it is known"
         )
 
 

@@ -296,7 +296,7 @@ class Counted(NamedTuple):
 
     evaluations: IntArray = integer()
     factorisations: IntArray = integer()
-    no_number: IntArray = integer()  #: 1 + the first element of a step whose law was not finite, 0 for none
+    no_number: IntArray = integer()  #: 1 + the first connection of a step whose law was not finite, 0 for none
     stopped: IntArray = integer()  #: 1 + the first output of a step that ends the run, 0 for none
     rows: IntArray = integer()  #: rows written into the results of the present call
 

@@ -22,7 +22,7 @@ import math
 
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.compiler.user_call import call_law
-from floatframe.engine.kernels.connections.user_force import put_state_derivatives, state_rows
+from floatframe.engine.kernels.connections.user_force import are_finite, put_state_derivatives, state_rows
 from floatframe.engine.kernels.marker import marker_acceleration
 from floatframe.engine.kernels.rotation import exp_matrix
 from floatframe.engine.kernels.vector import add, dot, matrix, norm, product, put, put_sum, scaled, vector
@@ -134,15 +134,10 @@ def law_rows(model, work, c, c_k):
 def note_what_is_no_number(model, work, c):
     """Record the first element of a step whose law is not finite for a finite motion."""
     head = model.laws.head[model.connections.item[c]]
-    total = 0.0
-    for k in range(n_results(head)):
-        total += work.laws.outputs[k]
-    if math.isfinite(total) or work.counted.no_number > 0:
+    if work.counted.no_number > 0 or are_finite(work.laws.outputs, n_results(head)):
         return
-    for k in range(1 + head[0] * head[1] + head[2] + head[3]):
-        if not math.isfinite(work.laws.inputs[k]):
-            return
-    work.counted.no_number = c + 1
+    if are_finite(work.laws.inputs, 1 + head[0] * head[1] + head[2] + head[3]):
+        work.counted.no_number = c + 1
 
 
 @inner

@@ -251,7 +251,20 @@ def user_outputs(model, work, c):
         for j in range(n_out):
             f = model.users.tape0[u] + j
             work.users.outputs[j] = tape_value(model.tapes, model.functions, f, work.users.inputs, work.tapes)
+    if work.counted.no_number == 0 and not are_finite(work.users.outputs, n_out):
+        n = model.elements.coordinate0[element_of(model, c) + 1] - model.elements.coordinate0[element_of(model, c)]
+        if are_finite(work.users.inputs, 1 + 2 * n + model.users.n_states[u]):
+            work.counted.no_number = c + 1
     return n_out
+
+
+@inner
+def are_finite(values, n):
+    """Return whether the first n values are finite."""
+    for k in range(n):
+        if not math.isfinite(values[k]):
+            return False
+    return True
 
 
 @inner

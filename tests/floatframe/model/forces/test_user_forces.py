@@ -10,6 +10,8 @@ from numpy.testing import assert_allclose
 from floatframe import (
     GROUND,
     AxialDistance,
+    ConvergenceError,
+    EnergyMomentum,
     FlexibleBody,
     GeneralizedAlpha,
     Gravity,
@@ -241,6 +243,34 @@ def test_an_error_in_a_function_ends_the_run_with_its_words():
     system = wheel(UserForce("valve", HUB, ("phi",), function=fails))
     with pytest.raises(ModelError, match="force 'valve': its function raised ZeroDivisionError: the valve is stuck"):
         integrate(system, METHOD, 0.2, 1e-3)
+
+
+@pytest.mark.parametrize("made", [lambda function: function, njit], ids=["python", "numba"])
+def test_a_function_that_returns_its_force_is_refused(made):
+    """Nobody would read what it returns, and the motion would be one without the force."""
+
+    def returns(t, x, v, z, Q, z_dot):
+        return -100.0 * x[0]
+
+    with pytest.raises(ModelError, match=r"force 'u': its function\(.*\) returns a value \(float(64)?\), which has no"):
+        integrate(wheel(UserForce("u", HUB, ("phi",), function=made(returns))), METHOD, 0.01, 1e-3)
+
+
+@pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")
+@pytest.mark.parametrize("method", [METHOD, EnergyMomentum()], ids=["generalized-alpha", "conserving"])
+@pytest.mark.parametrize("kind", ["python", "numba", "expression"])
+def test_a_force_that_becomes_no_number_is_named(kind, method):
+    def ends(t, x, v, z, Q, z_dot):
+        Q[0] = np.sqrt(0.0205 - t)
+
+    force = {
+        "python": UserForce("u", HUB, ("phi",), function=ends),
+        "numba": UserForce("u", HUB, ("phi",), function=njit(ends)),
+        "expression": UserForce("u", HUB, {"phi": "sqrt(0.0205 - t)"}),
+    }[kind]
+    with pytest.raises(ConvergenceError, match="force 'u' is not finite") as error:
+        integrate(wheel(force), method, 0.1, 1e-3)
+    assert error.value.trajectory.t[-1] == pytest.approx(0.02)
 
 
 def test_an_interrupt_in_a_function_passes_through():
