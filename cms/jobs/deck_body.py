@@ -191,7 +191,7 @@ def _layers(
     raw: "RawMesh", where: str, kinds: tuple[str, ...], properties: Mapping[str, Any]
 ) -> list[tuple[str, ...] | None]:
     """Split the groups into parts without two cells on the same nodes; None: all cells."""
-    from fe_models.meshes.cells.cells_apart import groups_apart
+    from fe_models.meshes.cells.raw_mesh import groups_apart
 
     if "all" in properties:
         return [None]

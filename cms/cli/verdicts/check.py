@@ -126,7 +126,7 @@ def run_accept(request: AcceptRequest) -> int:
     from cms.assessment.quality.errors import QualityError
     from cms.cli.job import densities_of
     from cms.jobs.acceptance.accept import FullModel, accept_body
-    from cms.jobs.acceptance.write import require_suffix, write_acceptance
+    from cms.jobs.acceptance.document import require_suffix, write_acceptance
     from fe_models.foundation.extras import extra_module
 
     if request.deck is None and (request.program or request.densities):

@@ -1,12 +1,15 @@
-"""The document of an acceptance."""
+"""The document of an acceptance, and its files."""
 
+import json
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from cms.assessment.quality.body_record import body_record, body_size
+from cms.assessment.quality.errors import QualityError
 from cms.assessment.quality.of_body.effective_mass import DIRECTIONS, EffectiveMass
 from cms.assessment.quality.record import QualityRecord
 from cms.assessment.rendering import Scene, Surface, Triad, render_picture
@@ -28,8 +31,10 @@ from fe_models.foundation.documents.document import (
     Section,
     TextTable,
 )
+from fe_models.foundation.documents.write import document_content
+from fe_models.foundation.paths import replace_files
 
-__all__ = ["body_picture", "document_of", "mass_chart"]
+__all__ = ["SUFFIXES", "body_picture", "document_of", "mass_chart", "require_suffix", "write_acceptance"]
 
 
 MOST_MODES = 40  #: rows of a table of modes; the JSON file has all
@@ -371,3 +376,45 @@ def mass_chart(found: EffectiveMass) -> Chart:
     ]  # fmt: skip
     across = Axis("frequency with the interface held [Hz]", range=(0.0, last))
     return Chart(across, (Axis("sum of effective mass [%]", range=(0.0, 105.0)),), tuple(lines), 280)
+
+
+# its files ------------------------------------------------------------------------------------------------------------
+
+
+SUFFIXES = (".pdf", ".html", ".json")
+
+
+def write_acceptance(acceptance: Acceptance, *paths: str | Path) -> None:
+    """Write one or several forms of an acceptance, all complete or none.
+
+    Raises
+    ------
+    QualityError
+        If a suffix is not .pdf, .html or .json, or a file cannot be written.
+    MissingExtraError
+        If a PDF is wanted and reportlab (extra `pdf`) is not installed.
+    """
+    targets = [Path(path) for path in paths]
+    for target in targets:
+        require_suffix(target)
+    document = document_of(acceptance) if any(target.suffix.lower() != ".json" for target in targets) else None
+    contents = {}
+    for target in targets:
+        if target.suffix.lower() == ".json" or document is None:
+            contents[target] = (json.dumps(acceptance.as_dict(), indent=2) + "\n").encode()
+        else:
+            contents[target] = document_content(document, target.suffix)
+    try:
+        replace_files(contents)
+    except OSError as error:
+        raise QualityError(
+            f"acceptance: cannot be written: {error.strerror or error}; check folder and space"
+        ) from error
+
+
+def require_suffix(path: Path) -> None:
+    """Raise `QualityError` unless the suffix is one of `SUFFIXES`."""
+    if path.suffix.lower() not in SUFFIXES:
+        raise QualityError(
+            f"{path}: an acceptance is written as {', '.join(SUFFIXES)}; got {path.suffix or 'no suffix'}"
+        )

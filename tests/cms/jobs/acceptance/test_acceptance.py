@@ -22,10 +22,9 @@ from cms.cli import main
 from cms.cli.verdicts.check import check_file
 from cms.jobs.acceptance import accept
 from cms.jobs.acceptance.accept import FullModel, accept_body, compare_with_model
-from cms.jobs.acceptance.document import document_of
+from cms.jobs.acceptance.document import document_of, write_acceptance
 from cms.jobs.acceptance.origin import source_files
 from cms.jobs.acceptance.range_of_use import range_of_use
-from cms.jobs.acceptance.write import write_acceptance
 from cms.pipeline import reduce_job
 from fe_models.foundation.documents.document import TextTable
 from fe_models.foundation.documents.html import html_page
