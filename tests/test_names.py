@@ -45,14 +45,12 @@ cms/assessment/compare/comparison.py words
 cms/assessment/compare/mode_selection.py words
 cms/assessment/compare/pulse.py words
 cms/assessment/correlation/update.py least
-cms/assessment/report/html.py words
 cms/body/geometric_stiffness.py turned
 cms/body/reduced_body.py kept
 cms/cli/demo.py words
 cms/exchange/exporters/nodes.py words
 cms/exchange/programs/sid_fem.py words
 cms/jobs/acceptance/acceptance.py words
-cms/jobs/acceptance/document.py words
 cms/jobs/acceptance/range_of_use.py words
 cms/jobs/job.py nearest
 cms/jobs/studies/correlation_file.py least

@@ -10,7 +10,7 @@ from cms.assessment.quality.limits import LIMITS
 from cms.assessment.report.formatting import share
 from cms.assessment.report.palette import FULL_MODEL, style_of
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.documents.charts import Axis, Bars, Chart, Limit, Line, Matrix
+from fe_models.foundation.documents.charts import Axis, Bars, Chart, LimitLine, Line, Matrix
 
 __all__ = [
     "convergence_chart",
@@ -130,6 +130,6 @@ def log_axis(label: str, arrays: Sequence[Array], more: Sequence[float] = ()) ->
     return Axis(label, is_log=True, range=(10 ** (low - 0.15), 10 ** (max(high, low + 1) + 0.1)))
 
 
-def limits_of(tolerance: float | None) -> tuple[Limit, ...]:
+def limits_of(tolerance: float | None) -> tuple[LimitLine, ...]:
     """Return the line of a limit with its words."""
-    return (Limit(tolerance, f"limit {share(tolerance)}"),) if tolerance else ()
+    return (LimitLine(tolerance, f"limit {share(tolerance)}"),) if tolerance else ()

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from fe_models.foundation.arrays import Array
 
-__all__ = ["INK", "Axis", "Bars", "Chart", "Limit", "Line", "Matrix", "chart_record", "thinned"]
+__all__ = ["INK", "Axis", "Bars", "Chart", "LimitLine", "Line", "Matrix", "chart_record", "thinned"]
 
 INK = "#1b1f24"  #: the colour of text, which a page turns with its ground
 DIGITS = 6  #: of a number in a page
@@ -66,11 +66,11 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Limit:
+class LimitLine:
     """A horizontal line with words; or a band from `low` to `value` of a panel."""
 
     value: float
-    words: str = ""
+    label: str = ""
     low: float | None = None
     panel: int = 0
 
@@ -101,7 +101,7 @@ class Chart:
     panels: tuple[Axis, ...]
     items: tuple[Line | Bars | Matrix, ...]
     height: int = 330
-    limits: tuple[Limit, ...] = ()
+    limits: tuple[LimitLine, ...] = ()
     names: tuple[str, ...] = ()
     has_legend: bool = True
     other_label: str = field(default="")  #: of the axis across after a switch of the page

@@ -24,7 +24,7 @@ MARKS = {"pass": "\u2713", "warn": "!", "fail": "\u2715", "error": "!", "info": 
 class Cell:
     """A cell of a table."""
 
-    words: str
+    text: str
     kind: str = ""  #: "n" for numbers, "name", "pass", "warn", "fail", "blank"; several separated by blanks
     note: str = ""  #: smaller text below
     badge: str = ""  #: verdict in whose colour the words stand in a badge
@@ -61,7 +61,7 @@ class TextTable:
 class Paragraph:
     """A sentence or some; kind: "", "why" (small) or "notice" (framed)."""
 
-    words: str
+    text: str
     kind: str = ""
 
 
@@ -69,7 +69,7 @@ class Paragraph:
 class Heading:
     """A heading inside a section."""
 
-    words: str
+    text: str
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ class Answer:
 
     Parameters
     ----------
-    words
+    text
         In a sentence.
     verdict
         "pass", "warn", "fail" or "info"; its colour.
@@ -147,7 +147,7 @@ class Answer:
         More sentences.
     """
 
-    words: str
+    text: str
     verdict: str = "pass"
     badge: str = ""
     figures: Sequence[tuple[str, str]] = ()

@@ -113,7 +113,7 @@ def head(document: Document, width: float) -> list[Any]:
     from reportlab.platypus import Table as Grid
 
     told = document.answer
-    rows = [[words_of(told.words, size=9)], *([words_of(note, size=8)] for note in told.notes)]
+    rows = [[words_of(told.text, size=9)], *([words_of(note, size=8)] for note in told.notes)]
     if told.badge:
         rows.insert(0, [words_of(f"{MARKS[told.verdict]} {told.badge}", size=13, bold=True, color=WORDS[told.verdict])])
     answer = Grid(
@@ -171,9 +171,9 @@ def block_flow(block: Block, width: float, is_inside: bool = False) -> list[Any]
 
     match block:
         case Paragraph():
-            return [words_of(block.words, size=7.5 if block.kind == "why" else 8.5), Spacer(1, 5)]
+            return [words_of(block.text, size=7.5 if block.kind == "why" else 8.5), Spacer(1, 5)]
         case Heading():
-            return [Spacer(1, 3), words_of(block.words, size=9.5, bold=True, color=INK), Spacer(1, 3)]
+            return [Spacer(1, 3), words_of(block.text, size=9.5, bold=True, color=INK), Spacer(1, 3)]
         case Terms():
             items = [(Cell(term, "name"), words) for term, words in block.items]
             return table_flow(TextTable(("", ""), items, (0.25, 0.75)), width)
@@ -243,9 +243,9 @@ def table_flow(block: TextTable, width: float) -> list[Any]:
             color, bold = WORDS.get(kind, TEXT), bool(kind) or "name" in kinds
             if kind:
                 style.append(("BACKGROUND", (k, i), (k, i), GROUNDS[kind]))
-            words = words_of(cell.words, size=7, bold=bold, color=color, right=right[k])
+            words = words_of(cell.text, size=7, bold=bold, color=color, right=right[k])
             note = words_of(cell.note, size=6.3, color=SOFT, right=right[k] and cell.span == 1)
-            line.append([words, note] if cell.note and cell.words else note if cell.note else words)
+            line.append([words, note] if cell.note and cell.text else note if cell.note else words)
             if cell.span > 1:
                 style.append(("SPAN", (k, i), (k + cell.span - 1, i)))
                 line += [""] * (cell.span - 1)
@@ -272,7 +272,7 @@ def automatic_widths(headings: Sequence[str], rows: Sequence[Sequence[Cell]], wi
     for row in rows:
         if len(row) == len(headings):
             for k, cell in enumerate(row):
-                texts[k] += [(cell.words, 7.0), (cell.note, 6.3)]
+                texts[k] += [(cell.text, 7.0), (cell.note, 6.3)]
     least = np.array([max(wide(word, size) for words, size in column for word in (words.split() or [""]))
                       for column in texts]) + 7.5  # fmt: skip
     wanted = np.array([max(min(wide(words, size), WIDEST) for words, size in column) for column in texts]) + 7.5
@@ -352,7 +352,7 @@ def draw_items(chart: Chart, panels: Sequence["Axes"]) -> None:
         else:
             axes.axhline(limit.value, color="#5b6770", linewidth=1, linestyle=(0, (5, 3)))
             across = axes.get_yaxis_transform()
-            axes.text(1, limit.value, limit.words, transform=across, ha="right", va="bottom", fontsize=6.5)
+            axes.text(1, limit.value, limit.label, transform=across, ha="right", va="bottom", fontsize=6.5)
 
 
 def draw_line(line: Line, axes: "Axes") -> None:

@@ -17,7 +17,7 @@ from fe_models.foundation.tasks.installation import source_mark
 from fe_models.foundation.tasks.task_map import ProcessError, Progress
 from fe_models.foundation.tasks.workers import Workers, tasks_of
 
-__all__ = ["Campaign", "Task", "TaskJournal", "campaign_digest", "open_task_journal"]
+__all__ = ["Campaign", "CampaignTask", "TaskJournal", "campaign_digest", "open_task_journal"]
 
 Value = TypeVar("Value")
 Row = TypeVar("Row")
@@ -25,7 +25,7 @@ Given = TypeVar("Given", contravariant=True)
 Made = TypeVar("Made")
 
 
-class Task(Protocol[Given, Made]):
+class CampaignTask(Protocol[Given, Made]):
     """What is computed at a value, and how its row stands in a journal; it is sent to workers."""
 
     def __call__(self, value: Given, /) -> Made:
@@ -55,7 +55,7 @@ class Campaign(Generic[Value, Row]):
         Keeps the rows; None: nothing is written.
     """
 
-    def __init__(self, task: Task[Value, Row], journal: "TaskJournal | None" = None) -> None:
+    def __init__(self, task: CampaignTask[Value, Row], journal: "TaskJournal | None" = None) -> None:
         self.task, self.journal = task, journal
         self.records = {} if journal is None else {json.dumps(each.get("key")): each for each in journal.records}
         self.n_known = 0  #: rows that were taken from the journal

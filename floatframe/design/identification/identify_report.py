@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.documents.charts import INK, Axis, Chart, Limit, Line, thinned
+from fe_models.foundation.documents.charts import INK, Axis, Chart, LimitLine, Line, thinned
 from fe_models.foundation.documents.document import Answer, Block, Cell, Document, Figure, Paragraph, Section, TextTable
 from floatframe.design.identification.base_parameters import base_parameters
 from floatframe.design.identification.estimation import Estimate, Measured
@@ -376,7 +376,7 @@ def fit_chart(made: Estimate) -> Chart:
 def residual_chart(made: Estimate) -> Chart:
     """Return the residuals over time, with the band of their noise."""
     chart = stacked(made, made.measured.times, {"residual": made.residuals})
-    bands = tuple(Limit(2 * sigma, low=-2 * sigma, panel=k) for k, sigma in enumerate(made.sigma.tolist()))
+    bands = tuple(LimitLine(2 * sigma, low=-2 * sigma, panel=k) for k, sigma in enumerate(made.sigma.tolist()))
     return replace(chart, limits=bands)
 
 

@@ -9,7 +9,7 @@ from html import unescape
 import numpy as np
 import pytest
 
-from fe_models.foundation.documents.charts import Axis, Bars, Chart, Limit, Line, Matrix, chart_record, thinned
+from fe_models.foundation.documents.charts import Axis, Bars, Chart, LimitLine, Line, Matrix, chart_record, thinned
 from fe_models.foundation.documents.document import (
     Answer,
     Cell,
@@ -47,7 +47,7 @@ def lines(*, n: int = 1) -> Chart:
     y = np.where(X == X[7], np.nan, np.exp(-X) * np.cos(9 * X))
     items = [Line(X, y + k, "tip", "#0072B2", panel=k, symbol="star" if k else "") for k in range(n)]
     items += [Line(X, np.abs(X), "force", is_hill=True), Line(X, X, "step", dash="dot", is_step=True)]
-    limits = (Limit(0.5, "limit 50 %"), Limit(0.2, low=-0.2))
+    limits = (LimitLine(0.5, "limit 50 %"), LimitLine(0.2, low=-0.2))
     return Chart(Axis("time [s]"), tuple(Axis(f"u\n[m{k}]") for k in range(n)), tuple(items), limits=limits)
 
 
