@@ -257,7 +257,7 @@ def exact_start(R: Sequence[Array], c: Array) -> list[Array]:
 
 def clipped(Y: Array, least: float, most: float) -> Array:
     """Return the nearest matrix with eigenvalues within the bounds."""
-    d, Z = la.eigh((Y + Y.T) / 2)
+    d, Z = np.linalg.eigh((Y + Y.T) / 2)  # scipy's takes three times as long for small matrices
     return np.asarray((Z * np.clip(d, least, most)) @ Z.T)
 
 

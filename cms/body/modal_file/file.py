@@ -139,7 +139,14 @@ def convert_units(reduced: ReducedBody, units: Units | str) -> ReducedBody:
 
 def digest(path: str | os.PathLike[str]) -> str:
     """Return the digest of a modal file: equal for equal contents (sha256, 64 hexadecimal digits)."""
-    return str(read_sealed(path, KIND).attributes["/"]["digest"])
+    path = Path(path)
+    has_seal = check_seal(path, KIND)
+    with opened(path, KIND, has_seal=has_seal) as file:
+        stated_version(file, path, KIND)
+        if has_seal and (stated := as_attribute(file.attrs.get(DIGEST))):  # the seal covers all bytes of the file
+            return str(stated)
+        _, groups = walk(file, path, KIND)
+        return str(groups["/"][DIGEST])
 
 
 # sealed files ---------------------------------------------------------------------------------------------------------
@@ -186,14 +193,20 @@ def read_sealed(path: str | os.PathLike[str], kind: Kind) -> Content:
     """
     path = Path(path)
     with opened(path, kind, has_seal=check_seal(path, kind)) as file:
-        found = as_attribute(file.attrs.get("format"))
-        if found != kind.format:
-            what = f"a {str(found)[:80]!r}" if found else "HDF5 of another program"
-            raise kind.error(f"{path}: not a {kind.format}: {what}")
-        stated = as_attribute(file.attrs.get("version"))
-        if isinstance(stated, int) and stated > kind.version:
-            raise newer(path, kind, stated)
-        return Content(kind.format, int(stated or 0), *walk(file, path, kind))
+        version = stated_version(file, path, kind)
+        return Content(kind.format, version, *walk(file, path, kind))
+
+
+def stated_version(file: Any, path: Path, kind: Kind) -> int:
+    """Return the version of a file; raise the error of the kind if it is of another kind, or of a later version."""
+    found = as_attribute(file.attrs.get("format"))
+    if found != kind.format:
+        what = f"a {str(found)[:80]!r}" if found else "HDF5 of another program"
+        raise kind.error(f"{path}: not a {kind.format}: {what}")
+    stated = as_attribute(file.attrs.get("version"))
+    if isinstance(stated, int) and stated > kind.version:
+        raise newer(path, kind, stated)
+    return int(stated or 0)
 
 
 def fill(file: Any, content: Content) -> None:
