@@ -37,7 +37,8 @@ SPREAD = ("-n", str(min(n_processors, MOST_WORKERS)), "--dist", "loadfile")
 
 LINT = ("lint", "ruff", "check", ".")
 TYPES = ("types", "mypy")
-KERNELS = ("kernels", "floatframe.cli.compile_kernels", "relative", "schemes")  # else by each worker
+#: else each worker compiles them
+KERNELS = ("kernels", "floatframe.cli.compile_kernels", "relative", "schemes", "recursion", "cholesky")
 #: the same motions with kernels compiled by plain numba, as with a numba that the lean compiler does not know; one test
 #: compiles them all, minutes beside other checks
 PLAIN = (
