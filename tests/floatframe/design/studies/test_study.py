@@ -68,7 +68,7 @@ def test_frequencies_of_a_grid_are_those_of_the_textbook_in_its_order(folder):
 
 def test_points_in_other_processes_and_of_a_cluster_give_one_table_csv_json_and_picture(folder):
     pytest.importorskip("distributed")
-    for name, workers in (("one", "1"), ("two", "2"), ("dask", "dask:2")):
+    for name, workers in (("one", "1"), ("two", "2"), ("dask", "dask:1")):
         more = ["-o", folder / "out.json", "-o", folder / "out.png"] if name == "two" else []
         text = sweep(
             folder / "study.toml", "-j", workers, "-o", folder / f"{name}.csv", "--journal", folder / name, *more
