@@ -170,8 +170,8 @@ def first_moments(model, work, i):
         q_dot = work.state.u[u0 + 6 : u0 + 6 + n]
         K_t, K_r = block(types, t, K_TRANSLATION, 3 * n * n), block(types, t, K_ROTATION, 3 * n * n)
         K_t_q_dot, K_r_q_dot = bodies.K_t_q_dot[3 * q0 : 3 * (q0 + n)], bodies.K_r_q_dot[3 * q0 : 3 * (q0 + n)]
-        for j in range(3 * n):
-            K_t_q_dot[j], K_r_q_dot[j] = 0.0, 0.0
+        K_t_q_dot[:] = 0.0
+        K_r_q_dot[:] = 0.0
         add_products(K_t, q, first)
         add_products(K_t, q_dot, K_t_q_dot)
         add_products(K_r, q_dot, K_r_q_dot)
@@ -181,10 +181,8 @@ def first_moments(model, work, i):
 @loops
 def products(types, t, n, q, q_dot, W, Y):
     """Write W_ab = S_ab q and Y = 4C q_dot."""
-    for j in range(9 * n):
-        W[j] = 0.0
-    for j in range(3 * n):
-        Y[j] = 0.0
+    W[:] = 0.0
+    Y[:] = 0.0
     add_products(block(types, t, S_AB, 9 * n * n), q, W)
     add_products(block(types, t, C4, 3 * n * n), q_dot, Y)
 

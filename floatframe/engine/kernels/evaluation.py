@@ -41,9 +41,7 @@ def evaluate_markers(model, work):
 @inner
 def slide_markers(model, work):
     """Move sliding markers to their current positions; wrenches of all markers are zero."""
-    for m in range(model.markers.body.shape[0]):
-        for k in range(6):
-            work.markers.wrench[m, k] = 0.0
+    work.markers.wrench[:, :] = 0.0
     for k in range(model.lines.marker.shape[0]):
         slide_marker(model, work, k)
 

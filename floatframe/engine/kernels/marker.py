@@ -133,8 +133,7 @@ def bent_rate(model, work, m, i, out):
 def bent_by(model, m, n, factors, out):
     """Write Σ_l K_P,l factors_l [6, k] into out, (6 n_q,)."""
     first = model.markers.bend0[m]
-    for j in range(6 * n):
-        out[j] = 0.0
+    out[: 6 * n] = 0.0
     add_products(model.markers.bend[first : first + 6 * n * n], factors, out)
 
 

@@ -26,8 +26,7 @@ def constrain(model, work, tree, joints, tangent, is_group):
     place_bodies(model, work, tree, joints)
     evaluate_tree(model, work, tree, joints, 1.0)
     if not is_group:
-        for k in range(joints.x.shape[0]):
-            joints.x[k] = 0.0
+        joints.x[:] = 0.0
     write_tangent(model, work, tree, joints, tangent, 1.0, 0.0, 0.0)
     kept_rates(model, work, tree)
 

@@ -3,6 +3,7 @@
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.connection import connection_rows
 from floatframe.engine.kernels.evaluation import evaluate_bodies, evaluate_markers, slide_markers
+from floatframe.engine.kernels.generalized_alpha import copy
 from floatframe.engine.kernels.marker import marker_motion
 from floatframe.engine.tree.kernels.projection import project
 
@@ -38,9 +39,7 @@ def project_residuals(model, work, tree, joints, c_k):
         if tree.is_kept[c] != 0:
             connection_rows(model, work, c, c_k)
         else:
-            for k in range(model.connections.w0[c], model.connections.w0[c + 1]):
-                work.connections.g[k] = 0.0
+            work.connections.g[model.connections.w0[c] : model.connections.w0[c + 1]] = 0.0
     evaluate_bodies(model, work)
-    for k in range(joints.own.shape[0]):
-        joints.own[k] = work.bodies.residual[k]
+    copy(work.bodies.residual, joints.own)
     project(model, work, tree, joints)

@@ -110,9 +110,7 @@ def front(tree, tangent, i):
 def put_screws(model, work, m, n, S):
     """Write the screws of all modes of its body at marker m, (6, n), body axes."""
     if m < 0 or model.markers.psi0[m] < 0:
-        for r in range(6):
-            for k in range(n):
-                S[r, k] = 0.0
+        S[:, :] = 0.0
         return
     for k in range(n):
         move, turn = mode_screw(model, work, m, model.markers.body[m], k)
@@ -267,11 +265,8 @@ def solve_kept(model, tree, joints, tangent, c_k):
     Y, q, u, and X.
     """
     x, b = tangent.step, tangent.b
-    for s in range(x.shape[0]):
-        x[s] = 0.0
-    for i in range(b.shape[0]):
-        for r in range(6):
-            b[i, r] = 0.0
+    x[:] = 0.0
+    b[:, :] = 0.0
     for place in range(tree.order.shape[0] - 1, -1, -1):
         i = tree.order[place]
         n_l, n, parent = tree.s0[i + 1] - tree.s0[i], model.bodies.n_q[i], tree.parent[i]

@@ -42,7 +42,20 @@ from floatframe.engine.kernels.generalized_alpha import (
 )
 from floatframe.engine.kernels.rotation import quaternion_of
 from floatframe.engine.kernels.step_start import hold_states
-from floatframe.engine.kernels.vector import add, cross, dot, matrix, norm, put, put_sum, scaled, sub, turned, vector
+from floatframe.engine.kernels.vector import (
+    add,
+    cross,
+    dot,
+    matrix,
+    norm,
+    put,
+    put_matrix,
+    put_sum,
+    scaled,
+    sub,
+    turned,
+    vector,
+)
 from floatframe.engine.tree.kernels.accelerations import accelerate
 from floatframe.engine.tree.kernels.evaluation import evaluate_placed, evaluate_tree
 from floatframe.engine.tree.kernels.kept_factors import factorize_poses, keep_bodies, solve_kept
@@ -75,20 +88,16 @@ def begin(model, work, tree, joints, memory):
     if joints.is_known == 0:
         joint_motion(model, work, tree, joints)
         start_here(tree, joints)
-    for k in range(joints.x.shape[0]):
-        joints.x[k] = 0.0
-    for i in range(joints.spins.shape[0]):
-        joints.spins[i] = 0
+    joints.x[:] = 0.0
+    joints.spins[:] = 0
 
 
 @inner
 def start_here(tree, joints):
     """Use the motion of the joints as that at the beginning of a step."""
     for i in range(tree.parent.shape[0]):
-        for a in range(3):
-            joints.d_start[i, a] = joints.d[i, a]
-            for b in range(3):
-                joints.Q_start[i, a, b] = joints.Q[i, a, b]
+        put(joints.d_start[i], 0, vector(joints.d[i]))
+        put_matrix(joints.Q_start[i], matrix(joints.Q[i]))
     copy(joints.rate, joints.rate_start)
     copy(joints.acceleration, joints.acceleration_start)
     joints.is_known = 1
@@ -190,10 +199,8 @@ def hold_velocities(model, work, tree, joints, tangent, by_rate, by_acceleration
     As `kernels.generalized_alpha.hold_velocities`, of unknowns s_dot by what joints and couplers that are kept hold.
     """
     step, mu = tangent.step, work.solver.mu
-    for s in range(step.shape[0]):
-        step[s] = 0.0
-    for r in range(tangent.mu.shape[0]):
-        tangent.mu[r] = 0.0
+    step[:] = 0.0
+    tangent.mu[:] = 0.0
     for e in range(tree.held.shape[0]):
         c = tree.held[e]
         write_velocity_gaps(model, work, c, 1.0 / by_rate, mu)
@@ -271,8 +278,7 @@ def local_error(model, work, tree, joints, tangent, memory, order, h):
     """
     alpha_m, alpha_f, u_dot = order.alpha_m, order.alpha_f, work.state.u_dot
     for i in range(tree.parent.shape[0]):
-        for k in range(6):
-            tangent.X[i, k] = u_dot[model.bodies.u0[i] + k]
+        copy(u_dot[model.bodies.u0[i] : model.bodies.u0[i] + 6], tangent.X[i])
     for s in range(tree.slot.shape[0]):
         now, before = accelerations(work, tree, joints, memory, s)
         a = memory.a[tree.slot[s]]

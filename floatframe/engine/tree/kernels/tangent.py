@@ -13,9 +13,11 @@ from floatframe.engine.kernels.body import moved_inertia, newton_block
 from floatframe.engine.kernels.compiler.compilation import inner, small
 from floatframe.engine.kernels.connections.connection import connection_derivatives
 from floatframe.engine.kernels.evaluation import tangent_of_body
+from floatframe.engine.kernels.generalized_alpha import copy
 from floatframe.engine.kernels.marker import bent_rate
 from floatframe.engine.kernels.vector import (
     add,
+    add_column,
     congruent,
     cross,
     dot,
@@ -77,18 +79,14 @@ def write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k):
     for i in range(tree.parent.shape[0]):
         for m in (tree.near[i], tree.far[i]):
             if m >= 0:
-                for k in range(6):
-                    work.markers.wrench[m, k] = 0.0
+                work.markers.wrench[m, :] = 0.0
     for i in range(tree.parent.shape[0]):
         of_body(model, work, joints, tangent, i, c_m, c_d, c_k)
     for e in range(tree.kept.shape[0]):
         connection_derivatives(model, work, tree.kept[e], c_k)
-    for r in range(tangent.V.shape[0]):
-        for k in range(tangent.V.shape[0]):
-            tangent.V[r, k] = 0.0
-        for k in range(tangent.C.shape[1]):
-            tangent.C[r, k] = 0.0
-            tangent.B[r, k] = 0.0
+    tangent.V[:, :] = 0.0
+    tangent.C[:, :] = 0.0
+    tangent.B[:, :] = 0.0
     for e in range(tree.kept.shape[0]):
         c = tree.kept[e]
         for r in range(model.connections.size[c]):
@@ -235,8 +233,7 @@ def matrix_column(model, work, tree, tangent, s):
         for e in range(18):
             Y[i, e] = X[tree.parent[i], e] if tree.parent[i] >= 0 else 0.0
         add_jets(tree, tangent, i, s, NEAR_MODE, Y[i])
-        for e in range(18):
-            X[i, e] = Y[i, e]
+        copy(Y[i], X[i])
         add_jets(tree, tangent, i, s, COLUMN, X[i])
         add_jets(tree, tangent, i, s, FAR_MODE, X[i])
         product_of(tangent.D[i], X[i], b[i])
@@ -314,13 +311,9 @@ def kept_pair(model, work, tangent, m, c, first, s, xi, xi_dot, unit, p, v, omeg
     sign = model.markers.sign[m]
     moved = add(unit[0], cross(unit[1], p))
     if model.markers.force[m] >= 0:
-        o = first + model.markers.force[m]
-        for a in range(3):
-            B[o + a, s] -= sign * moved[a]
+        add_column(B, first + model.markers.force[m], s, scaled(-sign, moved))
     if model.markers.moment[m] >= 0:
-        o = first + model.markers.moment[m]
-        for a in range(3):
-            B[o + a, s] -= sign * unit[1][a]
+        add_column(B, first + model.markers.moment[m], s, scaled(-sign, unit[1]))
 
 
 @inner

@@ -98,13 +98,11 @@ def factorize_joint(model, work, tree, tangent, i, c_d, c_k):
     if n_l > 0:
         if not lu_factor(L, tangent.L_pivot[s0 : s0 + n_l]):
             return False
-        for k in range(n_l):
-            for e in range(18):
-                R[k, e] = -R[k, e]
         lu_solve_columns(L, tangent.L_pivot[s0 : s0 + n_l], R)
         for k in range(n_l):  # P = A + W G
-            for r in range(6):
-                for e in range(18):
+            for e in range(18):
+                R[k, e] = -R[k, e]
+                for r in range(6):
                     A[r, e] += W[k, r] * R[k, e]
     if tree.parent[i] >= 0:
         add_to_parent(model, work, tree, tangent, i)
@@ -150,9 +148,7 @@ def add_to_parent(model, work, tree, tangent, i):
 def solve_tree(tree, tangent, x):
     """Overwrite x, (n_s,), by the solution for the right side in it."""
     b, X = tangent.b, tangent.X
-    for i in range(b.shape[0]):
-        for r in range(6):
-            b[i, r] = 0.0
+    b[:, :] = 0.0
     for place in range(tree.order.shape[0] - 1, -1, -1):
         i = tree.order[place]
         s0, n_l, parent = tree.s0[i], tree.s0[i + 1] - tree.s0[i], tree.parent[i]

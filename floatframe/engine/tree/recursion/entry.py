@@ -178,8 +178,7 @@ def make_entry(digest):
         for _ in range(task.times):
             what = task.what
             if what == FORWARD:
-                for j in range(work.a.shape[0]):
-                    work.a[j] = 0.0
+                work.a[:] = 0.0
             set_modes(nodes, work, marker_work.state)
             place_in_parent(nodes, work, model, marker_work)
             if what == INVERSE:
