@@ -109,6 +109,7 @@ def test_latching_keeps_momentum_and_moves_the_spacecraft_as_the_centre_of_mass_
     assert_allclose(bus[after].mean(), moved, rtol=0.05)  # petals go on swinging about it
 
 
+@pytest.mark.long
 def test_play_lets_petals_point_elsewhere_within_what_their_pins_leave(parts):
     """Pins 0.1 mm loose over 80 mm on a bus that turns under them: lateral angles up to 2 c/L, and what they bend."""
     folder, spread = parts[0] / "fine", {}

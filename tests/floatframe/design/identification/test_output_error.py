@@ -50,6 +50,7 @@ def noise(seed):
     return np.random.default_rng(seed).normal(size=len(TIME))
 
 
+@pytest.mark.long
 def test_bias_and_scatter_of_a_fit_are_those_it_predicts(swung, first):
     """16 noises: means within 4 standard errors, scatter of both parameters together within that of chi-squared."""
     n = 16
