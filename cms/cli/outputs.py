@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cms.cli.console import output_path, say
-from fe_models.foundation.documents.document import Document
-from fe_models.foundation.documents.table import TABLE_SUFFIXES, Table
-from fe_models.foundation.documents.write import document_content
+from fe_models.foundation.documents import TABLE_SUFFIXES
 from fe_models.foundation.extras import extra_module
-from fe_models.foundation.paths import replace_files
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from fe_models.foundation.documents.document import Document
+    from fe_models.foundation.documents.table import Table
 
 __all__ = ["DOCUMENTS", "PICTURES", "TABLES", "json_text", "output_file", "output_files", "write_outputs"]
 
@@ -64,9 +64,9 @@ def json_text(record: Any) -> str:
 def write_outputs(
     paths: Iterable[Path],
     *,
-    table: Callable[[], Table] | None = None,
+    table: Callable[[], "Table"] | None = None,
     record: Any = None,
-    document: Callable[[], Document] | None = None,
+    document: Callable[[], "Document"] | None = None,
     figure: Callable[[], "Figure"] | None = None,
     dpi: int = 130,
     others: Mapping[str, Callable[[Path], bytes | Mapping[Path, bytes]]] | None = None,
@@ -93,6 +93,8 @@ def write_outputs(
     is_quiet
         Whether the names of the files are not printed.
     """
+    from fe_models.foundation.paths import replace_files
+
     contents: dict[Path, bytes] = {}
     for path in paths:
         ending = path.suffix.lower()
@@ -102,6 +104,8 @@ def write_outputs(
         elif ending == ".json" and record is not None:
             contents[path] = json_text(record).encode()
         elif ending in DOCUMENTS and document is not None:
+            from fe_models.foundation.documents.write import document_content
+
             contents[path] = document_content(document(), ending)
         elif ending in TABLES and table is not None:
             contents[path] = table().content(ending, str(path))

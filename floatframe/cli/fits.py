@@ -8,9 +8,9 @@ import typer
 from cms.cli.arguments import Journal, Workers
 from cms.cli.console import guarded, output_path, print_table, say, stages
 from cms.cli.outputs import DOCUMENTS, PICTURES, TABLES, json_text, output_files, write_outputs
-from fe_models.foundation.documents.table import Table
 
 if TYPE_CHECKING:
+    from fe_models.foundation.documents.table import Table
     from floatframe.design.identification.excitation import ExcitingMotion
     from floatframe.design.identification.regressors import LinearForm
     from floatframe.design.optimization.optimize import Evaluated, OptimizationResult
@@ -109,9 +109,11 @@ def identify_command(
         say(f"{motions[0]} is not written: no better motion was found")
 
 
-def motion_table(motion: "ExcitingMotion", form: "LinearForm") -> Table:
+def motion_table(motion: "ExcitingMotion", form: "LinearForm") -> "Table":
     """Return the positions of one period, at 100 times per period of the fastest harmonic, as a table."""
     import numpy as np
+
+    from fe_models.foundation.documents.table import Table
 
     n = 100 * ((motion.coefficients.shape[1] - 1) // 2)
     t = np.arange(n + 1) * motion.period / n
@@ -294,8 +296,10 @@ def best_system(result: "OptimizationResult") -> str:
     return str(tomlkit.dumps(document))
 
 
-def history_table(result: "OptimizationResult") -> Table:
+def history_table(result: "OptimizationResult") -> "Table":
     """Return the history; the numbers of a failed evaluation are missing."""
+    from fe_models.foundation.documents.table import Table
+
     names = [p.name for p in result.design.parameters] + [q.output.name for q in result.design.quantities]
     rows = []
     for i, row in enumerate(result.history):

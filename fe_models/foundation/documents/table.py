@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fe_models.foundation.documents import TABLE_SUFFIXES
 from fe_models.foundation.errors import TableError
 from fe_models.foundation.extras import extra_module
 from fe_models.foundation.paths import near_file, replace_file
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from rich.table import Table as RichTable
     from xarray import Dataset
 
-__all__ = ["TABLE_SUFFIXES", "Table", "read_table"]
+__all__ = ["Table", "read_table"]
 
 Column = NDArray[Any]
 
@@ -581,14 +582,19 @@ class TableFormat:
     read: Callable[[bytes], Table]
 
 
-FORMATS = {
-    ".csv": TableFormat(csv_content, read_csv),
-    ".json": TableFormat(json_content, read_json),
-    ".mat": TableFormat(mat_content, read_mat),
-    ".npz": TableFormat(npz_content, read_npz),
-    ".parquet": TableFormat(parquet_content, read_parquet),
-}
-TABLE_SUFFIXES = tuple(FORMATS)  #: endings of the files in which tables are written
+FORMATS = dict(
+    zip(
+        TABLE_SUFFIXES,
+        (
+            TableFormat(csv_content, read_csv),
+            TableFormat(json_content, read_json),
+            TableFormat(mat_content, read_mat),
+            TableFormat(npz_content, read_npz),
+            TableFormat(parquet_content, read_parquet),
+        ),
+        strict=True,
+    )
+)
 
 
 def format_of(suffix: str, where: str) -> TableFormat:

@@ -122,7 +122,7 @@ def test_plot_goes_without_the_modal_files_and_says_so(folder):
 
 
 def test_plot_refuses_other_kinds_of_files(results, tmp_path):
-    assert_refused(run("plot", results, "-o", tmp_path / "swing.jpg"), ".png, .svg or .pdf")
+    assert_refused(run("plot", results, "-o", tmp_path / "swing.jpg"), ".png, .svg, .pdf")
     assert_refused(run("plot", results, "-o", results), "this is an input; choose another name")
     assert contents(tmp_path) == {}
 

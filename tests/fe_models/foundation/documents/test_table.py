@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fe_models.foundation.documents.table import TABLE_SUFFIXES, Table, TableError, read_table
+from fe_models.foundation.documents import TABLE_SUFFIXES
+from fe_models.foundation.documents.table import Table, TableError, read_table
 
 TEXTS = ["plain", 'with "quotes", commas', "Lager außen ü²", " spaces ", "", "two\nlines\r\nhere", "17", "nan", "True"]
 N = len(TEXTS)
