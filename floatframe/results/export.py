@@ -36,6 +36,15 @@ def motion_table(
     The columns are time; position and motion of every body frame; position, velocity and elastic displacement in B for
     the interfaces of the given bodies; force and moment on marker A for joints and springs; and energies. With the
     system, also its joint coordinates (value, rate and force along them) and the measurements of all its sensors.
+
+    Parameters
+    ----------
+    trajectory
+        The motion.
+    bodies
+        Reduced bodies by name, in the units of the motion.
+    system
+        The system that moves.
     """
     units = trajectory.units
     m, s = units.length_symbol, units.time_symbol
