@@ -575,13 +575,7 @@ register(
         },
         "Look": {"info": info_command, "view": view_command},
         "Set up": {
-            "schema": schema_command_of(
-                {
-                    "job": "cms.jobs.job:Job",
-                    "correlation": "cms.jobs.studies.correlation_file:CorrelationFile",
-                    "recovery": "cms.jobs.tables.recovery_section:RecoveryFile",
-                }
-            ),
+            "schema": schema_command_of("cms"),
         },
     },
 )

@@ -167,6 +167,7 @@ def kernels_compiled_beside() -> Iterator[Callable[[], None]]:
 
 def put_inputs(folder: Path) -> None:
     """Copy the mesh and the job files into the folder; raise `JobError` for a changed job, which is not overwritten."""
+    from fe_models.foundation.parametric_file import schemas_named_in
     from fe_models.foundation.paths import replace_file
     from fe_models.parts import shipped_mesh
 
@@ -181,7 +182,7 @@ def put_inputs(folder: Path) -> None:
                 f"{folder / name}: is there already, with other contents, and would be lost; move it away, or choose "
                 "another folder: cms demo FOLDER"
             )
-    for name, content in jobs.items():
+    for name, content in (jobs | schemas_named_in(jobs.values())).items():
         replace_file(folder / name, content)
     replace_file(folder / "rod.msh", shipped_mesh("slender_rod").read_bytes())
 

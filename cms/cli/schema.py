@@ -1,26 +1,24 @@
 """The command schema: the JSON schema of a kind of file, with which editors complete its keys."""
 
-import json
-from collections.abc import Callable, Mapping
-from importlib import import_module
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from cms.cli.console import guarded, output_path, say
+from fe_models.foundation.file_kinds import KINDS
 
 __all__ = ["schema_command_of"]
 
-PARAMETRIC = ("job", "system")  #: kinds of files with parameters, base files and repeated tables
 
-
-def schema_command_of(models: Mapping[str, str]) -> Callable[..., None]:
-    """Return the command for the kinds of files of a program, given as "module:class" by kind."""
+def schema_command_of(program: str) -> Callable[..., None]:
+    """Return the command for the kinds of files that a program runs."""
+    kinds = [kind for kind, each in KINDS.items() if each.command.startswith(f"{program} ")]
 
     @guarded
     def schema_command(
-        kind: Annotated[str, typer.Argument(help=f"Kind of file: {', '.join(models)}.")],
+        kind: Annotated[str, typer.Argument(help=f"Kind of file: {', '.join(kinds)}.")],
         output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write; default: print.")] = None,
     ) -> None:
         """Print the JSON schema of a kind of file.
@@ -33,19 +31,17 @@ def schema_command_of(models: Mapping[str, str]) -> Callable[..., None]:
         Example: cms schema job -o job.schema.json
         """
         from cms.errors import JobError
-        from fe_models.foundation.parametric_file import json_schema
+        from fe_models.foundation.parametric_file import schema_text
         from fe_models.foundation.words import nearest
 
-        if kind not in models:
-            raise JobError(f"schema: there is no kind of file {kind!r} here{nearest(kind, models)}")
-        module, _, name = models[kind].partition(":")
-        model = getattr(import_module(module), name)
-        text = json.dumps(json_schema(model, is_parametric=kind in PARAMETRIC), indent=2)
+        if kind not in kinds:
+            raise JobError(f"schema: there is no kind of file {kind!r} here{nearest(kind, kinds)}")
+        text = schema_text(kind)
         if output is None:
-            typer.echo(text)
+            typer.echo(text, nl=False)
             return
         path = output_path(output, output, JobError)
-        path.write_text(text + "\n", encoding="utf-8")
+        path.write_text(text, encoding="utf-8")
         say(f"wrote {path}")
 
     return schema_command

@@ -12,16 +12,19 @@ Expressions are evaluated by simpleeval: numbers, texts, lists, comparisons, `a 
 """
 
 import copy
+import json
 import logging
 import math
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
 from itertools import product
 from pathlib import Path
 from typing import Any
 
+from fe_models.foundation.file_kinds import KINDS
 from fe_models.foundation.toml_file import (
     FileContent,
     Location,
@@ -132,6 +135,23 @@ def json_schema(model: type[Table], *, is_parametric: bool) -> dict[str, Any]:
         "type": ["string", "array"], "description": "a file over which this one is merged, or several"
     }  # fmt: skip
     return schema
+
+
+PARAMETRIC = ("job", "system")  #: kinds of files with parameters, base files and repeated tables
+FIRST_LINE = re.compile(rb"#:schema (?:\.\./)*([a-z]+)\.schema\.json\r?\n")  #: of a file that names its schema
+
+
+def schema_text(kind: str) -> str:
+    """Return the JSON schema of a kind of file, one of `KINDS`."""
+    module, _, name = KINDS[kind].model.partition(":")
+    model = getattr(import_module(module), name)
+    return json.dumps(json_schema(model, is_parametric=kind in PARAMETRIC), indent=2) + "\n"
+
+
+def schemas_named_in(contents: Iterable[bytes]) -> dict[str, bytes]:
+    """Return by file name the schemas that files name in their first lines, to be written beside them."""
+    kinds = {found[1].decode() for content in contents if (found := FIRST_LINE.match(content))}
+    return {f"{kind}.schema.json": schema_text(kind).encode() for kind in sorted(kinds)}
 
 
 EXPRESSION_SCHEMA = {"type": "string", "pattern": r"\{.+\}"}

@@ -17,11 +17,12 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
+from fe_models.foundation.file_kinds import KINDS
 from fe_models.foundation.paths import is_stream, near_file
 from fe_models.foundation.words import nearest, quoted, shortened
 
 __all__ = [
-    "KINDS", "FileContent", "Location", "Matrix3", "Names", "PathBeside", "Range", "Table", "Vector3", "changed",
+    "FileContent", "Location", "Matrix3", "Names", "PathBeside", "Range", "Table", "Vector3", "changed",
     "choice", "describe", "files_named", "first_key", "kind_field", "names", "read_toml", "validated", "value_of",
 ]  # fmt: skip
 
@@ -34,17 +35,6 @@ class Table(BaseModel):
 
 Model = TypeVar("Model", bound=Table)
 Location = tuple[str | int, ...]  #: a key path: keys of tables, and indices in lists
-KINDS = {  #: the command that runs a file of each kind
-    "job": "cms reduce",
-    "correlation": "cms correlate",
-    "recovery": "cms recovery",
-    "system": "floatframe run",
-    "sweep": "floatframe sweep",
-    "optimization": "floatframe optimize",
-    "laboratory": "floatframe study",
-    "shake": "floatframe shake",
-    "fatigue": "floatframe fatigue",
-}
 DEEPEST = 20  #: largest depth of nested tables and lists in a file
 GREATEST = 1e100  #: largest number in a file: products of three stay finite, and no physical quantity is larger
 MOST_PROBLEMS = 20  #: largest number of problems in one message
@@ -157,7 +147,9 @@ def validated(
         where = f"{path}: kind = {quoted_value(kind)}"
         if kind not in KINDS:
             raise error(f"{where}: there is no such kind of file{nearest(str(kind), KINDS)}")
-        raise error(f'{where}: expected a file of kind "{expected.default}"; run this one by {KINDS[kind]} {path.name}')
+        raise error(
+            f'{where}: expected a file of kind "{expected.default}"; run this one by {KINDS[kind].command} {path.name}'
+        )
     try:
         return model.model_validate(data, context=context)
     except ValidationError as problem:

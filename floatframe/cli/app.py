@@ -568,16 +568,7 @@ register(
         },
         "Set up": {
             "prepare": prepare.prepare_command,
-            "schema": schema_command_of(
-                {
-                    "system": "floatframe.files.system_file.read_system:SystemFile",
-                    "sweep": "floatframe.design.studies.study_file:StudyFile",
-                    "optimization": "floatframe.design.optimization.design_file:DesignFile",
-                    "laboratory": "floatframe.design.laboratory.laboratory_file:LaboratoryFile",
-                    "shake": "floatframe.durability.shaking.shake_file:ShakeFile",
-                    "fatigue": "floatframe.durability.fatigue.fatigue_file:FatigueFile",
-                }
-            ),
+            "schema": schema_command_of("floatframe"),
         },
     },
 )

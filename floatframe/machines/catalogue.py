@@ -10,7 +10,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from fe_models.foundation.parametric_file import read_parametric
+from fe_models.foundation.parametric_file import read_parametric, schemas_named_in
 from fe_models.foundation.paths import replace_files
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
@@ -86,6 +86,8 @@ def machine_files(name: str) -> Sequence[Path]:
 def copy_machine(name: str, folder: str | Path) -> Sequence[Path]:
     """Copy the files of a machine into a folder, which is created; return their paths.
 
+    The schemas that they name in their first lines, for completion in an editor, are written beside them.
+
     Raises
     ------
     ModelError
@@ -93,13 +95,15 @@ def copy_machine(name: str, folder: str | Path) -> Sequence[Path]:
     """
     sources, place = machine_files(name), Path(folder)
     origin = Path(__file__).parent / MACHINES[name].room / "files"
-    targets = [place / source.relative_to(origin) for source in sources]
+    contents = {place / source.relative_to(origin): source.read_bytes() for source in sources}
+    contents |= {place / schema: text for schema, text in schemas_named_in(contents.values()).items()}
+    targets = list(contents)
     taken = [target for target in targets if target.exists()]
     if taken:
         raise ModelError(f"machine {name!r}: {taken[0]} exists; copy it into another folder, nothing was written")
     for target in targets:
         target.parent.mkdir(parents=True, exist_ok=True)
-    replace_files({target: source.read_bytes() for source, target in zip(sources, targets, strict=True)})
+    replace_files(contents)
     return targets
 
 

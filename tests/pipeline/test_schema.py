@@ -8,8 +8,9 @@ import pytest
 from typer.testing import CliRunner
 
 from cms.cli.app import app as cms_app
-from fe_models.foundation.toml_file import KINDS
+from fe_models.foundation.file_kinds import KINDS
 from floatframe.cli.app import app
+from floatframe.machines.catalogue import copy_machine
 from tests.root import ROOT
 
 SHIPPED = sorted(path for room in ("cms", "floatframe") for path in (ROOT / room).rglob("*.toml"))
@@ -20,8 +21,8 @@ PROGRAMS = {"cms": cms_app, "floatframe": app}
 def schemas():
     """Return the schema of every kind, as the command prints it."""
     found = {}
-    for kind, command in KINDS.items():
-        result = CliRunner().invoke(PROGRAMS[command.split()[0]], ["schema", kind])
+    for kind, each in KINDS.items():
+        result = CliRunner().invoke(PROGRAMS[each.command.split()[0]], ["schema", kind])
         assert result.exit_code == 0, result.output
         found[kind] = json.loads(result.stdout)
     return found
@@ -49,6 +50,19 @@ def test_every_schema_is_valid_and_describes_its_keys(schemas):
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: str(path.relative_to(ROOT)))
 def test_shipped_files_fit_their_schema(schemas, path):
     jsonschema.Draft202012Validator(schemas[kind_of(path)]).validate(tomllib.loads(path.read_text()))
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: str(path.relative_to(ROOT)))
+def test_shipped_files_name_their_schema_in_the_first_line(path):
+    (room,) = (each for each in path.parents if each.name in ("files", "data"))
+    up = "../" * len(path.parent.relative_to(room).parts)
+    assert path.read_text().splitlines()[0] == f"#:schema {up}{kind_of(path)}.schema.json"
+
+
+def test_the_schema_that_a_copied_file_names_stands_beside_it(schemas, tmp_path):
+    for path in (path for path in copy_machine("railway-engine", tmp_path) if path.suffix == ".toml"):
+        named = path.parent / path.read_text().splitlines()[0].removeprefix("#:schema ")
+        assert json.loads(named.read_text()) == schemas[kind_of(path)]
 
 
 def test_a_schema_refuses_what_the_reader_refuses(schemas):

@@ -26,7 +26,8 @@ from fe_models.foundation.documents.document import (
 )
 from fe_models.foundation.documents.html import html_page
 from fe_models.foundation.documents.pdf import pdf_pages
-from fe_models.foundation.documents.write import document_content
+from fe_models.foundation.documents.write import document_content, write_document
+from fe_models.foundation.errors import TableError
 from tests.cms.browser import browser, opened
 
 NASTY = "</script><script>alert(1)</script><b>&'\""
@@ -187,3 +188,13 @@ def test_a_page_is_dark_where_the_reader_wants_it_and_fits_paper(view):
     view.emulate_media(media="screen", color_scheme="light")
     view.set_viewport_size({"width": 420, "height": 800})
     view.wait_for_function("document.documentElement.scrollWidth <= window.innerWidth")
+
+
+def test_a_document_is_written_by_its_ending_or_refused(tmp_path):
+    for suffix in (".html", ".pdf", ".json"):
+        path = write_document(document(), tmp_path / f"rod{suffix}")
+        assert path.read_bytes()[:400] == document_content(document(), suffix)[:400]
+    with pytest.raises(TableError, match=r"rod\.htm: unknown ending '\.htm'.*did you mean '\.html'"):
+        write_document(document(), tmp_path / "rod.htm")
+    with pytest.raises(TableError, match="cannot be written"):
+        write_document(document(), tmp_path / "missing" / "rod.html")
