@@ -107,7 +107,7 @@ def explained(
         return failure
     words = f"Newton's method did not converge in {max_iterations} iterations"
     if outcome.status == NO_ACCELERATION:
-        words = "where it ends, constraints depend on each other or a force has no direction: no accelerations"
+        words = "at its end, constraints depend on each other or a force is not finite: there are no accelerations"
     elif outcome.status == SINGULAR:
         words = "the matrix of Newton's method is singular"
     elif not np.isfinite(outcome.excess):

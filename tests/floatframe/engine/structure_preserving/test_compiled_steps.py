@@ -18,6 +18,7 @@ from floatframe import (
     JointForce,
     Marker,
     PointForce,
+    PointOnPlane,
     RigidBody,
     SphericalJoint,
     SpringDamper,
@@ -132,17 +133,43 @@ def test_steps_before_one_whose_force_is_infinite_at_its_end_are_told_with_as_ma
     """A ball flies, in numbers without rounding, to the point where a tiny force is infinite, after four steps."""
     ball = RigidBody("ball", 1.0, np.eye(3), position=(-1.0, 0, 0), velocity=(1.0, 0, 0))
     along = AxialDistance(Marker(GROUND), Marker("ball"), (1, 0, 0))
-    system, method = System([ball], [], [UserForce("pull", {"x": along}, {"x": "1e-300/x"})]), EnergyMomentum()
+    system = System([ball], [], [UserForce("pull", {"x": along}, {"x": "1e-300/x"})])
+    after = after_three_good_steps(system, every, "force 'pull' is not finite")
+    assert_array_equal(after.state.r, [[-0.25, 0, 0]])
+
+
+@pytest.mark.parametrize("every", [1, 2, 4])
+def test_steps_before_one_whose_end_has_no_accelerations_are_told_with_as_many_rows(every):
+    """A point lies on two planes through it. They turn, in numbers without rounding, and meet after four steps.
+
+    A step of h omega turns by 2 atan(h |omega| / 2): one plane by 90 degrees about z, its normals x, y, -x, -y, x, the
+    other by 120 degrees about (1, 1, 1), its normals z, x, y, z, x. The factors of the first step serve all four.
+    """
+    ball = RigidBody("ball", 1.0, np.eye(3))
+    quarter = RigidBody("quarter", 1.0, np.eye(3), omega_B=(0, 0, 8.0))
+    third = RigidBody("third", 1.0, np.eye(3), omega_B=(8.0, 8.0, 8.0))
+    planes = [PointOnPlane("x", Marker("quarter"), Marker("ball"), (1, 0, 0)),
+              PointOnPlane("z", Marker("third"), Marker("ball"), (0, 0, 1))]  # fmt: skip
+    pins = [SphericalJoint(f"pin of {body.name}", GROUND, Marker(body.name)) for body in (quarter, third)]
+    system = System([ball, quarter, third], [*pins, *planes])
+    after = after_three_good_steps(system, every, "at its end, constraints depend on each other")
+    turned_by = [[1, 0, 0, 0], [np.sqrt(0.5), 0, 0, -np.sqrt(0.5)], [1, 0, 0, 0]]  # by 270 and by 360 degrees
+    assert_allclose(np.abs(np.sum(turned_by * after.state.p, axis=1)), 1.0, rtol=1e-15)
+
+
+def after_three_good_steps(system, every, words):
+    """Return the memory before the fourth step of 0.25, which fails with these words."""
+    method = EnergyMomentum()
     memory, work = method.start(system, 0.0), new_work(compiled_system(system).model)
     after, rows, n_good, failure = method.advance(system, memory, work, t0=0.0, h=0.25, first=0, n_steps=8, every=every)
     assert failure is not None
-    assert "force 'pull' is not finite" in failure.words
+    assert failure.words.startswith(words)
     assert n_good == after.n_steps == 3
     assert_array_equal(rows.t, 0.25 * np.arange(every, 4, every))
-    assert_array_equal(after.state.r, [[-0.25, 0, 0]])
-    with pytest.raises(ConvergenceError, match=r"from t = 0\.75 failed: force 'pull' is not") as caught:
+    with pytest.raises(ConvergenceError, match=rf"from t = 0\.75 failed: {words}") as caught:
         integrate(system, method, 2.0, 0.25, output_every=every)
     assert_array_equal(caught.value.trajectory.t, 0.25 * np.arange(0, 4, every))
+    return after
 
 
 def assert_steps_are_those_of_python(system, method, name, n_steps=4, h=0.04):
