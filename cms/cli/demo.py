@@ -45,7 +45,8 @@ def run_steps(folder: Path, wait_for_kernels: Callable[[], None]) -> None:
     """Run every command, each announced; independent commands run at the same time."""
     from cms.cli.info import info_command, info_record
     from cms.cli.reduce import reduce_command
-    from fe_models.foundation.paths import replace_file
+    from fe_models.foundation.parametric_file import schemas_named_in
+    from fe_models.foundation.paths import replace_file, replace_files
 
     modal = folder / "rod.h5"
     announce(folder, "cms reduce rod.toml -o rod.h5")
@@ -58,6 +59,8 @@ def run_steps(folder: Path, wait_for_kernels: Callable[[], None]) -> None:
         replace_file(folder / "rod.json", info_record(modal).encode("utf-8"))
         wait_for_kernels()
         run = begun(running, folder, "floatframe run crank.toml -o crank.h5")
+        schemas = schemas_named_in((folder / name).read_bytes() for name in JOBS)  # takes seconds, beside the run
+        replace_files({folder / name: content for name, content in schemas.items()})
         run.worker.wait()
         later = [
             begun(running, folder, words)
@@ -137,6 +140,8 @@ def list_files(folder: Path) -> None:
         "crank.h5": "its motion",
         "crank.png": "its plots",
         "crank.mp4": "its film",
+        "job.schema.json": "keys of rod.toml, for completion in an editor",
+        "system.schema.json": "keys of crank.toml, for completion in an editor",
     }
     typer.echo()
     rows = [(str(folder / name), f"{(folder / name).stat().st_size / 1e6:.2f}", words) for name, words in made.items()]
@@ -167,7 +172,6 @@ def kernels_compiled_beside() -> Iterator[Callable[[], None]]:
 
 def put_inputs(folder: Path) -> None:
     """Copy the mesh and the job files into the folder; raise `JobError` for a changed job, which is not overwritten."""
-    from fe_models.foundation.parametric_file import schemas_named_in
     from fe_models.foundation.paths import replace_file
     from fe_models.parts import shipped_mesh
 
@@ -182,7 +186,7 @@ def put_inputs(folder: Path) -> None:
                 f"{folder / name}: is there already, with other contents, and would be lost; move it away, or choose "
                 "another folder: cms demo FOLDER"
             )
-    for name, content in (jobs | schemas_named_in(jobs.values())).items():
+    for name, content in jobs.items():
         replace_file(folder / name, content)
     replace_file(folder / "rod.msh", shipped_mesh("slender_rod").read_bytes())
 

@@ -137,20 +137,20 @@ def json_schema(model: type[Table], *, is_parametric: bool) -> dict[str, Any]:
     return schema
 
 
-PARAMETRIC = ("job", "system")  #: kinds of files with parameters, base files and repeated tables
-FIRST_LINE = re.compile(rb"#:schema (?:\.\./)*([a-z]+)\.schema\.json\r?\n")  #: of a file that names its schema
+#: first line of a file that names its schema
+SCHEMA_LINE = re.compile(rb"#:schema (?:\.\./)*([a-z]+)\.schema\.json\r?\n")
 
 
 def schema_text(kind: str) -> str:
     """Return the JSON schema of a kind of file, one of `KINDS`."""
     module, _, name = KINDS[kind].model.partition(":")
-    model = getattr(import_module(module), name)
-    return json.dumps(json_schema(model, is_parametric=kind in PARAMETRIC), indent=2) + "\n"
+    schema = json_schema(getattr(import_module(module), name), is_parametric=KINDS[kind].is_parametric)
+    return json.dumps(schema, indent=2) + "\n"
 
 
 def schemas_named_in(contents: Iterable[bytes]) -> dict[str, bytes]:
-    """Return by file name the schemas that files name in their first lines, to be written beside them."""
-    kinds = {found[1].decode() for content in contents if (found := FIRST_LINE.match(content))}
+    """Return the schemas that the first lines of some files name, by the name of the file that holds each schema."""
+    kinds = {found[1].decode() for content in contents if (found := SCHEMA_LINE.match(content))}
     return {f"{kind}.schema.json": schema_text(kind).encode() for kind in sorted(kinds)}
 
 

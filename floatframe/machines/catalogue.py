@@ -86,7 +86,7 @@ def machine_files(name: str) -> Sequence[Path]:
 def copy_machine(name: str, folder: str | Path) -> Sequence[Path]:
     """Copy the files of a machine into a folder, which is created; return their paths.
 
-    The schemas that they name in their first lines, for completion in an editor, are written beside them.
+    The folder also gets the schemas that the files name in their first lines; editors complete keys with them.
 
     Raises
     ------

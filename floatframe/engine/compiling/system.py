@@ -29,6 +29,7 @@ from floatframe.engine.compiling.public_elements import PlacedLaw, add_public_el
 from floatframe.engine.kernels import model
 from floatframe.engine.kernels.model import (
     CONTACT,
+    COUPLER,
     ELEMENT,
     JOINT,
     Bodies,
@@ -263,9 +264,9 @@ class CompiledSystem:
         return self.joint_names + self.spring_names + self.element_names
 
     def connection_words(self, c: int) -> str:
-        """Return the kind and the name of connection c for messages."""
+        """Return the kind and the name of connection c for messages; a coupler counts as a joint, as in `System`."""
         law = int(self.model.connections.law[c])
-        kind = {JOINT: "joint", ELEMENT: "element"}.get(law, "force")
+        kind = {JOINT: "joint", COUPLER: "joint", ELEMENT: "element"}.get(law, "force")
         return f"{kind} {self.connection_names[c]!r}"
 
 

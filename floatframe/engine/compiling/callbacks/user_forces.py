@@ -69,13 +69,17 @@ def compiled_callback(force: UserForce, n: int, n_forces: int, n_states: int) ->
     name = f"force {force.name!r}"
     for each in function.overloads.values():  # type: ignore[attr-defined]
         if each.signature.return_type != types.none:
-            raise returned_error(name, str(each.signature.return_type))
+            raise returned_value_error(name, str(each.signature.return_type))
     return Callback(name, int(compiled.address or 0), compiled)
 
 
-def returned_error(name: str, kind: str) -> ModelError:
-    """Return the error of a function that returns something of a kind, which nobody would read."""
-    return ModelError(
+class ReturnedValueError(ModelError):
+    """The function of a user force returns a value, which would have no effect."""
+
+
+def returned_value_error(name: str, kind: str) -> ReturnedValueError:
+    """Return the error of a force whose function returns a value of a kind."""
+    return ReturnedValueError(
         f"{name}: its function(t, x, v, z, Q, z_dot) returns a value ({kind}), which has no effect; expected that it "
         "writes into Q and z_dot, such as Q[0] = ..., and returns nothing"
     )
@@ -97,7 +101,7 @@ def python_callback(force: UserForce, n: int, n_forces: int, n_states: int) -> C
             else:
                 parts = x[1 : 1 + n], x[1 + n : 1 + 2 * n], x[1 + 2 * n :], y[:n_forces], y[n_forces:]
                 if (returned := function(x[0], *parts)) is not None:
-                    raise returned_error(callback.name, type(returned).__name__)
+                    raise returned_value_error(callback.name, type(returned).__name__)
         except BaseException as error:  # the error is raised again after the kernels have returned
             callback.error = error
             y[:] = np.nan
@@ -115,6 +119,6 @@ def raise_errors_of(callbacks: Sequence[Callback]) -> None:
         error, callback.error = callback.error, None
         if error is None:
             continue
-        if not isinstance(error, Exception) or isinstance(error, ModelError):  # an interrupt, or with words of its own
+        if isinstance(error, ReturnedValueError) or not isinstance(error, Exception):  # the latter: an interrupt
             raise error
         raise ModelError(f"{callback.name}: its function raised {type(error).__name__}: {error}") from error

@@ -1,6 +1,7 @@
 """User forces: expressions, Python functions and jitted ones, with states."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from floatframe import (
     GROUND,
     AxialDistance,
     ConvergenceError,
+    CoordinateCoupler,
     EnergyMomentum,
     FlexibleBody,
     GeneralizedAlpha,
@@ -243,6 +245,24 @@ def test_an_error_in_a_function_ends_the_run_with_its_words():
     system = wheel(UserForce("valve", HUB, ("phi",), function=fails))
     with pytest.raises(ModelError, match="force 'valve': its function raised ZeroDivisionError: the valve is stuck"):
         integrate(system, METHOD, 0.2, 1e-3)
+
+
+def test_an_error_of_the_model_in_a_function_is_told_with_the_name_of_the_force():
+    def fails(t, x, v, z, Q, z_dot):
+        raise ModelError("the table ends here")
+
+    with pytest.raises(ModelError, match="force 'u': its function raised ModelError: the table ends here"):
+        integrate(wheel(UserForce("u", HUB, ("phi",), function=fails)), METHOD, 0.01, 1e-3)
+
+
+def test_connections_are_told_with_their_kind():
+    """A coupler is given among joints, and a spring among forces."""
+    spring = SpringDamper("s", Marker(GROUND), Marker("wheel"), 1.0)
+    coupler = CoordinateCoupler("c", [(HUB["phi"], 1.0)], harmonic(0.1, 2.0))
+    system = wheel([spring, UserForce("u", HUB, {"phi": "0"})])
+    compiled = compiled_system(replace(system, joints=[*system.joints, coupler]))
+    told = sorted(compiled.connection_words(c) for c in range(len(compiled.connection_names)))
+    assert told == ["force 's'", "force 'u'", "joint 'c'", "joint 'hub'"]
 
 
 @pytest.mark.parametrize("made", [lambda function: function, njit], ids=["python", "numba"])
