@@ -49,7 +49,7 @@ class RotatedLoads:
     interfaces: Array
 
     def __post_init__(self) -> None:
-        n, n_loaded = np.asarray(self.translation).shape[-1], len(np.asarray(self.interfaces))
+        n, n_loaded = np.atleast_1d(self.translation).shape[-1], len(np.atleast_1d(self.interfaces))
         shapes = {"translation": (3, 3, n), "rotation": (3, 3, n), "spin": (6, 3, n), "interfaces": (n_loaded, 6, 3, n)}
         put_arrays(self, "turned loads", shapes)
 
@@ -80,7 +80,7 @@ class SpreadLoads:
     turned_rigid: Array
 
     def __post_init__(self) -> None:
-        n = np.asarray(self.K).shape[-1]
+        n = np.atleast_1d(self.K).shape[-1]
         put_arrays(self, "spread loads", {"K": (6, n, n)}, is_symmetric=True)
         put_arrays(self, "spread loads", {"turned": (6, 3, n), "turned_rigid": (6, 3, 3)})
 
@@ -130,7 +130,7 @@ class GeometricStiffness:
     is_loaded: tuple[bool, ...] = ()
 
     def __post_init__(self) -> None:
-        n, n_loaded = np.asarray(self.translation).shape[-1], len(np.asarray(self.interfaces))
+        n, n_loaded = np.atleast_1d(self.translation).shape[-1], len(np.atleast_1d(self.interfaces))
         object.__setattr__(self, "is_loaded", tuple(bool(each) for each in self.is_loaded) or (True,) * n_loaded)
         if sum(self.is_loaded) != n_loaded:
             raise BodyError(f"geometric stiffness: {sum(self.is_loaded)} loaded interfaces, but matrices of {n_loaded}")

@@ -70,7 +70,7 @@ class Moments:
     missing: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        n = np.asarray(self.C1).shape[-1]
+        n = np.atleast_1d(self.C1).shape[-1]
         for term in self.missing:
             if term not in INERTIA_TERMS:
                 raise BodyError(f"moments: missing: unknown term {quoted(term)}{nearest(term, INERTIA_TERMS)}")
@@ -284,5 +284,5 @@ class NodalSums:
         require_finite("nodal sums: w", np.array(self.w))
         if not self.w > 0:
             raise BodyError(f"nodal sums: w: expected a positive sum of weights, got {self.w:g}")
-        n = np.asarray(self.U1).shape[-1]
+        n = np.atleast_1d(self.U1).shape[-1]
         put_arrays(self, "nodal sums", {"S": (3,), "R": (3, 3), "U1": (3, n), "U2": (3, n)})

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cms.errors import BodyError
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, require_finite, require_shape
+from fe_models.foundation.arrays import Array, IntArray, frozen_int
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.records import checked_fields, frozen_copies
+from fe_models.foundation.records import checked_fields, frozen_copies, put_arrays
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["SOURCES", "KeptPoints"]
@@ -49,13 +49,11 @@ class KeptPoints:
     def __post_init__(self) -> None:
         put = object.__setattr__
         put(self, "nodes", frozen_int(self.nodes))
-        put(self, "rotation", frozen(self.rotation))
         put(self, "source", tuple(self.source))
         n = self.nodes.size
         if self.nodes.ndim != 1 or np.unique(self.nodes).size != n:
             raise BodyError("kept points: nodes: a node is there twice")
-        require_shape("kept points: rotation", self.rotation, (n, 3, self.rotation.shape[-1]))
-        require_finite("kept points: rotation", self.rotation)
+        put_arrays(self, "kept points", {"rotation": (n, 3, np.atleast_1d(self.rotation).shape[-1])})
         if len(self.source) != n:
             raise BodyError(f"kept points: expected {n} sources, got {len(self.source)}")
         for word in set(self.source) - set(SOURCES):

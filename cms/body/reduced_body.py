@@ -107,7 +107,7 @@ class ReducedInterface:
 
     def __post_init__(self) -> None:
         where = f"interface {self.name!r}"
-        put_arrays(self, where, {"position": (3,), "triad": (3, 3), "Psi": (6, np.asarray(self.Psi).shape[-1])})
+        put_arrays(self, where, {"position": (3,), "triad": (3, 3), "Psi": (6, np.atleast_1d(self.Psi).shape[-1])})
         object.__setattr__(self, "members", frozen_int(self.members))
         require_orthonormal(f"{where}: triad", self.triad)
 
@@ -218,7 +218,7 @@ class ReducedBody:
             put(self, name, tuple(getattr(self, name)))
         put(self, "provenance", FrozenMapping(dict(self.provenance)))
         put(self, "recovery", FrozenMapping(dict(self.recovery)))
-        n, n_kept = self.n_q, len(self.nodes)
+        n, n_kept = len(np.atleast_1d(self.K)), len(np.atleast_1d(self.nodes))
         shapes: dict[str, tuple[int, ...]] = {
             "M": (n, n),
             "K": (n, n),
@@ -226,7 +226,7 @@ class ReducedBody:
             "nodes": (n_kept, 3),
             "Phi": (n_kept, 3, n),
             "energy_shares": (n, len(self.sources)),
-            "free_frequencies": (len(self.free_frequencies),),
+            "free_frequencies": (len(np.atleast_1d(self.free_frequencies)),),
         }
         if self.stress is not None:
             shapes["stress"] = (n_kept, 6, n)

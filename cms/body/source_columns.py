@@ -32,7 +32,7 @@ class SourceColumns:
             object.__setattr__(self, name, tuple(getattr(self, name)))
         if len(self.groups) != n:
             raise BodyError(f"source columns: {n} labels, but {len(self.groups)} groups")
-        shape = (n, np.asarray(self.A).shape[-1])
+        shape = (n, np.atleast_1d(self.A).shape[-1])
         put_arrays(self, "source columns", {"A": shape, "F": shape})
 
     @property

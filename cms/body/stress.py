@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
-from fe_models.foundation.records import frozen_copies
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.records import frozen_copies, put_arrays
 
 __all__ = ["PointStress", "stress_of", "von_mises", "von_mises_of"]
 
@@ -25,11 +25,7 @@ class PointStress:
     def __post_init__(self) -> None:
         object.__setattr__(self, "names", tuple(self.names))
         n = len(self.names)
-        for name in ("positions", "modes"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
-            require_finite(f"stress points: {name}", getattr(self, name))
-        require_shape("stress points: positions", self.positions, (n, 3))
-        require_shape("stress points: modes", self.modes, (n, 6, np.asarray(self.modes).shape[-1]))
+        put_arrays(self, "stress points", {"positions": (n, 3), "modes": (n, 6, np.atleast_1d(self.modes).shape[-1])})
 
 
 def von_mises(stress: Array) -> Array:
