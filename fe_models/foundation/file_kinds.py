@@ -2,10 +2,10 @@
 
 from typing import NamedTuple
 
-__all__ = ["KINDS", "Kind"]
+__all__ = ["KINDS", "FileKind"]
 
 
-class Kind(NamedTuple):
+class FileKind(NamedTuple):
     """A kind of file."""
 
     command: str  #: that runs it
@@ -14,13 +14,13 @@ class Kind(NamedTuple):
 
 
 KINDS = {
-    "job": Kind("cms reduce", "cms.jobs.job:Job", is_parametric=True),
-    "correlation": Kind("cms correlate", "cms.jobs.studies.correlation_file:CorrelationFile"),
-    "recovery": Kind("cms recovery", "cms.jobs.tables.recovery_section:RecoveryFile"),
-    "system": Kind("floatframe run", "floatframe.files.system_file.read_system:SystemFile", is_parametric=True),
-    "sweep": Kind("floatframe sweep", "floatframe.design.studies.study_file:StudyFile"),
-    "optimization": Kind("floatframe optimize", "floatframe.design.optimization.design_file:DesignFile"),
-    "laboratory": Kind("floatframe study", "floatframe.design.laboratory.laboratory_file:LaboratoryFile"),
-    "shake": Kind("floatframe shake", "floatframe.durability.shaking.shake_file:ShakeFile"),
-    "fatigue": Kind("floatframe fatigue", "floatframe.durability.fatigue.fatigue_file:FatigueFile"),
+    "job": FileKind("cms reduce", "cms.jobs.job:Job", is_parametric=True),
+    "correlation": FileKind("cms correlate", "cms.jobs.studies.correlation_file:CorrelationFile"),
+    "recovery": FileKind("cms recovery", "cms.jobs.tables.recovery_section:RecoveryFile"),
+    "system": FileKind("floatframe run", "floatframe.files.system_file.read_system:SystemFile", is_parametric=True),
+    "sweep": FileKind("floatframe sweep", "floatframe.design.studies.study_file:StudyFile"),
+    "optimization": FileKind("floatframe optimize", "floatframe.design.optimization.design_file:DesignFile"),
+    "laboratory": FileKind("floatframe study", "floatframe.design.laboratory.laboratory_file:LaboratoryFile"),
+    "shake": FileKind("floatframe shake", "floatframe.durability.shaking.shake_file:ShakeFile"),
+    "fatigue": FileKind("floatframe fatigue", "floatframe.durability.fatigue.fatigue_file:FatigueFile"),
 }
