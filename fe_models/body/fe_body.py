@@ -469,7 +469,7 @@ class FEBody:
 
     @property
     def length(self) -> float:
-        """Diagonal of the bounding box of the nodes, or 1 if it has none [m]; the length that scales rotations."""
+        """Diagonal of the bounding box of the nodes [m], which scales rotations; 1 if all nodes are at one place."""
         return float(np.linalg.norm(np.ptp(self.nodes, axis=0))) or 1.0
 
     def interface(self, name: str) -> Interface:

@@ -84,7 +84,7 @@ def read_only(value: Any) -> Any:
 def put_arrays(
     record: object, where: str, shapes: Mapping[str, tuple[int, ...]], *, is_symmetric: bool = False
 ) -> None:
-    """Make fields of a frozen record read-only arrays of float64, after a check of shapes and for finite numbers.
+    """Make fields of a frozen record read-only arrays of float64; refuse other shapes, NaN and infinite numbers.
 
     Parameters
     ----------
@@ -95,7 +95,8 @@ def put_arrays(
     shapes
         The shape of each field. A large array on disk is read in slices of rows.
     is_symmetric
-        Whether matrices over the modes, the last two axes, must be symmetric; what rounding left of them is removed.
+        Whether matrices over the modes, the last two axes, must be symmetric; an antisymmetric part within rounding is
+        removed.
 
     Raises
     ------

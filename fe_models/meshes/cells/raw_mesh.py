@@ -323,20 +323,21 @@ def _is_mirrored(kind: str, nodes: Array, cells: IntArray) -> np.ndarray:
     return np.asarray(cell_jacobians(kind, nodes[cells], middle)[:, 0] < 0)
 
 
-# layers of shells and beams: groups parted so that none of a part has a cell on the same nodes as another -------------
+# layers of shells and beams: groups with cells on the same nodes go to different parts --------------------------------
 
 
 def groups_apart(raw: RawMesh, kinds: Iterable[str], groups: Iterable[str]) -> list[tuple[str, ...]]:
-    """Return the groups in as few parts as going through them in their order needs, one where no cell is doubled.
+    """Split groups, in their order, into parts without two cells on the same nodes: one part if no cell is doubled.
 
-    Cells of one group on the same nodes are not parted: they are a fault, or one cell that is listed twice.
+    Each group goes to the first part that it fits. Cells of one group on the same nodes stay together: they are a
+    fault, or one cell that is listed twice.
 
     Parameters
     ----------
     raw
         The mesh.
     kinds
-        Of cells that count.
+        Types of the cells that are compared.
     groups
         Names of groups of cells.
     """
