@@ -31,6 +31,7 @@ from fe_models.foundation.words import shortened
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Drawing
 
 __all__ = ["pdf_pages"]
 
@@ -38,7 +39,9 @@ INK, TEXT, SOFT, LINE = "#1b1f24", "#3d4650", "#66727e", "#dde2e7"
 GROUNDS = {"pass": "#e4f3ec", "warn": "#fdf1dd", "fail": "#fbe8e3", "error": "#fbe8e3", "info": "#eef1f4"}
 WORDS = {"pass": "#0a6b4d", "warn": "#8a5300", "fail": "#a32a12", "error": "#a32a12", "info": "#66727e"}
 MARGIN = 15.0  #: [mm]
-LONGEST_FOOTER = 112  #: characters beside the number of the page
+PADDING = 6.0  #: of reportlab's frame on each side [points]
+FOOTER = 6.5  #: size of the words of the footer [points]
+LONGEST_FOOTER = 230  #: characters, two lines beside the number of the page
 DPI = 150  #: of charts
 HIGHEST = 560.0  #: height of a picture on a sheet [points]
 WIDEST = 150.0  #: of a text that counts for the width of its column [points]
@@ -55,12 +58,13 @@ def pdf_pages(document: Document) -> bytes:
     extra_module("reportlab", extra="pdf", purpose="write a document as PDF")
     from reportlab.lib.pagesizes import A4
     from reportlab.lib.units import mm
+    from reportlab.lib.utils import simpleSplit
     from reportlab.platypus import SimpleDocTemplate
 
     fonts()
     target = io.BytesIO()
     template = SimpleDocTemplate(
-        target, pagesize=A4, leftMargin=MARGIN * mm, rightMargin=MARGIN * mm, topMargin=MARGIN * mm,
+        target, pagesize=A4, leftMargin=MARGIN * mm - PADDING, rightMargin=MARGIN * mm - PADDING, topMargin=MARGIN * mm,
         bottomMargin=(MARGIN + 4) * mm, title=document.title, subject=document.facts, creator="floatframe",
     )  # fmt: skip
     width = A4[0] - 2 * MARGIN * mm
@@ -70,10 +74,11 @@ def pdf_pages(document: Document) -> bytes:
 
     def foot(canvas: Any, _: Any) -> None:
         canvas.saveState()
-        canvas.setFont("Report", 6.5)
+        canvas.setFont("Report", FOOTER)
         canvas.setFillColor(SOFT)
-        words = shortened(document.footer, LONGEST_FOOTER)
-        canvas.drawString(MARGIN * mm, 10 * mm, words)
+        lines = simpleSplit(shortened(document.footer, LONGEST_FOOTER), "Report", FOOTER, width - 15 * mm)
+        for k, line in enumerate(reversed(lines)):
+            canvas.drawString(MARGIN * mm, 10 * mm + 1.2 * FOOTER * k, line)
         canvas.drawRightString(A4[0] - MARGIN * mm, 10 * mm, f"page {canvas.getPageNumber()}")
         canvas.restoreState()
 
@@ -300,11 +305,14 @@ def chart_png(chart: Chart, width: float) -> bytes:
     from matplotlib.figure import Figure as Drawing
 
     high = min(max(1.6, chart.height / 110), HIGHEST / 72)
+    for item in chart.items:
+        if isinstance(item, Matrix):  # square cells, and room for the labels below
+            high = min(high, width / 72 * item.values.shape[0] / item.values.shape[1] + 0.5)
     drawing = Drawing(figsize=(width / 72, high), dpi=DPI, layout="constrained")
     panels = list(drawing.subplots(len(chart.panels), 1, sharex=True, squeeze=False)[:, 0])
     for axes, panel in zip(panels, chart.panels, strict=True):
         axes.set_ylabel(panel.label, fontsize=7)
-        axes.tick_params(labelsize=7)
+        axes.tick_params(labelsize=7, which="both")
         axes.grid(color="#e3e7eb", linewidth=0.6)
         axes.set_axisbelow(True)
         for side in ("top", "right"):
@@ -320,12 +328,26 @@ def chart_png(chart: Chart, width: float) -> bytes:
     if chart.x.range is not None:
         panels[-1].set_xlim(*chart.x.range)
     panels[-1].set_xlabel(chart.x.label, fontsize=7)
-    handles, names = panels[0].get_legend_handles_labels()
-    if (chart.has_legend or chart.other_label) and names:
-        drawing.legend(handles, names, fontsize=6.5, ncols=3, frameon=False, loc="outside upper left")
+    if chart.has_legend or chart.other_label:
+        put_legend(drawing, panels)
     target = io.BytesIO()
     drawing.savefig(target, format="png")
     return target.getvalue()
+
+
+def put_legend(drawing: "Drawing", panels: Sequence["Axes"]) -> None:
+    """List every name of the panels once above them, in as many columns as the drawing has room for, at most three."""
+    named: dict[str, Any] = {}
+    for axes in panels:
+        for handle, name in zip(*axes.get_legend_handles_labels(), strict=True):
+            named.setdefault(name, handle)
+    for n_columns in (3, 2, 1) if named else ():
+        legend = drawing.legend(
+            list(named.values()), list(named), fontsize=6.5, ncols=n_columns, frameon=False, loc="outside upper left"
+        )
+        if legend.get_window_extent().width <= drawing.bbox.width or n_columns == 1:
+            return
+        legend.remove()
 
 
 def draw_items(chart: Chart, panels: Sequence["Axes"]) -> None:
@@ -352,7 +374,8 @@ def draw_items(chart: Chart, panels: Sequence["Axes"]) -> None:
         else:
             axes.axhline(limit.value, color="#5b6770", linewidth=1, linestyle=(0, (5, 3)))
             across = axes.get_yaxis_transform()
-            axes.text(1, limit.value, limit.label, transform=across, ha="right", va="bottom", fontsize=6.5)
+            ground = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6}
+            axes.text(1, limit.value, limit.label, transform=across, ha="right", va="bottom", fontsize=6.5, bbox=ground)
 
 
 def draw_line(line: Line, axes: "Axes") -> None:

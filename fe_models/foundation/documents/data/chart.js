@@ -167,7 +167,7 @@
           else put(inside, "path", { d: `M${left} ${panel.y.at(limit.value)}H${right}`, stroke: "var(--soft)", "stroke-width": 1.5, "stroke-dasharray": DASHES.dash });
         }
         for (const line of lines) if (line.panel === k) this.line(inside, line, panel);
-        for (const limit of panel.limits) if (limit.label) put(svg, "text", { x: right - 3, y: panel.y.at(limit.value) - 4, "text-anchor": "end", fill: "var(--soft)", "font-size": 11 }, limit.label);
+        for (const limit of panel.limits) if (limit.label) put(svg, "text", { x: right - 3, y: panel.y.at(limit.value) - 4, "text-anchor": "end", fill: "var(--soft)", "font-size": 11, stroke: "var(--card)", "stroke-width": 3, "paint-order": "stroke" }, limit.label);
       });
       if (matrix) this.matrix(matrix);
       bars.forEach((bar, k) => bar.values.forEach((value, j) => {

@@ -8,6 +8,10 @@ from html import unescape
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure as Drawing
+from reportlab.lib.pagesizes import A4
+from reportlab.pdfbase.pdfmetrics import stringWidth
+from reportlab.pdfgen.canvas import Canvas
 
 from fe_models.foundation.documents.charts import Axis, Bars, Chart, LimitLine, Line, Matrix, chart_record, thinned
 from fe_models.foundation.documents.document import (
@@ -25,7 +29,7 @@ from fe_models.foundation.documents.document import (
     TextTable,
 )
 from fe_models.foundation.documents.html import html_page
-from fe_models.foundation.documents.pdf import pdf_pages
+from fe_models.foundation.documents.pdf import FOOTER, pdf_pages, put_legend
 from fe_models.foundation.documents.write import document_content, write_document
 from fe_models.foundation.errors import TableError
 from tests.cms.browser import browser, opened
@@ -114,6 +118,31 @@ def test_a_pdf_holds_all_blocks_however_high(n):
     content = pdf_pages(replace(found, sections=[*found.sections, tall]))
     assert content.startswith(b"%PDF")
     assert len(content) > 20_000
+
+
+def test_the_legend_of_a_printed_chart_lists_each_name_once_and_is_not_cut():
+    names = ("mean acceleration x, 5.27 g rms", "input foot:x", "mirror acceleration x, 23.9 g rms")
+    drawing = Drawing(figsize=(3.4, 3.0), layout="constrained")
+    panels = list(drawing.subplots(2, 1))
+    for axes, shown in zip(panels, (names[:2], names[1:]), strict=True):
+        for name in shown:
+            axes.plot([0, 1], [0, 1], label=name)
+    put_legend(drawing, panels)
+    drawing.draw_without_rendering()
+    (legend,) = drawing.legends
+    assert [words.get_text() for words in legend.get_texts()] == list(names)
+    box = legend.get_window_extent()
+    assert box.x0 >= 0
+    assert box.x1 <= drawing.bbox.width
+
+
+def test_a_long_footer_is_printed_whole(monkeypatch):
+    drawn = []
+    monkeypatch.setattr(Canvas, "drawString", lambda _, x, y, words: drawn.append((y, x, words)))
+    footer = f"/parts/bar.h5, digest {64 * '0'}; made 2026-01-01T12:00 by cms accept, with limits of a customer."
+    pdf_pages(Document("bar", "one bar", Answer("It holds."), (), footer=footer))
+    assert " ".join(words for *_, words in sorted(drawn, reverse=True)) == footer
+    assert all(x + stringWidth(words, "Report", FOOTER) < A4[0] - 2 * x for _, x, words in drawn)
 
 
 def test_json_holds_text_tables_and_charts():
