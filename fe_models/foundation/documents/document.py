@@ -1,7 +1,7 @@
 """Documents: headings, text, tables, charts and pictures with a verdict, before they become a page, a PDF or JSON.
 
 document = Document("Rod", "rod.h5", answer=Answer("It holds.", "pass"), sections=(Section("mass", "Mass", blocks),))
-write_documents({Path("rod.html"): document, Path("rod.pdf"): document})
+write_document(document, "rod.html")  # or "rod.pdf", "rod.json"
 """
 
 from collections.abc import Iterator, Sequence
@@ -138,7 +138,7 @@ class Answer:
     text
         In a sentence.
     verdict
-        "pass", "warn", "fail" or "info"; its colour.
+        "pass", "warn", "fail", or "info" where nothing is judged; its colour.
     badge
         The verdict in words; empty: none.
     figures
@@ -148,7 +148,7 @@ class Answer:
     """
 
     text: str
-    verdict: str = "pass"
+    verdict: str = "info"
     badge: str = ""
     figures: Sequence[tuple[str, str]] = ()
     notes: Sequence[str] = ()

@@ -14,7 +14,7 @@ from floatframe.durability.fatigue.criteria import Criterion
 from floatframe.durability.fatigue.fatigue_file import FatigueFile
 from floatframe.durability.fatigue.load_blocks import LoadBlock
 from floatframe.durability.fatigue.outputs import fatigue_record, nodes_of_places, vtu_of, worst_table
-from floatframe.durability.fatigue.report import fatigue_document
+from floatframe.durability.fatigue.report import fatigue_document, head
 from floatframe.durability.fatigue.surface_damage import spectral_damage
 from floatframe.errors import FatigueError
 from tests.bodies import box_mesh
@@ -132,6 +132,9 @@ def test_a_file_names_the_places_of_a_material(folder, mast, where):
     if "sets" in where:  # drawing takes seconds
         html = html_page(fatigue_document(made))
         assert "S-N curve weld" in html
+        for target, verdict in ((None, "info"), (0.5 * record["life"], "pass"), (2 * record["life"], "fail")):
+            asked = {**record, "programme": {**record["programme"], "target": target}}
+            assert head(asked)[1].verdict == verdict
         assert "stress points of elements" in html
     assert worst_table(made).names[:3] == ("rank", "node", "material")
     assert b"log10 damage" in vtu_of(made)
