@@ -38,6 +38,8 @@ def output_files(
     ------
     error
         If a path ends in something else, or cannot be written (`output_path`).
+    MissingExtraError
+        If the library that writes a PDF or Parquet is not installed.
     """
     inputs = tuple(overwrite_of)
     paths = [output_path(path, None, error, overwrite_of=inputs, needs_file=needs_file) for path in given or default]
@@ -46,6 +48,10 @@ def output_files(
             raise error(f"--output {path}: expected a file name that ends in {', '.join(endings)}")
         if path.suffix.lower() == ".pdf" and ".html" in endings:
             extra_module("reportlab", extra="pdf", purpose="write a document as PDF")
+        if path.suffix.lower() == ".parquet":
+            from fe_models.foundation.documents.table import parquet_modules
+
+            parquet_modules()
     return paths
 
 

@@ -22,10 +22,13 @@ from cms.body.modal_file.contents import Content
 from cms.body.modal_file.file import VERSION, read, write, write_sealed
 from cms.cli import demo
 from cms.cli.app import app
+from cms.cli.outputs import DOCUMENTS, TABLES, output_files
+from cms.errors import JobError
 from cms.jobs.job import read_job
 from cms.pipeline import reduce_job
 from cms.reduction.basis.frames import TisserandFrame
 from cms.reduction.frame_conversion import convert_frame
+from fe_models.foundation.extras import MissingExtraError
 from tests.bodies import box_mesh
 from tests.decks import JOB, write_deck
 from tests.root import ROOT, heed_signals
@@ -638,3 +641,10 @@ def test_version_and_unknown_commands():
     assert result.exit_code == 2
     assert "reduse" in result.stderr
     assert run().exit_code in (0, 2)
+
+
+@pytest.mark.parametrize(("ending", "library"), [(".parquet", "pyarrow"), (".pdf", "reportlab")])
+def test_a_missing_library_of_an_output_is_told_before_the_work(ending, library, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, library, None)
+    with pytest.raises(MissingExtraError, match=r"pip install"):
+        output_files([tmp_path / f"result{ending}"], [], (*DOCUMENTS, *TABLES), JobError)
