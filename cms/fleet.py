@@ -163,12 +163,11 @@ def reduce_fleet(
     fleet = fleet_of(paths, made, solver)
     kept = None if journal is None else open_task_journal(Path(journal), KIND, source_mark(), "this call", JobError)
     campaign = Campaign(FleetTask(), kept)
-    missing = [job for job in fleet if campaign.known(job) is None]
-    files = sorted({str(path) for job in missing for path in (job.job, job.output.parent)})
+    files = sorted({str(path) for job in fleet for path in (job.job, job.output.parent)})
     try:
         return campaign.rows(fleet, workers, threads=None, progress=progress, files=files)
     finally:  # a worker that was killed while writing could not clean up
-        for job in missing:
+        for job in fleet:
             remove_parts(job.output)
 
 
