@@ -4,7 +4,7 @@ A page draws them by `data/chart.js`, a PDF by matplotlib (`pdf.py`).
 """
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -104,12 +104,7 @@ class Chart:
     limits: tuple[LimitLine, ...] = ()
     names: tuple[str, ...] = ()
     has_legend: bool = True
-    other_label: str = field(default="")  #: of the axis across after a switch of the page
-
-    @property
-    def lines(self) -> tuple[Line, ...]:
-        """The lines."""
-        return tuple(item for item in self.items if isinstance(item, Line))
+    other_label: str = ""  #: of the axis across after a switch of the page
 
 
 def thinned(line: Line, most: int = 1500) -> Line:
@@ -143,7 +138,7 @@ def axis_record(axis: Axis) -> dict[str, Any]:
 
 
 def item_record(item: Line | Bars | Matrix) -> dict[str, Any]:
-    """Return what is drawn in plain types, with what differs from the defaults."""
+    """Return what is drawn in plain types."""
     if isinstance(item, Bars):
         return {"kind": "bars", "values": plain(item.values), "name": item.name, "color": item.color}
     if isinstance(item, Matrix):

@@ -135,7 +135,7 @@ def test_condition_numbers_read_short():
 
 def test_convergence_charts_draw_the_values_of_the_records(comparison):
     for name in DECIDING:
-        for line in convergence_chart(comparison, name).lines:
+        for line in convergence_chart(comparison, name).items:
             result = comparison.set(line.name)
             finite = [p for p in result.points if math.isfinite(p.record(name).value)]
             assert line.x == [p.n_modes for p in finite]
@@ -145,12 +145,12 @@ def test_convergence_charts_draw_the_values_of_the_records(comparison):
 
 
 def test_curves_are_those_of_the_records(comparison):
-    full, *sets = response_chart(comparison).lines
+    full, *sets = response_chart(comparison).items
     assert_allclose(full.y, comparison.full.response, rtol=0)
     shown = [r for r in comparison.sets if r.detail is not None]
     for line, result in zip(sets, shown, strict=True):
         assert_allclose(line.y, result.detail.record("frequency-response").data["drawn"], rtol=0)
-    for line, result in zip(deformation_chart(comparison).lines[1:], shown, strict=True):
+    for line, result in zip(deformation_chart(comparison).items[1:], shown, strict=True):
         error = result.detail.record("deformation-error").data["error"]["K"]
         assert_allclose(line.y, np.maximum(error, 1e-10), rtol=0)
     result = comparison.set("rubin")
