@@ -402,7 +402,8 @@ def frf_command(
         Path | None, typer.Option("--job", "-j", help="Job file of the full model, to draw its response too.")
     ] = None,
     output: Annotated[
-        list[Path] | None, typer.Option("--output", "-o", help="Picture (.png .svg .pdf) or table (.csv); repeatable.")
+        list[Path] | None,
+        typer.Option("--output", "-o", help="Picture (.png .svg .pdf) or table (.csv, ...); repeatable."),
     ] = None,
 ) -> None:
     """Frequency response between interfaces of the free body.
@@ -478,7 +479,7 @@ def compare_command(
 @guarded
 def correlate_command(
     file: Annotated[Path, typer.Argument(help="Correlation file (TOML), see docs/test_and_model.md.")],
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Page to write (.html).")] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Report: .html or .pdf.")] = None,
     updated_job: Annotated[
         Path | None, typer.Option(help="Job with the updated values to write, beside the job.")
     ] = None,

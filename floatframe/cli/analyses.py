@@ -230,7 +230,7 @@ def campbell_command(
     It shows frequencies over the speed, with the steady values of outputs.
 
     Outputs are those of the table [outputs] of the system, unless named. Their steady values at the speeds, such as
-    bearing forces, are printed, and written as columns of a .csv or as panels below the diagram.
+    bearing forces, are printed, and written as columns of a table or as panels below the diagram.
 
     Example: floatframe campbell rotor.toml --speeds 0:200:21 --axis z -o rotor.png
 

@@ -43,7 +43,7 @@ def identify_command(
         bool, typer.Option("--real/--no-real", help="Find real bodies (positive masses and inertias) too.")
     ] = True,
     motion: Annotated[
-        Path | None, typer.Option("--motion", help="Write a more informative motion, a .csv of positions.")
+        Path | None, typer.Option("--motion", help="Write a more informative motion, a table (.csv, ...) of positions.")
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the result as JSON, for other programs.")] = False,
 ) -> None:

@@ -38,7 +38,7 @@ def write_document(document: Document, path: str | os.PathLike[str]) -> Path:
     target = Path(path)
     if target.suffix.lower() not in DOCUMENTS:
         raise TableError(
-            f"document {target}: unknown ending {quoted(target.suffix)}{nearest(target.suffix, DOCUMENTS)}"
+            f"document {target}: unknown ending {quoted(target.suffix)}{nearest(target.suffix.lower(), DOCUMENTS)}"
         )
     try:
         replace_file(target, document_content(document, target.suffix))
