@@ -3,6 +3,7 @@
 import io
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -102,6 +103,7 @@ def write_outputs(
     from fe_models.foundation.paths import replace_files
 
     contents: dict[Path, bytes] = {}
+    document = None if document is None else cache(document)  # the page and the PDF show the same pictures
     for path in paths:
         ending = path.suffix.lower()
         if others and ending in others:

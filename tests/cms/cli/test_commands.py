@@ -22,12 +22,13 @@ from cms.body.modal_file.contents import Content
 from cms.body.modal_file.file import VERSION, read, write, write_sealed
 from cms.cli import demo
 from cms.cli.app import app
-from cms.cli.outputs import DOCUMENTS, TABLES, output_files
+from cms.cli.outputs import DOCUMENTS, TABLES, output_files, write_outputs
 from cms.errors import JobError
 from cms.jobs.job import read_job
 from cms.pipeline import reduce_job
 from cms.reduction.basis.frames import TisserandFrame
 from cms.reduction.frame_conversion import convert_frame
+from fe_models.foundation.documents.document import Answer, Document
 from fe_models.foundation.extras import MissingExtraError
 from tests.bodies import box_mesh
 from tests.decks import JOB, write_deck
@@ -648,3 +649,16 @@ def test_a_missing_library_of_an_output_is_told_before_the_work(ending, library,
     monkeypatch.setitem(sys.modules, library, None)
     with pytest.raises(MissingExtraError, match=r"pip install"):
         output_files([tmp_path / f"result{ending}"], [], (*DOCUMENTS, *TABLES), JobError)
+
+
+def test_a_page_and_a_pdf_are_of_one_document(tmp_path):
+    made = []
+
+    def document():
+        made.append(Document("bar", "one bar", Answer("It holds."), ()))
+        return made[-1]
+
+    paths = [tmp_path / "bar.html", tmp_path / "bar.pdf"]
+    write_outputs(paths, document=document)
+    assert len(made) == 1
+    assert [path.read_bytes()[:4] for path in paths] == [b"<!do", b"%PDF"]
