@@ -324,16 +324,16 @@ def refused_by(own: Callable[[Any], None] | None, subject: Any) -> None:
 
 
 def at_door(package: str, name: str, found: Any, error: type[Exception]) -> Any:
-    """Return what a package offers under a name: of a function, one that checks its arguments against its annotations.
+    """Return what a package offers under a name; functions then check their arguments against their annotations.
 
     Parameters
     ----------
     package
-        Name of the package, which keeps the checking function.
+        Name of the package; the checking function is stored in it.
     name
         The public name.
     found
-        What stands under it inside.
+        The object as its module defines it.
     error
         Raised if an argument is of another kind; Python's `TypeError` if one is missing or has an unknown name.
     """

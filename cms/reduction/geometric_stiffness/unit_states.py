@@ -166,7 +166,7 @@ def unit_states(
     spread: bool = True,
     interfaces: Sequence[str] | None = None,
 ) -> UnitStates:
-    """Return the static states of the unit loads of a body in a frame, for `reduce(..., geometric=states)` in it.
+    """Return the static states of the unit loads of a body in a frame, which `reduce(..., geometric=states)` takes too.
 
     They are computed while the factorisation of the mode set exists, which can then be freed before the reduction needs
     the memory. This matters from several hundred thousand dofs on.
