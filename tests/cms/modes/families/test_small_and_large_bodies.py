@@ -48,6 +48,22 @@ def test_with_all_its_modes_a_reduced_beam_is_the_beam(n, name):
     assert_allclose(np.sort(reduced.free_frequencies), free_frequencies(body), rtol=1e-8)
 
 
+@pytest.mark.parametrize("name", SETS)
+@pytest.mark.parametrize("units", ["m-kg-s", "mm-t-s"])
+def test_two_masses_at_one_place_keep_their_frequencies_in_all_units(units, name):
+    """The body has no size that could scale its rotations; its spring couples them with translations."""
+    system, A = fm.unit_system(units), np.random.default_rng(1).normal(size=(6, 6))
+    k = 1e4 * (A @ A.T + np.eye(6))
+    M, K = np.diag([2, 2, 2, 0.01, 0.01, 0.01, 1, 1, 1, 0.02, 0.02, 0.02]), np.block([[k, -k], [-k, k]])
+    expected = np.sqrt(la.eigh(K, M, eigvals_only=True)[6:]) / (2 * np.pi)
+    size = np.tile(np.repeat([1.0, 1 / system.length], 3), 2)  # a rotation, as a displacement in the unit of length
+    M, K = (each * np.outer(size, size) / system.mass for each in (M, K))
+    nodes, dofs = np.tile(np.array([0.3, 0.2, -0.1]) / system.length, (2, 1)), list(np.ndindex(2, 6))
+    at = fm.Interface("a", "nodes", np.array([0]), nodes[0])
+    body = cms.couple(fm.body_from_matrices(M, K, nodes, dofs, name="two", units=system, interfaces=[at]))
+    assert_allclose(cms.reduce(body, SETS[name](body, n_modes=6)).free_frequencies, expected, rtol=1e-8)
+
+
 def test_more_modes_than_there_are_are_refused_with_the_number():
     body = beam(2)
     with pytest.raises(ModeSetError, match=r"has 6 interior dofs; choose 0 <= n_modes <= 6"):
