@@ -50,6 +50,7 @@ __all__ = [
     "body_mass_product",
     "body_tangent",
     "coupling",
+    "gyroscopic",
     "inertia_rate",
     "modal_block",
     "modal_term",
@@ -267,6 +268,13 @@ def body_mass_product(model, work, i, v, out):
 
 
 @loops
+def gyroscopic(omega, J, D):
+    """Return the derivative of omega × J omega + 2 D omega by omega: omega~ J - (J omega)~ + 2 D."""
+    turning = matrix_sum(product(tilde(omega), J), tilde(scaled(-1.0, turned(J, omega))))
+    return matrix_sum(scaled_matrix(2.0, D), turning)
+
+
+@loops
 def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
     """Write the derivative of (1) to (3) into H, (6 + n, 6 + n), with weights of mass, damping, stiffness parts.
 
@@ -280,10 +288,8 @@ def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
     bodies, n, q0, u0 = work.bodies, model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
     m, a, s, J = model.body_types.mass[model.bodies.kind[i]], vector(bodies.a_B[i]), vector(bodies.s[i]), bodies.J[i]
     omega, q_dot = vector(work.state.u[u0 + 3 :]), work.state.u[u0 + 6 : u0 + 6 + n]
-    v, W = column_sum(bodies.C1[3 * q0 : 3 * (q0 + n)], n, q_dot), tilde(omega)
-    spin = matrix_sum(tilde(add(scaled(2.0, v), cross(omega, s))), product(W, tilde(s)))
-    gyro = matrix_sum(product(W, J), tilde(scaled(-1.0, turned(J, omega))))
-    gyro = matrix_sum(scaled_matrix(2.0, matrix(bodies.D_q_dot[i])), gyro)
+    v, gyro = column_sum(bodies.C1[3 * q0 : 3 * (q0 + n)], n, q_dot), gyroscopic(omega, J, matrix(bodies.D_q_dot[i]))
+    spin = matrix_sum(tilde(add(scaled(2.0, v), cross(omega, s))), product(tilde(omega), tilde(s)))
     H[:, :] = 0.0
     turn[:, :] = 0.0
     put_block(H, 0, 0, scaled_matrix(c_m * m, unit_matrix()))

@@ -218,7 +218,7 @@ def quaternion_of(R):
     """Return w and (x, y, z) of a quaternion of a rotation matrix, of any length; w >= 0."""
     w = 1.0 + R[0][0] + R[1][1] + R[2][2]  # 4 w², and 4 w times x
     x = (R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1])
-    if w < 1.0:  # more than 90 degrees: the products of x, y, z with the largest of them, times 4
+    if w < 1.0:  # more than 120 degrees: the products of x, y, z with the largest of them, times 4
         k = 0 if R[0][0] >= R[1][1] and R[0][0] >= R[2][2] else (1 if R[1][1] >= R[2][2] else 2)
         symmetric = (
             (2.0 + 2 * R[0][0] - w, R[0][1] + R[1][0], R[0][2] + R[2][0]),

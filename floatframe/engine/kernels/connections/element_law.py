@@ -22,7 +22,7 @@ import math
 
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.compiler.user_call import call_law
-from floatframe.engine.kernels.connections.user_force import are_finite, put_state_derivatives, state_rows
+from floatframe.engine.kernels.connections.user_force import note_no_number, put_state_derivatives, state_rows
 from floatframe.engine.kernels.marker import marker_acceleration
 from floatframe.engine.kernels.rotation import exp_matrix
 from floatframe.engine.kernels.vector import add, dot, matrix, norm, product, put, put_sum, scaled, vector
@@ -132,12 +132,10 @@ def law_rows(model, work, c, c_k):
 
 @inner
 def note_what_is_no_number(model, work, c):
-    """Record the first element of a step whose law is not finite for a finite motion."""
-    head = model.laws.head[model.connections.item[c]]
-    if work.counted.no_number > 0 or are_finite(work.laws.outputs, n_results(head)):
-        return
-    if are_finite(work.laws.inputs, 1 + head[0] * head[1] + head[2] + head[3]):
-        work.counted.no_number = c + 1
+    """Record element c if its law is not finite for a finite motion."""
+    head, laws = model.laws.head[model.connections.item[c]], work.laws
+    n_in = 1 + head[0] * head[1] + head[2] + head[3]
+    note_no_number(work, c, laws.outputs, n_results(head), laws.inputs, n_in)
 
 
 @inner

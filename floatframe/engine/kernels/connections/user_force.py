@@ -53,6 +53,7 @@ from floatframe.model.functions.expressions import (
 __all__ = [
     "begin_states",
     "element_of",
+    "note_no_number",
     "put_state_derivatives",
     "resize_states",
     "state_rows",
@@ -237,12 +238,12 @@ def user_values(model, work, c):
     Return the numbers of coordinates, inputs and outputs.
     """
     n, n_in = gather_inputs(model, work, c)
-    return n, n_in, user_outputs(model, work, c)
+    return n, n_in, user_outputs(model, work, c, n_in)
 
 
 @inner
-def user_outputs(model, work, c):
-    """Write forces and rates of states for work.users.inputs into work.users.outputs; return the numbers as above."""
+def user_outputs(model, work, c, n_in):
+    """Write forces and rates of states for n_in work.users.inputs into work.users.outputs; return their number."""
     u = model.connections.item[c]
     n_out = model.users.n_forces[u] + model.users.n_states[u]
     if model.users.address[u] != 0:
@@ -251,11 +252,15 @@ def user_outputs(model, work, c):
         for j in range(n_out):
             f = model.users.tape0[u] + j
             work.users.outputs[j] = tape_value(model.tapes, model.functions, f, work.users.inputs, work.tapes)
-    if work.counted.no_number == 0 and not are_finite(work.users.outputs, n_out):
-        n = model.elements.coordinate0[element_of(model, c) + 1] - model.elements.coordinate0[element_of(model, c)]
-        if are_finite(work.users.inputs, 1 + 2 * n + model.users.n_states[u]):
-            work.counted.no_number = c + 1
+    note_no_number(work, c, work.users.outputs, n_out, work.users.inputs, n_in)
     return n_out
+
+
+@inner
+def note_no_number(work, c, outputs, n_out, inputs, n_in):
+    """Record the first connection of a step whose outputs are not finite for finite inputs."""
+    if work.counted.no_number == 0 and not are_finite(outputs, n_out) and are_finite(inputs, n_in):
+        work.counted.no_number = c + 1
 
 
 @inner

@@ -1,15 +1,16 @@
 """How the forces of one body change with the motion of what carries it, ground axes, moments about one point O.
 
-With mass m, first moment s, inertia J and momentum p about O, D = Σ q_dot_k D_k of the modes (kernels/body.py), the
+With mass m, first moment s and inertia J about O, momentum p, and D = Σ q_dot_k D_k of the modes (kernels/body.py), the
 residual of the body, seen from what carries it, changes by
 
     I xi_ddot + N xi_dot,   I = [[m, -s~], [s~, J]],   N = [[0, -2 p~], [0, Q]]
-    Q y = 2 s × (y × v) - J (omega × y) + y × J omega + omega × J y + 2 D y about its origin, less 2 r~ p~ for O
+    Q y = 2 s × (y × v) - J (omega × y) + y × J omega + omega × J y + 2 D y - 2 r × (p × y)
 
-and that of mode k by (b, B)·xi_ddot and the turning of xi_dot with 2 v × b - B × omega + 2 Y - (D_k + D_kᵀ) omega.
+where in Q the origin of the body is at r, its velocity is v, and s, J are about it. The residual of mode k changes by
+(b, B)·xi_ddot and by the turning of xi_dot along 2 v × b - B × omega + 2 Y - (D_k + D_kᵀ) omega.
 """
 
-from floatframe.engine.kernels.body import block, column, column_sum, coupling, inertia_rate
+from floatframe.engine.kernels.body import block, column, column_sum, coupling, gyroscopic, inertia_rate
 from floatframe.engine.kernels.compiler.compilation import inner, small
 from floatframe.engine.kernels.model import C2, C3
 from floatframe.engine.kernels.vector import (
@@ -49,10 +50,8 @@ def momentum_of_modes(model, work, i, R):
 def turning_of_momentum(m, s, J, by_modes, r, v, omega):
     """Return p, and Q about O, of a body at r from O; m, s, J about its origin, by_modes: its `momentum_of_modes`."""
     p = add(by_modes[0], add(scaled(m, v), cross(omega, s)))
-    W = tilde(omega)
-    Q = matrix_sum(scaled_matrix(-2.0, product(tilde(s), tilde(v))), scaled_matrix(-1.0, product(J, W)))
-    Q = matrix_sum(Q, matrix_sum(product(W, J), tilde(scaled(-1.0, turned(J, omega)))))
-    Q = matrix_sum(Q, scaled_matrix(2.0, by_modes[1]))
+    Q = matrix_sum(scaled_matrix(-2.0, product(tilde(s), tilde(v))), scaled_matrix(-1.0, product(J, tilde(omega))))
+    Q = matrix_sum(Q, gyroscopic(omega, J, by_modes[1]))
     return p, matrix_sum(Q, scaled_matrix(-2.0, product(tilde(r), tilde(p))))
 
 

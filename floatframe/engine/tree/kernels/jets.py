@@ -28,7 +28,7 @@ from floatframe.engine.tree.kernels.spatial import (
 from floatframe.engine.tree.kernels.spins import spin_variations, turning_by_columns
 from floatframe.engine.tree.kernels.tree import COLUMN, FAR_MODE, NEAR_MODE
 
-__all__ = ["carrier", "put_jets", "put_mode_jet", "write_jets"]
+__all__ = ["carrier", "put_mode_jet", "write_jets"]
 
 
 @inner

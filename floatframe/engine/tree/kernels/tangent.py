@@ -59,7 +59,6 @@ from floatframe.engine.tree.kernels.tree import COLUMN, FAR_MODE, NEAR_MODE
 
 __all__ = [
     "assemble",
-    "body_frame",
     "inner_product",
     "product_of",
     "sum_forces",

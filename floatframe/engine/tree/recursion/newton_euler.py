@@ -38,7 +38,7 @@ from floatframe.engine.kernels.vector import (
 from floatframe.engine.tree.kernels.elastic_turning import elastic_body_in_joint, elastic_carrier, spin_matrix
 from floatframe.engine.tree.recursion.nodes import ROTATION, SCREW, TRANSLATION
 
-__all__ = ["add_modal_forces", "newton_euler"]
+__all__ = ["newton_euler"]
 
 
 @loops

@@ -139,12 +139,16 @@ def bushing_load(model, discrete, step, c):
 
 @inner
 def put_states(model, work, step, c, first, part):
-    """Write the states of user force c after a part of their change over the step into the inputs."""
+    """Write the states of user force c after a part of their change over the step into the inputs, from `first` on.
+
+    Return the number of inputs.
+    """
     u = model.connections.item[c]
     change0 = step.load.shape[0] + step.f.shape[0] + model.users.state0[u]
     for s in range(model.users.n_states[u]):
         k = model.states.row[model.users.state0[u] + s]
         work.users.inputs[first + s] = step.known[k] + part * step.z[change0 + s]
+    return first + model.users.n_states[u]
 
 
 @inner
@@ -160,8 +164,8 @@ def user_force_load(model, work, discrete, step, c):
         begin, end = coordinate_ends(model, step, k, a, b, change)
         inputs[1 + p - first] = counted(model, k, end, step.known[k]) - 0.5 * (end - begin)
         inputs[1 + n + p - first] = coordinate_rate(model, discrete, step, k, a, b)
-    put_states(model, work, step, c, 1 + 2 * n, 0.0 if step.is_still else 0.5)
-    user_outputs(model, work, c)
+    n_in = put_states(model, work, step, c, 1 + 2 * n, 0.0 if step.is_still else 0.5)
+    user_outputs(model, work, c, n_in)
     given = 0.0
     for p in range(first, last):
         if model.coordinates.force[p] >= 0:
@@ -187,8 +191,8 @@ def user_state_residual(model, work, discrete, step, c):
         if model.rows.is_angle[k] and not step.is_still:
             rate = coordinate_rate(model, discrete, step, k, a, b)
         inputs[1 + n + p - first] = rate
-    put_states(model, work, step, c, 1 + 2 * n, 0.5)
-    user_outputs(model, work, c)
+    n_in = put_states(model, work, step, c, 1 + 2 * n, 0.5)
+    user_outputs(model, work, c, n_in)
     change0 = step.load.shape[0] + step.f.shape[0] + model.users.state0[u]
     for s in range(model.users.n_states[u]):
         rate = work.users.outputs[model.users.n_forces[u] + s]

@@ -315,12 +315,8 @@ def add_axes_moment(model, discrete, step, m, M):
 @inner
 def note(model, work, c):
     """Record an output that ends the run, and results that are not finite for a finite motion."""
-    i, total = model.connections.item[c], 0.0
-    note_stops(model, work, i)
-    for k in range(n_results(model.laws.head[i])):
-        total += work.laws.outputs[k]
-    if not math.isfinite(total):
-        note_what_is_no_number(model, work, c)
+    note_stops(model, work, model.connections.item[c])
+    note_what_is_no_number(model, work, c)
 
 
 @inner
