@@ -21,8 +21,8 @@ def extra_module(name: str, *, extra: str, purpose: str) -> ModuleType:
         Dotted name of the module.
     extra
         The extra of this project that installs it.
-    What needs the library, as the beginning of the message: "OP2 files".
-        What needs it, as the beginning of the message: "OP2 files".
+    purpose
+        What needs the library, as the beginning of the message: "OP2 files".
 
     Raises
     ------

@@ -284,14 +284,14 @@ def failure_of_element(
     """
     from floatframe.engine.kernels.generalized_alpha import STOPPED, UNRESOLVED
 
+    if outcome.status == STOPPED:  # the step converged, whatever an iterate of it gave
+        return Failure(compiled.stop_words[outcome.singular], outcome.excess)
     if no_number := int(work.counted.no_number):
         words = (
             f"{compiled.connection_words(no_number - 1)} is not finite (NaN or infinity) for a finite motion; check "
             "its law, or choose a smaller h if it is only known near the motion"
         )
         return Failure(words, outcome.excess)
-    if outcome.status == STOPPED:
-        return Failure(compiled.stop_words[outcome.singular], outcome.excess)
     if outcome.status != UNRESOLVED:
         return None
     c = int(compiled.model.gaps.connection[int(work.gaps.shortest)])
