@@ -13,6 +13,7 @@ from cms.body.source_columns import SourceColumns
 from cms.body.stress import PointStress
 from cms.errors import BodyError
 from fe_models.body.load_cases import ReducedLoadCase
+from fe_models.body.unit_check import BodyNumbers, hull_volume, implausible_numbers
 from fe_models.foundation.arrays import Array, IntArray, frozen_int, require_shape
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import Summary, listed, presented
@@ -21,7 +22,7 @@ from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.numbering import NONE, Numbering
 
-__all__ = ["BodyFrame", "ReducedBody", "ReducedInterface"]
+__all__ = ["BodyFrame", "ReducedBody", "ReducedInterface", "unit_findings"]
 
 ORTHONORMAL = 1e-6  #: defect of axes that counts as rounding of printed digits
 
@@ -335,3 +336,18 @@ class ReducedBody:
                 return case
         choices = [case.name for case in self.load_cases]
         raise BodyError(f"reduced body {self.name!r}: no load case {quoted(name)}{nearest(name, choices)}")
+
+
+def unit_findings(body: ReducedBody) -> list[tuple[bool, str]]:
+    """Return (is an error, text) for each implausible number: size, mass over the hull, 2 f L of the first frequency.
+
+    Size and hull are those of the kept nodes, the frequency is the first of `free_frequencies`.
+    """
+    nodes, free = np.asarray(body.nodes), np.asarray(body.free_frequencies)
+    numbers = BodyNumbers(
+        size=float(np.linalg.norm(np.ptp(nodes, axis=0))) if len(nodes) else 0.0,
+        hull=hull_volume(nodes) if len(nodes) else 0.0,
+        mass=body.moments.m,
+        frequency=float(free[0]) if len(free) else None,
+    )
+    return implausible_numbers(body.units, numbers)

@@ -95,6 +95,7 @@ def frame_command(
     damping: Annotated[
         float | None, typer.Option(help="Ratio of the new modes; default: the damping of the file, carried over.")
     ] = None,
+    heavy: Annotated[bool, typer.Option("--heavy", help="Confirm a damping ratio above 0.2.")] = False,
     units: Annotated[str | None, typer.Option(help="Write numbers in another unit system, such as m-kg-s.")] = None,
     geometric: Annotated[
         bool, typer.Option("--geometric-stiffness/--no-geometric-stiffness", help="Convert it, or leave it out.")
@@ -113,7 +114,7 @@ def frame_command(
     """
     from cms.cli.frame import FrameRequest, run_frame
 
-    print_body(run_frame(FrameRequest(file, to, at, origin, axes, damping, units, output, geometric)))
+    print_body(run_frame(FrameRequest(file, to, at, origin, axes, damping, units, output, geometric, heavy)))
 
 
 @guarded
@@ -276,6 +277,7 @@ def import_command(
     damping: Annotated[
         float | None, typer.Option(help="Ratio of every mode, added to the damping of the files.")
     ] = None,
+    heavy: Annotated[bool, typer.Option("--heavy", help="Confirm a damping ratio above 0.2.")] = False,
     repair_mass: Annotated[bool, typer.Option("--repair-mass", help="Set slightly negative masses to zero.")] = False,
     accept: Annotated[list[str] | None, typer.Option(help="Findings to accept: units.")] = None,
     output: Output = None,
@@ -312,6 +314,7 @@ def import_command(
                 damping,
                 repair_mass,
                 tuple(accept or ()),
+                heavy,
             )
         )
     )

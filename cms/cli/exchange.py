@@ -167,6 +167,7 @@ class ImportRequest:
     damping: float | None = None
     repair_mass: bool = False
     accept: tuple[str, ...] = ()
+    heavy: bool = False  #: whether a damping ratio above 0.2 is meant
 
 
 def run_import(request: ImportRequest) -> "ReducedBody":
@@ -299,7 +300,7 @@ def damping_of(request: ImportRequest) -> "Damping | None":
     """Return the damping requested in addition to that of the files."""
     from cms.reduction.basis.damping import ModalDamping
 
-    return None if request.damping is None else ModalDamping(request.damping)
+    return None if request.damping is None else ModalDamping(request.damping, heavy=request.heavy)
 
 
 # `cms recovery`: recovery tables of a modal file, listed or written for other programs --------------------------------

@@ -31,6 +31,7 @@ class FrameRequest:
     units: str | None = None
     output: Path | None = None
     keep_geometric: bool = True  #: False: leave the geometric stiffness out
+    heavy: bool = False  #: whether a ratio above 0.2 is meant
 
 
 def run_frame(request: FrameRequest) -> "ReducedBody":
@@ -92,7 +93,7 @@ def damping_of(request: FrameRequest) -> "Damping | None":
     """Return the damping that replaces that of the file; None if none is requested."""
     from cms.reduction.basis.damping import ModalDamping
 
-    return None if request.ratio is None else ModalDamping(request.ratio)
+    return None if request.ratio is None else ModalDamping(request.ratio, heavy=request.heavy)
 
 
 def numbers(option: str, text: str) -> tuple[float, float, float]:

@@ -31,7 +31,7 @@ def info_record(file: Path, units: str | None = None, mass_at: str | None = None
 def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
     """Print mass properties, modes and interfaces of a body, and its provenance if `everything`."""
     from cms.assessment.quality.body_record import body_record, body_size
-    from cms.assessment.quality.of_body.unit_hints import unit_texts
+    from cms.body.reduced_body import unit_findings
 
     record = body_record(body)
     length, mass, inertia = (
@@ -43,7 +43,7 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
     rows = [
         ("name", record["name"]),
         ("units", f"{body.units.name} (force {body.units.force_symbol}, stress {body.units.stress_symbol})"),
-        *[("", text) for text in unit_texts(body)],
+        *[("warning", text) for _, text in unit_findings(body)],
         ("frame B", frame["kind"] + (f" at {frame['at']}" if frame["at"] else "")),
         *([("held", "to the ground, as declared: no floating frame can take it")] if record["is_held"] else []),
         ("origin of B", f"{vector_words(frame['origin'], size)} {length} (mesh coordinates)"),

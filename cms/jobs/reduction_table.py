@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, StringConstraints, field_validator, model_validator
 
+from cms.errors import ModeSetError
 from cms.linear_algebra.memory.size import memory_bytes
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.linear_algebra.solvers.registry import SOLVERS
@@ -416,6 +417,7 @@ class DampingSection(Table):
         Field(None, description="true, or pairs [frequency in Hz, ratio below it]")
     )
     above: Ratio | None = Field(None, description="a number, 0 to 1, the ratio above the last step of the ramp")
+    heavy: bool = Field(False, description="true or false: whether ratios above 0.2 are meant")
     alpha: Coefficient | None = Field(None, description="a number, 0 or more, of D = alpha M + beta K")
     beta: Coefficient | None = Field(None, description="a number, 0 or more, of D = alpha M + beta K")
     file: Annotated[Path, BeforeValidator(existing_file())] | None = Field(
@@ -430,6 +432,11 @@ class DampingSection(Table):
             raise ValueError(f"expected either ratio, ratios, ramp, alpha and beta, or file; got {got}")
         if self.above is not None and self.ramp is None:
             raise ValueError(f"above belongs to ramp; got {given[0]}")
+        if self.file is None:
+            try:
+                _ = self.damping
+            except ModeSetError as error:
+                raise ValueError(str(error).removeprefix("damping: ")) from None
         return self
 
     @property
@@ -438,9 +445,9 @@ class DampingSection(Table):
         if self.file is not None:
             return read_strain_damping(self.file)
         if self.ratio is not None:
-            return ModalDamping(self.ratio)
+            return ModalDamping(self.ratio, heavy=self.heavy)
         if self.ratios is not None:
-            return PerModeDamping(self.ratios)
+            return PerModeDamping(self.ratios, heavy=self.heavy)
         if self.ramp is not None:
-            return RampDamping(self.ramp, 1.0 if self.above is None else self.above)
+            return RampDamping(self.ramp, 1.0 if self.above is None else self.above, heavy=self.heavy)
         return RayleighDamping(self.alpha or 0.0, self.beta or 0.0)

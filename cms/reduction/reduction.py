@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from cms.body.invariants import NEGATIVITY, Moments, NodalSums, moments_from_gram
-from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
+from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface, unit_findings
 from cms.errors import BodyError, ModeSetError
 from cms.modes.families.cost import (
     chosen_words,
@@ -156,6 +156,8 @@ def reduce(
     if moments.is_exact and moments.negativity > OF_MASSES:
         told[NEGATIVITY] = f"{moments.negativity:.3g}"
     reduced = assembled(keeping, modes, finished, condition, kept=kept, moments=moments, damping=damping)
+    for _, text in unit_findings(reduced):
+        log.warning("body %r: %s", body.name, text)
     return replace(
         reduced,
         provenance={**reduced.provenance, **{key: words for key, words in told.items() if words}},

@@ -8,8 +8,8 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from fe_models.body.material import Material
+from fe_models.body.unit_check import BodyNumbers, implausible_numbers
 from fe_models.checks.report import Finding, Report
-from fe_models.checks.unit_check import implausible_units
 from fe_models.elements.beams.attachments import RigidLink, Spring
 from fe_models.foundation.units import Units
 from fe_models.meshes.line_mesh import LineMesh
@@ -93,7 +93,8 @@ def report_frame(
                 f"{' and '.join(_names(mesh, apart[0]))}; merge them if the parts are one",
             )
         )
-    findings += [Finding("units", is_error, text) for is_error, text in implausible_units(units, size, materials)]
+    numbers = BodyNumbers(size=size, materials=tuple(materials))
+    findings += [Finding("units", is_error, text) for is_error, text in implausible_numbers(units, numbers)]
     length = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
     return FrameReport(mesh.source, units, n, len(mesh.lines), length, n_parts, tuple(findings))
 

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fe_models.body.material import AnyMaterial, assign_materials
+from fe_models.body.unit_check import BodyNumbers, implausible_numbers
 from fe_models.checks.first_order import FirstOrderError, first_order_error
 from fe_models.checks.report import Finding, Report
-from fe_models.checks.unit_check import implausible_units
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 from fe_models.foundation.errors import ArgumentError
@@ -246,7 +246,8 @@ def report_mesh(
     first_order = _first_order(mesh, materials, incompatible_modes, findings)
     if first_order is not None and first_order.error > FIRST_ORDER_NOTED:
         findings.append(Finding("first-order", False, first_order.description()))
-    findings += [Finding("units", is_error, text) for is_error, text in implausible_units(units, size, given)]
+    numbers = BodyNumbers(size=size, materials=tuple(given))
+    findings += [Finding("units", is_error, text) for is_error, text in implausible_numbers(units, numbers)]
     return MeshReport(
         source=mesh.source,
         units=units,

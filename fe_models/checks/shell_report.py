@@ -9,8 +9,8 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from fe_models.body.material import AnyMaterial
+from fe_models.body.unit_check import BodyNumbers, implausible_numbers
 from fe_models.checks.report import Finding, Report
-from fe_models.checks.unit_check import implausible_units
 from fe_models.elements.beams.attachments import RigidLink, Spring
 from fe_models.elements.shells.quality import WARP_LIMIT, cell_quality
 from fe_models.elements.shells.skin import cell_edges
@@ -149,7 +149,8 @@ def report_shell(
                 "unless the walls are intended like this",
             )
         )
-    findings += [Finding("units", is_error, text) for is_error, text in implausible_units(units, size, materials)]
+    numbers = BodyNumbers(size=size, materials=tuple(materials))
+    findings += [Finding("units", is_error, text) for is_error, text in implausible_numbers(units, numbers)]
     return ShellReport(
         mesh.source,
         units,

@@ -9,7 +9,7 @@ import numpy as np
 from cms.assessment.quality.reference.free_pencil import free_elastic_modes, has_inertia
 from cms.body.geometric_stiffness import GeometricStiffness
 from cms.body.invariants import Moments, moments_from_gram
-from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
+from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface, unit_findings
 from cms.errors import ForeignBodyError
 from cms.exchange.importers.superelement import listed
 from cms.exchange.importers.superelement_body import ImportOptions
@@ -21,7 +21,6 @@ from cms.reduction.basis.node_motion import are_spread, mean_translation
 from cms.reduction.frame_conversion import convert_frame
 from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.load_cases import ReducedLoadCase
-from fe_models.checks.unit_check import implausible_motion
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 from fe_models.foundation.records import FrozenMapping, frozen_copies
 from fe_models.meshes.numbering import Numbering
@@ -221,15 +220,10 @@ def body_of_modes(body: ModalBody, options: ImportOptions) -> ReducedBody:
 
 def require_plausible(where: str, reduced: ReducedBody, accept: tuple[str, ...]) -> None:
     """Raise `ForeignBodyError` if no body in these units has such a size, density or first frequency."""
-    frequencies = np.asarray(reduced.free_frequencies)
-    first = float(frequencies[0]) / reduced.units.time if len(frequencies) else None
-    for is_error, text in implausible_motion(reduced.units, reduced.nodes, reduced.moments.m, first):
+    for is_error, text in unit_findings(reduced):
         if is_error and "units" not in accept:
-            raise ForeignBodyError(
-                f'{where}: units {reduced.units.name}: {text}; name the units of the file, or accept = ["units"] if it '
-                "is meant"
-            )
-        log.warning("%s: units %s: %s", where, reduced.units.name, text)
+            raise ForeignBodyError(f'{where}: {text}; name the units of the file, or accept = ["units"] if it is meant')
+        log.warning("%s: %s", where, text)
 
 
 def geometric_at(

@@ -6,7 +6,8 @@ two frames are therefore two different dampings.
 """
 
 import ast
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -17,15 +18,18 @@ from fe_models.foundation.records import checked_fields
 
 __all__ = [
     "CUSTOMARY_STEPS",
+    "HEAVY",
     "Damping",
     "ModalDamping",
     "PerModeDamping",
     "RampDamping",
     "RayleighDamping",
     "damping_of_words",
+    "heavy_words",
     "modal_damping",
 ]
 
+HEAVY = 0.2  #: ratio to critical damping above which it must be confirmed: 0.5 may be meant as 0.5 %
 CUSTOMARY_STEPS = ((100.0, 0.01), (1000.0, 0.1))  #: 1 % below 100 Hz, 10 % below 1 kHz, critical above
 
 
@@ -37,13 +41,16 @@ class ModalDamping:
     Parameters
     ----------
     ratio
-        Ratio to critical damping, 0 <= ratio.
+        Ratio to critical damping, 0 to 1.
+    heavy
+        Whether a ratio above 0.2 is meant; without it such a ratio is refused.
     """
 
     ratio: float
+    heavy: bool = field(default=False, kw_only=True, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        _require_ratios("ratio", (self.ratio,))
+        _require_ratios("ratio", (self.ratio,), heavy=self.heavy)
 
 
 @dataclass(frozen=True)
@@ -54,16 +61,19 @@ class PerModeDamping:
     Parameters
     ----------
     ratios
-        Ratios to critical damping.
+        Ratios to critical damping, 0 to 1.
+    heavy
+        Whether ratios above 0.2 are meant; without it such ratios are refused.
     """
 
     ratios: tuple[float, ...]
+    heavy: bool = field(default=False, kw_only=True, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "ratios", tuple(float(ratio) for ratio in self.ratios))
         if not self.ratios:
             raise ModeSetError("damping: ratios: expected at least one, got none")
-        _require_ratios("ratios", self.ratios)
+        _require_ratios("ratios", self.ratios, heavy=self.heavy)
 
 
 @dataclass(frozen=True)
@@ -78,11 +88,14 @@ class RampDamping:
     steps
         Pairs (frequency [Hz], ratio below it), by ascending frequency.
     above
-        Ratio at and above the last frequency.
+        Ratio at and above the last frequency, 0 to 1.
+    heavy
+        Whether steps with a ratio above 0.2 are meant; without it they are refused. `above` needs no confirmation.
     """
 
     steps: tuple[tuple[float, float], ...] = CUSTOMARY_STEPS
     above: float = 1.0
+    heavy: bool = field(default=False, kw_only=True, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         steps = tuple((float(frequency), float(ratio)) for frequency, ratio in self.steps)
@@ -90,7 +103,8 @@ class RampDamping:
         frequencies = [frequency for frequency, _ in steps]
         if not steps or not all(0 < f < np.inf for f in frequencies) or sorted(set(frequencies)) != frequencies:
             raise ModeSetError(f"damping: steps: expected pairs (frequency in Hz, ratio), ascending, got {self.steps}")
-        _require_ratios("steps", (*(ratio for _, ratio in steps), self.above))
+        _require_ratios("steps", tuple(ratio for _, ratio in steps), heavy=self.heavy)
+        _require_ratios("above", (self.above,), heavy=True)
 
 
 @dataclass(frozen=True)
@@ -124,7 +138,10 @@ def damping_of_words(words: str) -> Damping | None:
         call = ast.parse(words, mode="eval").body
         if not isinstance(call, ast.Call) or not isinstance(call.func, ast.Name):
             return None
-        made: Damping = known[call.func.id](**{str(each.arg): ast.literal_eval(each.value) for each in call.keywords})
+        values = {str(each.arg): ast.literal_eval(each.value) for each in call.keywords}
+        confirmed = {} if call.func.id == "RayleighDamping" else {"heavy": True}
+        kind: Any = known[call.func.id]
+        made: Damping = kind(**values, **confirmed)
     except (SyntaxError, KeyError, TypeError, ValueError):
         return None
     return made
@@ -165,9 +182,20 @@ def damping_ratios(
     return ratios[np.searchsorted(limits, hertz, side="right")]
 
 
-def _require_ratios(key: str, ratios: tuple[float, ...]) -> None:
+def _require_ratios(key: str, ratios: tuple[float, ...], *, heavy: bool) -> None:
     for ratio in ratios:
         if not 0 <= ratio <= 1:
             raise ModeSetError(
                 f"damping: {key} = {ratio}; expected 0 to 1 (0.01 is 1 % of critical damping, 1 is critical)"
             )
+        if ratio > HEAVY and not heavy:
+            raise ModeSetError(f"damping: {key} = {ratio}: {heavy_words(ratio)}")
+
+
+def heavy_words(ratio: float) -> str:
+    """Return what is wrong with a ratio above `HEAVY` that is not confirmed."""
+    return (
+        f"this is {100 * ratio:g} % of critical damping; expected at most {HEAVY}. If it is meant, confirm it by "
+        f"heavy = true in the table [damping] (heavy=True in Python, --heavy of a command); if {ratio:g} % is "
+        f"meant, write {ratio / 100:g}"
+    )

@@ -7,6 +7,7 @@ import scipy.sparse as sp
 
 from fe_models.body.fe_body import FEBody, Interface, Recovery
 from fe_models.body.rigid_motion import rigid_motion_of_points
+from fe_models.body.unit_check import warn_of_materials
 from fe_models.elements.beams.attachments import PointMass, RigidLink, Spring, point_slices, spring_matrix
 from fe_models.elements.beams.axes import line_geometry
 from fe_models.elements.beams.beam_property import BeamProperty, assign_properties, section_of
@@ -66,6 +67,7 @@ def beam_body(
         If a group is unknown, or lines have no property or two properties.
     """
     used, of_line = assign_properties(mesh, properties)
+    warn_of_materials(name, units, [item.material for item in used])
     point_masses, springs, links = tuple(point_masses), tuple(springs), tuple(links)
     _require_known_nodes(mesh, point_masses, springs, links)
     sections = tuple(section_of(item) for item in used)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fe_models.body.fe_body import FEBody, Interface, Recovery
 from fe_models.body.material import material_words
+from fe_models.body.unit_check import warn_of_materials
 from fe_models.elements.beams.attachments import PointMass, RigidLink, Spring
 from fe_models.elements.beams.beam_property import BeamProperty
 from fe_models.elements.beams.body import assembled, beam_body, skin_rows
@@ -90,6 +91,7 @@ def shell_body(
     """
     mesh = as_shell_mesh(mesh)
     used, of_cell = assign_shell_properties(mesh, properties)
+    warn_of_materials(name, units, [material for item in used for material in item.materials])
     _require_cells(mesh, warp_limit)
     groups = tuple(
         shell_cells(mesh.nodes, kind, cells, used, of_cell[kind]) for kind, cells in mesh.cells.items() if len(cells)

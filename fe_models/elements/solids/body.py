@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.material import AnyMaterial, assign_materials, material_words
 from fe_models.body.rigid_motion import MassLoads
+from fe_models.body.unit_check import warn_of_materials
 from fe_models.elements.solids.assembly import Progress, assemble, expand_scalar_mass
 from fe_models.elements.solids.assembly_on_ranks import SpreadMesh, assemble_on_ranks
 from fe_models.elements.solids.elements import INTEGRATIONS, MASSES, reference_element
@@ -271,6 +272,7 @@ def solid_body(
             raise BodyError(f"solid_body: {what}: unknown {quoted(value)}{nearest(value, choices)}")
     mesh = as_mesh(mesh)
     used, of_cell = assign_materials(mesh, materials)
+    warn_of_materials(name, units, used)
     rules: dict[str, Any] = {"incompatible": incompatible_modes, "integration": integration, "mass": mass}
     if ranks is None or ranks.size == 1:
         K, M_s = assemble(mesh, used, of_cell, progress=progress, **rules)

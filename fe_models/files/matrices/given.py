@@ -17,7 +17,7 @@ from fe_models.body.freedom import rigid_forces
 from fe_models.body.held_causes import mistake_description, support_description
 from fe_models.body.positive_mass import DENSE, negative_mass, positive_mass
 from fe_models.body.rigid_motion import MassLoads
-from fe_models.checks.unit_check import implausible_matrices
+from fe_models.body.unit_check import BodyNumbers, hull_volume, implausible_numbers
 from fe_models.elements.solids.body import scalar_mass_gram
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray
@@ -239,7 +239,14 @@ def require_units(body: FEBody, *, accept: tuple[str, ...]) -> None:
     if unknown := set(accept) - {"units"}:
         raise BodyError(f"body {body.name!r}: accept: unknown {unknown.pop()!r}; expected 'units'")
     mass = float(np.diag(rigid_forces(body.K, body.M, body.nodes, body.dofs).mass)[:3].max())
-    for is_error, text in implausible_matrices(body.units, body.nodes, mass, wave_speeds(body)):
+    speeds = wave_speeds(body)
+    numbers = BodyNumbers(
+        size=float(np.linalg.norm(np.ptp(body.nodes, axis=0))),
+        hull=hull_volume(body.nodes),
+        mass=mass,
+        meshed_speed=float(np.median(speeds)) if len(speeds) else None,
+    )
+    for is_error, text in implausible_numbers(body.units, numbers):
         if is_error and "units" not in accept:
             raise BodyError(f'body {body.name!r}: {text}; or accept = ["units"] if it is meant')
         log.warning("body %r: %s", body.name, text)

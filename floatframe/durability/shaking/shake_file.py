@@ -117,6 +117,7 @@ class DampingSection(Table):
     )
     modes: dict[str, float] = Field(default_factory=dict, description='ratios by mode number, { "1" = 0.02 }')
     own: bool = Field(False, description="true: the damping of the body or of the dampers of the system")
+    heavy: bool = Field(False, description="true or false: whether ratios above 0.2 are meant")
 
 
 class UncertaintySection(Table):
@@ -395,7 +396,7 @@ def damping_of(section: DampingSection) -> Damping:
         if not key.isdecimal():
             raise ModelError(f"damping.modes.{key}: expected the number of a mode, from 1")
     modes = {int(key): value for key, value in section.modes.items()}
-    return Damping(section.ratio, section.Q, section.table, section.bands, modes, section.own)
+    return Damping(section.ratio, section.Q, section.table, section.bands, modes, section.own, section.heavy)
 
 
 def level_of(rows: Any, unit: str, where: str) -> Level:

@@ -132,6 +132,7 @@ def test_a_good_job_is_read(job_file):
     ('at = "small_end"', 'at = "smal_end"', "pull.at = \"smal_end\": there is no such interface; did you mean"),
     ('at = "small_end"', 'at = "small_end"\nreference = [0,0,0]', "an interface has its own"),
     ("ratio = 0.01", "ratio = 1.5", "damping.ratio = 1.5"),
+    ("ratio = 0.01", "ratio = 0.5", "damping: ratio = 0.5: this is 50 % of critical damping; expected at most 0.2."),
         ("ratio = 0.01", "ratios = [0.01, -1]", "damping.ratios = [0.01, -1]: expected a list of numbers, 0 to 1"),
     ("ratio = 0.01", "ramp = false", "damping.ramp = false: expected true, or pairs"),
     ("ratio = 0.01", "ramp = [[100, 0.1], [50, 0.2]]", "expected true, or pairs [frequency in Hz, ratio below it]"),
@@ -238,6 +239,7 @@ def test_dampings_and_frames_of_a_job_are_those_of_the_library(job_file):
     assert damping("ratios = [0.01, 0.02]") == PerModeDamping((0.01, 0.02))
     assert damping("ramp = true") == RampDamping(((100.0, 0.01), (1000.0, 0.1)), 1.0)
     assert damping("ramp = [[50, 0.02]]\nabove = 0.5") == RampDamping(((50.0, 0.02),), 0.5)
+    assert damping("ratios = [0.01, 0.3]\nheavy = true") == PerModeDamping((0.01, 0.3), heavy=True)
     assert damping("beta = 1e-5") == RayleighDamping(0.0, 1e-5)
     turned = "axes = [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]"
     job = read_job(

@@ -61,7 +61,7 @@ def cantilever(width=WIDTH, frame=None, n_modes=2, axes=None, **options):
     rows = (cms.Rows("beam force", components=("end A My",)), cms.Rows("interface force"))
     return cms.reduce(
         body, cms.craig_bampton(body, n_modes), frame=cms.NodalFrame("foot") if frame is None else frame,
-        damping=cms.ModalDamping(0.5), recovery=cms.RecoveryRequest("t", rows), **options,
+        damping=cms.ModalDamping(0.5, heavy=True), recovery=cms.RecoveryRequest("t", rows), **options,
     )  # fmt: skip
 
 

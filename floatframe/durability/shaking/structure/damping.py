@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from cms.reduction.basis.damping import HEAVY, heavy_words
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.records import checked_fields
 from floatframe.errors import ModelError
@@ -33,6 +34,8 @@ class Damping:
         Ratios of single modes by number, from 1.
     own
         Whether the damping of the body or of the dampers of the system is used.
+    heavy
+        Whether ratios above 0.2 are meant; without it such ratios are refused. `Q` needs no confirmation.
 
     Raises
     ------
@@ -46,6 +49,7 @@ class Damping:
     bands: Sequence[Sequence[float]] = ()
     modes: Mapping[int, float] = field(default_factory=dict)
     own: bool = False
+    heavy: bool = False
 
     def __post_init__(self) -> None:
         if self.ratio is not None and self.Q is not None:
@@ -77,6 +81,8 @@ class Damping:
         for value in [*ratios, *self.modes.values()]:
             if not (math.isfinite(value) and 0 <= value < 1):
                 raise ModelError(f"damping: expected ratios of critical damping from 0 to below 1, got {value!r}")
+            if value > HEAVY and not self.heavy and not (self.Q is not None and value == self.ratio):
+                raise ModelError(f"damping: ratio {value:g}: {heavy_words(value)}")
 
     def ratios(self, frequencies: Array) -> Array:
         """Return the ratio of every mode, (n_m,), by its frequency [Hz] and number.

@@ -6,7 +6,14 @@ from numpy.testing import assert_allclose
 
 from cms.errors import ModeSetError
 from cms.modes.mode_sets import craig_bampton
-from cms.reduction.basis.damping import ModalDamping, PerModeDamping, RampDamping, RayleighDamping, modal_damping
+from cms.reduction.basis.damping import (
+    ModalDamping,
+    PerModeDamping,
+    RampDamping,
+    RayleighDamping,
+    damping_of_words,
+    modal_damping,
+)
 from cms.reduction.basis.frames import NodalFrame
 from cms.reduction.reduction import reduce
 from fe_models.body.couplings.couplings import couple
@@ -78,9 +85,20 @@ def test_impossible_dampings_are_refused():
         (lambda: RampDamping(((100.0, 0.1), (50.0, 0.2))), "ascending"),
         (lambda: RampDamping(((0.0, 0.1),)), "ascending"),
         (lambda: RampDamping(()), "ascending"),
-        (lambda: RampDamping(above=-1.0), "steps = -1"),
+        (lambda: RampDamping(above=-1.0), "above = -1"),
         (lambda: RayleighDamping(-1.0), "alpha = -1"),
         (lambda: modal_damping(PerModeDamping((0.1,) * 7), np.eye(6), K), "7 ratios, but only 6 modes"),
     ]:
         with pytest.raises(ModeSetError, match=words):
             make()
+
+
+def test_a_ratio_above_a_fifth_must_be_confirmed():
+    """0.5 may be meant as 0.5 %; the ratio above the last step of a ramp damps modes above the band of interest."""
+    for kind, value in ((ModalDamping, 0.35), (PerModeDamping, (0.02, 0.35)), (RampDamping, ((70.0, 0.35),))):
+        with pytest.raises(ModeSetError, match=r"= 0.35: this is 35 % of critical .* heavy = true .* write 0.0035"):
+            kind(value)
+        meant = kind(value, heavy=True)
+        assert damping_of_words(str(meant)) == meant
+    assert ModalDamping(0.2).ratio == 0.2
+    assert RampDamping(((70.0, 0.05),), above=0.9).above == 0.9

@@ -356,6 +356,7 @@ def test_damping_by_table_band_and_mode():
         ({}, "got nothing"),
         ({"ratio": 0.1, "Q": 5}, "either ratio or Q"),
         ({"ratio": -0.1}, "from 0 to below 1"),
+        ({"ratio": 0.02, "modes": {2: 0.3}}, "ratio 0.3: this is 30 % of critical damping.* heavy = true"),
         ({"table": [(10, 0.1), (5, 0.1)]}, "row 2"),
         ({"bands": [(10, 5, 0.1)]}, "from < to"),
         ({"own": True, "ratio": 0.1}, "either own"),
@@ -364,6 +365,11 @@ def test_damping_by_table_band_and_mode():
 def test_damping_that_makes_no_sense_is_refused(given, words):
     with pytest.raises(ModelError, match=words):
         Damping(**given)
+
+
+def test_heavy_damping_can_be_meant():
+    assert Damping(ratio=0.02, bands=[(20, 90, 0.3)], heavy=True).ratios(np.array([50.0])) == 0.3
+    assert Damping(Q=1.25).ratios(np.array([50.0])) == 0.4
 
 
 def test_a_mode_in_no_band_is_refused():
