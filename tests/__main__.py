@@ -1,7 +1,7 @@
 """The checks of the project, in named groups: `python -m tests` runs the group `ci`.
 
     python -m tests              # lint, types, tests, notebooks, documentation: what every change has to pass
-    python -m tests --long       # studies of minutes, and those of --relative
+    python -m tests --long       # studies of minutes, motions by plain numba, and --relative
     python -m tests --relative   # tests of the engine again, in the coordinates of joints
     python -m tests --external   # beside other programs; those that are not there are skipped, visibly
     python -m tests --campaign   # seeded bad inputs, kills, random motions and bodies
@@ -39,10 +39,14 @@ LINT = ("lint", "ruff", "check", ".")
 TYPES = ("types", "mypy")
 #: else each worker compiles them
 KERNELS = ("kernels", "floatframe.cli.compile_kernels", "relative", "schemes", "recursion", "cholesky")
-#: the same motions with kernels compiled by plain numba, as with a numba that the lean compiler does not know; one test
-#: compiles them all, minutes beside other checks
+#: small kernels compiled by plain numba, as with a numba that the lean compiler does not know
 PLAIN = (
-    "kernels by plain numba", "pytest", "-q", "-o", "timeout=3600", "-m", "not long", "tests/floatframe/engine/kernels",
+    "small kernels by plain numba", "pytest", "-q",
+    "tests/floatframe/engine/kernels/test_arrays.py", "tests/floatframe/engine/kernels/test_dense.py",
+)  # fmt: skip
+#: all kernels of motions: plain numba compiles them in minutes
+PLAIN_MOTIONS = (
+    "motions by plain numba", "pytest", "-q", "-o", "timeout=3600", "-m", "not long", "tests/floatframe/engine/kernels",
     "--ignore=tests/floatframe/engine/kernels/compiler", "tests/floatframe/integrators/test_pendulum.py",
 )  # fmt: skip
 #: notebooks among the tests, so that no worker is idle at the end of either
@@ -72,7 +76,7 @@ class Group:
 
 GROUPS = {
     "ci": Group(((LINT,), (TYPES, KERNELS), (TESTS, PLAIN, DOCUMENTATION, RELATIVE_IN_SHORT)), 20),
-    "long": Group(((LONG,), (RELATIVE,)), 90),
+    "long": Group(((LONG,), (PLAIN_MOTIONS,), (RELATIVE,)), 90),
     "relative": Group(((KERNELS,), (RELATIVE,)), 15),
     "external": Group(((EXTERNAL,),), 10),
 }
@@ -160,7 +164,7 @@ def environment(check: Check) -> dict[str, str]:
     Modules are always stored as byte code: tests start hundreds of processes, and each would compile what it imports.
     """
     threads = {} if check in (LONG, EXTERNAL) else {"OMP_NUM_THREADS": "1"}
-    compiler = {"FLOATFRAME_COMPILER": "plain"} if check is PLAIN else {}
+    compiler = {"FLOATFRAME_COMPILER": "plain"} if check in (PLAIN, PLAIN_MOTIONS) else {}
     inherited = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     return {**threads, **inherited, **compiler, "PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
 

@@ -1,9 +1,5 @@
 """How Python hands arrays to the kernels."""
 
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from numba.core.errors import TypingError
@@ -11,7 +7,6 @@ from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
 
 from floatframe.engine.compiling.system import compiled_system
-from floatframe.engine.kernels.compiler.choice import is_lean
 from floatframe.engine.kernels.compiler.compilation import (
     array_type,
     array_value,
@@ -22,7 +17,7 @@ from floatframe.engine.kernels.compiler.compilation import (
     small,
 )
 from floatframe.engine.kernels.compiler.structure import Structure, n_words
-from floatframe.engine.kernels.entry import NO_MEMORY, absolute_kernels, prepare
+from floatframe.engine.kernels.entry import NO_MEMORY
 from floatframe.engine.kernels.memory import Memory, Rows, new_rows
 from floatframe.engine.kernels.model import JointRows, Model
 from floatframe.engine.kernels.records import leaves, measured
@@ -88,30 +83,6 @@ def as_block(_, array):
         return array_value(context, builder, signature.return_type, value.data, shape)
 
     return array_type(array.dtype, array.ndim)(array), generate
-
-
-def test_there_is_one_compilation_for_all_systems():
-    prepare()
-    assert not prepare()
-    assert len(absolute_kernels.compiled.signatures) == 1
-
-
-def test_kernels_come_from_the_cache_in_the_next_process():
-    prepare()
-    code = "from floatframe.engine.kernels.entry import prepare; print(prepare())"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "False\n"
-
-
-@pytest.mark.long
-@pytest.mark.skipif(not is_lean, reason="plain numba takes several times as long")
-def test_a_first_compilation_takes_less_than_20_s_of_processor_time(tmp_path):
-    code = "import time; from floatframe.engine.kernels.entry import prepare; assert prepare()\n"
-    code += "print(time.process_time())"
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
-    run = [sys.executable, "-c", code]
-    done = subprocess.run(run, capture_output=True, text=True, check=True, env=environment)
-    assert float(done.stdout) < 20.0
 
 
 def test_an_error_in_a_kernel_names_the_line():

@@ -13,7 +13,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from floatframe.engine.kernels.compiler.choice import CHOICES, KNOWN_VERSIONS, VARIABLE
-from tests.__main__ import GROUPS, KERNELS, PLAIN, environment
+from tests.__main__ import GROUPS, KERNELS, PLAIN, PLAIN_MOTIONS, environment
 from tests.root import ROOT
 
 CODE = "from floatframe.engine.kernels.compiler.choice import is_lean, words; print(is_lean, words())"
@@ -114,13 +114,22 @@ def test_the_pendulum_moves_with_the_oldest_numba(tmp_path):
     assert "skipped" not in done.stdout
 
 
-def test_every_change_runs_kernels_and_pendulum_plainly_too():
-    """A check of the group `ci` does it, by a variable that it alone has, and names tests that exist."""
-    assert any(PLAIN in stage for stage in GROUPS["ci"].stages)
-    assert environment(PLAIN)[VARIABLE] == "plain"
+@pytest.mark.parametrize(
+    ("group", "check", "path"),
+    [
+        ("ci", PLAIN, "tests/floatframe/engine/kernels/test_dense.py"),
+        ("long", PLAIN_MOTIONS, "tests/floatframe/integrators/test_pendulum.py"),
+        ("long", PLAIN_MOTIONS, "tests/floatframe/engine/kernels"),
+    ],
+)
+def test_small_kernels_are_compiled_plainly_at_every_change_and_motions_in_the_long_group(group, check, path):
+    """By a variable that these checks alone have, and with tests that exist."""
+    assert any(check in stage for stage in GROUPS[group].stages)
+    assert environment(check)[VARIABLE] == "plain"
+    assert path in check
+    assert all(Path(ROOT / word).exists() for word in check if word.startswith("tests/"))
+
+
+def test_other_checks_compile_as_the_user_does():
     assert environment(KERNELS).get(VARIABLE) == os.environ.get(VARIABLE)
-    paths = [word for word in PLAIN if word.startswith("tests/")]
-    assert any("pendulum" in path for path in paths)
-    assert "tests/floatframe/engine/kernels" in paths
-    assert all(Path(ROOT / path).exists() for path in paths)
     assert set(CHOICES) == {"lean", "plain"}
