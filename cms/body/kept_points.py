@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cms.errors import BodyError
-from fe_models.foundation.arrays import Array, IntArray, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields, frozen_copies, put_arrays
@@ -48,7 +48,7 @@ class KeptPoints:
 
     def __post_init__(self) -> None:
         put = object.__setattr__
-        put(self, "nodes", frozen_int(self.nodes))
+        put(self, "nodes", frozen(self.nodes, np.int64))
         put(self, "source", tuple(self.source))
         n = self.nodes.size
         if self.nodes.ndim != 1 or np.unique(self.nodes).size != n:

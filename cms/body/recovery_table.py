@@ -17,7 +17,7 @@ import numpy as np
 
 from cms.body.geometric_stiffness import SPIN_PAIRS
 from cms.errors import BodyError
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, require_finite, require_shape
+from fe_models.foundation.arrays import Array, IntArray, frozen, require_finite, require_shape
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields, frozen_copies
@@ -93,7 +93,7 @@ class RecoveryTable:
         put = object.__setattr__
         for name in (*TEXTS, "loads"):
             put(self, name, tuple(getattr(self, name)))
-        put(self, "numbers", frozen_int(self.numbers))
+        put(self, "numbers", frozen(self.numbers, np.int64))
         for name in ("dimensions", "dynamic", "load_dimensions", "static"):
             put(self, name, frozen(getattr(self, name)))
             require_finite(f"{where}: {name}", getattr(self, name))

@@ -14,7 +14,7 @@ from cms.body.stress import PointStress
 from cms.errors import BodyError
 from fe_models.body.load_cases import ReducedLoadCase
 from fe_models.body.unit_check import BodyNumbers, hull_volume, implausible_numbers
-from fe_models.foundation.arrays import Array, IntArray, frozen_int, require_shape
+from fe_models.foundation.arrays import Array, IntArray, frozen, require_shape
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import Summary, listed, presented
 from fe_models.foundation.records import FrozenMapping, checked_fields, frozen_copies, put_arrays
@@ -63,7 +63,7 @@ class BodyFrame:
     dofs: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "dofs", frozen_int(self.dofs))
+        object.__setattr__(self, "dofs", frozen(self.dofs, np.int64))
         if self.dofs.shape != (len(self.dofs), 2):
             raise BodyError(f"body frame: dofs: expected (n, 2) of (node, component), got {self.dofs.shape}")
         put_arrays(self, "body frame", {"origin": (3,), "axes": (3, 3)})
@@ -109,7 +109,7 @@ class ReducedInterface:
     def __post_init__(self) -> None:
         where = f"interface {self.name!r}"
         put_arrays(self, where, {"position": (3,), "triad": (3, 3), "Psi": (6, np.atleast_1d(self.Psi).shape[-1])})
-        object.__setattr__(self, "members", frozen_int(self.members))
+        object.__setattr__(self, "members", frozen(self.members, np.int64))
         require_orthonormal(f"{where}: triad", self.triad)
 
 
@@ -214,7 +214,7 @@ class ReducedBody:
         where = f"reduced body {self.name!r}"
         put = object.__setattr__
         for name in ("node_ids", "surface"):
-            put(self, name, frozen_int(getattr(self, name)))
+            put(self, name, frozen(getattr(self, name), np.int64))
         for name in ("labels", "sources", "interfaces", "load_cases"):
             put(self, name, tuple(getattr(self, name)))
         put(self, "provenance", FrozenMapping(dict(self.provenance)))

@@ -15,7 +15,6 @@ from fe_models.foundation.arrays import (
     Array,
     IntArray,
     frozen,
-    frozen_int,
     require_finite,
     require_shape,
     symmetric_csc,
@@ -207,7 +206,7 @@ class Interface:
         where = f"interface {self.name!r}"
         if self.kind not in INTERFACE_KINDS:
             raise InterfaceError(f"{where}: unknown kind {quoted(self.kind)}{nearest(self.kind, INTERFACE_KINDS)}")
-        object.__setattr__(self, "nodes", frozen_int(self.nodes))
+        object.__setattr__(self, "nodes", frozen(self.nodes, np.int64))
         object.__setattr__(self, "reference", frozen(self.reference))
         object.__setattr__(self, "triad", frozen(self.triad))
         if self.nodes.ndim != 1 or self.nodes.size == 0:
@@ -230,7 +229,7 @@ class Interface:
             raise InterfaceError(f"{where}: weights: expected no negative weight and a positive sum")
         object.__setattr__(self, "weights", frozen(weights / weights.sum()))
         if self.dofs is not None:
-            object.__setattr__(self, "dofs", frozen_int(self.dofs))
+            object.__setattr__(self, "dofs", frozen(self.dofs, np.int64))
 
 
 @dataclass(frozen=True, eq=False)
@@ -381,8 +380,8 @@ class FEBody:
         where = f"body {self.name!r}"
         put = object.__setattr__
         put(self, "nodes", frozen(self.nodes))
-        put(self, "dofs", frozen_int(self.dofs))
-        put(self, "surface", frozen_int(self.surface))
+        put(self, "dofs", frozen(self.dofs, np.int64))
+        put(self, "surface", frozen(self.surface, np.int64))
         put(self, "interfaces", tuple(self.interfaces))
         put(self, "provenance", MappingProxyType(dict(self.provenance)))
         if self.nodes.ndim != 2 or self.nodes.shape[1] != 3 or len(self.nodes) == 0:
@@ -424,7 +423,7 @@ class FEBody:
         if self.surface.size and (self.surface.min() < 0 or self.surface.max() >= len(self.nodes)):
             raise BodyError(f"{where}: surface: nodes outside 0..{len(self.nodes) - 1}")
         self.numbering.require_fit(where, len(self.nodes), len(self.surface))
-        put(self, "kept", frozen_int(np.unique(self.kept)))
+        put(self, "kept", frozen(np.unique(self.kept), np.int64))
         if self.kept.size and (self.kept.min() < 0 or self.kept.max() >= len(self.nodes)):
             raise BodyError(f"{where}: kept: nodes outside 0..{len(self.nodes) - 1}")
 

@@ -15,7 +15,7 @@ from fe_models.body.unit_check import BodyNumbers, implausible_numbers
 from fe_models.checks.first_order import FirstOrderError, first_order_error
 from fe_models.checks.report import Finding, Report
 from fe_models.errors import MeshError
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
@@ -337,7 +337,7 @@ def _measure_tetra10(X: Array) -> tuple[Array, ...]:
 def _select(
     geometry: Mapping[str, CellGeometry], test: Callable[[CellGeometry], NDArray[np.bool_]]
 ) -> Mapping[str, IntArray]:
-    chosen = {kind: frozen_int(np.flatnonzero(test(g))) for kind, g in geometry.items()}
+    chosen = {kind: frozen(np.flatnonzero(test(g)), np.int64) for kind, g in geometry.items()}
     return MappingProxyType({kind: rows for kind, rows in chosen.items() if rows.size})
 
 

@@ -1,6 +1,6 @@
 """Arrays of the frozen types: float64, C order, finite, read-only; names of their components."""
 
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,7 +15,6 @@ __all__ = [
     "IntArray",
     "axial",
     "frozen",
-    "frozen_int",
     "require_finite",
     "require_shape",
     "symmetric_csc",
@@ -33,18 +32,13 @@ STRESS_COMPONENTS = ("xx", "yy", "zz", "yz", "xz", "xy")  #: components of a sym
 SYMMETRY_DEFECT = 1e-8  #: largest |A - A.T| / |A| that counts as rounding
 
 
-def frozen(values: Any) -> Array:
-    """Return a read-only float64 array in C order; the values are copied only if necessary."""
-    array = np.ascontiguousarray(values, dtype=np.float64)
-    if array.flags.writeable:
-        array = array.view()
-        array.flags.writeable = False
-    return array
-
-
-def frozen_int(values: Any) -> IntArray:
-    """Return a read-only int64 array in C order; the values are copied only if necessary."""
-    array = np.ascontiguousarray(values, dtype=np.int64)
+@overload
+def frozen(values: Any) -> Array: ...
+@overload
+def frozen(values: Any, kind: type[np.int64]) -> IntArray: ...
+def frozen(values: Any, kind: type[Any] = np.float64) -> Any:
+    """Return a read-only array of that kind in C order; the values are copied only if necessary."""
+    array = np.ascontiguousarray(values, dtype=kind)
     if array.flags.writeable:
         array = array.view()
         array.flags.writeable = False

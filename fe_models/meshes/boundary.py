@@ -6,7 +6,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array, IntArray, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.meshes.cell_shapes import facet_tables, quadrature, shape_values
 from fe_models.meshes.mesh import Mesh
 
@@ -90,7 +90,7 @@ def _boundary(mesh: Mesh) -> tuple[Facets, Facets]:
         ends = np.cumsum([len(every[kind][0]) for kind in kinds])
         for kind, own in zip(kinds, np.split(is_single, ends[:-1]), strict=True):
             if own.any():
-                facets[kind], owners[kind] = (frozen_int(array[own]) for array in every[kind])
+                facets[kind], owners[kind] = (frozen(array[own], np.int64) for array in every[kind])
     _known[mesh] = MappingProxyType(facets), MappingProxyType(owners)
     return _known[mesh]
 

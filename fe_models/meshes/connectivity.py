@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.foundation.arrays import IntArray, frozen_int
+from fe_models.foundation.arrays import IntArray, frozen
 from fe_models.meshes.boundary import CORNERS, all_facets, boundary_facets, first_of_equal_rows
 from fe_models.meshes.mesh import Mesh, used_nodes
 
@@ -104,4 +104,4 @@ def coincident_nodes(mesh: Mesh, distance: float) -> IntArray:
 
     nodes = np.flatnonzero(used_nodes(mesh))
     apart, _ = cKDTree(mesh.nodes[nodes]).query(mesh.nodes[nodes], k=2, distance_upper_bound=max(distance, 1e-300))
-    return frozen_int(nodes[np.isfinite(apart[:, 1])])
+    return frozen(nodes[np.isfinite(apart[:, 1])], np.int64)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fe_models.errors import BeamError
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import FrozenMapping, checked_fields, frozen_copies
@@ -74,12 +74,12 @@ class LineMesh:
     def __post_init__(self) -> None:
         put = object.__setattr__
         put(self, "nodes", frozen(self.nodes))
-        put(self, "lines", frozen_int(np.asarray(self.lines).reshape(-1, 2)))
+        put(self, "lines", frozen(np.asarray(self.lines).reshape(-1, 2), np.int64))
         put(self, "included", FrozenMapping(self.included))
-        put(self, "node_numbers", frozen_int(self.node_numbers))
-        put(self, "line_numbers", frozen_int(self.line_numbers))
+        put(self, "node_numbers", frozen(self.node_numbers, np.int64))
+        put(self, "line_numbers", frozen(self.line_numbers, np.int64))
         for name in ("line_sets", "node_sets"):
-            put(self, name, FrozenMapping({group: frozen_int(m) for group, m in getattr(self, name).items()}))
+            put(self, name, FrozenMapping({group: frozen(m, np.int64) for group, m in getattr(self, name).items()}))
         n = len(self.lines)
         if self.nodes.ndim != 2 or self.nodes.shape[1] != 3 or not len(self.nodes):
             raise BeamError(f"line mesh: nodes: expected (n_nodes, 3), got {self.nodes.shape}")

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import FrozenMapping, checked_fields, frozen_copies
@@ -82,18 +82,18 @@ class Mesh:
         put = object.__setattr__
         put(self, "nodes", frozen(self.nodes))
         put(self, "included", FrozenMapping(self.included))
-        put(self, "node_numbers", frozen_int(self.node_numbers))
+        put(self, "node_numbers", frozen(self.node_numbers, np.int64))
         put(self, "notes", tuple(self.notes))
         for name in ("cells", "faces", "cell_numbers"):
-            put(self, name, FrozenMapping({kind: frozen_int(c) for kind, c in getattr(self, name).items()}))
+            put(self, name, FrozenMapping({kind: frozen(c, np.int64) for kind, c in getattr(self, name).items()}))
         for name in ("cell_sets", "face_sets"):
             sets = {
-                group: FrozenMapping({kind: frozen_int(rows) for kind, rows in by_type.items()})
+                group: FrozenMapping({kind: frozen(rows, np.int64) for kind, rows in by_type.items()})
                 for group, by_type in getattr(self, name).items()
             }
             put(self, name, FrozenMapping(sets))
         put(self, "origin", FrozenMapping(self.origin))
-        put(self, "node_sets", FrozenMapping({group: frozen_int(n) for group, n in self.node_sets.items()}))
+        put(self, "node_sets", FrozenMapping({group: frozen(n, np.int64) for group, n in self.node_sets.items()}))
 
     @property
     def n_cells(self) -> int:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import FrozenMapping, checked_fields, frozen_copies
@@ -53,11 +53,11 @@ class NodeCloud:
         put = object.__setattr__
         put(self, "nodes", frozen(self.nodes))
         put(self, "included", FrozenMapping(self.included))
-        put(self, "node_numbers", frozen_int(self.node_numbers))
+        put(self, "node_numbers", frozen(self.node_numbers, np.int64))
         put(self, "notes", tuple(self.notes))
-        put(self, "node_sets", FrozenMapping({group: frozen_int(n) for group, n in self.node_sets.items()}))
+        put(self, "node_sets", FrozenMapping({group: frozen(n, np.int64) for group, n in self.node_sets.items()}))
         sets = {
-            group: FrozenMapping({kind: frozen_int(rows) for kind, rows in by_type.items()})
+            group: FrozenMapping({kind: frozen(rows, np.int64) for kind, rows in by_type.items()})
             for group, by_type in self.face_sets.items()
         }
         put(self, "face_sets", FrozenMapping(sets))

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array, IntArray, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.errors import ArgumentError, BodyError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields, frozen_copies
@@ -22,7 +22,7 @@ __all__ = ["NONE", "NO_NUMBERS", "NamedSet", "Numbering", "node_place", "numberi
 NONE = -1  #: marks a node or element without a user number, such as the reference node of an interface
 SHOWN = 3  #: how many of the nearest numbers a message lists
 KINDS = ("nodes", "elements")
-NO_NUMBERS = frozen_int(np.zeros(0))  #: stands for unknown numbers
+NO_NUMBERS = frozen(np.zeros(0), np.int64)  #: stands for unknown numbers
 
 
 @frozen_copies
@@ -49,7 +49,7 @@ class NamedSet:
     size: int
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "members", frozen_int(self.members))
+        object.__setattr__(self, "members", frozen(self.members, np.int64))
         if self.kind not in KINDS:
             raise BodyError(f"set {self.name!r}: kind: expected one of {', '.join(KINDS)}, got {quoted(self.kind)}")
         if self.members.ndim != 1:
@@ -95,7 +95,7 @@ class Numbering:
     def __post_init__(self) -> None:
         put = object.__setattr__
         for name in ("nodes", "on_skin", "elements", "node_instance", "element_instance"):
-            put(self, name, frozen_int(getattr(self, name)))
+            put(self, name, frozen(getattr(self, name), np.int64))
             if getattr(self, name).ndim != 1:
                 raise BodyError(f"numbering: {name}: expected (n,), got {getattr(self, name).shape}")
         put(self, "instances", tuple(self.instances))

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.errors import ShellError
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import FrozenMapping, checked_fields, frozen_copies
@@ -75,15 +75,15 @@ class ShellMesh:
     def __post_init__(self) -> None:
         put = object.__setattr__
         put(self, "nodes", frozen(self.nodes))
-        put(self, "lines", frozen_int(np.asarray(self.lines).reshape(-1, 2)))
+        put(self, "lines", frozen(np.asarray(self.lines).reshape(-1, 2), np.int64))
         put(self, "included", FrozenMapping(self.included))
-        put(self, "node_numbers", frozen_int(self.node_numbers))
-        put(self, "line_numbers", frozen_int(self.line_numbers))
+        put(self, "node_numbers", frozen(self.node_numbers, np.int64))
+        put(self, "line_numbers", frozen(self.line_numbers, np.int64))
         put(self, "notes", tuple(self.notes))
         for name in ("cells", "line_sets", "node_sets", "cell_numbers"):
-            put(self, name, FrozenMapping({key: frozen_int(rows) for key, rows in getattr(self, name).items()}))
+            put(self, name, FrozenMapping({key: frozen(rows, np.int64) for key, rows in getattr(self, name).items()}))
         sets = {
-            group: FrozenMapping({kind: frozen_int(rows) for kind, rows in by_type.items()})
+            group: FrozenMapping({kind: frozen(rows, np.int64) for kind, rows in by_type.items()})
             for group, by_type in self.cell_sets.items()
         }
         put(self, "cell_sets", FrozenMapping(sets))

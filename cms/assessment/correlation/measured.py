@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from cms.assessment.correlation.errors import CorrelationError
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 
 __all__ = ["MeasuredModes", "phase_collinearity", "real_shapes"]
 
@@ -36,7 +36,7 @@ class MeasuredModes:
         put, where = object.__setattr__, f"measured modes {self.source}".rstrip()
         for name in ("frequencies", "shapes", "directions", "places", "damping", "collinearity"):
             put(self, name, frozen(getattr(self, name)))
-        put(self, "points", frozen_int(self.points))
+        put(self, "points", frozen(self.points, np.int64))
         n, n_rows = len(self.frequencies), len(self.points)
         if not n or not n_rows:
             raise CorrelationError(f"{where}: expected at least one mode and one point, got {n} and {n_rows}")

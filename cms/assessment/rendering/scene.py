@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from cms.assessment.rendering.errors import SceneError
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 
 __all__ = ["Lines", "Scene", "Surface", "Triad", "frame_of"]
 
@@ -28,7 +28,7 @@ class Surface:
     def __post_init__(self) -> None:
         where = f"surface {self.name!r}" if self.name else "surface"
         put = object.__setattr__
-        put(self, "triangles", frozen_int(self.triangles))
+        put(self, "triangles", frozen(self.triangles, np.int64))
         put(self, "nodes", positions(where, self.nodes))
         n_nodes = self.nodes.shape[-2]
         if self.triangles.ndim != 2 or self.triangles.shape[1] != 3:
@@ -65,7 +65,7 @@ class Lines:
     is_backdrop: bool = False  #: whether it is drawn behind everything else, such as a ground
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "segments", frozen_int(self.segments))
+        object.__setattr__(self, "segments", frozen(self.segments, np.int64))
         object.__setattr__(self, "points", positions("lines", self.points))
         n_points = self.points.shape[-2]
         if self.segments.ndim != 2 or self.segments.shape[1] != 2:

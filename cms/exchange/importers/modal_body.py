@@ -21,7 +21,7 @@ from cms.reduction.basis.node_motion import are_spread, mean_translation
 from cms.reduction.frame_conversion import convert_frame
 from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.load_cases import ReducedLoadCase
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.records import FrozenMapping, frozen_copies
 from fe_models.meshes.numbering import Numbering
 
@@ -43,7 +43,7 @@ class ForeignInterface:
     Psi: Array | None = None  #: translation and rotation for each mode in B, (6, n_q); None: from its nodes
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "nodes", frozen_int(self.nodes))
+        object.__setattr__(self, "nodes", frozen(self.nodes, np.int64))
 
 
 @frozen_copies
@@ -92,8 +92,8 @@ class ModalBody:
             if not np.isfinite(array).all():
                 raise ForeignBodyError(f"{where}: {name}: expected finite numbers")
             put(self, name, array)
-        put(self, "node_numbers", frozen_int(self.node_numbers))
-        put(self, "surface", frozen_int(self.surface))
+        put(self, "node_numbers", frozen(self.node_numbers, np.int64))
+        put(self, "surface", frozen(self.surface, np.int64))
         put(self, "provenance", FrozenMapping(dict(self.provenance)))
         if not n:
             raise ForeignBodyError(f"{where}: expected at least one mode, got none; a rigid body needs no file")

@@ -8,7 +8,7 @@ import numpy as np
 from cms.errors import ForeignBodyError
 from cms.exchange.importers.element_rows import ForeignRows
 from fe_models.files.matrices.foreign_matrices import SCALAR, ForeignMatrices, pair_keys
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.records import FrozenMapping, frozen_copies
 
 __all__ = ["RecoveryRows", "Superelement", "superelement_of_matrices"]
@@ -26,7 +26,7 @@ class RecoveryRows:
     matrix: Array  #: (n_rows, n_dof)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "dofs", frozen_int(self.dofs))
+        object.__setattr__(self, "dofs", frozen(self.dofs, np.int64))
         object.__setattr__(self, "matrix", frozen(self.matrix))
         if self.dofs.shape != (len(self.matrix), 2):
             raise ForeignBodyError(
@@ -61,8 +61,8 @@ class Superelement:
     def __post_init__(self) -> None:
         where = f"superelement {self.name!r}"
         put = object.__setattr__
-        put(self, "dofs", frozen_int(self.dofs))
-        put(self, "node_numbers", frozen_int(self.node_numbers))
+        put(self, "dofs", frozen(self.dofs, np.int64))
+        put(self, "node_numbers", frozen(self.node_numbers, np.int64))
         put(self, "nodes", frozen(self.nodes))
         n = len(self.dofs)
         if self.dofs.shape != (n, 2) or not n:

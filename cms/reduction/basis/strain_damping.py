@@ -16,7 +16,7 @@ import numpy as np
 
 from cms.errors import ModeSetError
 from fe_models.body.fe_body import FEBody
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.tall.columns import inner
 
 __all__ = ["StrainDamping", "read_strain_damping", "strain_damping_bytes"]
@@ -58,7 +58,7 @@ class StrainDamping:
     def __post_init__(self) -> None:
         for name in ("coefficients", "forces", "positions"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
-        object.__setattr__(self, "components", frozen_int(self.components))
+        object.__setattr__(self, "components", frozen(self.components, np.int64))
         n_dof, n = len(self.components), len(self.coefficients)
         if self.coefficients.shape != (n,) or self.forces.shape != (n_dof, n) or self.positions.shape != (n_dof, 3):
             raise ModeSetError(

@@ -7,7 +7,7 @@ import numpy as np
 
 from fe_models.elements.beams.slices import Slices, second_moments
 from fe_models.errors import BeamError
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, tilde
+from fe_models.foundation.arrays import Array, IntArray, frozen, tilde
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.records import checked_fields
 
@@ -135,7 +135,7 @@ class RigidLink:
     followers: Any
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "followers", frozen_int(np.atleast_1d(self.followers)))
+        object.__setattr__(self, "followers", frozen(np.atleast_1d(self.followers), np.int64))
         if not len(self.followers) or self.node in self.followers:
             raise BeamError(
                 f"rigid link at node {self.node}: expected other nodes that follow it, got {self.followers}"

@@ -9,7 +9,7 @@ from fe_models.body.fe_body import FEBody
 from fe_models.elements.beams.model import BeamModel
 from fe_models.elements.beams.section_properties import SectionProperties
 from fe_models.errors import BeamError
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 
 __all__ = ["SectionPoints", "section_points"]
 
@@ -22,7 +22,7 @@ class SectionPoints:
     lines: IntArray  #: (n_lines,)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "lines", frozen_int(self.lines))
+        object.__setattr__(self, "lines", frozen(self.lines, np.int64))
 
     @property
     def names(self) -> tuple[str, ...]:

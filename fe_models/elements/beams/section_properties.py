@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.errors import SectionError
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 
 __all__ = ["SectionProperties", "normal_stress"]
 
@@ -44,8 +44,8 @@ class SectionProperties:
                 raise SectionError(f"section: {name}: expected a number above zero, got {value:g}")
         object.__setattr__(self, "points", frozen(self.points))
         object.__setattr__(self, "stress", frozen(self.stress))
-        object.__setattr__(self, "loops", tuple(frozen_int(loop) for loop in self.loops))
-        object.__setattr__(self, "cap", frozen_int(self.cap))
+        object.__setattr__(self, "loops", tuple(frozen(loop, np.int64) for loop in self.loops))
+        object.__setattr__(self, "cap", frozen(self.cap, np.int64))
         n = len(self.points)
         if self.points.shape != (n, 2) or self.stress.shape != (n, 3, 6):
             raise SectionError(

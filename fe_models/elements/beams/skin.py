@@ -6,7 +6,7 @@ import numpy as np
 
 from fe_models.elements.beams.axes import LineGeometry
 from fe_models.elements.beams.section_properties import SectionProperties
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 
 __all__ = ["Skin", "make_skin"]
 
@@ -85,10 +85,10 @@ def make_skin(
             line_of.append(np.full(len(cap), line))
     return Skin(
         frozen(np.concatenate(points) if points else np.zeros((0, 3))),
-        frozen_int(np.concatenate(mover) if mover else np.zeros(0)),
-        frozen_int(np.concatenate(triangles) if triangles else np.zeros((0, 3))),
-        frozen_int(np.concatenate(line_of) if line_of else np.zeros(0)),
-        frozen_int(start),
+        frozen(np.concatenate(mover) if mover else np.zeros(0), np.int64),
+        frozen(np.concatenate(triangles) if triangles else np.zeros((0, 3)), np.int64),
+        frozen(np.concatenate(line_of) if line_of else np.zeros(0), np.int64),
+        frozen(start, np.int64),
     )
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 
 __all__ = ["Slices", "second_moments"]
 
@@ -35,7 +35,7 @@ class Slices:
     def __post_init__(self) -> None:
         for name in ("position", "mass", "axes", "moments", "motion"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
-        object.__setattr__(self, "dofs", frozen_int(self.dofs))
+        object.__setattr__(self, "dofs", frozen(self.dofs, np.int64))
 
     def mass_matrices(self) -> Array:
         """Return the mass matrices of the elements, (n, d, d) [kg, kg m, kg m²]."""

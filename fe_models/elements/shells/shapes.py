@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 
 __all__ = ["FlatShape", "flat_quadrature", "flat_shape"]
 
@@ -77,4 +77,4 @@ def flat_quadrature(kind: str, degree: int) -> tuple[Array, Array]:
 
 
 def _frozen_shape(N: Array, dN: Array, E: Array, dE: Array, sides: IntArray) -> FlatShape:
-    return FlatShape(frozen(N), frozen(dN), frozen(E), frozen(dE), frozen_int(sides))
+    return FlatShape(frozen(N), frozen(dN), frozen(E), frozen(dE), frozen(sides, np.int64))

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_models.elements.shells.elements import ShellCells
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 
 __all__ = ["ShellSkin", "cell_edges", "make_shell_skin"]
 
@@ -132,8 +132,8 @@ def make_shell_skin(nodes: Array, groups: tuple[ShellCells, ...]) -> ShellSkin:
             behind += [own, own]
     return ShellSkin(
         frozen(np.concatenate([center + half, center - half])),
-        frozen_int(np.concatenate([mover, mover])),
-        frozen_int(np.concatenate(triangles)),
-        frozen_int(np.concatenate(behind)),
-        tuple(frozen_int(rows) for rows in by_type),
+        frozen(np.concatenate([mover, mover]), np.int64),
+        frozen(np.concatenate(triangles), np.int64),
+        frozen(np.concatenate(behind), np.int64),
+        tuple(frozen(rows, np.int64) for rows in by_type),
     )

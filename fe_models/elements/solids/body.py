@@ -23,7 +23,7 @@ from fe_models.elements.solids.geometric import (
 )
 from fe_models.elements.solids.incompatible import KIND, brick_chunks, brick_stiffness
 from fe_models.elements.solids.stress import nodal_stress
-from fe_models.foundation.arrays import Array, IntArray, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.errors import BodyError
 from fe_models.foundation.ranks.product import RowsProduct
 from fe_models.foundation.ranks.ranks import Ranks
@@ -124,7 +124,7 @@ class SolidModel:
         best = np.full(len(self.mesh.nodes), len(order) - 1, np.int64)
         for kind, cells in self.mesh.cells.items():
             np.minimum.at(best, cells.ravel(), np.repeat(rank[self.of_cell[kind]], cells.shape[1]))
-        return frozen_int(order[best])
+        return frozen(order[best], np.int64)
 
     def mass_gram(self, u: Any) -> Array:
         """Return ∫ a aᵀ dm with a = [1, c, u_x, u_y, u_z], (4 + 3 k, 4 + 3 k), exact; u is (3 n_nodes, k)."""

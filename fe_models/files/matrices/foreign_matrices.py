@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_models.errors import MatrixError
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import FrozenMapping, checked_fields, frozen_copies
@@ -102,7 +102,7 @@ class ForeignMatrices:
                 raise MatrixError(f"{role}: expected {n} rows as the matrix before it, got {matrix.shape[0]}")
             n = matrix.shape[0]
         if self.dofs is not None:
-            put(self, "dofs", frozen_int(self.dofs))
+            put(self, "dofs", frozen(self.dofs, np.int64))
             if self.dofs.ndim != 2 or self.dofs.shape[1] != 2:
                 raise MatrixError(f"dofs: expected (node, component) of every row, got shape {self.dofs.shape}")
             if n is not None and len(self.dofs) != n:
@@ -113,7 +113,7 @@ class ForeignMatrices:
                 )
             n = len(self.dofs)
         if self.row_nodes is not None:
-            put(self, "row_nodes", frozen_int(self.row_nodes))
+            put(self, "row_nodes", frozen(self.row_nodes, np.int64))
             if n is not None and n not in (3 * len(self.row_nodes), 6 * len(self.row_nodes)):
                 raise MatrixError(
                     f"row_nodes: expected 3 or 6 of {n} rows to each node, got a list of {len(self.row_nodes)} nodes"
@@ -122,7 +122,7 @@ class ForeignMatrices:
             raise MatrixError("nodes: expected positions and numbers of the nodes together, got one of them")
         if self.nodes is not None and self.node_numbers is not None:
             put(self, "nodes", frozen(self.nodes))
-            put(self, "node_numbers", frozen_int(self.node_numbers))
+            put(self, "node_numbers", frozen(self.node_numbers, np.int64))
             if self.nodes.shape != (len(self.node_numbers), 3):
                 raise MatrixError(
                     f"nodes: expected ({len(self.node_numbers)}, 3) positions, one for each number, got "
@@ -135,8 +135,8 @@ class ForeignMatrices:
             put(self, name, FrozenMapping({key: frozen(value) for key, value in getattr(self, name).items()}))
         for name in ("others", "triangle", "files"):
             put(self, name, FrozenMapping(dict(getattr(self, name))))
-        put(self, "constrained", frozen_int(self.constrained))
-        put(self, "removed", frozen_int(np.reshape(self.removed, (-1, 2))))
+        put(self, "constrained", frozen(self.constrained, np.int64))
+        put(self, "removed", frozen(np.reshape(self.removed, (-1, 2)), np.int64))
         put(self, "notes", tuple(self.notes))
 
     @property

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cms.body.reduced_body import ReducedBody
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.meshes.numbering import NONE
@@ -103,7 +103,7 @@ class FatigueResult:
         for name in ("block_damage", "bound", "cycles", "beyond", "largest"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
         for name in ("nodes", "points", "material", "plane"):
-            object.__setattr__(self, name, frozen_int(getattr(self, name)))
+            object.__setattr__(self, name, frozen(getattr(self, name), np.int64))
 
     @property
     def curve(self) -> SNCurve:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array, IntArray, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 from floatframe.errors import ModelError
 from floatframe.model.shapes.piece import Piece
 
@@ -26,7 +26,7 @@ class Mesh:
             raise ModelError(f"mesh: nodes: expected finite positions (n, 3), got shape {nodes.shape}")
         nodes.flags.writeable = False
         put(self, "nodes", nodes)
-        put(self, "triangles", frozen_int(self.triangles))
+        put(self, "triangles", frozen(self.triangles, np.int64))
         if self.triangles.ndim != 2 or self.triangles.shape[1] != 3 or not len(self.triangles):
             raise ModelError(f"mesh: triangles: expected (n, 3), got {self.triangles.shape}")
         if self.triangles.min() < 0 or self.triangles.max() >= len(nodes):

@@ -8,7 +8,7 @@ from scipy.optimize import linear_sum_assignment
 from cms.assessment.quality.record import QualityRecord, judge
 from cms.assessment.quality.reference.free_basis import FreeBasis
 from cms.assessment.quality.reference.full_reference import FullReference
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 
 __all__ = ["FrequencyComparison", "compare_frequencies", "compare_shapes", "frequency_records", "mac"]
 
@@ -33,7 +33,7 @@ class FrequencyComparison:
     def __post_init__(self) -> None:
         for name in ("full", "reduced", "error", "mac", "mac_nodal", "partner_error", "recovered", "recovered_nodal"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
-        object.__setattr__(self, "partner", frozen_int(self.partner))
+        object.__setattr__(self, "partner", frozen(self.partner, np.int64))
 
 
 def mac(A: Array, B: Array, M_B: Array | None = None) -> Array:

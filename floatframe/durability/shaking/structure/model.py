@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.units import Units
 from floatframe.errors import ModelError
 
@@ -81,7 +81,7 @@ class ShakenModel:
     def __post_init__(self) -> None:
         for name in ("omega", "C", "B", "E", "D", "mass"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
-        object.__setattr__(self, "rates", frozen_int(self.rates))
+        object.__setattr__(self, "rates", frozen(self.rates, np.int64))
         n_m, n_s, n_out = len(self.omega), len(self.inputs), len(self.outputs)
         for name, shape in {"C": (n_m, n_m), "B": (3, n_m, n_s), "E": (3, n_out, n_m), "D": (3, n_out, n_s)}.items():
             if getattr(self, name).shape != shape:
