@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from cms.errors import BodyError
 from fe_models.foundation.arrays import Array, IntArray, require_shape
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.records import checked_fields, frozen_copies, put_arrays
+from fe_models.foundation.records import Shape, checked_fields, frozen_copies
 from fe_models.foundation.units import Units
 
 __all__ = ["SPIN_PAIRS", "UNIT_LOADS", "GeometricStiffness", "RotatedLoads", "SpreadLoads", "stiffness_of_loads"]
@@ -43,15 +43,10 @@ class RotatedLoads:
         Matrices of the loads of interfaces, (n_loaded, 6, 3, n_q) [1/sqrt(kg) and 1/(sqrt(kg) m) per q].
     """
 
-    translation: Array
-    rotation: Array
-    spin: Array
-    interfaces: Array
-
-    def __post_init__(self) -> None:
-        n, n_loaded = np.atleast_1d(self.translation).shape[-1], len(np.atleast_1d(self.interfaces))
-        shapes = {"translation": (3, 3, n), "rotation": (3, 3, n), "spin": (6, 3, n), "interfaces": (n_loaded, 6, 3, n)}
-        put_arrays(self, "turned loads", shapes)
+    translation: Annotated[Array, Shape((3, 3, "n_q"))]
+    rotation: Annotated[Array, Shape((3, 3, "n_q"))]
+    spin: Annotated[Array, Shape((6, 3, "n_q"))]
+    interfaces: Annotated[Array, Shape(("n_loaded", 6, 3, "n_q"))]
 
 
 @presented
@@ -75,14 +70,9 @@ class SpreadLoads:
         Work of load j alone, rotated about an axis, on the rotations e_b × c, (6, 3, 3) [m and m²].
     """
 
-    K: Array
-    turned: Array
-    turned_rigid: Array
-
-    def __post_init__(self) -> None:
-        n = np.atleast_1d(self.K).shape[-1]
-        put_arrays(self, "spread loads", {"K": (6, n, n)}, is_symmetric=True)
-        put_arrays(self, "spread loads", {"turned": (6, 3, n), "turned_rigid": (6, 3, 3)})
+    K: Annotated[Array, Shape((6, "n_q", "n_q"), is_symmetric=True)]
+    turned: Annotated[Array, Shape((6, 3, "n_q"))]
+    turned_rigid: Annotated[Array, Shape((6, 3, 3))]
 
 
 @presented
@@ -121,21 +111,19 @@ class GeometricStiffness:
     .. [1] Schwertassek & Wallrapp (1999), docs/bibliography.md; derived in docs/theory.md §7.
     """
 
-    translation: Array
-    rotation: Array
-    spin: Array
-    interfaces: Array
+    translation: Annotated[Array, Shape((3, "n_q", "n_q"), is_symmetric=True)]
+    rotation: Annotated[Array, Shape((3, "n_q", "n_q"), is_symmetric=True)]
+    spin: Annotated[Array, Shape((6, "n_q", "n_q"), is_symmetric=True)]
+    interfaces: Annotated[Array, Shape(("n_loaded", 6, "n_q", "n_q"), is_symmetric=True)]
     turned: RotatedLoads | None = None
     spread: SpreadLoads | None = None
     is_loaded: tuple[bool, ...] = ()
 
     def __post_init__(self) -> None:
-        n, n_loaded = np.atleast_1d(self.translation).shape[-1], len(np.atleast_1d(self.interfaces))
+        n, n_loaded = self.n_q, len(self.interfaces)
         object.__setattr__(self, "is_loaded", tuple(bool(each) for each in self.is_loaded) or (True,) * n_loaded)
         if sum(self.is_loaded) != n_loaded:
             raise BodyError(f"geometric stiffness: {sum(self.is_loaded)} loaded interfaces, but matrices of {n_loaded}")
-        shapes = {"translation": (3, n, n), "rotation": (3, n, n), "spin": (6, n, n), "interfaces": (n_loaded, 6, n, n)}
-        put_arrays(self, "geometric stiffness", shapes, is_symmetric=True)
         if self.turned is not None:
             require_shape("turned loads: interfaces", self.turned.interfaces, (n_loaded, 6, 3, n))
         if self.spread is not None:

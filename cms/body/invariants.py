@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from cms.errors import BodyError
 from fe_models.foundation.arrays import Array, frozen, require_finite
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.records import checked_fields, frozen_copies, put_arrays
+from fe_models.foundation.records import Shape, checked_fields, frozen_copies
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["INERTIA_TERMS", "NEGATIVITY", "Moments", "NodalSums", "known_P", "known_S_kl", "moments_from_gram"]
@@ -61,23 +62,21 @@ class Moments:
     """
 
     m: float
-    S: Array
-    R: Array
-    C1: Array
-    P: Array
-    S_kl: Array
+    S: Annotated[Array, Shape((3,))]
+    R: Annotated[Array, Shape((3, 3))]
+    C1: Annotated[Array, Shape((3, "n_q"))]
+    P: Annotated[Array, Shape((3, 3, "n_q"))]
+    S_kl: Annotated[Array, Shape((3, 3, "n_q", "n_q"))]
     is_exact: bool = True
     missing: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        n = np.atleast_1d(self.C1).shape[-1]
         for term in self.missing:
             if term not in INERTIA_TERMS:
                 raise BodyError(f"moments: missing: unknown term {quoted(term)}{nearest(term, INERTIA_TERMS)}")
         lost = {*self.missing, "5C"} if "4C" in self.missing else {*self.missing}  # 4C is contained in 5C
         missing = tuple(term for term in INERTIA_TERMS if term in lost)
         object.__setattr__(self, "missing", missing)
-        put_arrays(self, "moments", {"S": (3,), "R": (3, 3), "C1": (3, n), "P": (3, 3, n), "S_kl": (3, 3, n, n)})
         if missing:
             object.__setattr__(self, "P", frozen(known_P(self.P, missing)))
             object.__setattr__(self, "S_kl", frozen(known_S_kl(self.S_kl, missing)))
@@ -266,6 +265,7 @@ def moments_from_gram(gram: Array, *, is_exact: bool = True, missing: tuple[str,
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class NodalSums:
     """Weighted sums over all nodes about the origin of a frame B; w is the weight of a node; translations only.
 
@@ -273,10 +273,10 @@ class NodalSums:
     """
 
     w: float  #: sum of the weights [m³; dimensionless if the nodes count equally]
-    S: Array  #: Σ w c, (3,) [w times m]
-    R: Array  #: Σ w c_a c_b, (3, 3) [w times m²]
-    U1: Array  #: Σ w phi_k, (3, n_q)
-    U2: Array  #: Σ w c × phi_k, (3, n_q) [U1 times m]
+    S: Annotated[Array, Shape((3,))]  #: Σ w c [w times m]
+    R: Annotated[Array, Shape((3, 3))]  #: Σ w c_a c_b [w times m²]
+    U1: Annotated[Array, Shape((3, "n_q"))]  #: Σ w phi_k
+    U2: Annotated[Array, Shape((3, "n_q"))]  #: Σ w c × phi_k [U1 times m]
     is_volume: bool = True  #: False: every node has weight 1
 
     def __post_init__(self) -> None:
@@ -284,5 +284,3 @@ class NodalSums:
         require_finite("nodal sums: w", np.array(self.w))
         if not self.w > 0:
             raise BodyError(f"nodal sums: w: expected a positive sum of weights, got {self.w:g}")
-        n = np.atleast_1d(self.U1).shape[-1]
-        put_arrays(self, "nodal sums", {"S": (3,), "R": (3, 3), "U1": (3, n), "U2": (3, n)})

@@ -1,14 +1,15 @@
 """Points that a reduced body keeps with translations and rotations: line nodes, point masses, and requested nodes."""
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
 from cms.errors import BodyError
-from fe_models.foundation.arrays import Array, IntArray, frozen
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.records import checked_fields, frozen_copies, put_arrays
+from fe_models.foundation.records import Shape, checked_fields, frozen_copies
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["SOURCES", "KeptPoints"]
@@ -42,20 +43,13 @@ class KeptPoints:
         If shapes do not fit, or a source is unknown.
     """
 
-    nodes: IntArray
-    rotation: Array
-    source: tuple[str, ...]
+    nodes: Annotated[IntArray, Shape(("n",))]
+    rotation: Annotated[Array, Shape(("n", 3, "n_q"))]
+    source: Annotated[tuple[str, ...], Shape(("n",))]
 
     def __post_init__(self) -> None:
-        put = object.__setattr__
-        put(self, "nodes", frozen(self.nodes, np.int64))
-        put(self, "source", tuple(self.source))
-        n = self.nodes.size
-        if self.nodes.ndim != 1 or np.unique(self.nodes).size != n:
+        if np.unique(self.nodes).size != self.nodes.size:
             raise BodyError("kept points: nodes: a node is there twice")
-        put_arrays(self, "kept points", {"rotation": (n, 3, np.atleast_1d(self.rotation).shape[-1])})
-        if len(self.source) != n:
-            raise BodyError(f"kept points: expected {n} sources, got {len(self.source)}")
         for word in set(self.source) - set(SOURCES):
             raise BodyError(f"kept points: unknown source {quoted(word)}{nearest(word, SOURCES)}")
 

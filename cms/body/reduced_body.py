@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
@@ -14,24 +15,15 @@ from cms.body.stress import PointStress
 from cms.errors import BodyError
 from fe_models.body.load_cases import ReducedLoadCase
 from fe_models.body.unit_check import BodyNumbers, hull_volume, implausible_numbers
-from fe_models.foundation.arrays import Array, IntArray, frozen, require_shape
+from fe_models.foundation.arrays import Array, IntArray, require_shape
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import Summary, listed, presented
-from fe_models.foundation.records import FrozenMapping, checked_fields, frozen_copies, put_arrays
+from fe_models.foundation.records import FrozenMapping, Shape, checked_fields, frozen_copies
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.numbering import NONE, Numbering
 
 __all__ = ["BodyFrame", "ReducedBody", "ReducedInterface", "unit_findings"]
-
-ORTHONORMAL = 1e-6  #: defect of axes that counts as rounding of printed digits
-
-
-def require_orthonormal(where: str, axes: Array) -> None:
-    """Raise `BodyError` unless the columns are orthonormal."""
-    defect = float(np.abs(axes.T @ axes - np.eye(3)).max())
-    if not defect <= ORTHONORMAL:
-        raise BodyError(f"{where}: expected orthonormal axes as columns, they are {defect:.1e} from it")
 
 
 @frozen_copies
@@ -57,19 +49,10 @@ class BodyFrame:
     """
 
     kind: str
-    origin: Array
-    axes: Array = field(default_factory=lambda: np.eye(3))
+    origin: Annotated[Array, Shape((3,))]
+    axes: Annotated[Array, Shape((3, 3), is_triad=True)] = field(default_factory=lambda: np.eye(3))
     at: str = ""
-    dofs: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "dofs", frozen(self.dofs, np.int64))
-        if self.dofs.shape != (len(self.dofs), 2):
-            raise BodyError(f"body frame: dofs: expected (n, 2) of (node, component), got {self.dofs.shape}")
-        put_arrays(self, "body frame", {"origin": (3,), "axes": (3, 3)})
-        require_orthonormal("body frame: axes", self.axes)
-        if np.linalg.det(self.axes) < 0:
-            raise BodyError("body frame: axes: expected right-handed axes as columns")
+    dofs: Annotated[IntArray, Shape((None, 2))] = field(default_factory=lambda: np.zeros((0, 2), np.int64))
 
 
 @presented
@@ -100,17 +83,11 @@ class ReducedInterface:
 
     name: str
     kind: str
-    position: Array
-    triad: Array
-    Psi: Array
-    members: IntArray
+    position: Annotated[Array, Shape((3,))]
+    triad: Annotated[Array, Shape((3, 3), is_triad=True)]
+    Psi: Annotated[Array, Shape((6, "n_q"))]
+    members: Annotated[IntArray, Shape(("n_members",))]
     has_rotation: bool = True
-
-    def __post_init__(self) -> None:
-        where = f"interface {self.name!r}"
-        put_arrays(self, where, {"position": (3,), "triad": (3, 3), "Psi": (6, np.atleast_1d(self.Psi).shape[-1])})
-        object.__setattr__(self, "members", frozen(self.members, np.int64))
-        require_orthonormal(f"{where}: triad", self.triad)
 
 
 @presented
@@ -185,27 +162,27 @@ class ReducedBody:
     name: str
     units: Units
     frame: BodyFrame
-    M: Array
-    K: Array
-    D: Array
-    labels: tuple[str, ...]
-    energy_shares: Array
-    sources: tuple[str, ...]
+    M: Annotated[Array, Shape(("n_q", "n_q"))]
+    K: Annotated[Array, Shape(("n_q", "n_q"))]
+    D: Annotated[Array, Shape(("n_q", "n_q"))]
+    labels: Annotated[tuple[str, ...], Shape(("n_q",))]
+    energy_shares: Annotated[Array, Shape(("n_q", "n_sources"))]
+    sources: Annotated[tuple[str, ...], Shape(("n_sources",))]
     moments: Moments
-    free_frequencies: Array
-    nodes: Array
-    node_ids: IntArray
-    Phi: Array
-    surface: IntArray
+    free_frequencies: Annotated[Array, Shape((None,))]
+    nodes: Annotated[Array, Shape(("n_kept", 3))]
+    node_ids: Annotated[IntArray, Shape(("n_kept",))]
+    Phi: Annotated[Array, Shape(("n_kept", 3, "n_q"))]
+    surface: Annotated[IntArray, Shape((None, 3))]
     interfaces: tuple[ReducedInterface, ...]
     provenance: Mapping[str, str] = field(default_factory=dict)
     columns: SourceColumns | None = None
     nodal_sums: NodalSums | None = None
     load_cases: tuple[ReducedLoadCase, ...] = ()
-    stress: Array | None = None
+    stress: Annotated[Array | None, Shape(("n_kept", 6, "n_q"))] = None
     point_stress: PointStress | None = None
     geometric: GeometricStiffness | None = None
-    quadratic: Array | None = None
+    quadratic: Annotated[Array | None, Shape(("n_kept", 3, "n_q", "n_q"))] = None
     numbering: Numbering = field(default_factory=Numbering)
     kept: KeptPoints | None = None
     recovery: Mapping[str, RecoveryTable] = field(default_factory=dict)
@@ -213,32 +190,13 @@ class ReducedBody:
     def __post_init__(self) -> None:
         where = f"reduced body {self.name!r}"
         put = object.__setattr__
-        for name in ("node_ids", "surface"):
-            put(self, name, frozen(getattr(self, name), np.int64))
-        for name in ("labels", "sources", "interfaces", "load_cases"):
+        for name in ("interfaces", "load_cases"):
             put(self, name, tuple(getattr(self, name)))
         put(self, "provenance", FrozenMapping(dict(self.provenance)))
         put(self, "recovery", FrozenMapping(dict(self.recovery)))
-        n, n_kept = len(np.atleast_1d(self.K)), len(np.atleast_1d(self.nodes))
-        shapes: dict[str, tuple[int, ...]] = {
-            "M": (n, n),
-            "K": (n, n),
-            "D": (n, n),
-            "nodes": (n_kept, 3),
-            "Phi": (n_kept, 3, n),
-            "energy_shares": (n, len(self.sources)),
-            "free_frequencies": (len(np.atleast_1d(self.free_frequencies)),),
-        }
-        if self.stress is not None:
-            shapes["stress"] = (n_kept, 6, n)
-        if self.quadratic is not None:
-            shapes["quadratic"] = (n_kept, 3, n, n)
-            if self.geometric is None:
-                raise BodyError(f"{where}: quadratic modes without the geometric stiffness that is their inertia")
-        put_arrays(self, where, shapes)
-        require_shape(f"{where}: node_ids", self.node_ids, (n_kept,))
-        if len(self.labels) != n:
-            raise BodyError(f"{where}: {n} modes need as many labels, got {len(self.labels)}")
+        n, n_kept = self.n_q, len(self.nodes)
+        if self.quadratic is not None and self.geometric is None:
+            raise BodyError(f"{where}: quadratic modes without the geometric stiffness that is their inertia")
         if self.moments.n_q != n:
             raise BodyError(f"{where}: {n} modes, but moments of {self.moments.n_q}")
         widths = {f"load case {case.name!r}: h": case.h.shape for case in self.load_cases}

@@ -1,18 +1,20 @@
 """Origin of modes: the share of each column of the mode set in the energy of a mode, and a label."""
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
-from cms.errors import BodyError
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.records import frozen_copies, put_arrays
+from fe_models.foundation.errors import ArgumentError
+from fe_models.foundation.records import Shape, checked_fields, frozen_copies
 
 __all__ = ["SourceColumns", "source_columns"]
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class SourceColumns:
     """The columns from which a reduced body was made, with the data that give their shares in any mode.
 
@@ -21,19 +23,10 @@ class SourceColumns:
     and unit. Both are linear in the mode, so they can be transformed with the modes to another frame.
     """
 
-    labels: tuple[str, ...]  #: label of each column, (n_columns,)
-    groups: tuple[str, ...]  #: group of each column
-    A: Array  #: coordinates of the modes in the columns, (n_columns, n_q) [1/s]
-    F: Array  #: forces of the modes on the columns, (n_columns, n_q) [1/s]
-
-    def __post_init__(self) -> None:
-        n = len(tuple(self.labels))
-        for name in ("labels", "groups"):
-            object.__setattr__(self, name, tuple(getattr(self, name)))
-        if len(self.groups) != n:
-            raise BodyError(f"source columns: {n} labels, but {len(self.groups)} groups")
-        shape = (n, np.atleast_1d(self.A).shape[-1])
-        put_arrays(self, "source columns", {"A": shape, "F": shape})
+    labels: Annotated[tuple[str, ...], Shape(("n_columns",))]  #: label of each column
+    groups: Annotated[tuple[str, ...], Shape(("n_columns",))]  #: group of each column
+    A: Annotated[Array, Shape(("n_columns", "n_q"))]  #: coordinates of the modes in the columns [1/s]
+    F: Annotated[Array, Shape(("n_columns", "n_q"))]  #: forces of the modes on the columns [1/s]
 
     @property
     def sources(self) -> tuple[str, ...]:

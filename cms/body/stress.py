@@ -2,11 +2,13 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.records import frozen_copies, put_arrays
+from fe_models.foundation.errors import ArgumentError
+from fe_models.foundation.records import Shape, checked_fields, frozen_copies
 
 __all__ = ["PointStress", "stress_of", "von_mises", "von_mises_of"]
 
@@ -15,17 +17,14 @@ CHUNK_SIZE = 2_000_000  #: number of stress values held at a time
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class PointStress:
     """Stress modes at named points that are not nodes, such as the extreme fibres of beam sections."""
 
-    names: tuple[str, ...]  #: name of each point
-    positions: Array  #: undeformed, in B, (n_points, 3) [m]
-    modes: Array  #: stress xx yy zz yz xz xy for each mode, in axes of B, (n_points, 6, n_q) [Pa per unit of q]
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "names", tuple(self.names))
-        n = len(self.names)
-        put_arrays(self, "stress points", {"positions": (n, 3), "modes": (n, 6, np.atleast_1d(self.modes).shape[-1])})
+    names: Annotated[tuple[str, ...], Shape(("n_points",))]  #: name of each point
+    positions: Annotated[Array, Shape(("n_points", 3))]  #: undeformed, in B [m]
+    #: stress xx yy zz yz xz xy for each mode, in axes of B [Pa per unit of q]
+    modes: Annotated[Array, Shape(("n_points", 6, "n_q"))]
 
 
 def von_mises(stress: Array) -> Array:

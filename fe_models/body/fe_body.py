@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any, Protocol
+from typing import Annotated, Any, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -24,7 +24,7 @@ from fe_models.foundation.presentation import Summary, listed, presented
 from fe_models.foundation.ranks.row_layout import RowLayout
 from fe_models.foundation.ranks.spread_columns import spread_parts
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
-from fe_models.foundation.records import checked_fields
+from fe_models.foundation.records import Shape, checked_fields
 from fe_models.foundation.tall.columns import elsewhere, in_memory
 from fe_models.foundation.tall.on_disk import is_on_disk, release, row_slices, zeros_like
 from fe_models.foundation.units import Units, unit_system
@@ -346,17 +346,17 @@ class FEBody:
     name: str
     M: sp.csc_array
     K: sp.csc_array
-    nodes: Array
-    dofs: IntArray
+    nodes: Annotated[Array, Shape(("n_nodes", 3))]
+    dofs: Annotated[IntArray, Shape(("n_dof", 2))]
     interfaces: tuple[Interface, ...] = ()
     units: Units = field(default_factory=lambda: unit_system("m-kg-s"))
     D: sp.csc_array | None = None
-    surface: IntArray = field(default_factory=lambda: np.zeros((0, 3), np.int64))
+    surface: Annotated[IntArray, Shape((None, 3))] = field(default_factory=lambda: np.zeros((0, 3), np.int64))
     element_model: ElementModel | None = None
     recovery: Recovery | None = None
     load_cases: tuple[LoadCase, ...] = ()
     stress_points: StressPointModel | None = None
-    node_volumes: Array | None = None
+    node_volumes: Annotated[Array | None, Shape(("n_nodes",))] = None
     provenance: Mapping[str, str] = field(default_factory=dict)
     is_held: bool = False
     numbering: Numbering = field(default_factory=Numbering)
@@ -379,18 +379,11 @@ class FEBody:
     def __post_init__(self) -> None:
         where = f"body {self.name!r}"
         put = object.__setattr__
-        put(self, "nodes", frozen(self.nodes))
-        put(self, "dofs", frozen(self.dofs, np.int64))
-        put(self, "surface", frozen(self.surface, np.int64))
         put(self, "interfaces", tuple(self.interfaces))
         put(self, "provenance", MappingProxyType(dict(self.provenance)))
-        if self.nodes.ndim != 2 or self.nodes.shape[1] != 3 or len(self.nodes) == 0:
-            raise BodyError(f"{where}: nodes: expected (n_nodes, 3), got {self.nodes.shape}")
-        require_finite(f"{where}: nodes", self.nodes)
-        if self.dofs.ndim != 2 or self.dofs.shape[1] != 2:
-            raise BodyError(f"{where}: dofs: expected (n_dof, 2) of (node, component), got {self.dofs.shape}")
-        if len(self.dofs) == 0:
-            raise BodyError(f"{where}: dofs: expected at least one dof, got none")
+        for name, what in (("nodes", "node"), ("dofs", "dof")):
+            if not len(getattr(self, name)):
+                raise BodyError(f"{where}: {name}: expected at least one {what}, got none")
         if self.dofs[:, 0].min() < 0 or self.dofs[:, 0].max() >= len(self.nodes):
             raise BodyError(
                 f"{where}: dofs: expected nodes 0..{len(self.nodes) - 1}, got "
@@ -405,12 +398,8 @@ class FEBody:
             put(self, name, checked_matrix(f"{where}: {name}", getattr(self, name), n_dof))
         if self.D is not None:
             put(self, "D", symmetric_csc(f"{where}: D", self.D, n_dof))
-        if self.node_volumes is not None:
-            put(self, "node_volumes", frozen(self.node_volumes))
-            require_shape(f"{where}: node_volumes", self.node_volumes, (len(self.nodes),))
-            require_finite(f"{where}: node_volumes", self.node_volumes)
-            if (self.node_volumes < 0).any() or not self.node_volumes.any():
-                raise BodyError(f"{where}: node_volumes: expected no negative volume and a positive sum")
+        if self.node_volumes is not None and ((self.node_volumes < 0).any() or not self.node_volumes.any()):
+            raise BodyError(f"{where}: node_volumes: expected no negative volume and a positive sum")
         put(self, "load_cases", tuple(self.load_cases))
         if self.load_cases:
             check_load_cases(where, self.load_cases, n_dof)

@@ -17,16 +17,17 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike
 from typing_extensions import get_protocol_members, is_protocol
 
-from fe_models.foundation.arrays import SYMMETRY_DEFECT, frozen, require_finite, require_shape
+from fe_models.foundation.arrays import SYMMETRY_DEFECT, IntArray, frozen, require_finite
 from fe_models.foundation.errors import BodyError, ReportedError
 from fe_models.foundation.tall.on_disk import row_slices
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = [
-    "FrozenMapping", "MismatchError", "Takes", "at_door", "checked_fields", "conformed", "frozen_copies", "put_arrays",
+    "FrozenMapping", "MismatchError", "Shape", "Takes", "at_door", "checked_fields", "conformed", "frozen_copies",
 ]  # fmt: skip
 
 MOST_KINDS = 3  #: named in a message
+ORTHONORMAL = 1e-6  #: defect of axes that counts as rounding of printed digits
 
 Class = TypeVar("Class", bound=type)
 Key = TypeVar("Key")
@@ -81,10 +82,39 @@ def read_only(value: Any) -> Any:
     return value
 
 
-def put_arrays(
-    record: object, where: str, shapes: Mapping[str, tuple[int, ...]], *, is_symmetric: bool = False
-) -> None:
-    """Make fields of a frozen record read-only arrays of float64; refuse other shapes, NaN and infinite numbers.
+# arrays of records ----------------------------------------------------------------------------------------------------
+
+
+class Shape(NamedTuple):
+    """The shape of an array, or the length of a tuple, that a field holds: `Annotated[Array, Shape((3, "n_q"))]`.
+
+    Parameters
+    ----------
+    axes
+        Length of each axis. A name stands for the same length in all fields of a record; None: any length.
+    is_symmetric
+        Whether matrices over the modes, the last two axes, are symmetric; an antisymmetric part within rounding is
+        removed.
+    is_triad
+        Whether the columns of the matrix are orthonormal right-handed axes.
+    """
+
+    axes: tuple[int | str | None, ...]
+    is_symmetric: bool = False
+    is_triad: bool = False
+
+
+@cache
+def shapes_of(kind: Hashable) -> dict[str, tuple[Shape, Any]]:
+    """Return the declared shapes of the fields of a data class, each with the type of the array."""
+    annotated = {name: get_args(hint) for name, hint in hints_of(kind).items() if get_origin(hint) is Annotated}
+    return {name: (extra, held) for name, (held, extra, *_) in annotated.items() if isinstance(extra, Shape)}
+
+
+def put_arrays(record: object, where: str) -> None:
+    """Make the fields of a frozen record that declare a `Shape` read-only arrays, or tuples; refuse other shapes.
+
+    A large array on disk is read in slices of rows.
 
     Parameters
     ----------
@@ -92,31 +122,41 @@ def put_arrays(
         The record, in its `__post_init__`.
     where
         What the record is, for messages.
-    shapes
-        The shape of each field. A large array on disk is read in slices of rows.
-    is_symmetric
-        Whether matrices over the modes, the last two axes, must be symmetric; an antisymmetric part within rounding is
-        removed.
 
     Raises
     ------
     BodyError
-        If an array has another shape, holds a NaN or an infinity, or is not symmetric.
+        If an array has another shape, holds a NaN or an infinity, or is not symmetric or orthonormal.
     """
-    for name, shape in shapes.items():
-        array = frozen(getattr(record, name))
-        require_shape(f"{where}: {name}", array, shape)
-        for rows in row_slices(len(array), array):
-            require_finite(f"{where}: {name}", array[rows])
-        if is_symmetric:
+    lengths: dict[int | str | None, int] = {}  # of the axes that have names
+    for name, (shape, held) in shapes_of(cast(Hashable, type(record))).items():
+        if (value := getattr(record, name)) is None:
+            continue
+        what, is_tuple, is_whole = f"{where}: {name}", get_origin(held) is tuple, IntArray in (held, *get_args(held))
+        array: Any = tuple(value) if is_tuple else frozen(value, np.int64) if is_whole else frozen(value)
+        got = (len(array),) if is_tuple else array.shape
+        expected = tuple(lengths.get(axis, axis or "any") for axis in shape.axes)
+        if len(got) != len(expected) or any(isinstance(n, int) and n != m for n, m in zip(expected, got, strict=True)):
+            words = str(expected).replace("'", "")
+            raise BodyError(f"{what}: expected shape {words}, got {got}")
+        lengths |= {axis: n for axis, n in zip(shape.axes, got, strict=True) if isinstance(axis, str)}
+        for rows in () if is_tuple or is_whole else row_slices(len(array), array):
+            require_finite(what, array[rows])
+        if shape.is_symmetric:
             other = np.swapaxes(array, -1, -2)
             defect, scale = np.abs(array - other).max(initial=0.0), np.abs(array).max(initial=0.0)
             if defect > SYMMETRY_DEFECT * scale:
                 raise BodyError(
-                    f"{where}: {name}: expected symmetric matrices over the modes, got |K - K.T| = "
-                    f"{defect / scale:.2e} |K|; check that all are projected on both sides by the same modes"
+                    f"{what}: expected symmetric matrices over the modes, got |K - K.T| = {defect / scale:.2e} |K|; "
+                    "check that all are projected on both sides by the same modes"
                 )
             array = frozen((array + other) / 2)
+        if shape.is_triad:
+            defect = np.abs(array.T @ array - np.eye(3)).max()
+            if not defect <= ORTHONORMAL:
+                raise BodyError(f"{what}: expected orthonormal axes as columns, they are {defect:.1e} from it")
+            if np.linalg.det(array) < 0:
+                raise BodyError(f"{what}: expected right-handed axes as columns")
         object.__setattr__(record, name, array)
 
 
@@ -282,7 +322,7 @@ def conformed_inputs(where: str, hints: Mapping[str, Any], given: Mapping[str, A
 
 
 def checked_fields(error: type[Exception]) -> Callable[[Class], Class]:
-    """Decorate a data class: its fields are checked against their annotations before its own checks.
+    """Decorate a data class: its fields are checked against their annotations and shapes before its own checks.
 
     Parameters
     ----------
@@ -303,6 +343,7 @@ def checked_fields(error: type[Exception]) -> Callable[[Class], Class]:
                 raise
             for changed, value in inputs.items():
                 object.__setattr__(self, changed, value)
+            put_arrays(self, where)
             if own is not None:
                 own(self)
 

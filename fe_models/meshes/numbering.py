@@ -7,14 +7,14 @@ file. Messages, sensors, tables and exported files take names only from here.
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.errors import ArgumentError, BodyError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.records import checked_fields, frozen_copies
+from fe_models.foundation.records import Shape, checked_fields, frozen_copies
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["NONE", "NO_NUMBERS", "NamedSet", "Numbering", "node_place", "numbering_side_by_side"]
@@ -44,16 +44,9 @@ class NamedSet:
     """
 
     name: str
-    kind: str
-    members: IntArray
+    kind: Literal["nodes", "elements"]
+    members: Annotated[IntArray, Shape(("n",))]
     size: int
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "members", frozen(self.members, np.int64))
-        if self.kind not in KINDS:
-            raise BodyError(f"set {self.name!r}: kind: expected one of {', '.join(KINDS)}, got {quoted(self.kind)}")
-        if self.members.ndim != 1:
-            raise BodyError(f"set {self.name!r}: members: expected (n,), got {self.members.shape}")
 
 
 @presented
@@ -84,20 +77,16 @@ class Numbering:
         The user's sets of nodes and elements.
     """
 
-    nodes: IntArray = field(default_factory=lambda: NO_NUMBERS)
-    on_skin: IntArray = field(default_factory=lambda: NO_NUMBERS)
-    elements: IntArray = field(default_factory=lambda: NO_NUMBERS)
+    nodes: Annotated[IntArray, Shape((None,))] = field(default_factory=lambda: NO_NUMBERS)
+    on_skin: Annotated[IntArray, Shape((None,))] = field(default_factory=lambda: NO_NUMBERS)
+    elements: Annotated[IntArray, Shape((None,))] = field(default_factory=lambda: NO_NUMBERS)
     instances: tuple[str, ...] = ()
-    node_instance: IntArray = field(default_factory=lambda: NO_NUMBERS)
-    element_instance: IntArray = field(default_factory=lambda: NO_NUMBERS)
+    node_instance: Annotated[IntArray, Shape((None,))] = field(default_factory=lambda: NO_NUMBERS)
+    element_instance: Annotated[IntArray, Shape((None,))] = field(default_factory=lambda: NO_NUMBERS)
     sets: tuple[NamedSet, ...] = ()
 
     def __post_init__(self) -> None:
         put = object.__setattr__
-        for name in ("nodes", "on_skin", "elements", "node_instance", "element_instance"):
-            put(self, name, frozen(getattr(self, name), np.int64))
-            if getattr(self, name).ndim != 1:
-                raise BodyError(f"numbering: {name}: expected (n,), got {getattr(self, name).shape}")
         put(self, "instances", tuple(self.instances))
         put(self, "sets", tuple(self.sets))
         if self.nodes.min(initial=0) < NONE or self.elements.min(initial=0) < NONE:

@@ -1,6 +1,7 @@
 """Reduced pencils (M, K) of mode sets, to compare reductions that a floating frame cannot use (docs/theory.md §3)."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import scipy.linalg as la
@@ -14,7 +15,8 @@ from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets.free_interface import rubin
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.records import put_arrays
+from fe_models.foundation.errors import ArgumentError
+from fe_models.foundation.records import Shape, checked_fields
 from fe_models.foundation.tall.columns import in_memory
 
 __all__ = [
@@ -32,6 +34,7 @@ DEPENDENT = 1e-10  #: squared remainder of a unit column, below which it is left
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class ReducedPencil:
     """Equations of motion (K - omega² M) x = Lᵀ f of a reduced body, with boundary displacement u_B = L x.
 
@@ -40,17 +43,11 @@ class ReducedPencil:
     """
 
     name: str
-    M: Array  #: (n, n)
-    K: Array  #: (n, n)
-    labels: tuple[str, ...]  #: label of each coordinate, (n,)
-    interface: Array  #: L, (n_b, n), rows in the order of the boundary dofs of the body
+    M: Annotated[Array, Shape(("n", "n"))]
+    K: Annotated[Array, Shape(("n", "n"))]
+    labels: Annotated[tuple[str, ...], Shape(("n",))]  #: label of each coordinate
+    interface: Annotated[Array, Shape(("n_b", "n"))]  #: L, rows in the order of the boundary dofs of the body
     is_dual: bool = False
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "labels", tuple(self.labels))
-        n = len(self.labels)
-        shapes = {"M": (n, n), "K": (n, n), "interface": (len(self.interface), n)}
-        put_arrays(self, f"reduced pencil {self.name!r}", shapes)
 
 
 def pencil_of_modes(body: FEBody, modes: ModeSet) -> ReducedPencil:
