@@ -127,26 +127,26 @@ def test_values_become_what_the_annotation_wants(hint, value, found):
 @pytest.mark.parametrize(
     ("hint", "value", "words", "wrong"),
     [
-        (Sequence[str], ["a", 3], "^a list, each of it text$", 3),
-        (tuple[str, ...], 3, "^a list, each of it text$", 3),
-        (float, "2", "^a number$", "2"),
-        (str | None, 3, "^text$", 3),
-        (ArrayLike | None, "x", "^numbers$", "x"),
-        (Callable[[float], float], 3, "^a function$", 3),
-        (Mapping[str, int], [3], "^a dictionary$", [3]),
-        (Literal["a", "b"], "c", "^one of a, b$", "c"),
-        (Literal["a", "b"], ["c", "d"], "^one of a, b$", ["c", "d"]),
-        (Units, 3, "^a Units$", 3),
+        (Sequence[str], ["a", 3], "a list, each of it text", 3),
+        (tuple[str, ...], 3, "a list, each of it text", 3),
+        (float, "2", "a number", "2"),
+        (str | None, 3, "text", 3),
+        (ArrayLike | None, "x", "numbers", "x"),
+        (Callable[[float], float], 3, "a function", 3),
+        (Mapping[str, int], [3], "a dictionary", [3]),
+        (Literal["a", "b"], "c", "one of a, b", "c"),
+        (Literal["a", "b"], ["c", "d"], "one of a, b", ["c", "d"]),
+        (Units, 3, "a Units", 3),
         (
             int | Units | str | Mapping[str, int] | bool,
             [3],
-            "^a number or a Units or text or one of 2 other kinds$",
+            "a number or a Units or text or one of 2 other kinds",
             [3],
         ),
-        (int | Units | str | Mapping[str, int] | None, [3], "^a number or a Units or text or a dictionary$", [3]),
+        (int | Units | str | Mapping[str, int] | None, [3], "a number or a Units or text or a dictionary", [3]),
     ],
 )
 def test_another_kind_is_told(hint, value, words, wrong):
-    with pytest.raises(MismatchError, match=words) as caught:
+    with pytest.raises(MismatchError) as caught:
         conformed(hint, value)
-    assert caught.value.wrong == wrong
+    assert caught.value.args == (words, wrong)

@@ -47,19 +47,18 @@ class SourceColumns:
         return self.shares() @ np.array([[group == s for s in self.sources] for group in self.groups], dtype=float)
 
     def mode_labels(self) -> tuple[str, ...]:
-        """Return a label of each mode: the one or two columns with the largest shares in its energy."""
-        return tuple(share_words(self.labels, shares) for shares in self.shares())
+        """Return a label of each mode: 'constraint left ux (93 %)', or the two columns with the largest shares."""
+        found = []
+        for shares in self.shares():
+            order = np.argsort(shares)[::-1]
+            is_nearly_all = shares[order[0]] > 0.9 or len(order) < 2 or shares[order[1]] < 0.05
+            parts = order[:1] if is_nearly_all else order[:2]
+            found.append(", ".join(f"{self.labels[k]} ({100 * shares[k]:.0f} %)" for k in parts))
+        return tuple(found)
 
     def of_modes(self, Z: Array) -> "SourceColumns":
         """Return the same columns for the modes Phi Z."""
         return replace(self, A=np.asarray(self.A) @ Z, F=np.asarray(self.F) @ Z)
-
-
-def share_words(labels: tuple[str, ...], shares: Array) -> str:
-    """Return 'constraint left ux (93 %)', or the two largest shares if one is not nearly all."""
-    order = np.argsort(shares)[::-1]
-    parts = [order[0]] if shares[order[0]] > 0.9 or len(order) < 2 or shares[order[1]] < 0.05 else order[:2]
-    return ", ".join(f"{labels[k]} ({100 * shares[k]:.0f} %)" for k in parts)
 
 
 def source_columns(labels: tuple[str, ...], groups: tuple[str, ...], A: Array, F: Array) -> SourceColumns:

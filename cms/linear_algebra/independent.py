@@ -18,7 +18,7 @@ from scipy.linalg.lapack import dpstrf
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.sparse.sparse_product import SymmetricProduct
-from fe_models.foundation.tall.columns import beside, combine, dots, inner, squares
+from fe_models.foundation.tall.columns import beside, combine, dots, inner
 
 __all__ = [
     "Basis", "DisplacementColumns", "Products", "gram", "gram_in_blocks", "independent_basis", "independent_columns",
@@ -180,7 +180,7 @@ def independent_basis(
         return _no_columns(V), np.asarray(redundant, dtype=np.int64)
     size = length[index]
     diagonal = np.abs(body.K.diagonal()) + omega2 * body.M.diagonal()
-    noise = np.finfo(float).eps * np.sqrt(squares(diagonal, V))[index]  # W-length of rounding errors eps |v_k|
+    noise = np.finfo(float).eps * np.sqrt(dots(V, V, diagonal))[index]  # W-length of rounding errors eps |v_k|
     tolerance = np.maximum(RANK_TOLERANCE, ROUNDING_MARGIN * noise / size)
     # tall arrays are not changed: lengths and pivot order go into the small matrices
     W = (G_K + omega2 * G_M)[np.ix_(index, index)] / np.outer(size, size)

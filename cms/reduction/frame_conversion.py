@@ -18,7 +18,7 @@ import numpy as np
 from cms.body.invariants import INERTIA_TERMS, Moments, NodalSums, moments_from_gram
 from cms.body.recovery_table import RecoveryTable
 from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
-from cms.body.source_columns import SourceColumns, share_words
+from cms.body.source_columns import SourceColumns
 from cms.body.stress import PointStress
 from cms.errors import BodyError
 from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
@@ -373,12 +373,11 @@ def changed_point_stress(points: PointStress, change: Change) -> PointStress:
 def changed_labels(reduced: ReducedBody, Z: Array) -> tuple[tuple[str, ...], Array]:
     """Return label and energy shares of the new modes; without source columns, in terms of the old modes.
 
-    The energy Z_kᵀ K Z_k splits into Z_lk² K_l without mixed terms, because the old modes are K-orthogonal.
+    The energy Z_kᵀ K Z_k splits into Z_lk K_l Z_lk without mixed terms, because the old modes are K-orthogonal.
     """
     if reduced.columns is not None:
         columns: SourceColumns = reduced.columns.of_modes(Z)
         return columns.mode_labels(), columns.group_shares()
-    parts = (Z**2 * np.diag(reduced.K)[:, None]).T
-    parts = parts / np.maximum(parts.sum(axis=1, keepdims=True), np.finfo(float).tiny)
     names = tuple(f"{reduced.frame.kind} mode {k + 1}" for k in range(reduced.n_q))
-    return tuple(share_words(names, part) for part in parts), parts @ reduced.energy_shares
+    modes = SourceColumns(names, names, Z, np.diag(reduced.K)[:, None] * Z)
+    return modes.mode_labels(), modes.shares() @ reduced.energy_shares

@@ -11,7 +11,7 @@ import numpy as np
 
 from cms.body.invariants import NEGATIVITY, Moments, NodalSums, moments_from_gram
 from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface, unit_findings
-from cms.errors import BodyError, ModeSetError
+from cms.errors import ModeSetError
 from cms.modes.families.cost import (
     chosen_words,
     left_out_words,
@@ -291,11 +291,11 @@ def gram_in_frame(gram: Array, frame: BodyFrame) -> Array:
 
 
 def reduced_nodal_sums(body: FEBody, Phi: Array, frame: BodyFrame) -> NodalSums | None:
-    """Return weighted sums over the nodes in the frame B; None if the nodes are too few or collinear."""
-    try:
-        U = inner(weighted_rigid_modes(body, frame.origin), Phi)
-    except BodyError:  # nodes are collinear or have no translations, so there is no Buckens frame
+    """Return weighted sums over the nodes in the frame B; None if there is no Buckens frame."""
+    W_Psi_R = weighted_rigid_modes(body, frame.origin)
+    if W_Psi_R is None:
         return None
+    U = inner(W_Psi_R, Phi)
     weights, c = node_weights(body), (body.nodes - frame.origin) @ frame.axes
     return NodalSums(
         w=weights.sum(),

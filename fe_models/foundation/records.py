@@ -170,19 +170,7 @@ class Takes(NamedTuple):
 
 
 class MismatchError(Exception):
-    """A value is not of the annotated kind.
-
-    Parameters
-    ----------
-    expected
-        Words for what was expected.
-    wrong
-        The value, or the item of a list.
-    """
-
-    def __init__(self, expected: str, wrong: Any) -> None:
-        super().__init__(expected)
-        self.expected, self.wrong = expected, wrong
+    """A value is not of the annotated kind; made of words for what was expected, and the value or item of a list."""
 
 
 def conformed(hint: Any, value: Any) -> Any:
@@ -214,24 +202,15 @@ def conformed(hint: Any, value: Any) -> Any:
             hints = np.ndarray, *(hint for hint in hints if hint not in ARRAY_LIKE)
         return _first_conformed(hints, value)
     if kind is Literal:
-        choices = get_args(hint)
-        is_one = any(isinstance(value, type(choice)) and value == choice for choice in choices)
-        return _required(is_one, f"one of {', '.join(map(str, choices))}", value)
+        if not any(isinstance(value, type(choice)) and value == choice for choice in get_args(hint)):
+            raise MismatchError(f"one of {', '.join(map(str, get_args(hint)))}", value)
+        return value
     if kind is Any or not isinstance(kind, type):  # or it says nothing at run time
         return value
-    if kind in (type, Callable):
-        return _required(isinstance(value, type) if kind is type else callable(value), KINDS[kind], value)
     if issubclass(kind, Iterable) and not issubclass(kind, str | bytes | Mapping | np.ndarray) and get_args(hint):
         is_row = kind is tuple and Ellipsis not in get_args(hint)  # of items of different kinds
         return value if is_row and hasattr(value, "__len__") else _sequence(kind, get_args(hint)[0], value)
     return _of_class(kind, value)
-
-
-def _required(is_so: bool, expected: str, value: Any) -> Any:
-    """Return a value that is of the expected kind; raise `MismatchError` if it is not."""
-    if not is_so:
-        raise MismatchError(expected, value)
-    return value
 
 
 def _first_conformed(hints: Sequence[Any], value: Any) -> Any:
@@ -241,16 +220,16 @@ def _first_conformed(hints: Sequence[Any], value: Any) -> Any:
         try:
             found.append(conformed(hint, value))
         except MismatchError as mismatch:
-            expected.append(mismatch)
+            expected.append(mismatch.args)
         else:
             if found[-1] is value:
                 return value
     if found:
         return found[0]
-    kinds = list(dict.fromkeys(each.expected for each in expected if each.expected != KINDS[NoneType]))
+    kinds = list(dict.fromkeys(words for words, _ in expected if words != KINDS[NoneType]))
     if len(kinds) > MOST_KINDS + 1:
         kinds[MOST_KINDS:] = [f"one of {len(kinds) - MOST_KINDS} other kinds"]
-    raise MismatchError(" or ".join(kinds), expected[0].wrong)
+    raise MismatchError(" or ".join(kinds), expected[0][1])
 
 
 def _sequence(kind: type, item: Any, value: Any) -> Any:
@@ -262,7 +241,8 @@ def _sequence(kind: type, item: Any, value: Any) -> Any:
     try:
         items = [conformed(item, each) for each in given]
     except MismatchError as mismatch:
-        raise MismatchError(f"a list, each of it {mismatch.expected}", mismatch.wrong) from None
+        expected, wrong = mismatch.args
+        raise MismatchError(f"a list, each of it {expected}", wrong) from None
     is_as_given = all(a is b for a, b in zip(items, given, strict=True)) and not is_one
     return value if is_as_given and (kind is not tuple or isinstance(value, tuple)) else tuple(items)
 
@@ -294,8 +274,10 @@ def _of_class(kind: type, value: Any) -> Any:
         is_so = not isinstance(value, type) and all(hasattr(value, name) for name in get_protocol_members(kind))
     else:
         is_so = isinstance(value, kind)
-    article = "an" if kind.__name__[0] in "AEIO" else "a"
-    return _required(is_so, KINDS.get(kind, f"{article} {kind.__name__}"), value)
+    if not is_so:
+        article = "an" if kind.__name__[0] in "AEIO" else "a"
+        raise MismatchError(KINDS.get(kind, f"{article} {kind.__name__}"), value)
+    return value
 
 
 @cache
@@ -313,9 +295,9 @@ def conformed_inputs(where: str, hints: Mapping[str, Any], given: Mapping[str, A
         try:
             found = conformed(hints[name], value)
         except MismatchError as mismatch:
-            wrong = mismatch.wrong
+            expected, wrong = mismatch.args
             got = f"the class {wrong.__name__} itself" if isinstance(wrong, type) else quoted(wrong)
-            raise error(f"{where}: {name}: expected {mismatch.expected}, got {got}") from None
+            raise error(f"{where}: {name}: expected {expected}, got {got}") from None
         if found is not value:
             changed[name] = found
     return changed

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -13,9 +14,9 @@ from fe_models.meshes.mesh import Mesh
 __all__ = [
     "all_facets",
     "area_centroid",
+    "boundary",
     "boundary_facets",
     "boundary_nodes",
-    "boundary_owners",
     "boundary_triangles",
     "facet_weights",
     "first_of_equal_rows",
@@ -31,9 +32,18 @@ _TRIANGLES = {
 
 CORNERS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}  #: corner nodes of a face
 
-Facets = Mapping[str, IntArray]
+
+class Boundary(NamedTuple):
+    """The facets of a solid mesh that belong to only one cell, and flat triangles over all their nodes."""
+
+    #: facets by face type, oriented outward, (n_facets, nodes per facet); complete faces in meshio order
+    facets: Mapping[str, IntArray]
+    triangles: IntArray  #: oriented outward, (n_tri, 3)
+    cells: IntArray  #: cell of each triangle, (n_tri,); cells are numbered through all types
+
+
 # boundaries of meshes that are still in use
-_known: WeakKeyDictionary[Mesh, tuple[Facets, Facets]] = WeakKeyDictionary()
+_known: WeakKeyDictionary[Mesh, Boundary] = WeakKeyDictionary()
 
 
 def all_facets(mesh: Mesh) -> dict[str, tuple[IntArray, IntArray]]:
@@ -63,23 +73,16 @@ def boundary_facets(mesh: Mesh) -> Mapping[str, IntArray]:
     mesh
         A solid mesh.
     """
-    return _boundary(mesh)[0]
+    return boundary(mesh).facets
 
 
-def boundary_owners(mesh: Mesh) -> IntArray:
-    """Return the cell of each of the `boundary_triangles`, (n_tri,); cells are numbered through all types."""
-    owners = _boundary(mesh)[1]
-    parts = [np.repeat(cells, len(_TRIANGLES[kind])) for kind, cells in owners.items()]
-    return np.concatenate(parts) if parts else np.zeros(0, np.int64)
-
-
-def _boundary(mesh: Mesh) -> tuple[Facets, Facets]:
-    """Return the facets by face type, and the cell of each facet by face type."""
+def boundary(mesh: Mesh) -> Boundary:
+    """Return the boundary of a solid mesh; it is cached as long as the mesh exists."""
     if mesh in _known:
         return _known[mesh]
     every = all_facets(mesh)
     facets: dict[str, IntArray] = {}
-    owners: dict[str, IntArray] = {}
+    triangles, cells = [np.zeros((0, 3), np.int64)], [np.zeros(0, np.int64)]
     for n_corners in (3, 4):
         kinds = [kind for kind in every if CORNERS[kind] == n_corners]
         if not kinds:
@@ -90,8 +93,11 @@ def _boundary(mesh: Mesh) -> tuple[Facets, Facets]:
         ends = np.cumsum([len(every[kind][0]) for kind in kinds])
         for kind, own in zip(kinds, np.split(is_single, ends[:-1]), strict=True):
             if own.any():
-                facets[kind], owners[kind] = (frozen(array[own], np.int64) for array in every[kind])
-    _known[mesh] = MappingProxyType(facets), MappingProxyType(owners)
+                facets[kind], owners = (frozen(array[own], np.int64) for array in every[kind])
+                flat = np.array(_TRIANGLES[kind])
+                triangles.append(facets[kind][:, flat].reshape(-1, 3))
+                cells.append(np.repeat(owners, len(flat)))
+    _known[mesh] = Boundary(MappingProxyType(facets), np.concatenate(triangles), np.concatenate(cells))
     return _known[mesh]
 
 
@@ -123,8 +129,7 @@ def boundary_triangles(mesh: Mesh) -> IntArray:
     mesh
         A solid mesh.
     """
-    parts = [nodes[:, np.array(_TRIANGLES[kind])].reshape(-1, 3) for kind, nodes in boundary_facets(mesh).items()]
-    return np.concatenate(parts) if parts else np.zeros((0, 3), np.int64)
+    return boundary(mesh).triangles
 
 
 def facet_weights(nodes: Array, faces: Mapping[str, IntArray]) -> Array:

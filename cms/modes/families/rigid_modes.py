@@ -11,7 +11,7 @@ from fe_models.body.fe_body import FEBody
 from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.sparse.submatrix import principal_block
-from fe_models.foundation.tall.columns import combine, dots, of_this_process, squares
+from fe_models.foundation.tall.columns import combine, dots, of_this_process
 from fe_models.foundation.words import node_list
 
 __all__ = [
@@ -181,7 +181,7 @@ SUSPECT = 1e-6  #: energy above which a direction is certainly not free, relativ
 
 def rounding_of_energy(body: FEBody, u: Array) -> Array:
     """Size of the rounding in the strain energy of each column: eps times the sum of |K_kk| u_k², (k,)."""
-    return np.finfo(float).eps * squares(np.abs(body.K.diagonal()), u)
+    return np.finfo(float).eps * dots(u, u, np.abs(body.K.diagonal()))
 
 
 def free_motions(body: FEBody, X: Array, C: Array, S: Array, terms: Array, load: Array | None = None) -> Array:

@@ -22,7 +22,7 @@ from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.frames import FrameCondition
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.tall.columns import combine, combined, copied, in_memory, inner, squares, subtract
+from fe_models.foundation.tall.columns import combine, combined, copied, dots, in_memory, inner, subtract
 
 __all__ = ["IN_SPAN", "FinishedBasis", "elastic_directions", "finish", "orthonormal_motions"]
 
@@ -95,7 +95,7 @@ def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedB
     free = suspect[:, without_energy(body, suspect)]
     if free.shape[1]:
         raise BodyError(mechanism_words(body, free))
-    of_mass = np.finfo(float).eps * squares(np.abs(body.M.diagonal()), Phi)[is_massive].max(initial=0.0)
+    of_mass = np.finfo(float).eps * dots(Phi, Phi, np.abs(body.M.diagonal()))[is_massive].max(initial=0.0)
     of_stiffness = (rounding / np.maximum(omega2, np.finfo(float).tiny))[is_massive].max(initial=0.0)
     for lost, most, words in ((of_mass, LOST_MASS, "mass"), (of_stiffness, LOST_STIFFNESS, "stiffness")):
         if lost > most:

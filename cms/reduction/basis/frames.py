@@ -166,6 +166,11 @@ def frame_condition(body: FEBody, frame: Frame | HeldFrame) -> FrameCondition:
         weights = node_weights(body)
         middle = weights @ body.nodes / weights.sum() if weights.any() else center
         W_Psi_R = weighted_rigid_modes(body, center)
+        if W_Psi_R is None:
+            raise BodyError(
+                f"body {body.name!r}: a Buckens frame needs at least three nodes with translations that are not on one "
+                "line; take a Tisserand or a nodal frame"
+            )
         norm = la.lu_factor(W_Psi_R.T @ Psi_R)
         return FrameCondition(
             placed("buckens", frame, middle),

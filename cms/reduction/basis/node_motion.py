@@ -194,23 +194,17 @@ def node_weights(body: FEBody) -> Array:
     return np.where(has.all(axis=1), weights, 0.0)
 
 
-def weighted_rigid_modes(body: FEBody, origin: Array) -> Array:
+def weighted_rigid_modes(body: FEBody, origin: Array) -> Array | None:
     """Return W Psi_R over the dofs of the body, (n_dof, 6); its product with columns gives their weighted sums.
 
-    Raises
-    ------
-    BodyError
-        If no node has three translations, or all such nodes are collinear.
+    None if there is no Buckens frame, because the nodes with three translations are too few or collinear.
     """
     weights, dofs = node_weights(body), body.to_mesh.dofs
     used = weights > 0
     points = body.nodes[used]
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False) if used.sum() > 2 else np.zeros(3)
     if spread[1] <= 1e-8 * spread[0]:
-        raise BodyError(
-            f"body {body.name!r}: a Buckens frame needs at least three nodes with translations that are not on one "
-            "line; take a Tisserand or a nodal frame"
-        )
+        return None
     motion = rigid_motion_of_points(body.nodes, origin)
     node, component = dofs.T
     rows = np.flatnonzero((component >= 0) & (component < 3))

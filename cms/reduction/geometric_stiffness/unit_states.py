@@ -2,8 +2,8 @@
 
 Loads per unit mass, about the origin and along the axes of the frame B: -e_a for the acceleration of the origin, -e_a ×
 c for the angular acceleration, -½ [e_a × (e_b × c) + e_b × (e_a × c)] for products of angular velocities. Then a unit
-force and a unit moment at every interface, or at chosen interfaces. Optionally, six loads distributed over the nodes
-(`spread_forces`). All are balanced by the same support, W Psi_R of the frame condition. Their static states are the
+force and a unit moment at every interface, or at chosen interfaces. Optionally, six loads distributed over the nodes.
+All are balanced by the same support, W Psi_R of the frame condition. Their static states are the
 part of the geometric stiffness that needs the factorisation.
 """
 
@@ -29,7 +29,7 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = [
     "UnitLoads", "UnitStates", "balanced", "has_geometric_stiffness", "loaded_interfaces",
-    "require_geometric_stiffness", "spread_forces", "turned_rigid_work", "unit_loads", "unit_mass_loads",
+    "require_geometric_stiffness", "turned_rigid_work", "unit_loads", "unit_mass_loads",
     "unit_states",
 ]  # fmt: skip
 
@@ -104,21 +104,6 @@ def together(body: FEBody, mass: MassLoads, on_dofs: Array) -> UnitLoads:
     return UnitLoads(mass, on_dofs, F, np.asarray(~F.any(axis=0)))
 
 
-# six loads distributed over the nodes of a body by weight, and their work when they are rotated (theory.md §7) --------
-
-
-def spread_forces(body: FEBody, frame: BodyFrame) -> Array | None:
-    """Return the loads (w_i/w) e_a and (w_i/w) e_a × c_i, axes and origin of B, over the dofs, (n_dof, 6).
-
-    None if there is no Buckens frame, because nodes are collinear or have no translations.
-    """
-    try:
-        W_Psi_R = weighted_rigid_modes(body, frame.origin)
-    except BodyError:
-        return None
-    return np.asarray(W_Psi_R @ np.kron(np.eye(2), frame.axes) / node_weights(body).sum())
-
-
 def turned_rigid_work(body: FEBody, forces: Array, frame: BodyFrame) -> Array:
     """Return the work of loads, rotated about the axes of B, on the rotations about its axes and origin, (k, 3, 3).
 
@@ -155,7 +140,9 @@ class UnitStates:
     on_dofs: Array  #: loads on the dofs of the body, (n_dof, k) [N, N m]
     loaded: IntArray  #: indices of the loads that are not zero, (n_loaded,)
     u: Array  #: responses to the loaded ones, up to a rigid motion, (n_dof, n_loaded)
-    spread: Array | None  #: the last six loads before balancing, (n_dof, 6); None: not needed
+    #: the last six loads before balancing, (w_i/w) e_a and (w_i/w) e_a × c_i over the nodes, axes and origin of B,
+    #: (n_dof, 6); None: not requested, or there is no Buckens frame
+    spread: Array | None
     interfaces: tuple[Interface, ...]  #: interfaces whose loads are included
 
 
@@ -194,7 +181,10 @@ def unit_states(
     require_geometric_stiffness(body)
     condition = frame if isinstance(frame, FrameCondition) else frame_condition(body, frame or TisserandFrame())
     loaded_ones = loaded_interfaces(body, interfaces)
-    forces = spread_forces(body, condition.frame) if spread else None
+    W_Psi_R = weighted_rigid_modes(body, condition.frame.origin) if spread else None
+    forces = None
+    if W_Psi_R is not None:
+        forces = np.asarray(W_Psi_R @ np.kron(np.eye(2), condition.frame.axes) / node_weights(body).sum())
     with families_of(source) as families:
         loads = balanced(body, unit_loads(body, condition.frame, loaded_ones, forces), condition)
         loaded = np.flatnonzero(~loads.is_zero)

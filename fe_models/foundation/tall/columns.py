@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Columns", "are_finite", "beside", "combine", "combine_in_place", "combined", "copied", "dots", "elsewhere",
-    "frozen_columns", "in_memory", "inner", "of_this_process", "ordered", "put", "rows_times", "squares", "subtract",
+    "frozen_columns", "in_memory", "inner", "of_this_process", "ordered", "put", "rows_times", "subtract",
 ]  # fmt: skip
 
 SMALL = 20_000  #: rows below which threads cost more than they save
@@ -84,11 +84,16 @@ def inner(X: Any, Y: Any) -> Array:
     return np.sum(_by_rows(lambda some: X[some].T @ Y[some], X, Y, is_sum=True), axis=0)
 
 
-def dots(X: Any, Y: Any) -> Array:
-    """Return Σ_n X_nk Y_nk for every column, (k,)."""
+def dots(X: Any, Y: Any, d: Array | None = None) -> Array:
+    """Return Σ_n X_nk Y_nk for every column, (k,); with weights d, (n,) or (n, 1): Σ_n d_n X_nk Y_nk."""
     if (far := elsewhere(X, Y)) is not None:
-        return np.asarray(sum(far.on_rows(dots, far.like(X), far.like(Y))))
-    return np.asarray(np.einsum("nk,nk->k", X, Y))
+        weights = () if d is None else (far.like(d.reshape(-1, 1)),)
+        return np.asarray(sum(far.on_rows(dots, far.like(X), far.like(Y), *weights)))
+    total = np.zeros(X.shape[1])
+    for some in row_slices(len(X), X, Y):
+        weights = () if d is None else (d.ravel()[some],)
+        total += np.einsum("n,nk,nk->k" if weights else "nk,nk->k", *weights, X[some], Y[some])
+    return total
 
 
 def rows_times(S: Any, X: Any) -> Array:
@@ -98,14 +103,6 @@ def rows_times(S: Any, X: Any) -> Array:
     S = sp.csr_array(S)
     read = np.unique(S.indices).astype(np.int64)
     return np.asarray(S[:, read] @ X[read])
-
-
-def squares(d: Array, X: Any) -> Array:
-    """Return Σ_n d_n X_nk² for every column, (k,); d is (n,) or (n, 1)."""
-    if (far := elsewhere(X)) is not None:
-        return np.asarray(sum(far.on_rows(squares, far.like(d[:, None]), X)))
-    d = d.reshape(-1)
-    return np.sum([np.einsum("n,nk,nk->k", d[some], X[some], X[some]) for some in row_slices(len(X), X)], axis=0)
 
 
 def combine(X: Any, C: Array, *, order: Literal["C", "F"] | None = None) -> Any:

@@ -13,7 +13,7 @@ from cms.reduction.basis.finishing import finish
 from cms.reduction.basis.frames import FrameCondition
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, frozen
-from fe_models.foundation.tall.columns import combine, inner, of_this_process, squares
+from fe_models.foundation.tall.columns import combine, dots, inner, of_this_process
 
 __all__ = ["FreeBasis", "ShapeRounding", "free_basis", "ritz_basis", "shape_rounding"]
 
@@ -45,7 +45,7 @@ def shape_rounding(body: FEBody, V: Array, A: Array) -> ShapeRounding:
     """Return the rounding of the shapes V A."""
     motion = np.where(body.dofs[:, 1] < 3, 1.0, body.length**2)
     diagonals = (motion, np.abs(body.M.diagonal()), np.abs(body.K.diagonal()))
-    of_columns = ShapeRounding(*(np.finfo(float).eps * np.sqrt(squares(each, V)) for each in diagonals))
+    of_columns = ShapeRounding(*(np.finfo(float).eps * np.sqrt(dots(V, V, each)) for each in diagonals))
     return of_columns.of_combinations(A)
 
 

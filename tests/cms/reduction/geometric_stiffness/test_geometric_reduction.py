@@ -13,7 +13,7 @@ from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.frames import BuckensFrame, NodalFrame, TisserandFrame, frame_condition
 from cms.reduction.basis.node_motion import reference_motion
 from cms.reduction.geometric_stiffness.geometric_reduction import reduced_geometric_stiffness
-from cms.reduction.geometric_stiffness.unit_states import balanced, spread_forces, unit_loads
+from cms.reduction.geometric_stiffness.unit_states import balanced, unit_loads, unit_states
 from fe_models.assembly.planar import planar
 from fe_models.body.material import Material
 from fe_models.body.rigid_motion import MassLoads
@@ -42,7 +42,7 @@ def test_a_rigid_rotation_turns_the_loads(name, frame):
         found = reduced_geometric_stiffness(families, columns, condition)
     own = found.interfaces.reshape(-1, *found.spin.shape[1:])
     K = np.concatenate([found.translation, found.rotation, found.spin, own, found.spread.K])
-    spread = spread_forces(body, condition.frame)
+    spread = unit_states(body, frame=condition).spread
     loads = balanced(body, unit_loads(body, condition.frame, body.interfaces, spread), condition)
     assert_allclose(K[:, :3], 0, rtol=0, atol=1e-9 * np.abs(K).max())  # translations
     T = np.eye(body.n_dof) if body.recovery is None else body.recovery.matrix

@@ -14,7 +14,6 @@ from fe_models.foundation.tall.columns import (
     inner,
     ordered,
     rows_times,
-    squares,
     subtract,
 )
 
@@ -109,7 +108,7 @@ def test_columns_of_any_kind_are_treated_as_arrays():
     assert_allclose(inner(X, far_Y), X.T @ Y, **close)
     for products in (dots(far, far), dots(far, X), dots(X, far)):
         assert_allclose(products, (X * X).sum(axis=0), **close)
-    assert_allclose(squares(d, far), d @ X**2, **close)
+    assert_allclose(dots(far, far, d), d @ X**2, **close)
     assert_allclose(rows_times(S, far), S @ X, **close)
     for product in (combine(far, C), combined(far, C)):
         assert isinstance(product, HalvedColumns)

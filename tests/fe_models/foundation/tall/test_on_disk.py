@@ -11,7 +11,7 @@ from fe_models.elements.solids.body import solid_body
 from fe_models.elements.solids.interfaces import nodes_interface, rigid_interface
 from fe_models.foundation.errors import StorageError
 from fe_models.foundation.tall import on_disk as room
-from fe_models.foundation.tall.columns import beside, combine, combined, copied, in_memory, inner, squares, subtract
+from fe_models.foundation.tall.columns import beside, combine, combined, copied, dots, in_memory, inner, subtract
 from fe_models.foundation.tall.on_disk import is_on_disk, on_disk, release, row_slices
 from fe_models.meshes.selections import NodeSet
 from tests.bodies import STEEL, box_mesh
@@ -61,7 +61,7 @@ def test_tall_products_are_those_of_arrays_in_memory(tiny):
     assert_allclose(inner(stored(X), stored(Y)), X.T @ Y, rtol=0, atol=1e-12)
     assert_allclose(combine(stored(X), C), X @ C, rtol=0, atol=1e-12)
     assert_allclose(combined(stored(X), C), X @ C, rtol=0, atol=1e-12)
-    assert_allclose(squares(Y[:, 0], stored(X)), Y[:, 0] @ X**2, rtol=0, atol=1e-12)
+    assert_allclose(dots(stored(X), stored(X), Y[:, 0]), Y[:, 0] @ X**2, rtol=0, atol=1e-12)
     changed = stored(Y)
     subtract(changed, stored(X), np.eye(8))
     assert_allclose(changed, Y - X, rtol=0, atol=1e-12)
