@@ -178,15 +178,15 @@ class Plan:
             memory of this machine does not suffice.
         """
         from cms.modes.families.cost import require_room_for_stiffness, stiffness_words
-        from cms.reduction.geometric_stiffness.unit_states import loaded_interfaces, require_geometric_stiffness
+        from cms.reduction.geometric_stiffness.unit_states import require_geometric_stiffness
 
         plan = replace(cls.of_stiffness(job, body), solver=solver)
         n_columns = min(expected_columns(job, body), body.n_dof)  # the mode set refuses a job with more modes
         words = plan.left_out(n_columns)
         if plan.is_requested:
             require_geometric_stiffness(body)
-            if isinstance(plan.asked, list):
-                loaded_interfaces(body, plan.asked)
+            for name in plan.asked if isinstance(plan.asked, list) else ():
+                body.interface(name)  # an unknown name is refused before the long work
             require_room_for_stiffness(body, n_columns, plan.asked)
             words = stiffness_words(body, n_columns, plan.asked)
         if words:

@@ -190,6 +190,8 @@ def independent_basis(
     if not len(left) and np.linalg.cond(W) < TRUSTED_CONDITION:  # (2)
         return Basis(V, Z, Z, within(G_K, Z), within(G_M, Z), is_formed=False), np.asarray(redundant, dtype=np.int64)
     basis = orthonormal_basis(combine(V, Z), Z, products, omega2)  # (3)
+    if not len(left):
+        return basis, np.asarray(redundant, dtype=np.int64)
     rest = products.beside(V[:, index[left]] / size[left])
     rest.T = np.zeros((V.shape[1], len(left)))
     rest.T[index[left], np.arange(len(left))] = 1 / size[left]

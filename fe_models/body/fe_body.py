@@ -394,10 +394,16 @@ class FEBody:
                 f"{where}: dofs: expected components 0..5, got {self.dofs[:, 1].min()}..{self.dofs[:, 1].max()}"
             )
         n_dof = len(self.dofs)
-        for name in ("M", "K"):
-            put(self, name, checked_matrix(f"{where}: {name}", getattr(self, name), n_dof))
-        if self.D is not None:
-            put(self, "D", symmetric_csc(f"{where}: D", self.D, n_dof))
+        for name in ("M", "K", "D"):
+            A: Any = getattr(self, name)
+            if isinstance(A, SpreadMatrix):  # it was symmetrised when it was made
+                if A.shape != (n_dof, n_dof) or not np.isfinite(A.largest):
+                    raise BodyError(
+                        f"{where}: {name}: expected finite entries and shape {(n_dof, n_dof)}, got {A.shape}, up to "
+                        f"{A.largest:g}"
+                    )
+            elif A is not None:
+                put(self, name, symmetric_csc(f"{where}: {name}", A, n_dof))
         if self.node_volumes is not None and ((self.node_volumes < 0).any() or not self.node_volumes.any()):
             raise BodyError(f"{where}: node_volumes: expected no negative volume and a positive sum")
         put(self, "load_cases", tuple(self.load_cases))
@@ -514,15 +520,6 @@ class FEBody:
     def with_load_cases(self, *load_cases: LoadCase) -> "FEBody":
         """Return the body with these load cases added."""
         return replace(self, load_cases=(*self.load_cases, *load_cases))
-
-
-def checked_matrix(where: str, A: Any, n: int) -> Any:
-    """Return a symmetric matrix after checking it; a distributed matrix was symmetrised when it was made."""
-    if not isinstance(A, SpreadMatrix):
-        return symmetric_csc(where, A, n)
-    if A.shape != (n, n) or not np.isfinite(A.largest):
-        raise BodyError(f"{where}: expected finite entries and shape {(n, n)}, got {A.shape}, up to {A.largest:g}")
-    return A
 
 
 def put_translations(field_: Array, dofs: IntArray, u: Array) -> None:

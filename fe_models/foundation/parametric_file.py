@@ -205,6 +205,9 @@ def merged(
     bases = [bases] if isinstance(bases, str) else bases
     if not isinstance(bases, list) or not all(isinstance(base, str) for base in bases):
         raise error(f"{path}: extends = {quoted_value(bases)}: expected a file name, or a list of file names")
+    own_origins = {location: (path, location) for location in locations(own)}
+    if not bases:
+        return own, own_origins, (path,)
     content: dict[str, Any] = {}
     origins: dict[Location, tuple[Path, Location]] = {}
     files = [path]
@@ -214,7 +217,6 @@ def merged(
         if (path.parent / base).parent.resolve() != path.parent.resolve():
             lower = relocated(lower, (path.parent / base).parent)
         merge(content, lower, lower_origins, origins)
-    own_origins = {location: (path, location) for location in locations(own)}
     merge(content, own, own_origins, origins)
     return content, origins, tuple(dict.fromkeys(files))
 

@@ -124,9 +124,9 @@ def values_of(body: ReducedBody) -> dict[str, Any]:
     values |= numbering_values(body.numbering)
     if body.kept is not None:
         values |= {f"/kept/{name}": getattr(body.kept, name) for name in ("nodes", "rotation", "source")}
-    values |= {f"/moments/{name}": getattr(moments, name) for name in ("S", "R", "C1")}
-    values |= {f"/moments/{name}": getattr(moments, name) for name in known_products(moments.missing)}
-    values |= {f"/invariants/{name}": getattr(moments, name) for name in known_invariants(moments.missing)}
+    products, invariants = known_terms(moments.missing)
+    values |= {f"/moments/{name}": getattr(moments, name) for name in ("S", "R", "C1", *products)}
+    values |= {f"/invariants/{name}": getattr(moments, name) for name in invariants}
     for k, interface in enumerate(body.interfaces):
         names = ("position", "triad", "Psi", "members")
         values |= {f"/interfaces/{k}/{name}": getattr(interface, name) for name in names}
@@ -173,17 +173,13 @@ def geometric_values(geometric: GeometricStiffness) -> dict[str, Any]:
     return values
 
 
-def known_products(missing: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the products P and S_kl that a file stores: those without a missing part.
+def known_terms(missing: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the products P and S_kl, and the invariants, that a file stores: those without a missing part.
 
     M* is stored instead of an incomplete S_kl; 2C is among the invariants.
     """
-    return (() if "3C" in missing else ("P",)) + (("M",) if "5C" in missing else ("S_kl",))
-
-
-def known_invariants(missing: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the invariants that a file stores."""
-    return tuple(name for name in INVARIANTS if name not in {f"C{term[0]}" for term in missing})
+    products = (() if "3C" in missing else ("P",)) + (("M",) if "5C" in missing else ("S_kl",))
+    return products, tuple(name for name in INVARIANTS if name not in {f"C{term[0]}" for term in missing})
 
 
 # Content to body -----------------------------------------------------------------------------------------------------
@@ -260,7 +256,7 @@ def moments_of(contents: Contents) -> Moments:
     missing: tuple[str, ...] = ()
     if "missing" in contents.content.attributes.get("/moments", {}):
         missing = tuple(contents.attribute("/moments", "missing", str).split())
-    known = contents.arrays("/moments", "S", "R", "C1", *known_products(missing))
+    known = contents.arrays("/moments", "S", "R", "C1", *known_terms(missing)[0])
     if "P" not in known:
         C2 = contents.array("/invariants/C2")
         require_shape("dataset /invariants/C2", C2, np.shape(known["C1"]))
@@ -351,7 +347,7 @@ def units_of(contents: Contents) -> Units:
 
 def require_same_invariants(content: Content, moments: Moments) -> None:
     """Raise `ModalFileError` unless the stored invariants, meant for other readers, follow from the moments."""
-    for name in known_invariants(moments.missing):
+    for name in known_terms(moments.missing)[1]:
         stored = Contents(content).array(f"/invariants/{name}")
         expected = getattr(moments, name)
         scale = np.abs(expected).max(initial=0.0)

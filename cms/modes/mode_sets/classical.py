@@ -295,9 +295,9 @@ def craig_bampton(
     with families_of(body) as families:
         body, wanted = families.body, mode_count(n_modes)
         require_interfaces("craig_bampton", body)
-        block, modes = _held_modes("craig_bampton", families, wanted, free or {})
+        block, modes, options = _held_modes("craig_bampton", families, wanted, free or {})
         blocks = [constraint_block(families), block]
-        return mode_set("craig-bampton", families, blocks, modes=modes, wanted=wanted, options=_free_words(free))
+        return mode_set("craig-bampton", families, blocks, modes=modes, wanted=wanted, options=options)
 
 
 def craig_bampton_ir(
@@ -330,9 +330,9 @@ def craig_bampton_ir(
     with families_of(body) as families:
         body, wanted = families.body, mode_count(n_modes)
         require_interfaces("craig_bampton_ir", body)
-        block, modes = _held_modes("craig_bampton_ir", families, wanted, free or {})
+        block, modes, options = _held_modes("craig_bampton_ir", families, wanted, free or {})
         blocks = [constraint_block(families), rigid_block(families, families.Psi_H, "inertia-relief"), block]
-        return mode_set("craig-bampton-ir", families, blocks, modes=modes, wanted=wanted, options=_free_words(free))
+        return mode_set("craig-bampton-ir", families, blocks, modes=modes, wanted=wanted, options=options)
 
 
 def guyan(body: FEBody | Families) -> ModeSet:
@@ -358,15 +358,17 @@ def _held_modes(
     families: Families,
     wanted: ModeCount,
     free: Mapping[str, Sequence[str]],
-) -> tuple[Block, EigenResult]:
-    """Return the modes with B held, or with B held except its free dofs (then made zero on B by means of Psi_C)."""
+) -> tuple[Block, EigenResult, dict[str, str]]:
+    """Return the modes with B held, or with B held except its free dofs (then made zero on B by means of Psi_C).
+
+    Beside their block and the modes themselves, the options to record: the free dofs, if there are any.
+    """
     body = families.body
-    directions = free_directions(body, free)
+    directions = free_directions(body, free) if free else np.zeros((len(body.b), 0))
     if not directions.shape[1]:
         modes = checked_modes(name, "fixed-interface", families.fixed_modes, body, wanted)
-        if len(families.h) == len(body.b):
-            return vibration_block("fixed-interface", modes), modes
-        return vibration_block("fixed-interface", modes, families.without_boundary(modes.Phi)), modes
+        columns = modes.Phi if len(families.h) == len(body.b) else families.without_boundary(modes.Phi)
+        return vibration_block("fixed-interface", modes, columns), modes, {}
     n_b, n_h = len(body.b), len(families.h)
     Z = np.zeros((n_h, directions.shape[1] + n_h - n_b))
     Z[:n_b, : directions.shape[1]] = directions
@@ -378,9 +380,6 @@ def _held_modes(
         body,
         wanted,
     )
-    return vibration_block("mixed-interface", modes, families.without_boundary(modes.Phi)), modes
-
-
-def _free_words(free: Mapping[str, Sequence[str]] | None) -> dict[str, str]:
-    words = "; ".join(f"{name} {' '.join(components)}" for name, components in (free or {}).items() if components)
-    return {"free": words} if words else {}
+    words = "; ".join(f"{name} {' '.join(components)}" for name, components in free.items() if components)
+    columns = families.without_boundary(modes.Phi)
+    return vibration_block("mixed-interface", modes, columns), modes, {"free": words}

@@ -25,10 +25,9 @@ from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.rigid_motion import MassLoads
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.tall.columns import combine, of_this_process
-from fe_models.foundation.words import nearest, quoted
 
 __all__ = [
-    "UnitLoads", "UnitStates", "balanced", "has_geometric_stiffness", "loaded_interfaces",
+    "UnitLoads", "UnitStates", "balanced", "has_geometric_stiffness",
     "require_geometric_stiffness", "turned_rigid_work", "unit_loads", "unit_mass_loads",
     "unit_states",
 ]  # fmt: skip
@@ -85,15 +84,12 @@ def balanced(body: FEBody, loads: UnitLoads, condition: FrameCondition) -> UnitL
     else:
         after = together(body, loads.mass, loads.on_dofs - condition.W @ amounts)
     is_zero = np.abs(after.F).max(axis=0) <= BALANCED * np.abs(loads.F).max(axis=0)
-    # a load per unit mass may load sections even if its nodal forces vanish
-    is_zero &= _size(body, after.mass) <= BALANCED * _size(body, loads.mass)
-    return UnitLoads(after.mass, after.on_dofs, after.F, is_zero)
-
-
-def _size(body: FEBody, mass: MassLoads) -> Array:
-    """Return the largest force per unit mass at the nodes and over a length of the body, (k,)."""
-    at_nodes = np.abs(mass.at(body.nodes)).max(axis=(0, 1))
-    return np.asarray(at_nodes + np.abs(mass.A).max(axis=(1, 2)) * body.length)
+    # a load per unit mass may load sections even if its nodal forces vanish: its size at the nodes and over the length
+    remainder, size = (
+        np.abs(mass.at(body.nodes)).max(axis=(0, 1)) + np.abs(mass.A).max(axis=(1, 2)) * body.length
+        for mass in (after.mass, loads.mass)
+    )
+    return UnitLoads(after.mass, after.on_dofs, after.F, is_zero & (remainder <= BALANCED * size))
 
 
 def together(body: FEBody, mass: MassLoads, on_dofs: Array) -> UnitLoads:
@@ -180,7 +176,8 @@ def unit_states(
     body = body_of(source)
     require_geometric_stiffness(body)
     condition = frame if isinstance(frame, FrameCondition) else frame_condition(body, frame or TisserandFrame())
-    loaded_ones = loaded_interfaces(body, interfaces)
+    named = body.interfaces if interfaces is None else [body.interface(name) for name in interfaces]
+    loaded_ones = tuple(interface for interface in body.interfaces if interface in named)
     W_Psi_R = weighted_rigid_modes(body, condition.frame.origin) if spread else None
     forces = None
     if W_Psi_R is not None:
@@ -190,17 +187,6 @@ def unit_states(
         loaded = np.flatnonzero(~loads.is_zero)
         u = static_states(families, loads.F[:, loaded])
     return UnitStates(body, condition, loads.mass, loads.on_dofs, loaded, u, forces, loaded_ones)
-
-
-def loaded_interfaces(body: FEBody, names: Sequence[str] | None) -> tuple[Interface, ...]:
-    """Return the interfaces with these names (None: all); raise `BodyError` for an unknown name."""
-    known = [interface.name for interface in body.interfaces]
-    for name in names or ():
-        if name not in known:
-            raise BodyError(
-                f"body {body.name!r}: geometric stiffness: no interface {quoted(name)}{nearest(name, known)}"
-            )
-    return tuple(each for each in body.interfaces if names is None or each.name in names)
 
 
 def has_geometric_stiffness(body: FEBody) -> bool:
