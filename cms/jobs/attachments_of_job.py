@@ -137,7 +137,7 @@ def frame_interface(name: str, section: Any, mesh: "LineMesh") -> Interface:
     from cms.jobs.parts_of_job import selection_of
     from fe_models.elements.beams.interfaces import line_interface
 
-    chosen = selection_of(section.selection, getattr(section, section.selection))
+    chosen = selection_of(section)
     # the job lists axes as rows; here they are columns
     triad = None if section.triad is None else np.array(section.triad).T
     return line_interface(mesh, name, chosen, kind=section.kind, reference=section.reference, triad=triad)

@@ -95,7 +95,7 @@ def interfaces_on(job: Job, geometry: "Mesh | NodeCloud") -> tuple[Interface, ..
         return interfaces_of(job, geometry)
     interfaces = []
     for name, section in job.interfaces.items():
-        chosen = selection_of(section.selection, getattr(section, section.selection))
+        chosen = selection_of(section)
         facets = selected_facets(geometry, chosen)
         weights = facet_weights(geometry.nodes, facets) if facets else np.ones(len(geometry.nodes))
         # the job lists axes as rows; here they are columns
@@ -188,9 +188,8 @@ def body_of_mixed(job: Job, stages: Stages, solid: FEBody, solid_mesh: Any, on_r
     of_solid, of_frame = [], []
     for name, tie in job.ties.items():
         node = one_node(lines, f"ties.{name}.node", tie.node)
-        key = "faces" if tie.faces is not None else "nodes"
         point = lines.nodes[node]
-        of_solid.append(makers[tie.kind](solid_mesh, name, selection_of(key, getattr(tie, key)), reference=point))
+        of_solid.append(makers[tie.kind](solid_mesh, name, selection_of(tie), reference=point))
         of_frame.append(line_interface(lines, name, NodeIndices((node,))))
     frame = body_of_frame(job, stages, on_report, interfaces=tuple(of_frame))
     frame = replace(frame, name=f"{frame.name} beams")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cms.errors import JobError
-from cms.jobs.job import InterfaceSection, Job
+from cms.jobs.job import SELECTIONS, InterfaceSection, Job
 from cms.jobs.tables.material_table import isotropic_of, material_of
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import IntArray
@@ -432,7 +432,8 @@ def _empty(n: int) -> Any:
 def _interface(name: str, table: InterfaceSection, raw: "RawMesh", joined: "Joined") -> Interface:
     """Return an interface on a group of nodes of the deck."""
     if not isinstance(table.nodes, str):
-        raise JobError(f"interfaces.{name}: with a deck, expected nodes = a group of nodes, got {table.selection}")
+        (given,) = (key for key in SELECTIONS if getattr(table, key) is not None)
+        raise JobError(f"interfaces.{name}: with a deck, expected nodes = a group of nodes, got {given}")
     nodes = _placed(joined, _group(raw, f"interfaces.{name}.nodes", table.nodes), f"interfaces.{name}")
     points = joined.body.nodes[nodes]
     # the job lists axes as rows; here they are columns

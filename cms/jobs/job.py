@@ -338,11 +338,6 @@ class InterfaceSection(Table):
         None, description="solid or lines: the part on which it is, if a body has both"
     )
 
-    @property
-    def selection(self) -> str:
-        """The key of the given selection."""
-        return next(key for key in SELECTIONS if getattr(self, key) is not None)
-
     @model_validator(mode="after")
     def _one_selection(self) -> "InterfaceSection":
         given = [key for key in SELECTIONS if getattr(self, key) is not None]

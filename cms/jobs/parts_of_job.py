@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cms.errors import JobError
-from cms.jobs.job import InterfaceSection, Job, LoadCaseSection, PartSection
+from cms.jobs.job import SELECTIONS, InterfaceSection, Job, LoadCaseSection, PartSection
 from cms.jobs.tables.material_table import material_of
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.load_cases import LoadCase
@@ -59,14 +59,14 @@ def interface_of(name: str, section: InterfaceSection, mesh: "Mesh") -> Interfac
         "distributing": interfaces.distributing_interface,
         "nodes": interfaces.nodes_interface,
     }
-    chosen = selection_of(section.selection, getattr(section, section.selection))
+    chosen = selection_of(section)
     # the job lists axes as rows; here they are columns
     triad = None if section.triad is None else np.array(section.triad).T
     return makers[section.kind](mesh, name, chosen, reference=section.reference, triad=triad)
 
 
-def selection_of(key: str, given: Any) -> Any:
-    """Return the selection for a key of the job and its options."""
+def selection_of(section: Any) -> Any:
+    """Return the selection of nodes that a table of the job makes by one of its `SELECTIONS`."""
     from fe_models.meshes import selections
 
     types = {
@@ -77,6 +77,8 @@ def selection_of(key: str, given: Any) -> Any:
         "box": selections.Box,
         "nearest": selections.NearestNode,
     }
+    key = next(key for key in SELECTIONS if getattr(section, key, None) is not None)
+    given = getattr(section, key)
     if key == "faces":
         first, *more = [given] if isinstance(given, str) else given
         return selections.FaceGroup(first, tuple(more))
@@ -106,7 +108,7 @@ def load_case_of(
         return loads.interface_load(body, name, section.at, force=force, torque=torque)
     if mesh is None or section.selection is None:
         raise JobError(f"load_cases.{name}: there is no mesh to select on; give at = an interface")
-    chosen = selection_of(section.selection, getattr(section, section.selection))
+    chosen = selection_of(section)
     if section.pressure is not None:
         return loads.pressure_load(body, mesh, name, chosen, section.pressure)
     return loads.selection_load(body, mesh, name, chosen, force=force, torque=torque, reference=section.reference)

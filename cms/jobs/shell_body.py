@@ -134,7 +134,7 @@ def shell_interface_of(name: str, section: InterfaceSection, mesh: "ShellMesh") 
     from cms.jobs.parts_of_job import selection_of
     from fe_models.elements.shells.body import shell_interface
 
-    chosen = selection_of(section.selection, getattr(section, section.selection))
+    chosen = selection_of(section)
     # the job lists axes as rows; here they are columns
     triad = None if section.triad is None else np.array(section.triad).T
     return shell_interface(mesh, name, chosen, kind=section.kind, reference=section.reference, triad=triad)

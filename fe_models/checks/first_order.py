@@ -22,8 +22,7 @@ from fe_models.body.material import AnyMaterial, Material, assign_materials
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.elements.solids.assembly import assemble, expand_scalar_mass
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.meshes.boundary import boundary_nodes
-from fe_models.meshes.connectivity import facet_pairs
+from fe_models.meshes.boundary import boundary_nodes, facets_of
 from fe_models.meshes.mesh import Mesh, drop_unused_nodes
 from fe_models.meshes.quadratic_mesh import quadratic_mesh, tetrahedra_of
 
@@ -167,7 +166,7 @@ class LowestModes:
 
 def piece_of(mesh: Mesh) -> tuple[Mesh, IntArray]:
     """Step (1): return the piece, and the indices of its cells, counted through all types, ascending, (n,)."""
-    pairs = facet_pairs(mesh)
+    pairs = facets_of(mesh).pairs
     n = mesh.n_cells
     joined = sp.coo_array(
         (np.ones(2 * len(pairs)), (pairs.ravel("F"), pairs[:, ::-1].ravel("F"))), shape=(n, n)

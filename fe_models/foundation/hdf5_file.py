@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
@@ -27,7 +27,7 @@ __all__ = [
     "Manifest",
     "as_attribute",
     "described",
-    "digest_of_lines",
+    "digest_of",
     "opened",
     "own_items",
     "require_digest",
@@ -147,6 +147,15 @@ def write_sealed_file(path: Path, kind: Kind, fill: Callable[[Any], None], *, pa
     sync_folder(path.parent)
 
 
+class Entry(NamedTuple):
+    """What the manifest of a file says about an attribute or dataset."""
+
+    path: str  #: of a dataset, or "<path>@<name>" of an attribute
+    kind: str  #: "utf8", "int64" or "float64"
+    shape: tuple[int, ...]
+    sha256: str  #: of the values
+
+
 @dataclass(eq=False)
 class Manifest:
     """Writes attributes and datasets into a file, and finally the digest over all of them.
@@ -156,20 +165,20 @@ class Manifest:
     """
 
     file: Any  #: an open `h5py.File`
-    lines: list[str] = field(default_factory=list)  #: of the manifest, one for each attribute and dataset
+    entries: list[Entry] = field(default_factory=list)  #: of all attributes and datasets
 
     def attributes(self, path: str, values: Mapping[str, Attribute]) -> None:
         """Write the attributes of a group, which is created if it does not exist."""
         item = self.file.require_group(path)
-        self.lines += [put_attribute(item, path, name, value) for name, value in values.items()]
+        self.entries += [put_attribute(item, path, name, value) for name, value in values.items()]
 
     def dataset(self, path: str, values: Any, attributes: Mapping[str, Attribute]) -> None:
         """Write a dataset with its attributes and its sha256."""
-        stored, kind, sha256, line = described(path, values)
+        stored, kind, entry = described(path, values)
         item = self.file.create_dataset(path, data=stored, dtype=kind, track_times=False, **filters_for(stored))
-        self.lines += [put_attribute(item, path, name, value) for name, value in attributes.items()]
-        put_attribute(item, path, SHA256, sha256)
-        self.lines.append(line)
+        self.entries += [put_attribute(item, path, name, value) for name, value in attributes.items()]
+        put_attribute(item, path, SHA256, entry.sha256)
+        self.entries.append(entry)
 
     def rows(
         self, path: str, shape: tuple[int, ...], parts: Iterable[Any], attributes: Mapping[str, Attribute]
@@ -191,13 +200,13 @@ class Manifest:
             first += len(block)
         if first != shape[0]:
             raise ValueError(f"{path}: expected {shape[0]} rows, got {first}")
-        self.lines += [put_attribute(item, path, name, value) for name, value in attributes.items()]
+        self.entries += [put_attribute(item, path, name, value) for name, value in attributes.items()]
         put_attribute(item, path, SHA256, digest.hexdigest())
-        self.lines.append(line_of(path, "float64", shape, digest.hexdigest()))
+        self.entries.append(Entry(path, "float64", shape, digest.hexdigest()))
 
     def close(self) -> None:
         """Write the digest."""
-        put_attribute(self.file, "/", DIGEST, digest_of_lines(self.lines))
+        put_attribute(self.file, "/", DIGEST, digest_of(self.entries))
 
 
 def filters_for(stored: Any) -> dict[str, Any]:
@@ -227,11 +236,10 @@ def chunk_of(shape: tuple[int, ...], itemsize: int) -> tuple[int, ...]:
     return tuple(chunk)
 
 
-def described(path: str, values: Any) -> tuple[Any, Any, str, str]:
-    """Return the values as stored, their HDF5 type, their sha256, and their line of the manifest.
+def described(path: str, values: Any) -> tuple[Any, Any, Entry]:
+    """Return the values as stored, their HDF5 type, and their entry of the manifest.
 
-    The line holds path, type, shape and sha256, separated by tabs. The sha256 covers the little-endian values in C
-    order, or the UTF-8 bytes of each string followed by a zero byte.
+    The sha256 covers the little-endian values in C order, or the UTF-8 bytes of each string followed by a zero byte.
 
     Raises
     ------
@@ -257,23 +265,22 @@ def described(path: str, values: Any) -> tuple[Any, Any, str, str]:
         kind = np.dtype("<i8" if name == "int64" else "<f8")
         stored = np.ascontiguousarray(array, dtype=kind).reshape(array.shape)
         sha256 = hashlib.sha256(stored.reshape(-1).view(np.uint8).data).hexdigest()
-    return stored, kind, sha256, line_of(path, name, stored.shape, sha256)
+    return stored, kind, Entry(path, name, stored.shape, sha256)
 
 
-def line_of(path: str, name: str, shape: tuple[int, ...], sha256: str) -> str:
-    """Return a line of the manifest."""
-    return f"{path}\t{name}\t{','.join(str(n) for n in shape)}\t{sha256}\n"
-
-
-def put_attribute(item: Any, path: str, name: str, value: Attribute) -> str:
-    """Write one attribute and return its line of the manifest."""
-    stored, kind, _, line = described(f"{path}@{name}", value)
+def put_attribute(item: Any, path: str, name: str, value: Attribute) -> Entry:
+    """Write one attribute and return its entry of the manifest."""
+    stored, kind, entry = described(f"{path}@{name}", value)
     item.attrs.create(name, stored, dtype=kind)
-    return line
+    return entry
 
 
-def digest_of_lines(lines: list[str]) -> str:
-    """Return the sha256 of the lines in ascending order of their bytes."""
+def digest_of(entries: Iterable[Entry]) -> str:
+    """Return the sha256 of the manifest: a line for each entry, in ascending order of their bytes.
+
+    A line holds path, type, shape and sha256, separated by tabs.
+    """
+    lines = [f"{path}\t{kind}\t{','.join(map(str, shape))}\t{sha256}\n" for path, kind, shape, sha256 in entries]
     return hashlib.sha256(b"".join(sorted(line.encode("utf-8") for line in lines))).hexdigest()
 
 
@@ -361,20 +368,20 @@ def require_digest(items: Mapping[str, Any], path: Path, kind: Kind) -> None:
     """Raise the error of the kind unless attributes and datasets match the digest; values are read in blocks."""
     import h5py
 
-    lines = []
+    entries = []
     for where, item in items.items():
         attributes = {name: as_attribute(item.attrs[name]) for name in item.attrs}
         is_dataset = isinstance(item, h5py.Dataset)
         expected = attributes.pop(SHA256 if is_dataset else DIGEST, None) if is_dataset or where == "/" else None
-        lines += [described(f"{where}@{name}", value)[3] for name, value in attributes.items()]
+        entries += [described(f"{where}@{name}", value)[2] for name, value in attributes.items()]
         if is_dataset:
             sha256 = sha256_of(item)
             if sha256 != expected:
                 raise altered(path, kind, f"dataset {where} does not have its sha256")
-            lines.append(line_of(where, "int64" if item.dtype.kind in "iu" else "float64", item.shape, sha256))
+            entries.append(Entry(where, "int64" if item.dtype.kind in "iu" else "float64", item.shape, sha256))
         elif where == "/":
             digest = expected
-    if digest_of_lines(lines) != digest:
+    if digest_of(entries) != digest:
         raise altered(
             path, kind, "its contents do not have its digest (an attribute or a name was changed, or one is missing)"
         )

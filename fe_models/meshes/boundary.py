@@ -1,4 +1,4 @@
-"""The boundary of a solid mesh: outward facets that belong to only one cell."""
+"""The facets of the cells of a solid mesh; those of only one cell are its boundary."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -14,11 +14,11 @@ from fe_models.meshes.mesh import Mesh
 __all__ = [
     "all_facets",
     "area_centroid",
-    "boundary",
     "boundary_facets",
     "boundary_nodes",
     "boundary_triangles",
     "facet_weights",
+    "facets_of",
     "first_of_equal_rows",
 ]
 
@@ -33,17 +33,19 @@ _TRIANGLES = {
 CORNERS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}  #: corner nodes of a face
 
 
-class Boundary(NamedTuple):
-    """The facets of a solid mesh that belong to only one cell, and flat triangles over all their nodes."""
+class Facets(NamedTuple):
+    """The facets of the cells of a solid mesh, compared by their corner nodes; cells are numbered through all types."""
 
-    #: facets by face type, oriented outward, (n_facets, nodes per facet); complete faces in meshio order
-    facets: Mapping[str, IntArray]
-    triangles: IntArray  #: oriented outward, (n_tri, 3)
-    cells: IntArray  #: cell of each triangle, (n_tri,); cells are numbered through all types
+    boundary: Mapping[str, IntArray]  #: those of only one cell, as `boundary_facets` returns them
+    triangles: IntArray  #: flat triangles over all nodes of the boundary, oriented outward, (n_tri, 3)
+    cells: IntArray  #: cell of each triangle, (n_tri,)
+    pairs: IntArray  #: cells with a common facet, (n_pairs, 2)
+    n_overlapping: int  #: facets that belong to more than two cells
+    n_mismatched: int  #: pairs whose facets have different middle nodes
 
 
-# boundaries of meshes that are still in use
-_known: WeakKeyDictionary[Mesh, Boundary] = WeakKeyDictionary()
+# facets of meshes that are still in use
+_known: WeakKeyDictionary[Mesh, Facets] = WeakKeyDictionary()
 
 
 def all_facets(mesh: Mesh) -> dict[str, tuple[IntArray, IntArray]]:
@@ -73,22 +75,30 @@ def boundary_facets(mesh: Mesh) -> Mapping[str, IntArray]:
     mesh
         A solid mesh.
     """
-    return boundary(mesh).facets
+    return facets_of(mesh).boundary
 
 
-def boundary(mesh: Mesh) -> Boundary:
-    """Return the boundary of a solid mesh; it is cached as long as the mesh exists."""
+def facets_of(mesh: Mesh) -> Facets:
+    """Return the facets of a solid mesh; they are cached as long as the mesh exists."""
     if mesh in _known:
         return _known[mesh]
     every = all_facets(mesh)
     facets: dict[str, IntArray] = {}
-    triangles, cells = [np.zeros((0, 3), np.int64)], [np.zeros(0, np.int64)]
+    triangles, cells, pairs = [np.zeros((0, 3), np.int64)], [np.zeros(0, np.int64)], [np.zeros((0, 2), np.int64)]
+    n_overlapping = n_mismatched = 0
     for n_corners in (3, 4):
         kinds = [kind for kind in every if CORNERS[kind] == n_corners]
         if not kinds:
             continue
         corners = np.concatenate([every[kind][0][:, :n_corners] for kind in kinds])
+        middles = np.concatenate([every[kind][0][:, n_corners:].sum(axis=1) for kind in kinds])
+        cell = np.concatenate([every[kind][1] for kind in kinds])
         classes, count = first_of_equal_rows(np.sort(corners, axis=1))
+        order = np.argsort(classes, kind="stable")
+        same = classes[order][1:] == classes[order][:-1]
+        pairs.append(np.column_stack([cell[order][1:][same], cell[order][:-1][same]]))
+        n_overlapping += int((count > 2).sum())
+        n_mismatched += int((middles[order][1:][same] != middles[order][:-1][same]).sum())
         is_single = (count == 1)[classes]
         ends = np.cumsum([len(every[kind][0]) for kind in kinds])
         for kind, own in zip(kinds, np.split(is_single, ends[:-1]), strict=True):
@@ -97,7 +107,14 @@ def boundary(mesh: Mesh) -> Boundary:
                 flat = np.array(_TRIANGLES[kind])
                 triangles.append(facets[kind][:, flat].reshape(-1, 3))
                 cells.append(np.repeat(owners, len(flat)))
-    _known[mesh] = Boundary(MappingProxyType(facets), np.concatenate(triangles), np.concatenate(cells))
+    _known[mesh] = Facets(
+        MappingProxyType(facets),
+        np.concatenate(triangles),
+        np.concatenate(cells),
+        np.concatenate(pairs),
+        n_overlapping,
+        n_mismatched,
+    )
     return _known[mesh]
 
 
@@ -129,7 +146,7 @@ def boundary_triangles(mesh: Mesh) -> IntArray:
     mesh
         A solid mesh.
     """
-    return boundary(mesh).triangles
+    return facets_of(mesh).triangles
 
 
 def facet_weights(nodes: Array, faces: Mapping[str, IntArray]) -> Array:

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import IntArray, frozen
-from fe_models.meshes.boundary import CORNERS, all_facets, boundary_facets, first_of_equal_rows
+from fe_models.meshes.boundary import CORNERS, boundary_facets, facets_of, first_of_equal_rows
 from fe_models.meshes.mesh import Mesh, used_nodes
 
-__all__ = ["Connectivity", "coincident_nodes", "connectivity", "facet_pairs"]
+__all__ = ["Connectivity", "coincident_nodes", "connectivity"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,8 @@ def connectivity(mesh: Mesh) -> Connectivity:
     heads = np.concatenate([cells[:, 0] for cells in mesh.cells.values()])
     part_node = [int(heads[np.argmax(part_of_cell == part)]) for part in parts[order][:10]]
 
-    pairs, n_overlapping, n_mismatched = _facet_pairs(mesh)
+    facets = facets_of(mesh)
+    pairs = facets.pairs
     n_cells = mesh.n_cells
     neighbours = coo_array((np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), shape=(n_cells, n_cells))
     n_facet_parts, _ = connected_components(neighbours, directed=False)
@@ -53,35 +54,10 @@ def connectivity(mesh: Mesh) -> Connectivity:
         tuple(int(c) for c in count[order]),
         tuple(part_node),
         int(n_facet_parts),
-        n_overlapping,
-        n_mismatched,
+        facets.n_overlapping,
+        facets.n_mismatched,
         _transitions(mesh),
     )
-
-
-def facet_pairs(mesh: Mesh) -> IntArray:
-    """Return pairs of cells with a common facet, (n_pairs, 2); cells are numbered through all types of `mesh.cells`."""
-    return _facet_pairs(mesh)[0]
-
-
-def _facet_pairs(mesh: Mesh) -> tuple[IntArray, int, int]:
-    """Return pairs of cells with a common facet, (n_pairs, 2), and the counts of overlapping and mismatched facets."""
-    facets = all_facets(mesh)
-    pairs, n_overlapping, n_mismatched = [np.zeros((0, 2), np.int64)], 0, 0
-    for n_corners in (3, 4):
-        kinds = [kind for kind in facets if CORNERS[kind] == n_corners]
-        if not kinds:
-            continue
-        corners = np.sort(np.concatenate([facets[kind][0][:, :n_corners] for kind in kinds]), axis=1)
-        middles = np.concatenate([facets[kind][0][:, n_corners:].sum(axis=1) for kind in kinds])
-        cell = np.concatenate([facets[kind][1] for kind in kinds])
-        classes, count = first_of_equal_rows(corners)
-        n_overlapping += int((count > 2).sum())
-        order = np.argsort(classes, kind="stable")
-        same = classes[order][1:] == classes[order][:-1]
-        pairs.append(np.column_stack([cell[order][1:][same], cell[order][:-1][same]]))
-        n_mismatched += int((middles[order][1:][same] != middles[order][:-1][same]).sum())
-    return np.concatenate(pairs), n_overlapping, n_mismatched
 
 
 def _transitions(mesh: Mesh) -> int:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from fe_models.foundation.arrays import IntArray
-from fe_models.meshes.boundary import boundary
+from fe_models.meshes.boundary import facets_of
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.mesh import Mesh
 from fe_models.meshes.numbering import NO_NUMBERS, NONE, NamedSet, Numbering
@@ -21,7 +21,7 @@ def solid_numbering(mesh: Mesh) -> Numbering:
 
     Groups of faces become sets of their nodes.
     """
-    cell_of = boundary(mesh).cells
+    cell_of = facets_of(mesh).cells
     of_faces = {
         group: np.unique(np.concatenate([mesh.faces[kind][rows].ravel() for kind, rows in by_type.items()]))
         for group, by_type in mesh.face_sets.items()

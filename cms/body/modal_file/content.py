@@ -121,7 +121,10 @@ def values_of(body: ReducedBody) -> dict[str, Any]:
         "/nodes/Phi": body.Phi,
         "/surface/triangles": body.surface,
     }
-    values |= numbering_values(body.numbering)
+    values |= {path: n for path, name in NUMBERS.items() if (n := getattr(body.numbering, name)).size}
+    if body.numbering.instances:
+        values["/instances/names"] = body.numbering.instances
+    values |= {f"/sets/{k}/members": each.members for k, each in enumerate(body.numbering.sets)}
     if body.kept is not None:
         values |= {f"/kept/{name}": getattr(body.kept, name) for name in ("nodes", "rotation", "source")}
     products, invariants = known_terms(moments.missing)
@@ -149,15 +152,6 @@ def values_of(body: ReducedBody) -> dict[str, Any]:
     if body.recovery:
         values |= recovery_values(body.recovery)
     return values
-
-
-def numbering_values(numbering: Numbering) -> dict[str, Any]:
-    """Return the known user's numbers and sets by path."""
-    arrays = {path: getattr(numbering, name) for path, name in NUMBERS.items()}
-    values: dict[str, Any] = {path: numbers for path, numbers in arrays.items() if numbers.size}
-    if numbering.instances:
-        values["/instances/names"] = numbering.instances
-    return values | {f"/sets/{k}/members": each.members for k, each in enumerate(numbering.sets)}
 
 
 def geometric_values(geometric: GeometricStiffness) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from fe_models.foundation.hdf5_file import (
     Manifest,
     as_attribute,
     described,
-    digest_of_lines,
+    digest_of,
     opened,
     own_items,
     write_sealed_file,
@@ -226,24 +226,24 @@ def walk(file: Any, path: Path, kind: Kind) -> tuple[dict[str, Dataset], dict[st
     """Return all datasets and all group attributes; raise the error of the kind if one differs from its digest."""
     import h5py
 
-    datasets, groups, lines = {}, {}, []
+    datasets, groups, entries = {}, {}, []
     for name, item in own_items(file, path, kind).items():
         attributes = {key: as_attribute(item.attrs[key]) for key in item.attrs}
         written = {"/": DIGEST}.get(name) if not isinstance(item, h5py.Dataset) else SHA256
         expected = attributes.pop(written, None) if written else None
-        lines += [described(f"{name}@{key}", value)[3] for key, value in attributes.items()]
+        entries += [described(f"{name}@{key}", value)[2] for key, value in attributes.items()]
         if isinstance(item, h5py.Dataset):
             values = as_values(item[()])
-            _, _, sha256, line = described(name, values)
-            if sha256 != expected:
+            *_, entry = described(name, values)
+            if entry.sha256 != expected:
                 raise altered(path, kind, f"dataset {name} does not have its sha256")
             datasets[name] = Dataset(values, str(attributes.get("unit", "1")), str(attributes.get("description", "")))
-            lines.append(line)
+            entries.append(entry)
         else:
             groups[name] = attributes
             if name == "/":
                 digest = expected
-    if digest_of_lines(lines) != digest:
+    if digest_of(entries) != digest:
         raise altered(
             path, kind, "its contents do not have its digest (an attribute or a name was changed, or one is missing)"
         )

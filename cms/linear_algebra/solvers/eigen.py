@@ -163,7 +163,7 @@ def eigenmodes(
                 "energy"
             )
         omega2 = np.where(modes.omega2 <= zero, 0.0, modes.omega2)
-        columns = modes.expand()
+        columns = combine(modes.Y, modes.Z)
         del search, modes, operator  # frees the basis before the modes are copied
         if space is not None:
             space.close()

@@ -362,7 +362,7 @@ class DenseSearch:
         for _ in range(MOST_REFINEMENTS):
             if modes.residuals.max(initial=0.0) <= operator.tolerance:
                 break
-            modes = refined_modes(operator, modes.expand(), 1 / (modes.omega2 - operator.shift), k)
+            modes = refined_modes(operator, combine(modes.Y, modes.Z), 1 / (modes.omega2 - operator.shift), k)
         if modes.residuals.max(initial=0.0) > operator.tolerance:
             raise EigenError(
                 f"eigenmodes: residuals are {modes.residuals.max():.1e}, expected {operator.tolerance:.1e}; "

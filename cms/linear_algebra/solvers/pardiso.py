@@ -109,10 +109,14 @@ class PardisoFactor:
         self.n_negative = 0 if definite else int(self._iparm[22])
         self.n_positive = self.n if definite else int(self._iparm[21])
         self.n_perturbed = 0 if definite else int(self._iparm[13])
+        text = ctypes.create_string_buffer(200)
+        library.mkl_get_version_string(text, 200)
+        words = text.value.decode(errors="replace").split()
+        version = next((word.split("-")[0] for word in words if word[0].isdigit()), "unknown")
         matched = ", scaling and matching" if self._iparm[12] else ""
         kind = "L Lᵀ" if definite else f"L D Lᵀ, Bunch-Kaufman pivots{matched}"
         bitwise = ", bitwise repeatable" if BITWISE else ""
-        self.description = f"PARDISO (MKL {mkl_version()}; {kind}; no refinement; {self._n_threads} threads{bitwise})"
+        self.description = f"PARDISO (MKL {version}; {kind}; no refinement; {self._n_threads} threads{bitwise})"
 
     def _factorize(self, *, definite: bool, matching: bool) -> None:
         """Make the factor; raise `FactorizationError` if PARDISO cannot."""
@@ -208,15 +212,3 @@ class PardisoFactor:
         ]
         self._pardiso(*pointers, ctypes.byref(error))
         return error.value
-
-
-@cache
-def mkl_version() -> str:
-    """Return the version of the library, such as '2024.1'."""
-    library = mkl_runtime()
-    if library is None:
-        return "none"
-    text = ctypes.create_string_buffer(200)
-    library.mkl_get_version_string(text, 200)
-    words = text.value.decode(errors="replace").split()
-    return next((word.split("-")[0] for word in words if word[0].isdigit()), "unknown")

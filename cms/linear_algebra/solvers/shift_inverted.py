@@ -118,10 +118,6 @@ class Modes:
     Y: Any  #: columns of the space, (n, p)
     Z: Array  #: coefficients, M-orthonormal Phi = Y Z, (p, n_wanted + n_guards)
 
-    def expand(self) -> Any:
-        """Return the M-orthonormal modes Phi, columns of the space, (n, n_wanted + n_guards)."""
-        return combine(self.Y, self.Z)
-
 
 def refined_modes(operator: ShiftInverted, X: Any, theta: Array, n_wanted: int) -> Modes:
     """Refine M-orthonormal Ritz vectors X, (n, p), by one inverse iteration and Rayleigh-Ritz.

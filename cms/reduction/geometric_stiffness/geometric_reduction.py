@@ -150,17 +150,8 @@ def elastic_part(body: FEBody, u: Array, mass: MassLoads, Phi: Array) -> Array:
     if not len(asked):
         return K
     forces = model.internal_forces(u_mesh, nodes=asked) - model.mass_forces(mass)
-    return K + followers_work(body, forces, Phi)
-
-
-def followers_work(body: FEBody, forces: Array, Phi: Array) -> Array:
-    """Return the work of forces on the mesh dofs, (n_mesh_dof, k), on the second-order motion of followers, (k, n, n).
-
-    Followers are nodes that move with a leader (rigid links) or with the mean of others.
-    """
-    assert body.recovery is not None  # it says who follows whom
-    work = link_work(body.recovery.matrix, body.recovery.dofs, body.dofs, forces, Phi)
-    return work + mean_nodes_part(body, forces, Phi) if body.mean_nodes else work
+    work = link_work(T, dofs, body.dofs, forces, Phi)
+    return K + (work + mean_nodes_part(body, forces, Phi) if body.mean_nodes else work)
 
 
 def mean_nodes_part(body: FEBody, forces: Array, Phi: Array) -> Array:

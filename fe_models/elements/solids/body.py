@@ -36,7 +36,7 @@ from fe_models.foundation.tall.columns import elsewhere, in_memory
 from fe_models.foundation.tall.on_disk import row_slices
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
-from fe_models.meshes.boundary import boundary
+from fe_models.meshes.boundary import facets_of
 from fe_models.meshes.cell_shapes import CELL_SHAPES, cell_jacobians, shape_values
 from fe_models.meshes.mesh import Mesh
 from fe_models.meshes.mesh_numbering import solid_numbering
@@ -288,7 +288,7 @@ def solid_body(
         dofs=np.stack([np.repeat(np.arange(n_nodes), 3), np.tile(np.arange(3), n_nodes)], axis=1),
         interfaces=tuple(interfaces),
         units=units,
-        surface=boundary(mesh).triangles,
+        surface=facets_of(mesh).triangles,
         node_volumes=node_volumes(mesh),
         element_model=SolidModel(mesh, used, of_cell, M_s, incompatible_modes, integration, parts),
         numbering=solid_numbering(mesh),

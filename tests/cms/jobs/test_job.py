@@ -80,7 +80,7 @@ def test_a_good_job_is_read(job_file):
     assert job.body.mesh == path.parent / "rod.msh"
     assert job.materials["steel"].young == 210000.0
     assert job.materials["steel"].cells == ("all",)
-    assert [i.selection for i in job.interfaces.values()] == ["plane", "nodes"]
+    assert [(i.plane is None, i.nodes is None) for i in job.interfaces.values()] == [(False, True), (True, False)]
     assert job.interfaces["small_end"].triad == ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     assert (job.reduction.set, job.reduction.n_modes, job.reduction.cutoff) == ("craig-bampton", 12, None)
     assert (job.damping.ratio, job.damping.alpha) == (0.01, None)

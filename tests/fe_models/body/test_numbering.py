@@ -20,7 +20,7 @@ from fe_models.errors import BodyError, InterfaceError, MeshError
 from fe_models.files.matrices.given import body_from_matrices
 from fe_models.files.tables import read_tables
 from fe_models.foundation.units import unit_system
-from fe_models.meshes.boundary import boundary
+from fe_models.meshes.boundary import facets_of
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.mesh import Mesh
 from fe_models.meshes.numbering import NONE, NamedSet, Numbering, numbering_side_by_side
@@ -186,7 +186,7 @@ def test_cells_of_two_types_are_numbered_through():
     one, two = box_mesh(1, 1, 1), box_mesh(1, 1, 1, kind="wedge")
     nodes = np.concatenate([one.nodes, two.nodes + np.array([3.0, 0.0, 0.0])])
     mesh = Mesh(nodes, {"hexahedron": one.cells["hexahedron"], "wedge": two.cells["wedge"] + len(one.nodes)})
-    found = boundary(mesh)
+    found = facets_of(mesh)
     for triangle, cell in zip(found.triangles, found.cells, strict=True):
         rows = mesh.cells["hexahedron"][cell] if cell == 0 else mesh.cells["wedge"][cell - 1]
         assert set(triangle) <= set(rows)
