@@ -6,7 +6,7 @@ The functions that make mode sets (`cms/modes/mode_sets`) assemble them from blo
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, Protocol
+from typing import Annotated, Any, Protocol
 
 import numpy as np
 
@@ -20,8 +20,8 @@ from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, frozen
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.ranks.spread_columns import spread_beside
-from fe_models.foundation.records import checked_fields
-from fe_models.foundation.tall.columns import are_finite, beside, frozen_columns
+from fe_models.foundation.records import Shape, checked_fields
+from fe_models.foundation.tall.columns import beside
 
 __all__ = [
     "Block", "ModeSet", "boundary_block", "checked_modes", "constraint_block", "mode_set", "require_interfaces",
@@ -31,7 +31,7 @@ __all__ = [
 
 @presented
 @dataclass(frozen=True, eq=False)
-@checked_fields(ArgumentError)
+@checked_fields(ArgumentError, misfit=ModeSetError)
 class ModeSet:
     """Columns over all dofs of a coupled body, before the finishing step of `reduce`.
 
@@ -54,29 +54,20 @@ class ModeSet:
     """
 
     name: str
-    columns: Array
-    labels: tuple[str, ...]
-    frequencies: Array
+    columns: Annotated[Array, Shape((None, "n_columns"))]
+    labels: Annotated[tuple[str, ...], Shape(("n_columns",))]
+    frequencies: Annotated[Array, Shape(("n_columns",), has_nan=True)]
     options: Mapping[str, str] = field(default_factory=dict)
     groups: tuple[str, ...] = ()
     data: Mapping[str, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "columns", frozen_columns(self.columns))
-        object.__setattr__(self, "labels", tuple(self.labels))
         groups = tuple(self.groups) or tuple(label.rsplit(" ", 1)[0] for label in self.labels)
         object.__setattr__(self, "groups", groups)
-        object.__setattr__(self, "frequencies", frozen(self.frequencies))
         object.__setattr__(self, "options", MappingProxyType(dict(self.options)))
         object.__setattr__(self, "data", MappingProxyType({name: frozen(x) for name, x in self.data.items()}))
-        n_columns = self.columns.shape[1]
-        if not len(self.labels) == len(self.groups) == n_columns or self.frequencies.shape != (n_columns,):
-            raise ModeSetError(
-                f"mode set {self.name!r}: {n_columns} columns need as many labels and frequencies, got "
-                f"{len(self.labels)} and {self.frequencies.shape}"
-            )
-        if not are_finite(self.columns):
-            raise ModeSetError(f"mode set {self.name!r}: expected finite numbers, got NaN or infinite ones")
+        if len(self.groups) != len(self.labels):
+            raise ModeSetError(f"mode set {self.name!r}: {len(self.labels)} labels, but {len(self.groups)} groups")
 
     @property
     def is_static(self) -> np.ndarray:

@@ -36,6 +36,8 @@ SYMMETRY_DEFECT = 1e-8  #: largest |A - A.T| / |A| that counts as rounding
 def frozen(values: Any) -> Array: ...
 @overload
 def frozen(values: Any, kind: type[np.int64]) -> IntArray: ...
+@overload
+def frozen(values: Any, kind: type[Any]) -> Any: ...
 def frozen(values: Any, kind: type[Any] = np.float64) -> Any:
     """Return a read-only array of that kind in C order; the values are copied only if necessary."""
     array = np.ascontiguousarray(values, dtype=kind)
@@ -45,12 +47,12 @@ def frozen(values: Any, kind: type[Any] = np.float64) -> Any:
     return array
 
 
-def require_finite(where: str, array: Array) -> None:
-    """Raise `BodyError` that names `where` if the array contains a NaN or an infinity."""
+def require_finite(where: str, array: Array, error: type[Exception] = BodyError) -> None:
+    """Raise an error that names `where` if the array contains a NaN or an infinity."""
     bad = ~np.isfinite(array)
     if bad.any():
         first = tuple(int(i) for i in np.argwhere(bad)[0])
-        raise BodyError(f"{where}: expected finite numbers, got {int(bad.sum())} NaN or infinite, first at {first}")
+        raise error(f"{where}: expected finite numbers, got {int(bad.sum())} NaN or infinite, first at {first}")
 
 
 def require_shape(where: str, array: Array | IntArray, shape: tuple[int, ...]) -> None:

@@ -19,6 +19,7 @@ from typing_extensions import get_protocol_members, is_protocol
 
 from fe_models.foundation.arrays import SYMMETRY_DEFECT, IntArray, frozen, require_finite
 from fe_models.foundation.errors import BodyError, ReportedError
+from fe_models.foundation.tall.columns import are_finite
 from fe_models.foundation.tall.on_disk import row_slices
 from fe_models.foundation.words import nearest, quoted
 
@@ -97,11 +98,14 @@ class Shape(NamedTuple):
         removed.
     is_triad
         Whether the columns of the matrix are orthonormal right-handed axes.
+    has_nan
+        Whether NaN stands for numbers that do not exist.
     """
 
     axes: tuple[int | str | None, ...]
     is_symmetric: bool = False
     is_triad: bool = False
+    has_nan: bool = False
 
 
 @cache
@@ -111,10 +115,10 @@ def shapes_of(kind: Hashable) -> dict[str, tuple[Shape, Any]]:
     return {name: (extra, held) for name, (held, extra, *_) in annotated.items() if isinstance(extra, Shape)}
 
 
-def put_arrays(record: object, where: str) -> None:
+def put_arrays(record: object, where: str, error: type[Exception]) -> None:
     """Make the fields of a frozen record that declare a `Shape` read-only arrays, or tuples; refuse other shapes.
 
-    A large array on disk is read in slices of rows.
+    A large array on disk is read in slices of rows. Columns that are no array of this process (`Columns`) stay there.
 
     Parameters
     ----------
@@ -122,31 +126,32 @@ def put_arrays(record: object, where: str) -> None:
         The record, in its `__post_init__`.
     where
         What the record is, for messages.
-
-    Raises
-    ------
-    BodyError
-        If an array has another shape, holds a NaN or an infinity, or is not symmetric or orthonormal.
+    error
+        Raised if an array has another shape, holds a NaN or an infinity, or is not symmetric or orthonormal.
     """
     lengths: dict[int | str | None, int] = {}  # of the axes that have names
     for name, (shape, held) in shapes_of(cast(Hashable, type(record))).items():
         if (value := getattr(record, name)) is None:
             continue
         what, is_tuple, is_whole = f"{where}: {name}", get_origin(held) is tuple, IntArray in (held, *get_args(held))
-        array: Any = tuple(value) if is_tuple else frozen(value, np.int64) if is_whole else frozen(value)
+        is_far = hasattr(value, "on_rows")
+        array: Any = value if is_far else tuple(value) if is_tuple else frozen(value, np.int64 if is_whole else float)
         got = (len(array),) if is_tuple else array.shape
         expected = tuple(lengths.get(axis, axis or "any") for axis in shape.axes)
         if len(got) != len(expected) or any(isinstance(n, int) and n != m for n, m in zip(expected, got, strict=True)):
             words = str(expected).replace("'", "")
-            raise BodyError(f"{what}: expected shape {words}, got {got}")
+            raise error(f"{what}: expected shape {words}, got {got}")
         lengths |= {axis: n for axis, n in zip(shape.axes, got, strict=True) if isinstance(axis, str)}
-        for rows in () if is_tuple or is_whole else row_slices(len(array), array):
-            require_finite(what, array[rows])
+        if is_far and not are_finite(array):
+            raise error(f"{what}: expected finite numbers, got NaN or infinite ones")
+        is_any = is_far or is_tuple or is_whole or shape.has_nan
+        for rows in () if is_any else row_slices(len(array), array):
+            require_finite(what, array[rows], error)
         if shape.is_symmetric:
             other = np.swapaxes(array, -1, -2)
             defect, scale = np.abs(array - other).max(initial=0.0), np.abs(array).max(initial=0.0)
             if defect > SYMMETRY_DEFECT * scale:
-                raise BodyError(
+                raise error(
                     f"{what}: expected symmetric matrices over the modes, got |K - K.T| = {defect / scale:.2e} |K|; "
                     "check that all are projected on both sides by the same modes"
                 )
@@ -154,9 +159,9 @@ def put_arrays(record: object, where: str) -> None:
         if shape.is_triad:
             defect = np.abs(array.T @ array - np.eye(3)).max()
             if not defect <= ORTHONORMAL:
-                raise BodyError(f"{what}: expected orthonormal axes as columns, they are {defect:.1e} from it")
+                raise error(f"{what}: expected orthonormal axes as columns, they are {defect:.1e} from it")
             if np.linalg.det(array) < 0:
-                raise BodyError(f"{what}: expected right-handed axes as columns")
+                raise error(f"{what}: expected right-handed axes as columns")
         object.__setattr__(record, name, array)
 
 
@@ -303,13 +308,15 @@ def conformed_inputs(where: str, hints: Mapping[str, Any], given: Mapping[str, A
     return changed
 
 
-def checked_fields(error: type[Exception]) -> Callable[[Class], Class]:
+def checked_fields(error: type[Exception], *, misfit: type[Exception] = BodyError) -> Callable[[Class], Class]:
     """Decorate a data class: its fields are checked against their annotations and shapes before its own checks.
 
     Parameters
     ----------
     error
         Raised if a field is of another kind.
+    misfit
+        Raised if an array does not have its `Shape`.
     """
 
     def decorate(kind: Class) -> Class:
@@ -325,7 +332,7 @@ def checked_fields(error: type[Exception]) -> Callable[[Class], Class]:
                 raise
             for changed, value in inputs.items():
                 object.__setattr__(self, changed, value)
-            put_arrays(self, where)
+            put_arrays(self, where, misfit)
             if own is not None:
                 own(self)
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -15,10 +15,12 @@ from cms.linear_algebra.solvers.mode_search import DenseSearch, KrylovSearch
 from cms.linear_algebra.solvers.shift_inverted import ArraySpace, Modes, ShiftInverted
 from cms.linear_algebra.solvers.slepc_modes import SlepcSearch, search_on_ranks
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
+from fe_models.foundation.records import Shape, checked_fields
 from fe_models.foundation.solver import Solver
 from fe_models.foundation.sparse.submatrix import PrincipalBlock
-from fe_models.foundation.tall.columns import combine, elsewhere, frozen_columns, in_memory, of_this_process
+from fe_models.foundation.tall.columns import combine, elsewhere, in_memory, of_this_process
 from fe_models.foundation.tall.on_disk import row_slices
 from fe_models.foundation.threads import one_blas_thread
 
@@ -41,20 +43,18 @@ class FactorMismatchError(EigenError):
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError, misfit=EigenError)
 class EigenResult:
     """Modes by ascending frequency, M-orthonormal."""
 
-    omega2: Array  #: (n_modes,) [1/s²]; exactly 0 for rigid-body modes
-    frequencies: Array  #: (n_modes,) [Hz]
-    Phi: Array  #: (n, n_modes); `SpreadColumns` if the body is distributed
-    residuals: Array  #: |x - (omega² - sigma) (K - sigma M)⁻¹ M x|_M of x before its last inverse iteration, (n_modes,)
+    omega2: Annotated[Array, Shape(("n_modes",))]  #: [1/s²]; exactly 0 for rigid-body modes
+    frequencies: Annotated[Array, Shape(("n_modes",))]  #: [Hz]
+    Phi: Annotated[Array, Shape((None, "n_modes"))]  #: `SpreadColumns` if the body is distributed
+    #: |x - (omega² - sigma) (K - sigma M)⁻¹ M x|_M of x before its last inverse iteration
+    residuals: Annotated[Array, Shape(("n_modes",))]
     n_solves: int  #: number of columns solved
     method: str  #: solver and its settings
     is_proven: bool  #: whether the inertia of a second factorisation proved that no mode was missed
-
-    def __post_init__(self) -> None:
-        for name in ("omega2", "frequencies", "Phi", "residuals"):
-            object.__setattr__(self, name, frozen_columns(getattr(self, name)))
 
 
 def no_modes(n_dof: int) -> EigenResult:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 import numpy as np
 import scipy.sparse as sp
 
-from fe_models.foundation.arrays import Array, frozen
+from fe_models.foundation.arrays import Array
 from fe_models.foundation.tall.on_disk import is_on_disk, row_slices, zeros_like
 from fe_models.foundation.threads import n_threads
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Columns", "are_finite", "beside", "combine", "combine_in_place", "combined", "copied", "dots", "elsewhere",
-    "frozen_columns", "in_memory", "inner", "of_this_process", "ordered", "put", "rows_times", "subtract",
+    "in_memory", "inner", "of_this_process", "ordered", "put", "rows_times", "subtract",
 ]  # fmt: skip
 
 SMALL = 20_000  #: rows below which threads cost more than they save
@@ -190,11 +190,6 @@ def in_memory(X: Any) -> Array:
     for rows in row_slices(len(X), X):
         result[rows] = X[rows]
     return result
-
-
-def frozen_columns(X: Any) -> Any:
-    """Return columns for a frozen record: an array read-only, other columns unchanged."""
-    return X if elsewhere(X) is not None else frozen(X)
 
 
 def are_finite(X: Any) -> bool:
