@@ -371,6 +371,8 @@ def named_interfaces(reduction: ReductionSection) -> Mapping[str, str]:
     named |= {f"loads.{name}": name for name in reduction.loads or {}}
     for neighbour in reduction.neighbours or []:
         named |= {f"neighbours.interfaces.{name}": name for name in neighbour.interfaces}
+    if isinstance(reduction.geometric_stiffness, list):
+        named |= {f'geometric_stiffness = ["{name}"]': name for name in reduction.geometric_stiffness}
     return named
 
 

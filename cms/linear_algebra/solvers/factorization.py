@@ -1,6 +1,7 @@
 """Factorise a large symmetric matrix once, solve for many columns."""
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import partial
 from typing import TypeAlias
@@ -73,7 +74,7 @@ class EmptyFactor:
         self.is_open = False
 
 
-class Factorization:
+class Factorization(AbstractContextManager["Factorization"]):
     """A factorised symmetric matrix; the context manager frees the factor."""
 
     def __init__(self, factor: Factor, solver: Solver) -> None:
@@ -116,9 +117,6 @@ class Factorization:
     def close(self) -> None:
         """Free the factor."""
         self.factor.close()
-
-    def __enter__(self) -> "Factorization":
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -43,7 +43,7 @@ GROUNDED = 1e-6  #: |K Psi_R| / (|K| |Psi_R|) above which a body is not free
 log = logging.getLogger(__name__)
 
 
-class Families:
+class Families(AbstractContextManager["Families"]):
     """The mode families of a body; each is computed once, when first used. The context manager frees the factor.
 
     >>> with Families(body) as families:                                   # doctest: +SKIP
@@ -93,9 +93,6 @@ class Families:
         #: determinate dofs R, ascending, (n_r,), and those in the interior if B leaves a rigid-body motion free
         self.r, self.interior_r = determinate_partition(body, self.Psi_R)
         self.h = np.concatenate([body.b, self.interior_r])  #: held dofs: B, then the interior dofs of R, (n_h,)
-
-    def __enter__(self) -> "Families":
-        return self
 
     def __exit__(self, *_: object) -> None:
         """Free the factorisation; computed families stay."""

@@ -1,5 +1,6 @@
 """The body with all boundary dofs held: interior stiffness, factorised once; its modes; stiffness condensed to B."""
 
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,16 +22,13 @@ __all__ = ["CondensedBody", "FixedInterfaceBody", "fix_interfaces", "fixed_inter
 
 
 @dataclass(frozen=True, eq=False)
-class FixedInterfaceBody:
+class FixedInterfaceBody(AbstractContextManager["FixedInterfaceBody"]):
     """Interior partition of a coupled body, and the factorisation of K_II; the context manager frees it."""
 
     body: FEBody
     i: IntArray  #: interior dofs, which are all others, ordered so that neighbours are near, (n_i,)
     b: IntArray  #: held dofs: boundary dofs in the order of `body.b`, then extra dofs, (n_b,)
     factorization: Factorization  #: of K_ii
-
-    def __enter__(self) -> "FixedInterfaceBody":
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.factorization.close()

@@ -87,12 +87,14 @@ def inner(X: Any, Y: Any) -> Array:
 def dots(X: Any, Y: Any, d: Array | None = None) -> Array:
     """Return Σ_n X_nk Y_nk for every column, (k,); with weights d, (n,) or (n, 1): Σ_n d_n X_nk Y_nk."""
     if (far := elsewhere(X, Y)) is not None:
-        weights = () if d is None else (far.like(d.reshape(-1, 1)),)
-        return np.asarray(sum(far.on_rows(dots, far.like(X), far.like(Y), *weights)))
+        there = [far.like(X), far.like(Y), *([] if d is None else [far.like(d.reshape(-1, 1))])]
+        return np.asarray(sum(far.on_rows(dots, *there)))
     total = np.zeros(X.shape[1])
     for some in row_slices(len(X), X, Y):
-        weights = () if d is None else (d.ravel()[some],)
-        total += np.einsum("n,nk,nk->k" if weights else "nk,nk->k", *weights, X[some], Y[some])
+        if d is None:
+            total += np.einsum("nk,nk->k", X[some], Y[some])
+        else:
+            total += np.einsum("n,nk,nk->k", d.ravel()[some], X[some], Y[some])
     return total
 
 
