@@ -1,7 +1,8 @@
 """Public objects and functions: what they are given is checked where it enters, and copies of objects are frozen too.
 
-Annotations say what is expected; a class that has a name for each of its objects offers `of_name(text)`, and is taken
-by that name too. NumPy makes writable copies of read-only arrays, and a mapping proxy cannot be pickled at all.
+Annotations say what is expected, also the shapes of arrays (`Shape`); a class that has a name for each of its objects
+offers `of_name(text)`, and is taken by that name too. NumPy makes writable copies of read-only arrays, and a mapping
+proxy cannot be pickled at all.
 """
 
 import inspect
@@ -118,7 +119,7 @@ def shapes_of(kind: Hashable) -> dict[str, tuple[Shape, Any]]:
 def put_arrays(record: object, where: str, error: type[Exception]) -> None:
     """Make the fields of a frozen record that declare a `Shape` read-only arrays, or tuples; refuse other shapes.
 
-    A large array on disk is read in slices of rows. Columns that are no array of this process (`Columns`) stay there.
+    A large array on disk is read in slices of rows. `Columns` that are no array of this process stay where they are.
 
     Parameters
     ----------
@@ -133,20 +134,25 @@ def put_arrays(record: object, where: str, error: type[Exception]) -> None:
     for name, (shape, held) in shapes_of(cast(Hashable, type(record))).items():
         if (value := getattr(record, name)) is None:
             continue
-        what, is_tuple, is_whole = f"{where}: {name}", get_origin(held) is tuple, IntArray in (held, *get_args(held))
-        is_far = hasattr(value, "on_rows")
-        array: Any = value if is_far else tuple(value) if is_tuple else frozen(value, np.int64 if is_whole else float)
-        got = (len(array),) if is_tuple else array.shape
+        what = f"{where}: {name}"
+        array: Any
+        if get_origin(held) is tuple:
+            array = tuple(value)
+        elif hasattr(value, "on_rows"):
+            array = value  # `Columns`
+        else:
+            array = frozen(value, np.int64 if IntArray in (held, *get_args(held)) else np.float64)
+        got = (len(array),) if isinstance(array, tuple) else array.shape
         expected = tuple(lengths.get(axis, axis or "any") for axis in shape.axes)
         if len(got) != len(expected) or any(isinstance(n, int) and n != m for n, m in zip(expected, got, strict=True)):
             words = str(expected).replace("'", "")
             raise error(f"{what}: expected shape {words}, got {got}")
         lengths |= {axis: n for axis, n in zip(shape.axes, got, strict=True) if isinstance(axis, str)}
-        if is_far and not are_finite(array):
+        if isinstance(array, np.ndarray) and not shape.has_nan:
+            for rows in row_slices(len(array), array):
+                require_finite(what, array[rows], error)
+        elif not isinstance(array, tuple | np.ndarray) and not are_finite(array):
             raise error(f"{what}: expected finite numbers, got NaN or infinite ones")
-        is_any = is_far or is_tuple or is_whole or shape.has_nan
-        for rows in () if is_any else row_slices(len(array), array):
-            require_finite(what, array[rows], error)
         if shape.is_symmetric:
             other = np.swapaxes(array, -1, -2)
             defect, scale = np.abs(array - other).max(initial=0.0), np.abs(array).max(initial=0.0)
