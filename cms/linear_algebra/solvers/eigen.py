@@ -50,8 +50,8 @@ class EigenResult:
     omega2: Annotated[Array, Shape(("n_modes",))]  #: [1/s²]; exactly 0 for rigid-body modes
     frequencies: Annotated[Array, Shape(("n_modes",))]  #: [Hz]
     Phi: Annotated[Array, Shape((None, "n_modes"))]  #: `SpreadColumns` if the body is distributed
-    #: |x - (omega² - sigma) (K - sigma M)⁻¹ M x|_M of x before its last inverse iteration
-    residuals: Annotated[Array, Shape(("n_modes",))]
+    #: |x - (omega² - sigma) (K - sigma M)⁻¹ M x|_M of x before its last inverse iteration; NaN: not measured
+    residuals: Annotated[Array, Shape(("n_modes",), has_nan=True)]
     n_solves: int  #: number of columns solved
     method: str  #: solver and its settings
     is_proven: bool  #: whether the inertia of a second factorisation proved that no mode was missed

@@ -77,7 +77,7 @@ def test_loads_of_chosen_interfaces_give_the_matrices_that_all_loads_give(body, 
     assert (cms.reduce(body, modes, geometric=unit_states(body, interfaces=[])).geometric.interfaces.shape) == (
         0, 6, whole.n_q, whole.n_q,
     )  # fmt: skip
-    with pytest.raises(BodyError, match="geometric stiffness: no interface 'rigth'"):
+    with pytest.raises(BodyError, match="body 'block': no interface 'rigth'"):
         unit_states(body, interfaces=["rigth"])
 
 
