@@ -14,6 +14,7 @@ from floatframe.analyses.linear.linearization import allowed_motions, massive_an
 from floatframe.analyses.linear.system_modes import undamped_modes
 from floatframe.analyses.system_matrices import Tangents, tangents
 from floatframe.engine.compiling.file_frames import state_of_engine
+from floatframe.engine.compiling.placing import held_directions, placed_bodies
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.freedoms import Mobility
 from floatframe.engine.initial_conditions.initial import ConsistentState, consistent_motion, mobility
@@ -161,6 +162,8 @@ def start_records(system: System, state: State | None, made: ConsistentState, M:
             f"{share:.2g} of its size"
         )
     action = "place it at its joints: from this distance it can end in another configuration"
+    if state is None and compiled.by_joints.any():
+        yield by_joints_record(system)
     yield record("placement", "Placement", "pass" if share <= REPORTED else "warn", words, action, share, REPORTED)
     first = compiled.model.bodies.u0[:-1]
     parts = []
@@ -180,6 +183,18 @@ def start_records(system: System, state: State | None, made: ConsistentState, M:
             else "the given velocities fit the joints"
         )
     yield record("start", "State at the start", "pass", "; ".join(parts))
+
+
+def by_joints_record(system: System) -> QualityRecord:
+    """Return the record of bodies without a position: where their joints put them, and what these leave as drawn."""
+    bodies, parts = {body.name: body for body in placed_bodies(system)}, []
+    for name, n_held in held_directions(system).items():
+        at = ", ".join(f"{x:.5g}" for x in bodies[name].drawn_position)
+        free = {3: "", 0: ", as drawn: no joint asks for a position"}.get(
+            n_held, f", as drawn in the {3 - n_held} directions that its joints leave free"
+        )
+        parts.append(f"{name!r} begins at [{at}] {system.units.length_symbol}{free}")
+    return record("no position", "Bodies without a position", "info", "; ".join(parts))
 
 
 def tangents_at(system: System, made: ConsistentState) -> Tangents:

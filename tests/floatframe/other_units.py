@@ -374,7 +374,7 @@ def moved(system, R, place):
         """Return a joint whose marker A is the ground, without a place, with that place."""
         body = system.body(body_name(joint.marker_b.body))
         where = np.zeros(3) if joint.marker_b.position is None else joint.marker_b.position
-        found = body.position + rotation_matrix(body.orientation) @ where
+        found = body.drawn_position + rotation_matrix(body.orientation) @ where
         return replace(joint, marker_a=Marker(GROUND, position=found))
 
     def part(each):
@@ -397,7 +397,7 @@ def moved(system, R, place):
         return each
 
     bodies = tuple(
-        replace(body, position=R @ body.position + place, velocity=R @ body.velocity,
+        replace(body, position=R @ body.drawn_position + place, velocity=R @ body.velocity,
                 orientation=euler_parameter_product(euler_parameters(R), body.orientation))
         for body in system.bodies
     )  # fmt: skip

@@ -115,6 +115,6 @@ def turning(body: Body, omega: Array, *, point: Array | None = None, velocity: A
     The rotation is about the ground origin, or about a point, (3,), that moves with a velocity, (3,).
     """
     omega = np.asarray(omega, dtype=float)
-    arm = body.position if point is None else body.position - point
+    arm = body.drawn_position if point is None else body.drawn_position - point
     base = np.zeros(3) if velocity is None else velocity
     return replace(body, velocity=base + np.cross(omega, arm), omega_B=rotation_matrix(body.orientation).T @ omega)

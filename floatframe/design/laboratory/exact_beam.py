@@ -1,6 +1,6 @@
 """Geometrically exact beams as a reference without linear frame and modes; two meshes give their error."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from fe_models.elements.beams.model import BeamModel
 from fe_models.foundation.records import checked_fields
 from floatframe.components.flexible_parts.exact_beams import exact_beams
 from floatframe.design.laboratory.substitution import with_part
+from floatframe.engine.compiling.placing import placed_bodies
 from floatframe.errors import ModelError
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.system import System
@@ -50,6 +51,7 @@ def with_exact_beams(system: System, name: str, model: FEBody, elements: int) ->
     ModelError
         If the body is not of lines, or something of the system names what such beams have not.
     """
+    system = replace(system, bodies=placed_bodies(system))
     body = system.body(name)
     if not isinstance(body, FlexibleBody):
         raise ModelError(f"system {system.name!r}: body {name!r}: expected a flexible body")

@@ -12,6 +12,7 @@ from cms.body.reduced_body import ReducedBody
 from cms.errors import CmsError
 from fe_models.foundation.arrays import Array
 from floatframe.components.flexible_parts.flexible_part import FlexiblePart
+from floatframe.engine.compiling.placing import placed_bodies
 from floatframe.errors import ModelError
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.bodies.markers import Marker, body_name
@@ -78,14 +79,15 @@ def with_part(system: System, name: str, part: FlexiblePart) -> System:
     ModelError
         If a joint or force names a place that the part has not, or the body as a whole.
     """
+    system = replace(system, bodies=placed_bodies(system))
     body = system.body(name)
     assert isinstance(body, FlexibleBody)
     bodies = [each for old in system.bodies for each in (part.bodies if old.name == name else (old,))]
-    places = {each.name: each.position for each in part.bodies}
+    places = {each.name: each.drawn_position for each in part.bodies}
     R = rotation_matrix(body.orientation)
 
     def on_part(marker: Marker) -> Marker:
-        there = marker_of_part(marker, part, places, body.position, R)
+        there = marker_of_part(marker, part, places, body.drawn_position, R)
         triad = there.triad if marker.triad is None else np.asarray(there.triad) @ marker.triad
         return replace(there, triad=triad)
 

@@ -27,6 +27,7 @@ from fe_models.body.load_cases import LoadCase
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.design.laboratory.full_transient import full_transient, spin_columns
 from floatframe.design.laboratory.substitution import with_body
+from floatframe.engine.compiling.placing import placed_bodies
 from floatframe.errors import ModelError
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha
 from floatframe.model.bodies.flexible_body import FlexibleBody
@@ -147,10 +148,10 @@ def suspended_motion(
 
 def _placed(where: str, system: System, name: str) -> Array:
     """Return the position of the frame of a body, (3,); `ModelError` unless its axes are the ground axes."""
-    body = system.body(name)
+    body = {each.name: each for each in placed_bodies(system)}[system.body(name).name]
     if np.abs(np.asarray(body.orientation) - [1, 0, 0, 0]).max() > ALIGNED:
         raise ModelError(f"{where}: body {name!r} is turned as placed; expected axes along those of the ground")
-    return np.asarray(body.position)
+    return body.drawn_position
 
 
 def _rigid_mass(where: str, system: System, name: str) -> Array:

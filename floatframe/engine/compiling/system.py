@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array, IntArray
@@ -25,6 +26,7 @@ from floatframe.engine.compiling.markers import (
     n_q_of,
 )
 from floatframe.engine.compiling.pair_forces import add_pair_laws
+from floatframe.engine.compiling.placing import placed_state
 from floatframe.engine.compiling.public_elements import PlacedLaw, add_public_elements
 from floatframe.engine.kernels import model
 from floatframe.engine.kernels.model import (
@@ -48,13 +50,13 @@ from floatframe.errors import ModelError
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.bodies.marker_shape import MarkerShape
 from floatframe.model.bodies.markers import Marker, body_name
-from floatframe.model.bodies.mean_axes import FrameMotion, MeanAxes
+from floatframe.model.bodies.mean_axes import MeanAxes
 from floatframe.model.bodies.rigid_body import RigidBody
 from floatframe.model.forces import Gravity, PointForce, SpringDamper
 from floatframe.model.functions.time_functions import TimeFunction
 from floatframe.model.joints.rows import COUPLE, MOMENT, NO_MOMENT, RELEASED, is_held_length, kind_of
 from floatframe.model.joints.sliding import SlidingJoint, line_triad
-from floatframe.model.rotations import euler_parameters, rotation_matrix
+from floatframe.model.rotations import rotation_matrix
 from floatframe.model.state import State
 from floatframe.model.system import System
 
@@ -214,6 +216,7 @@ class CompiledSystem:
     callbacks: tuple[Callback, ...]  #: users' functions called by the kernels
     owners: tuple[str, ...]  #: name of the connection of each row, (n_w,)
     placed: State  #: the given state, before it is made consistent, in the frames of the engine
+    by_joints: NDArray[np.bool_]  #: whether a body has no position, so that its joints placed it, (n_b,)
     mean_axes: tuple[MeanAxes | None, ...]  #: of bodies whose frame in the engine differs from that of their file
     coordinates: tuple[str, ...]  #: name of the joint coordinate to which each row belongs, "" for none, (n_w,)
     length: float  #: size of the system as placed [m]; scales rotations against translations
@@ -291,7 +294,7 @@ def compile_system(system: System) -> CompiledSystem:
     """
     require_inertia(system.bodies)
     axes = tuple(body.mean_axes if isinstance(body, FlexibleBody) else None for body in system.bodies)
-    placed = place(system, axes)
+    placed = placed_state(system)
     types, kind = body_types(system.bodies)
     n_q = n_q_of(system)
     gravity = np.zeros(3)
@@ -414,6 +417,7 @@ def compile_system(system: System) -> CompiledSystem:
         callbacks=(*elements.callbacks, *public.callbacks),
         owners=tuple(made.owner),
         placed=placed,
+        by_joints=np.array([body.position is None for body in system.bodies]),
         mean_axes=axes,
         coordinates=tuple(row.coordinate_name for row in rows),
         length=length,
@@ -491,37 +495,6 @@ def principal_moments(types: BodyTypes) -> Array:
     for m, S, J0 in zip(types.mass, types.S, types.J0, strict=True):
         moments.append(np.linalg.eigvalsh(J0 - (S @ S * np.eye(3) - np.outer(S, S)) / m))
     return np.array(moments)
-
-
-def place(system: System, mean_axes: tuple[MeanAxes | None, ...]) -> State:
-    """Return the given state of the bodies, in the frames of the engine."""
-    r: list[Array] = []
-    p: list[Array] = []
-    q: list[Array] = []
-    u: list[Array] = []
-    for body, axes in zip(system.bodies, mean_axes, strict=True):
-        if isinstance(body, FlexibleBody):
-            motion = motion_at_start(body)
-            if axes is not None:
-                motion = axes.to_mean(motion)
-            r.append(motion.r)
-            p.append(motion.p)
-            q.append(motion.q)
-            u += [motion.v, motion.omega, motion.q_dot]
-        else:
-            r.append(body.position)
-            p.append(body.orientation)
-            u += [body.velocity, body.omega_B]
-    return State(r=np.array(r), p=np.array(p), q=np.concatenate([*q, np.zeros(0)]), u=np.concatenate(u))
-
-
-def motion_at_start(body: FlexibleBody) -> FrameMotion:
-    """Return the motion of the frame of a body's file at the start, without accelerations."""
-    zero = np.zeros(3)
-    return FrameMotion(
-        body.frame_position, euler_parameters(body.frame_orientation), body.q, body.frame_velocity, body.frame_omega,
-        body.q_dot, zero, zero, np.zeros_like(body.q),
-    )  # fmt: skip
 
 
 def body_sizes(made: ConnectionLists, places: list[Array], placed: State, radii: Array) -> Array:

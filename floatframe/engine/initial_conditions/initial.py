@@ -264,6 +264,9 @@ def refuse_open_joints(compiled: CompiledSystem, work: Work, state: State, error
         raise ModelError(f"conflicting drives: {conflict}; remove one of them, or free the coordinate that opposes it")
     is_driven = (compiled.model.rows.motion[is_held_position(compiled.model.rows.kind)] >= 0).any()
     reach = ", and that the drives stay within reach" if is_driven else ""
+    unplaced = [repr(name) for name, is_free in zip(compiled.body_names, compiled.by_joints, strict=True) if is_free]
+    if unplaced:
+        reach += f". No position is given for {', '.join(unplaced)}: in a loop, give orientations near the meant ones"
     raise ModelError(
         f"the joints cannot be closed from the given positions: {open_joints(compiled, error)}; place the bodies "
         f"nearer to their joints, or check lengths and axes{reach}"

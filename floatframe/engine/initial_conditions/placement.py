@@ -24,7 +24,8 @@ REFUSED = 3.0  #: displacement relative to the size of the largest body, above w
 def require_placed_near(compiled: CompiledSystem, placed: State, closed: State) -> None:
     """Log the body that the joints moved far, and raise `ModelError` if it was placed out of reach.
 
-    Prescribed motions may move bodies far at their beginning: with them it is told, not refused.
+    Prescribed motions may move bodies far at their beginning: with them it is told, not refused. So may the joints of a
+    loop that place bodies without a position.
 
     Parameters
     ----------
@@ -35,24 +36,30 @@ def require_placed_near(compiled: CompiledSystem, placed: State, closed: State) 
     """
     way = np.linalg.norm(closed.r - placed.r, axis=1)
     size = body_sizes(compiled)
+    by_joints = compiled.by_joints & (placed is compiled.placed)
     is_driven = bool((compiled.model.rows.motion >= 0).any())
     i = int(np.argmax(way / size))
     if way[i] <= REPORTED * size[i]:
         return
-    words = (
-        f"body {compiled.body_names[i]!r} was placed {way[i]:.3g} from where its joints hold it, "
-        f"{way[i] / size[i]:.2g} of its size"
-    )
-    if way.max() > REFUSED * size.max() and not is_driven:
-        far = int(np.argmax(way))
+    given = np.where(by_joints, 0.0, way)
+    if given.max() > REFUSED * size.max() and not is_driven:
+        far = int(np.argmax(given))
         raise ModelError(
             f"body {compiled.body_names[far]!r} was placed {way[far]:.3g} from where its joints hold it; the largest "
             f"body has a size of {size.max():.3g}: place it at its joints, or check the units of its position"
         )
+    if by_joints[i]:
+        log.warning(
+            "body %r has no position: closing its joints moved it by %.3g, %.2g of its size; from this distance they "
+            "can close in another configuration, so give a position and an orientation near the one that is meant",
+            compiled.body_names[i], way[i], way[i] / size[i],
+        )  # fmt: skip
+        return
     log.warning(
-        "%s and was moved there; from this distance it can end in another configuration, so place it at its joints",
-        words,
-    )
+        "body %r was placed %.3g from where its joints hold it, %.2g of its size, and was moved there; from this "
+        "distance it can end in another configuration, so place it at its joints",
+        compiled.body_names[i], way[i], way[i] / size[i],
+    )  # fmt: skip
 
 
 def body_sizes(compiled: CompiledSystem) -> Array:

@@ -19,6 +19,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.paths import replace_file
 from floatframe.engine.compiling.markers import joint_markers
+from floatframe.engine.compiling.placing import placed_bodies
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import UrdfError
 from floatframe.files.importers.frames import Frame, rpy_of
@@ -103,7 +104,7 @@ class Exporter:
             raise UrdfError(
                 f"{self.where}: URDF has no flexible bodies; replace by rigid bodies: {', '.join(flexible)}"
             )
-        self.bodies = {body.name: body for body in system.bodies if isinstance(body, RigidBody)}
+        self.bodies = {body.name: body for body in placed_bodies(system) if isinstance(body, RigidBody)}
         known = {joint.name for joint in system.joints}
         for name in [*values, *limits]:
             if name not in known:
@@ -125,7 +126,7 @@ class Exporter:
         if body == GROUND.name:
             return Frame()
         found = self.bodies[body]
-        return Frame(found.position, rotation_matrix(found.orientation))
+        return Frame(found.drawn_position, rotation_matrix(found.orientation))
 
     # Joints ----------------------------------------------------------------------------------------------------------
 

@@ -70,7 +70,7 @@ class Writer:
 
     def body(self, body: RigidBody | FlexibleBody) -> dict[str, Any]:
         """Return the table of a body."""
-        place = {"position": body.position.tolist(), "euler_parameters": body.orientation.tolist()}
+        place = {"position": body.drawn_position.tolist(), "euler_parameters": body.orientation.tolist()}
         if body.velocity.any() or body.omega_B.any():
             place |= {"velocity": body.velocity.tolist(), "omega_B": body.omega_B.tolist()}
         if isinstance(body, FlexibleBody):

@@ -66,7 +66,9 @@ class BodySection(Table):
         None, description="a list of whole numbers from 0, the modes to leave out"
     )
     is_rigid: bool | None = Field(None, description="true: a flexible body without its modes")
-    position: Vector3 = Field((0.0, 0.0, 0.0), description="the position of the body (mesh) origin, [x, y, z]")
+    position: Vector3 | None = Field(
+        None, description="the position of the body (mesh) origin, [x, y, z]; without it, the joints place the body"
+    )
     rotation_vector: Vector3 | None = Field(None, description="axis times angle in rad from ground to body, [x, y, z]")
     euler_parameters: Parameters4 | None = Field(None, description="Euler parameters of length 1, [w, x, y, z]")
     velocity: Vector3 = Field((0.0, 0.0, 0.0), description="the velocity of the body (mesh) origin, [x, y, z]")

@@ -88,7 +88,7 @@ def unit_hints(system: System) -> tuple[str, ...]:
         float(np.linalg.norm(np.ptp(b.reduced.nodes, axis=0))) for b in system.bodies if not isinstance(b, RigidBody)
     ]
     reach = [float(np.linalg.norm(body.center_of_mass)) for body in rigid]
-    places = np.array([body.position for body in system.bodies])
+    places = np.array([body.drawn_position for body in system.bodies])
     length = max([*sizes, *reach, float(np.linalg.norm(np.ptp(places, axis=0)))])
     for body in rigid:
         radius = float(np.sqrt(np.linalg.eigvalsh(body.inertia)[-1] / body.mass))

@@ -118,7 +118,7 @@ def in_circle(
     straight = vehicle(data, speed, pair=pair, track=track, laws=laws, is_independent=is_independent, frames=frames)
     bodies = []
     for body in straight.bodies:
-        x, y, z = np.asarray(body.position)
+        x, y, z = body.drawn_position
         here = track.frame(LEAD + x)
         placed = here.origin + here.axes @ np.array([0.0, y, z])
         axes = euler_parameters(here.axes)

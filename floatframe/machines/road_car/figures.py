@@ -201,7 +201,7 @@ def car_mass(car: RoadCar, system: System) -> CarMass:
             own = float(gram[0, 0])
             place = gram[0, 1:4] / own + np.array(car.cockpit) - body.reduced.interface("cockpit").position
         else:
-            own, place = body.mass, np.asarray(body.center_of_mass) + np.asarray(body.position)
+            own, place = body.mass, np.asarray(body.center_of_mass) + body.drawn_position
         mass, first = mass + own, first + own * place
     return CarMass(mass, float(first[0] / mass), float(first[2] / mass))
 

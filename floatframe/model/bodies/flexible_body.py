@@ -37,7 +37,7 @@ class FlexibleBody:
     reduced
         The reduced body.
     position
-        Initial position of the mesh origin, in ground axes, (3,) [m].
+        Initial position of the mesh origin, in ground axes, (3,) [m]; None: the joints place the body (below).
     orientation
         Euler parameters of the mesh axes, (4,).
     velocity
@@ -59,6 +59,12 @@ class FlexibleBody:
     shapes
         Shapes drawn besides its surface, in mesh axes or in those of interfaces.
 
+    Notes
+    -----
+    A body without a position goes from the ground origin to the nearest pose that its joints ask for: their points
+    coincide; a body without an orientation too takes the smallest rotation that fulfils the `axis_b` or `rotation` of a
+    joint. What the joints leave free stays as drawn. A joint with one marker lies where this marker is.
+
     Raises
     ------
     ModelError
@@ -67,7 +73,7 @@ class FlexibleBody:
 
     name: str
     reduced: ReducedBody
-    position: Array = field(default_factory=lambda: np.zeros(3))
+    position: Array | None = None
     orientation: Array = field(default_factory=lambda: np.array([1.0, 0, 0, 0]))
     velocity: Array = field(default_factory=lambda: np.zeros(3))
     omega_B: Array = field(default_factory=lambda: np.zeros(3))  # noqa: N815
@@ -87,8 +93,10 @@ class FlexibleBody:
                 "bushings"
             )
         put = object.__setattr__
-        for name in ("position", "velocity", "omega_B"):
+        for name in ("velocity", "omega_B"):
             put(self, name, array_of_shape(f"{where}: {name}", getattr(self, name), (3,)))
+        if self.position is not None:
+            put(self, "position", array_of_shape(f"{where}: position", self.position, (3,)))
         put(self, "orientation", euler_parameters_from_user(f"{where}: orientation", self.orientation))
         interfaces = [interface.name for interface in self.reduced.interfaces]
         put(self, "shapes", shape_tuple(where, self.shapes, interfaces))
@@ -118,6 +126,11 @@ class FlexibleBody:
             raise ModelError(f"{where}: expected a mass above zero, got {self.reduced.moments.m:g}")
 
     @property
+    def drawn_position(self) -> Array:
+        """The given position; the ground origin for a body without one, before its joints place it, (3,) [m]."""
+        return np.zeros(3) if self.position is None else self.position
+
+    @property
     def is_stiffened(self) -> bool:
         """Whether the geometric stiffness of the reduced body is used."""
         return self.stiffening is not False and self.reduced.geometric is not None
@@ -141,7 +154,7 @@ class FlexibleBody:
     @property
     def frame_position(self) -> Array:
         """Position of the frame origin at the start, in ground axes, (3,) [m]."""
-        return self.position + rotation_matrix(self.orientation) @ self.reduced.frame.origin
+        return self.drawn_position + rotation_matrix(self.orientation) @ self.reduced.frame.origin
 
     @property
     def frame_velocity(self) -> Array:

@@ -37,7 +37,7 @@ class RigidBody:
     center_of_mass
         From the frame origin, in body axes, (3,) [m]; by default the origin itself.
     position
-        Initial position of the frame origin, in ground axes, (3,) [m].
+        Initial position of the frame origin, in ground axes, (3,) [m]; None: the joints place the body (below).
     orientation
         Initial unit Euler parameters p = (w, x, y, z) of R_GB, which maps components in body axes to ground axes, (4,).
     velocity
@@ -46,6 +46,12 @@ class RigidBody:
         Initial angular velocity, in body axes, (3,) [rad/s].
     shapes
         Drawn shapes, in the body frame.
+
+    Notes
+    -----
+    A body without a position goes from the ground origin to the nearest pose that its joints ask for: their points
+    coincide; a body without an orientation too takes the smallest rotation that fulfils the `axis_b` or `rotation` of a
+    joint. What the joints leave free stays as drawn. A joint with one marker lies where this marker is.
 
     Raises
     ------
@@ -57,7 +63,7 @@ class RigidBody:
     mass: float
     inertia: Array
     center_of_mass: Array = field(default_factory=lambda: np.zeros(3))
-    position: Array = field(default_factory=lambda: np.zeros(3))
+    position: Array | None = None
     orientation: Array = field(default_factory=lambda: np.array([1.0, 0, 0, 0]))
     velocity: Array = field(default_factory=lambda: np.zeros(3))
     omega_B: Array = field(default_factory=lambda: np.zeros(3))  # noqa: N815
@@ -74,8 +80,10 @@ class RigidBody:
                 f"principal moments about the body axes are numpy.diag({list(moments)})"
             )
         put(self, "inertia", array_of_shape(f"{where}: inertia", self.inertia, (3, 3)))
-        for name in ("center_of_mass", "position", "velocity", "omega_B"):
+        for name in ("center_of_mass", "velocity", "omega_B"):
             put(self, name, array_of_shape(f"{where}: {name}", getattr(self, name), (3,)))
+        if self.position is not None:
+            put(self, "position", array_of_shape(f"{where}: position", self.position, (3,)))
         put(self, "orientation", euler_parameters_from_user(f"{where}: orientation", self.orientation))
         put(self, "shapes", shape_tuple(where, self.shapes))
         scale = np.abs(self.inertia).max()
@@ -92,6 +100,11 @@ class RigidBody:
             raise ModelError(
                 f"{where}: inertia: expected moments above zero, got none; give a point mass a small extent"
             )
+
+    @property
+    def drawn_position(self) -> Array:
+        """The given position; the ground origin for a body without one, before its joints place it, (3,) [m]."""
+        return np.zeros(3) if self.position is None else self.position
 
     @property
     def inertia_about_origin(self) -> Array:

@@ -1,0 +1,253 @@
+"""Bodies without a position, placed by their joints.
+
+A body without a position begins where its mesh is drawn. Its joints then move it to the nearest pose that they ask for:
+
+    (1) the body with the most held directions to bodies already placed comes next; the ground and the bodies that give
+        a position are placed from the beginning, and so is the first body of a part without any of them
+    (2) orientation     its own; a body without one takes the smallest rotation that fulfils the first joint with
+                        `axis_b` or `rotation`
+    (3) position        the shortest translation d with n · (r_B + d - r_A) = 0, in the least squares, for the held
+                        directions n of its joints to bodies already placed
+
+What the joints leave free stays as drawn: a distance along an axis, an angle, a body that only springs hold. A joint
+with one marker lies where this marker is, and asks for nothing. Joints that close loops can stay open; the start of a
+run closes them (initial.py).
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, tilde
+from floatframe.engine.compiling.markers import MarkerData, find_marker
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.bodies.markers import Marker
+from floatframe.model.bodies.mean_axes import FrameMotion
+from floatframe.model.joints import (
+    ConstantVelocityJoint,
+    CylindricalJoint,
+    FixedJoint,
+    Joint,
+    PlanarJoint,
+    PointOnLine,
+    PointOnPlane,
+    PrismaticJoint,
+    RevoluteJoint,
+    ScrewJoint,
+    SphericalJoint,
+    UniversalJoint,
+)
+from floatframe.model.joints.axis_frame import normals_of
+from floatframe.model.rotations import euler_parameters, rotation_matrix
+from floatframe.model.state import State
+from floatframe.model.system import Body, System
+
+__all__ = ["held_directions", "placed_bodies", "placed_state"]
+
+AT_JOINT = 1e-9  #: gap of a joint relative to the size of the system, up to which a body stays as drawn
+PARALLEL = 1e-12  #: sine of an angle that is rounding
+
+
+def point(joint: Any) -> Array:
+    """Return the held directions of a joint whose two points coincide, (3, 3)."""
+    return np.eye(3)
+
+
+def line(joint: Any) -> Array:
+    """Return the held directions of a joint whose point of B lies on a line of A, (2, 3)."""
+    return np.array(normals_of(joint.axis))
+
+
+def plane(joint: Any) -> Array:
+    """Return the held direction of a joint whose point of B lies in a plane of A, (1, 3)."""
+    return np.array([joint.axis])
+
+
+#: directions in the axes of marker A along which the points of a joint coincide; other joints ask for no position
+HELD: dict[type, Callable[[Any], Array]] = {
+    RevoluteJoint: point,
+    SphericalJoint: point,
+    FixedJoint: point,
+    UniversalJoint: point,
+    ConstantVelocityJoint: point,
+    ScrewJoint: point,
+    PrismaticJoint: line,
+    CylindricalJoint: line,
+    PointOnLine: line,
+    PlanarJoint: plane,
+    PointOnPlane: plane,
+}
+#: joints whose `axis_b` is parallel to their `axis`
+PARALLEL_AXES = (RevoluteJoint, CylindricalJoint, ScrewJoint, PlanarJoint)
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A joint between two given markers, seen from one of its bodies."""
+
+    joint: Joint
+    own: MarkerData  #: on this body
+    other: MarkerData
+    is_b: bool  #: whether the own marker is marker B
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedBodies:
+    """The bodies of a system with their positions, and in how many directions joints hold those that give none."""
+
+    bodies: tuple[Body, ...]
+    n_held: Mapping[str, int]  #: by the name of a body without a position, 0 to 3
+
+
+def placed_bodies(system: System) -> tuple[Body, ...]:
+    """Return the bodies of a system, those without a position placed by their joints; made once for a system."""
+    return system.derived(place_bodies).bodies
+
+
+def held_directions(system: System) -> Mapping[str, int]:
+    """Return in how many directions joints hold each body without a position, 0 to 3, by its name."""
+    return system.derived(place_bodies).n_held
+
+
+def place_bodies(system: System) -> PlacedBodies:
+    """Return the bodies of a system, those without a position placed by their joints."""
+    bodies = [body if body.position is not None else replace(body, position=np.zeros(3)) for body in system.bodies]
+    waiting = {i for i, body in enumerate(system.bodies) if body.position is None}
+    names, n_held = [body.name for body in bodies], {}
+    links = links_of(system) if waiting else []
+    length = length_of(bodies, links) if waiting else 1.0
+    done = {-1, *range(len(bodies))} - waiting
+    rank = dict.fromkeys(sorted(waiting), 0)  # number of held directions to placed bodies
+    for i in waiting:
+        rank[i] = rank_of(bodies, links[i], done)
+    while rank:
+        i = max(rank, key=lambda k: (rank[k], -k))  # (1)
+        bodies[i] = placed(bodies, i, [link for link in links[i] if link.other.body in done], length)
+        n_held[names[i]] = rank.pop(i)
+        done.add(i)
+        for k in {link.other.body for link in links[i]} & set(rank):
+            rank[k] = rank_of(bodies, links[k], done)
+    return PlacedBodies(tuple(bodies), n_held)
+
+
+def links_of(system: System) -> list[list[Link]]:
+    """Return the joints of each body that may ask for its pose."""
+    links: list[list[Link]] = [[] for _ in system.bodies]
+    for joint in system.joints:
+        if not (isinstance(joint.marker_a, Marker) and isinstance(joint.marker_b, Marker)):
+            continue
+        a, b = (find_marker(system, f"joint {joint.name!r}: marker_{k}", getattr(joint, f"marker_{k}")) for k in "ab")
+        if a.body >= 0:
+            links[a.body].append(Link(joint, a, b, is_b=False))
+        if b.body >= 0:
+            links[b.body].append(Link(joint, b, a, is_b=True))
+    return links
+
+
+def length_of(bodies: list[Body], links: list[list[Link]]) -> float:
+    """Return the largest distance of a marker from the origin of its body, or between two bodies; 1 if all are 0."""
+    arms = [float(np.linalg.norm(link.own.shape.position)) for each in links for link in each]
+    extent = float(np.linalg.norm(np.ptp([body.drawn_position for body in bodies], axis=0)))
+    return max([extent, *arms]) or 1.0
+
+
+def rank_of(bodies: list[Body], links: list[Link], done: set[int]) -> int:
+    """Return the number of directions in which placed bodies hold a body."""
+    rows = [n for link in links if link.other.body in done for n in held(bodies, link)]
+    return int(np.linalg.matrix_rank(np.array(rows), tol=1e-6)) if rows else 0
+
+
+def held(bodies: list[Body], link: Link) -> Array:
+    """Return the directions in which a joint holds the distance of its points, ground axes, (n, 3)."""
+    directions = HELD.get(type(link.joint))
+    if directions is None:
+        return np.zeros((0, 3))
+    _, A = pose(bodies, link.other if link.is_b else link.own)
+    return directions(link.joint) @ A.T
+
+
+def pose(bodies: list[Body], marker: MarkerData) -> tuple[Array, Array]:
+    """Return position, (3,), and axes, (3, 3), of a marker in ground axes."""
+    if marker.body < 0:
+        return marker.shape.position, marker.shape.triad
+    at = motion_at_start(bodies[marker.body])
+    R = rotation_matrix(at.p)
+    rho, axes = marker.shape.pose(at.q)
+    return at.r + R @ rho, R @ axes
+
+
+def placed(bodies: list[Body], i: int, links: list[Link], length: float) -> Body:
+    """Return body i, moved by its joints to placed bodies."""
+    body = bodies[i]
+    moving = list(bodies)
+    is_turned = not np.array_equal(body.orientation, [1.0, 0.0, 0.0, 0.0])
+    for link in [] if is_turned else links:  # (2)
+        turn = asked_rotation(bodies, link)
+        if turn is not None:
+            p = euler_parameters(turn @ rotation_matrix(body.orientation))
+            body = moving[i] = replace(body, orientation=p)
+            break
+    rows, gaps = [np.zeros((0, 3))], [np.zeros(0)]
+    for link in links:
+        n = held(moving, link)
+        rows.append(n)
+        gaps.append(n @ (pose(moving, link.other)[0] - pose(moving, link.own)[0]))
+    n, gap = np.concatenate(rows), np.concatenate(gaps)
+    if not np.abs(gap).max(initial=0.0) > AT_JOINT * length:
+        return body
+    return replace(body, position=body.drawn_position + np.linalg.lstsq(n, gap, rcond=1e-9)[0])  # (3)
+
+
+def asked_rotation(bodies: list[Body], link: Link) -> Array | None:
+    """Return the smallest rotation, (3, 3), by which a body fulfils the given axes of a joint; None: none are given."""
+    own, other = pose(bodies, link.own)[1], pose(bodies, link.other)[1]
+    A_a, A_b = (other, own) if link.is_b else (own, other)
+    if (rotation := getattr(link.joint, "rotation", None)) is not None:
+        wanted = A_a @ rotation @ A_b.T  # turns B
+        wanted = wanted if link.is_b else wanted.T
+        return None if np.abs(wanted - np.eye(3)).max() <= PARALLEL else wanted
+    if not isinstance(link.joint, PARALLEL_AXES) or link.joint.axis_b is None:
+        return None
+    axes = (A_a @ link.joint.axis, A_b @ link.joint.axis_b)
+    there, here = axes if link.is_b else axes[::-1]
+    return rotation_between(here, there)
+
+
+def rotation_between(here: Array, there: Array) -> Array | None:
+    """Return the smallest rotation, (3, 3), that turns a unit vector to another; None if they are parallel."""
+    normal, cosine = np.cross(here, there), float(here @ there)
+    if np.linalg.norm(normal) <= PARALLEL:
+        if cosine > 0:
+            return None
+        across = normals_of(here)[0]  # half a turn about any normal
+        return np.asarray(2 * np.outer(across, across) - np.eye(3))
+    N = tilde(normal)
+    return np.asarray(np.eye(3) + N + N @ N / (1 + cosine))
+
+
+def placed_state(system: System) -> State:
+    """Return the state of the bodies as placed, in the frames of the engine."""
+    motions = [motion_at_start(body) for body in placed_bodies(system)]
+    return State(
+        r=np.array([motion.r for motion in motions]),
+        p=np.array([motion.p for motion in motions]),
+        q=np.concatenate([motion.q for motion in motions]),
+        u=np.concatenate([each for motion in motions for each in (motion.v, motion.omega, motion.q_dot)]),
+    )
+
+
+def motion_at_start(body: Body) -> FrameMotion:
+    """Return the motion of the frame in which a body is computed at the start, without accelerations."""
+    zero = np.zeros(3)
+    if not isinstance(body, FlexibleBody):
+        none = np.zeros(0)
+        return FrameMotion(
+            body.drawn_position, body.orientation, none, body.velocity, body.omega_B, none, zero, zero, none
+        )
+    motion = FrameMotion(
+        body.frame_position, euler_parameters(body.frame_orientation), body.q, body.frame_velocity, body.frame_omega,
+        body.q_dot, zero, zero, np.zeros_like(body.q),
+    )  # fmt: skip
+    return motion if body.mean_axes is None else body.mean_axes.to_mean(motion)
