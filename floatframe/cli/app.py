@@ -392,8 +392,8 @@ def plot_command(
     from floatframe.errors import ResultsError
     from floatframe.pictures.animation import bodies_of
     from floatframe.pictures.overview import plot_overview
-    from floatframe.pictures.sensor_plots import plot_sensors
     from floatframe.results.sensor_choice import chosen_measurements
+    from floatframe.results.sensor_plots import plot_sensors
     from floatframe.results.sensors import measured
     from floatframe.results.trajectory import read_trajectory
 

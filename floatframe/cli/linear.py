@@ -107,7 +107,6 @@ def response_command(
     Example: floatframe response crane.toml --input jib/tip:z --out jib/tip:z -o frf.csv
     """
     from floatframe.analyses.linear.frequency_response import frequency_response, resolved_frequencies
-    from floatframe.analyses.linear.plots import plot_frequency_response
     from floatframe.errors import ModelError
 
     model, form = read_in_formulation(system, formulation, set_values)
@@ -129,7 +128,7 @@ def response_command(
     print_peaks(response, seconds)
     write_outputs(
         [path], table=lambda: response.to_table(seconds),
-        figure=lambda: plot_frequency_response(response, time_unit=seconds),
+        figure=lambda: response.plot(time_unit=seconds),
     )  # fmt: skip
 
 

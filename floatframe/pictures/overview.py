@@ -10,8 +10,8 @@ from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from floatframe.errors import ResultsError
 from floatframe.pictures.plots import axes_for, labelled, plot_drift, plot_energies, plot_energy_balance
-from floatframe.pictures.sensor_plots import panels_of, plot_measurement
 from floatframe.results.recovery import elastic_displacements, interface_positions
+from floatframe.results.sensor_plots import groups_of, plot_measurement
 from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.trajectory import Trajectory
 
@@ -62,8 +62,8 @@ def plot_overview(
     if trajectory.head.joints:
         panels.append(lambda ax: plot_drift(trajectory, ax))
     for measurement in measurements:
-        for unit, _ in panels_of(measurement):
-            panels.append(partial(sensor_panel, trajectory, measurement, unit))
+        for columns in groups_of(measurement):
+            panels.append(partial(sensor_panel, trajectory, measurement, columns))
     n_rows = (len(panels) + 1) // 2
     figure = Figure(figsize=(13, 3.4 * n_rows + 0.6), layout="constrained")
     figure.suptitle(trajectory.head.system)
@@ -75,9 +75,9 @@ def plot_overview(
     return figure
 
 
-def sensor_panel(trajectory: Trajectory, measurement: Measurement, unit: str, ax: "Axes") -> "Axes":
-    """Plot the columns of a sensor that have one unit."""
-    return plot_measurement(measurement, ax, unit=unit, time_symbol=trajectory.units.time_symbol)
+def sensor_panel(trajectory: Trajectory, measurement: Measurement, columns: tuple[str, ...], ax: "Axes") -> "Axes":
+    """Plot columns of a sensor that have one unit."""
+    return plot_measurement(measurement, ax, columns=columns, time_symbol=trajectory.units.time_symbol)
 
 
 def plot_places(trajectory: Trajectory, bodies: Mapping[str, ReducedBody], ax: "Axes | None" = None) -> "Axes":

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from floatframe.results.energy_balance import balance_defect, energy_scale
+from floatframe.results.sensor_plots import labelled
 from floatframe.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -121,12 +122,4 @@ def axes_for(trajectory: Trajectory, ax: "Axes | None") -> "Axes":
         ax = Figure(layout="constrained").add_subplot()
     ax.set_xlabel(f"time [{trajectory.units.time_symbol}]")
     ax.grid(alpha=0.3)
-    return ax
-
-
-def labelled(ax: "Axes", label: str) -> "Axes":
-    """Set the label of the y axis, and add a legend of the curves."""
-    ax.set_ylabel(label)
-    if ax.get_legend_handles_labels()[0]:
-        ax.legend(fontsize="small")
     return ax

@@ -4,6 +4,7 @@ motion = integrate(system, GeneralizedAlpha(), t_end=1.0, h=1e-3)      # or read
 motion.joint("pin").angle                                              # (n_t,), counted through full turns
 motion.body("rod").interface("big_end").position                       # (n_t, 3), in ground axes
 motion.sensor("tip").x
+motion.plot("tip", "pin")                                              # a figure with a panel for each unit
 motion.to_dataframe("tip", "pin.angle")
 """
 
@@ -25,11 +26,14 @@ from floatframe.results.joint_coordinates import CoordinateMotion, joint_coordin
 from floatframe.results.place_motion import PlaceMotion, interface_motion, nodal_stress
 from floatframe.results.recovery import nodal_displacements
 from floatframe.results.sensor_choice import chosen_measurements
+from floatframe.results.sensor_plots import figure_of, plot_columns, plot_sensors
 from floatframe.results.sensors import coordinate_sensors, measured, measurement_of, sensors_of
 from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.trajectory import BodyMotion, Drift, Reaction, Trajectory
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from pandas import DataFrame
     from xarray import Dataset
 
@@ -88,6 +92,8 @@ class Motion(Trajectory):
     def measurements(self, *names: str) -> tuple[Measurement, ...]:
         """Return the measurements of sensors and coordinates by name, with * and ? for letters; without names, of all.
 
+        The name of a joint stands for its coordinates and its reaction, that of a body for the position of its origin.
+
         Raises
         ------
         ModelError
@@ -107,6 +113,34 @@ class Motion(Trajectory):
         columns = {one.channel(name): values for one in chosen for name, values in one.columns.items()}
         units = {one.channel(name): unit for one in chosen for name, unit in one.units.items()}
         return Table({"t": self.t, **columns}, {"t": self.units.time_symbol, **units})
+
+    def plot(self, *names: str, ax: "Axes | None" = None) -> "Figure":
+        """Plot measurements over time (see `measurements`), with the units of the system at the axes.
+
+        Parameters
+        ----------
+        names
+            Sensors, "tip" or "tip x", coordinates, "pin.angle", joints or bodies; without names: all sensors and
+            coordinates.
+        ax
+            Axes of a figure, into which all columns are drawn; they must have one unit. None: a new figure, with a
+            panel for each sensor and unit, and a dozen curves at most in each.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure of the axes, or the new one: `motion.plot("tip").savefig("tip.png")`.
+
+        Raises
+        ------
+        ResultsError
+            If there is nothing to plot, or columns for given axes have several units.
+        """
+        chosen, symbol = self.measurements(*names), self.units.time_symbol
+        if ax is None:
+            return plot_sensors(chosen, title=self.head.system, time_symbol=symbol)
+        plot_columns(chosen, ax, time_symbol=symbol)
+        return figure_of(ax)
 
     def to_dataframe(self, *names: str) -> "DataFrame":
         """Return a pandas DataFrame of measurements over time (see `measurements`), columns such as "tip x".

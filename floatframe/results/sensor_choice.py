@@ -7,7 +7,8 @@ from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.model.system import System
 from floatframe.results.sensors import coordinate_sensors, measured, measurement_of, sensor_of, sensors_of
-from floatframe.results.sensors.measurement import Measurement
+from floatframe.results.sensors.loads import CoordinateSensor, ReactionSensor
+from floatframe.results.sensors.measurement import Measurement, Sensor, unit_words, vector_columns
 from floatframe.results.trajectory import Trajectory
 
 __all__ = ["chosen_measurements"]
@@ -19,6 +20,7 @@ def chosen_measurements(system: System, trajectory: Trajectory, names: Sequence[
     """Return the measurements of the sensors with the given names, each once, in the order of the names.
 
     A name is that of a sensor, of a column, "sensor.column" or "sensor column", or of a coordinate, "joint.coordinate".
+    The name of a joint stands for its coordinates and its reaction, that of a body for the position of its origin.
     In names of sensors and coordinates, * stands for any letters and ? for one letter; if none matches, also in
     "sensor.column".
 
@@ -37,6 +39,10 @@ def chosen_measurements(system: System, trajectory: Trajectory, names: Sequence[
             found |= measured(system, trajectory, [sensor_of(system, each) for each in fitting if each not in found])
             continue
         if not is_wild(name, known):
+            part = {} if name in known else measurements_of_part(system, trajectory, name)
+            if part:
+                found |= part
+                continue
             try:
                 found[name] = measurement_of(system, trajectory, name)
             except ModelError as error:
@@ -67,3 +73,15 @@ def is_wild(name: str, known: Sequence[str]) -> bool:
 def pattern_of(name: str) -> str:
     """Return a pattern in which brackets are literal characters."""
     return name.replace("[", "[[]")
+
+
+def measurements_of_part(system: System, trajectory: Trajectory, name: str) -> dict[str, Measurement]:
+    """Return the measurements of a joint or a body of that name; none if there is neither."""
+    for joint in system.joints:
+        if joint.name == name:
+            own: list[Sensor] = [CoordinateSensor(f"{name}.{each}", name, each) for each in joint.coordinates]
+            return measured(system, trajectory, [*own, ReactionSensor(f"{name} reaction", name)])
+    if name in trajectory.body_names:
+        columns, units = vector_columns(trajectory.body(name).r, unit_words(system.units, "length"))
+        return {f"{name} position": Measurement(f"{name} position", trajectory.t, columns, units)}
+    return {}

@@ -1,6 +1,8 @@
 """Frequency responses of a linearised system: amplitude and phase of every output divided by every input."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,11 +13,17 @@ from fe_models.foundation.records import checked_fields
 from floatframe.analyses.linear.linearization import LinearSystem
 from floatframe.analyses.linear.system_modes import system_modes
 from floatframe.errors import ModelError
+from floatframe.results.sensor_plots import figure_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 __all__ = ["FrequencyResponse", "frequency_response", "resolved_frequencies"]
 
 AROUND = 12.0  #: range around a resonance with additional points, in half-widths
 POINTS_AROUND = 40  #: even, so that none is at the middle, where an undamped response is infinite
+ROUNDING = 1e-12  #: rounding error of a response, relative to the largest amplitude with the same unit
 LEAST_DAMPING = 1e-4  #: least damping used for the width of a resonance, because an undamped one has zero width
 
 
@@ -54,6 +62,69 @@ class FrequencyResponse:
     def phases(self) -> Array:
         """Phase of y/s, continuous over the frequency, starting between -180 and 180, same shape [degrees]."""
         return np.degrees(np.unwrap(np.angle(self.values), axis=0))
+
+    def plot(self, *, axes: "Sequence[Axes] | None" = None, time_unit: float = 1.0) -> "Figure":
+        """Draw a Bode plot with a curve for each output and input: amplitudes in a panel for each unit, phases below.
+
+        Parameters
+        ----------
+        axes
+            Axes of a figure: one for the amplitudes of each unit, and one for the phases. None: a new figure.
+        time_unit
+            Unit of time of the system [s].
+
+        Raises
+        ------
+        ModelError
+            If other than so many axes are given.
+        """
+        from matplotlib.figure import Figure
+
+        pairs = [(o, i) for o in range(len(self.outputs)) for i in range(len(self.inputs))]
+        amplitudes, phases = self.amplitudes, self.phases
+        finite = np.where(np.isfinite(amplitudes), amplitudes, 0.0)
+        sizes = {pair: float(finite[:, pair[0], pair[1]].max()) for pair in pairs}
+        largest = {self.units[o][i]: 0.0 for o, i in pairs}
+        for (o, i), size in sizes.items():
+            largest[self.units[o][i]] = max(largest[self.units[o][i]], size)
+        units = [unit for unit, size in largest.items() if size > 0] or [self.units[0][0]]
+        if axes is None:
+            new = Figure(figsize=(8, 2.8 * len(units) + 2.6), layout="constrained")
+            axes = list(new.subplots(len(units) + 1, 1, sharex=True, squeeze=False).ravel())
+        if len(axes) != len(units) + 1:
+            raise ModelError(
+                f"plot: expected {len(units) + 1} axes, for the amplitudes in {', '.join(units)} and the phases, got "
+                f"{len(axes)}"
+            )
+        figure = figure_of(axes[0])
+        hertz = self.frequencies / time_unit
+        still = []
+        for k, (o, i) in enumerate(pairs):
+            unit, label = self.units[o][i], f"{self.outputs[o]} / {self.inputs[i]}"
+            if sizes[o, i] <= ROUNDING * largest[unit]:
+                still.append(label)
+                continue
+            curve = amplitudes[:, o, i]
+            curve = np.where((curve > 0) & np.isfinite(curve), curve, np.nan)
+            axes[units.index(unit)].loglog(hertz, curve, color=f"C{k % 10}", linewidth=1.4, label=label)
+            axes[-1].semilogx(hertz, phases[:, o, i], color=f"C{k % 10}", linewidth=1.1)
+        for unit, ax in zip(units, axes, strict=False):
+            ax.set_ylabel(f"amplitude [{unit}]")
+            if ax.get_legend_handles_labels()[0]:
+                ax.legend(fontsize="small")
+            ax.grid(which="major", alpha=0.4)
+            ax.grid(which="minor", alpha=0.15)
+        ax = axes[-1]
+        ax.set_ylabel("phase [degrees]")
+        low, high = ax.get_ylim()
+        first, last = np.floor(low / 90 - 0.05), np.ceil(high / 90 + 0.05)
+        ax.set_yticks(90 * np.arange(first, last + 1, max(1, (last - first) // 6)))
+        ax.grid(which="major", alpha=0.4)
+        ax.set_xlabel("frequency [Hz]")
+        ax.set_xlim(hertz[0], hertz[-1])
+        if still:
+            figure.suptitle(f"no response: {', '.join(still)}", fontsize="small", color="0.4")
+        return figure
 
     def to_table(self, time_unit: float = 1.0) -> Table:
         """Return the frequency in Hz, and amplitude and phase of every output divided by every input.

@@ -4,14 +4,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from floatframe.analyses.linear.frequency_response import FrequencyResponse
 from floatframe.analyses.linear.parameter_study import Locus
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["campbell_figure", "plot_campbell", "plot_frequency_response", "plot_root_locus"]
+__all__ = ["campbell_figure", "plot_campbell", "plot_root_locus"]
 
 
 ROUNDING = 1e-12  #: rounding error of a response, relative to the largest amplitude with the same unit
@@ -106,58 +105,6 @@ def plot_root_locus(locus: Locus, ax: "Axes | None" = None) -> "Axes":
     ax.set_ylabel("imaginary part [1/s]")
     ax.grid(alpha=0.3)
     return ax
-
-
-def plot_frequency_response(response: FrequencyResponse, *, time_unit: float = 1.0) -> "Figure":
-    """Return a Bode plot with a curve for each output and input: amplitudes in a panel for each unit, phases below.
-
-    Parameters
-    ----------
-    response
-        Result of `frequency_response`.
-    time_unit
-        Unit of time of the system [s].
-    """
-    from matplotlib.figure import Figure
-
-    pairs = [(o, i) for o in range(len(response.outputs)) for i in range(len(response.inputs))]
-    amplitudes, phases = response.amplitudes, response.phases
-    finite = np.where(np.isfinite(amplitudes), amplitudes, 0.0)
-    sizes = {pair: float(finite[:, pair[0], pair[1]].max()) for pair in pairs}
-    largest = {response.units[o][i]: 0.0 for o, i in pairs}
-    for (o, i), size in sizes.items():
-        largest[response.units[o][i]] = max(largest[response.units[o][i]], size)
-    units = [unit for unit, size in largest.items() if size > 0] or [response.units[0][0]]
-    figure = Figure(figsize=(8, 2.8 * len(units) + 2.6), layout="constrained")
-    axes = figure.subplots(len(units) + 1, 1, sharex=True, squeeze=False).ravel()
-    hertz = response.frequencies / time_unit
-    still = []
-    for k, (o, i) in enumerate(pairs):
-        unit, label = response.units[o][i], f"{response.outputs[o]} / {response.inputs[i]}"
-        if sizes[o, i] <= ROUNDING * largest[unit]:
-            still.append(label)
-            continue
-        curve = amplitudes[:, o, i]
-        curve = np.where((curve > 0) & np.isfinite(curve), curve, np.nan)
-        axes[units.index(unit)].loglog(hertz, curve, color=f"C{k % 10}", linewidth=1.4, label=label)
-        axes[-1].semilogx(hertz, phases[:, o, i], color=f"C{k % 10}", linewidth=1.1)
-    for unit, ax in zip(units, axes, strict=False):
-        ax.set_ylabel(f"amplitude [{unit}]")
-        if ax.get_legend_handles_labels()[0]:
-            ax.legend(fontsize="small")
-        ax.grid(which="major", alpha=0.4)
-        ax.grid(which="minor", alpha=0.15)
-    ax = axes[-1]
-    ax.set_ylabel("phase [degrees]")
-    low, high = ax.get_ylim()
-    first, last = np.floor(low / 90 - 0.05), np.ceil(high / 90 + 0.05)
-    ax.set_yticks(90 * np.arange(first, last + 1, max(1, (last - first) // 6)))
-    ax.grid(which="major", alpha=0.4)
-    ax.set_xlabel("frequency [Hz]")
-    ax.set_xlim(hertz[0], hertz[-1])
-    if still:
-        figure.suptitle(f"no response: {', '.join(still)}", fontsize="small", color="0.4")
-    return figure
 
 
 def _axes() -> "Axes":

@@ -29,12 +29,12 @@ from floatframe.model.system import System
 from floatframe.pictures.animation import bodies_of, diagonal
 from floatframe.pictures.body_colors import BODY_COLORS
 from floatframe.pictures.film_times import film_times, round_below
-from floatframe.pictures.sensor_plots import panels_of
 from floatframe.pictures.viewer.flexible import FlexibleSurface, flexible_surface, nodes_within
 from floatframe.pictures.viewer.packing import Block
 from floatframe.pictures.viewer.record import Shown, colors_record, stage_record
 from floatframe.results.recovery import elastic_displacements, require_same_modes
 from floatframe.results.sensor_choice import chosen_measurements
+from floatframe.results.sensor_plots import panels_of
 from floatframe.results.sensors import measured
 from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.trajectory import Trajectory, read_trajectory

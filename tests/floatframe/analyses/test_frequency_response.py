@@ -7,6 +7,7 @@ import h5py
 import numpy as np
 import pytest
 import scipy.linalg as la
+from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
 from scipy.io import loadmat
 from typer.testing import CliRunner
@@ -30,7 +31,6 @@ from floatframe import (
     resolved_frequencies,
     static_equilibrium,
 )
-from floatframe.analyses.linear.plots import plot_frequency_response
 from floatframe.analyses.snapshot import snapshot
 from floatframe.cli.app import app
 from floatframe.results.sensors import StressSensor
@@ -262,9 +262,14 @@ def test_plot_of_responses_has_a_panel_for_each_unit_and_one_for_phases():
     turn = Channel("turn", Marker("mass"), (0, 0, 1), "rotation")
     still = Channel("still", Marker("mass"), (0, 1, 0), rate=1)
     linear = linearize(oscillator(), inputs=[push], outputs=[push, turn, still])
-    figure = plot_frequency_response(frequency_response(linear, np.geomspace(0.1, 10, 30)))
+    figure = frequency_response(linear, np.geomspace(0.1, 10, 30)).plot()
     assert [ax.get_ylabel() for ax in figure.axes] == ["amplitude [m/N]", "amplitude [rad/N]", "phase [degrees]"]
     assert figure.get_suptitle() == "no response: still / push"
+    response, axes = frequency_response(linear, np.geomspace(0.1, 10, 30)), Figure().subplots(3)
+    assert response.plot(axes=axes) is axes[0].figure
+    assert [ax.get_ylabel() for ax in axes] == [ax.get_ylabel() for ax in figure.axes]
+    with pytest.raises(ModelError, match=r"expected 3 axes, for the amplitudes in m/N, rad/N and the phases, got 2"):
+        response.plot(axes=axes[:2])
 
 
 @pytest.mark.parametrize(("old", "new", "words"), [

@@ -35,9 +35,9 @@ from floatframe.cli.app import app
 from floatframe.pictures.animation import motion_scene
 from floatframe.pictures.body_colors import VON_MISES
 from floatframe.pictures.film_times import film_times
-from floatframe.pictures.sensor_plots import plot_measurement
 from floatframe.results.export import sensors_record
 from floatframe.results.place_motion import interface_motion, point_motion
+from floatframe.results.sensor_plots import plot_measurement
 from floatframe.results.sensors import (
     DisplacementSensor,
     ElongationSensor,

@@ -1,0 +1,135 @@
+"""Plots of measurements over time: panels with the columns of one unit, at most a dozen curves in each."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from floatframe.errors import ResultsError
+from floatframe.results.sensors.measurement import Measurement
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["figure_of", "groups_of", "labelled", "panels_of", "plot_columns", "plot_measurement", "plot_sensors"]
+
+ROUNDING = 1e-9  #: relative to the largest column of a unit; smaller curves would coincide with zero
+MOST_CURVES = 12  #: of a panel; more columns go into several panels
+N_COLORS = 10  #: colours of curves, which then begin anew, with dashes
+LONG_LEGEND = 6  #: entries of a legend, above which it has two columns
+
+
+def panels_of(measurement: Measurement) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Return the columns of each unit, as the unit and the names of the columns with this unit."""
+    quantities = measurement.quantities
+    units = dict.fromkeys(measurement.units[name] for name in quantities)
+    return tuple((unit, tuple(name for name in quantities if measurement.units[name] == unit)) for unit in units)
+
+
+def groups_of(measurement: Measurement) -> tuple[tuple[str, ...], ...]:
+    """Return the columns of each panel: of one unit, without those that stay zero beside others, a dozen at most.
+
+    If all columns of a unit stay zero, the last one is shown.
+    """
+    groups = []
+    for _, columns in panels_of(measurement):
+        size = {name: float(np.abs(measurement.columns[name]).max(initial=0.0)) for name in columns}
+        shown = [name for name in columns if size[name] > ROUNDING * max(size.values())] or [columns[-1]]
+        n = -(-len(shown) // MOST_CURVES)
+        groups += [tuple(map(str, part)) for part in np.array_split(shown, n)]
+    return tuple(groups)
+
+
+def plot_measurement(
+    measurement: Measurement, ax: "Axes | None" = None, *, columns: Sequence[str] = (), time_symbol: str = "s"
+) -> "Axes":
+    """Plot columns of one unit over time, as `groups_of` returns them; default: the first group."""
+    if ax is None:
+        from matplotlib.figure import Figure
+
+        ax = Figure(figsize=(7, 4), layout="constrained").add_subplot()
+    columns = columns or groups_of(measurement)[0]
+    unit = measurement.units[columns[0]]
+    for k, name in enumerate(columns):
+        is_sum = name.split()[-1] in ("size", "total", "von")
+        line = {"linewidth": 1.0, "color": "k"} if is_sum else {"linewidth": 1.5}
+        style = "-" if k < N_COLORS else "--"
+        ax.plot(measurement.t, measurement.columns[name], style, label=name, **line)
+    ax.set_xlabel(f"time [{time_symbol}]")
+    ax.set_title("\n".join([measurement.sensor, *measurement.places]), fontsize="medium")
+    ax.grid(alpha=0.3)
+    if dict(panels_of(measurement))[unit] == tuple(columns) and len(columns) == 1:
+        ax.set_ylabel(f"{columns[0]} [{unit}]")
+        return ax
+    return labelled(ax, f"{measurement.sensor} [{unit}]")
+
+
+def plot_columns(measurements: Sequence[Measurement], ax: "Axes", *, time_symbol: str = "s") -> "Axes":
+    """Plot all columns of measurements into one pair of axes, each with its whole name.
+
+    Raises
+    ------
+    ResultsError
+        If there is nothing to plot, or the columns have several units.
+    """
+    units: dict[str, list[str]] = {}
+    for each in measurements:
+        for columns in groups_of(each):
+            units.setdefault(each.units[columns[0]], []).extend(each.channel(name) for name in columns)
+            if len(units) == 1:
+                for name in columns:
+                    style = "-" if len(ax.lines) < N_COLORS else "--"
+                    ax.plot(each.t, each.columns[name], style, linewidth=1.5, label=each.channel(name))
+    if len(units) != 1:
+        words = "; ".join(f"{', '.join(names)} [{unit}]" for unit, names in units.items())
+        raise ResultsError(
+            f"plot: expected columns of one unit for the given axes, got {words or 'nothing'}; name columns, such as "
+            '"tip x", or leave the axes out'
+        )
+    ((unit, names),) = units.items()
+    ax.set_xlabel(f"time [{time_symbol}]")
+    ax.grid(alpha=0.3)
+    return labelled(ax, f"{names[0]} [{unit}]" if len(names) == 1 else f"[{unit}]")
+
+
+def plot_sensors(measurements: Sequence[Measurement], *, title: str = "", time_symbol: str = "s") -> "Figure":
+    """Return a figure with panels for every sensor: the columns of a unit, a dozen at most in one panel.
+
+    Raises
+    ------
+    ResultsError
+        If there is nothing to plot.
+    """
+    from matplotlib.figure import Figure
+
+    panels = [(measurement, columns) for measurement in measurements for columns in groups_of(measurement)]
+    if not panels:
+        raise ResultsError("plot: no sensor to plot; name a joint coordinate, or add tables [sensors.NAME]")
+    n_columns = 1 if len(panels) == 1 else 2
+    n_rows = (len(panels) + n_columns - 1) // n_columns
+    figure = Figure(figsize=(6.5 * n_columns, 3.4 * n_rows + 0.6), layout="constrained")
+    if title:
+        figure.suptitle(title)
+    axes = figure.subplots(n_rows, n_columns, squeeze=False).ravel()
+    for (measurement, columns), ax in zip(panels, axes, strict=False):
+        plot_measurement(measurement, ax, columns=columns, time_symbol=time_symbol)
+    for ax in axes[len(panels) :]:
+        ax.remove()
+    return figure
+
+
+def figure_of(ax: "Axes") -> "Figure":
+    """Return the figure of axes; `ResultsError` if they have been removed from theirs."""
+    figure = ax.get_figure(root=True)
+    if figure is None:
+        raise ResultsError("plot: the given axes belong to no figure")
+    return figure
+
+
+def labelled(ax: "Axes", label: str) -> "Axes":
+    """Set the label of the y axis, and add a legend of the curves."""
+    ax.set_ylabel(label)
+    if handles := ax.get_legend_handles_labels()[0]:
+        ax.legend(fontsize="small", ncols=1 if len(handles) <= LONG_LEGEND else 2)
+    return ax
