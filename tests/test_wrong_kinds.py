@@ -2,8 +2,9 @@
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ import cms
 import fe_models
 import floatframe as ff
 from fe_models.foundation.errors import ReportedError
-from fe_models.foundation.records import MismatchError, conformed
+from fe_models.foundation.records import MismatchError, Takes, checked_fields, conformed
 from fe_models.foundation.units import Units
 from tests.bodies import bar
 
@@ -150,3 +151,25 @@ def test_another_kind_is_told(hint, value, words, wrong):
     with pytest.raises(MismatchError) as caught:
         conformed(hint, value)
     assert caught.value.args == (words, wrong)
+
+
+@dataclass
+@checked_fields(ff.ModelError)
+class Inputs:
+    """Annotations that look at a class, and those that look at contents."""
+
+    number: float | None = None
+    names: Sequence[str] = ()
+    choice: Literal["a", "b"] | float = "a"
+    level: Annotated[float, Takes(Literal[1, 2])] = 1
+    units: Units | str | None = None
+
+
+def test_inputs_of_a_class_that_was_taken_are_judged_by_their_contents_where_those_count():
+    Inputs(2.0, ["a"], "a", 1, "mm-t-s")
+    for name, value in {"names": ["a", 3], "choice": "c", "level": 3, "number": "2"}.items():
+        with pytest.raises(ff.ModelError, match=f"{name}: expected "):
+            Inputs(**{name: value})
+    assert Inputs(names="b").names == ("b",)
+    with pytest.raises(ReportedError, match="unknown unit system"):
+        Inputs(units="mm-t-h")

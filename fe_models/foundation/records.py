@@ -7,6 +7,7 @@ proxy cannot be pickled at all.
 
 import inspect
 import sys
+from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import fields
 from functools import cache, wraps
@@ -297,11 +298,16 @@ def hints_of(subject: Hashable) -> dict[str, Any]:
     return get_type_hints(subject, include_extras=True)
 
 
-def conformed_inputs(where: str, hints: Mapping[str, Any], given: Mapping[str, Any], error: type[Exception]) -> Any:
-    """Return those inputs that change; raise the package's error for the first that is of another kind."""
+#: inputs by the function or data class, with classes of which every object is taken as it is
+TAKEN: defaultdict[Hashable, set[tuple[str, type]]] = defaultdict(set)
+
+
+def conformed_inputs(where: str, subject: Hashable, given: Mapping[str, Any], error: type[Exception]) -> Any:
+    """Return those inputs of a function or data class that change; raise the error for the first of another kind."""
     changed = {}
+    hints, taken = hints_of(subject), TAKEN[subject]
     for name, value in given.items():
-        if name not in hints:
+        if name not in hints or (name, type(value)) in taken:
             continue
         try:
             found = conformed(hints[name], value)
@@ -309,8 +315,11 @@ def conformed_inputs(where: str, hints: Mapping[str, Any], given: Mapping[str, A
             expected, wrong = mismatch.args
             got = f"the class {wrong.__name__} itself" if isinstance(wrong, type) else quoted(wrong)
             raise error(f"{where}: {name}: expected {expected}, got {got}") from None
+        looks_inside = isinstance(value, type | Iterable) and not isinstance(value, np.ndarray)
         if found is not value:
             changed[name] = found
+        elif not looks_inside and "Literal[" not in str(hints[name]):
+            taken.add((name, type(value)))
     return changed
 
 
@@ -332,7 +341,7 @@ def checked_fields(error: type[Exception], *, misfit: type[Exception] = BodyErro
             name = getattr(self, "name", None)
             where = f"{kind.__name__} {name!r}" if isinstance(name, str) else type(self).__name__
             try:
-                inputs = conformed_inputs(where, hints_of(cast(Hashable, type(self))), vars(self), error)
+                inputs = conformed_inputs(where, cast(Hashable, type(self)), vars(self), error)
             except error:
                 refused_by(own, self)
                 raise
@@ -392,7 +401,7 @@ def at_door(package: str, name: str, found: Any, error: type[Exception]) -> Any:
         except TypeError as reason:
             raise TypeError(f"{function.__name__}: {reason}") from None
         given = {name: bound.arguments[name] for name in single if name in bound.arguments}
-        changed = conformed_inputs(function.__name__, hints_of(function), given, error)
+        changed = conformed_inputs(function.__name__, function, given, error)
         if changed:
             bound.arguments.update(changed)
             return function(*bound.args, **bound.kwargs)
