@@ -10,7 +10,7 @@ from cms.errors import BodyError
 from fe_models.foundation.arrays import Array, IntArray, require_shape
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.records import Shape, checked_fields, frozen_copies
+from fe_models.foundation.records import ArrayShape, checked_fields, frozen_copies
 from fe_models.foundation.units import Units
 
 __all__ = ["SPIN_PAIRS", "UNIT_LOADS", "GeometricStiffness", "RotatedLoads", "SpreadLoads", "stiffness_of_loads"]
@@ -43,10 +43,10 @@ class RotatedLoads:
         Matrices of the loads of interfaces, (n_loaded, 6, 3, n_q) [1/sqrt(kg) and 1/(sqrt(kg) m) per q].
     """
 
-    translation: Annotated[Array, Shape((3, 3, "n_q"))]
-    rotation: Annotated[Array, Shape((3, 3, "n_q"))]
-    spin: Annotated[Array, Shape((6, 3, "n_q"))]
-    interfaces: Annotated[Array, Shape(("n_loaded", 6, 3, "n_q"))]
+    translation: Annotated[Array, ArrayShape((3, 3, "n_q"))]
+    rotation: Annotated[Array, ArrayShape((3, 3, "n_q"))]
+    spin: Annotated[Array, ArrayShape((6, 3, "n_q"))]
+    interfaces: Annotated[Array, ArrayShape(("n_loaded", 6, 3, "n_q"))]
 
 
 @presented
@@ -70,9 +70,9 @@ class SpreadLoads:
         Work of load j alone, rotated about an axis, on the rotations e_b × c, (6, 3, 3) [m and m²].
     """
 
-    K: Annotated[Array, Shape((6, "n_q", "n_q"), is_symmetric=True)]
-    turned: Annotated[Array, Shape((6, 3, "n_q"))]
-    turned_rigid: Annotated[Array, Shape((6, 3, 3))]
+    K: Annotated[Array, ArrayShape((6, "n_q", "n_q"), is_symmetric=True)]
+    turned: Annotated[Array, ArrayShape((6, 3, "n_q"))]
+    turned_rigid: Annotated[Array, ArrayShape((6, 3, 3))]
 
 
 @presented
@@ -111,10 +111,10 @@ class GeometricStiffness:
     .. [1] Schwertassek & Wallrapp (1999), docs/bibliography.md; derived in docs/theory.md §7.
     """
 
-    translation: Annotated[Array, Shape((3, "n_q", "n_q"), is_symmetric=True)]
-    rotation: Annotated[Array, Shape((3, "n_q", "n_q"), is_symmetric=True)]
-    spin: Annotated[Array, Shape((6, "n_q", "n_q"), is_symmetric=True)]
-    interfaces: Annotated[Array, Shape(("n_loaded", 6, "n_q", "n_q"), is_symmetric=True)]
+    translation: Annotated[Array, ArrayShape((3, "n_q", "n_q"), is_symmetric=True)]
+    rotation: Annotated[Array, ArrayShape((3, "n_q", "n_q"), is_symmetric=True)]
+    spin: Annotated[Array, ArrayShape((6, "n_q", "n_q"), is_symmetric=True)]
+    interfaces: Annotated[Array, ArrayShape(("n_loaded", 6, "n_q", "n_q"), is_symmetric=True)]
     turned: RotatedLoads | None = None
     spread: SpreadLoads | None = None
     is_loaded: tuple[bool, ...] = ()

@@ -11,7 +11,7 @@ from cms.errors import BodyError
 from fe_models.foundation.arrays import Array, frozen, require_finite
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.records import Shape, checked_fields, frozen_copies
+from fe_models.foundation.records import ArrayShape, checked_fields, frozen_copies
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["INERTIA_TERMS", "NEGATIVITY", "Moments", "NodalSums", "known_P", "known_S_kl", "moments_from_gram"]
@@ -62,11 +62,11 @@ class Moments:
     """
 
     m: float
-    S: Annotated[Array, Shape((3,))]
-    R: Annotated[Array, Shape((3, 3))]
-    C1: Annotated[Array, Shape((3, "n_q"))]
-    P: Annotated[Array, Shape((3, 3, "n_q"))]
-    S_kl: Annotated[Array, Shape((3, 3, "n_q", "n_q"))]
+    S: Annotated[Array, ArrayShape((3,))]
+    R: Annotated[Array, ArrayShape((3, 3))]
+    C1: Annotated[Array, ArrayShape((3, "n_q"))]
+    P: Annotated[Array, ArrayShape((3, 3, "n_q"))]
+    S_kl: Annotated[Array, ArrayShape((3, 3, "n_q", "n_q"))]
     is_exact: bool = True
     missing: tuple[str, ...] = ()
 
@@ -273,10 +273,10 @@ class NodalSums:
     """
 
     w: float  #: sum of the weights [m³; dimensionless if the nodes count equally]
-    S: Annotated[Array, Shape((3,))]  #: Σ w c [w times m]
-    R: Annotated[Array, Shape((3, 3))]  #: Σ w c_a c_b [w times m²]
-    U1: Annotated[Array, Shape((3, "n_q"))]  #: Σ w phi_k
-    U2: Annotated[Array, Shape((3, "n_q"))]  #: Σ w c × phi_k [U1 times m]
+    S: Annotated[Array, ArrayShape((3,))]  #: Σ w c [w times m]
+    R: Annotated[Array, ArrayShape((3, 3))]  #: Σ w c_a c_b [w times m²]
+    U1: Annotated[Array, ArrayShape((3, "n_q"))]  #: Σ w phi_k
+    U2: Annotated[Array, ArrayShape((3, "n_q"))]  #: Σ w c × phi_k [U1 times m]
     is_volume: bool = True  #: False: every node has weight 1
 
     def __post_init__(self) -> None:

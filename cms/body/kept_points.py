@@ -9,7 +9,7 @@ from cms.errors import BodyError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.records import Shape, checked_fields, frozen_copies
+from fe_models.foundation.records import ArrayShape, checked_fields, frozen_copies
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["SOURCES", "KeptPoints"]
@@ -43,9 +43,9 @@ class KeptPoints:
         If shapes do not fit, or a source is unknown.
     """
 
-    nodes: Annotated[IntArray, Shape(("n",))]
-    rotation: Annotated[Array, Shape(("n", 3, "n_q"))]
-    source: Annotated[tuple[str, ...], Shape(("n",))]
+    nodes: Annotated[IntArray, ArrayShape(("n",))]
+    rotation: Annotated[Array, ArrayShape(("n", 3, "n_q"))]
+    source: Annotated[tuple[str, ...], ArrayShape(("n",))]
 
     def __post_init__(self) -> None:
         if np.unique(self.nodes).size != self.nodes.size:

@@ -18,7 +18,7 @@ from fe_models.body.unit_check import BodyNumbers, hull_volume, implausible_numb
 from fe_models.foundation.arrays import Array, IntArray, require_shape
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import Summary, listed, presented
-from fe_models.foundation.records import FrozenMapping, Shape, checked_fields, frozen_copies
+from fe_models.foundation.records import ArrayShape, FrozenMapping, checked_fields, frozen_copies
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.numbering import NONE, Numbering
@@ -49,10 +49,10 @@ class BodyFrame:
     """
 
     kind: str
-    origin: Annotated[Array, Shape((3,))]
-    axes: Annotated[Array, Shape((3, 3), is_triad=True)] = field(default_factory=lambda: np.eye(3))
+    origin: Annotated[Array, ArrayShape((3,))]
+    axes: Annotated[Array, ArrayShape((3, 3), is_triad=True)] = field(default_factory=lambda: np.eye(3))
     at: str = ""
-    dofs: Annotated[IntArray, Shape((None, 2))] = field(default_factory=lambda: np.zeros((0, 2), np.int64))
+    dofs: Annotated[IntArray, ArrayShape((None, 2))] = field(default_factory=lambda: np.zeros((0, 2), np.int64))
 
 
 @presented
@@ -83,10 +83,10 @@ class ReducedInterface:
 
     name: str
     kind: str
-    position: Annotated[Array, Shape((3,))]
-    triad: Annotated[Array, Shape((3, 3), is_triad=True)]
-    Psi: Annotated[Array, Shape((6, "n_q"))]
-    members: Annotated[IntArray, Shape(("n_members",))]
+    position: Annotated[Array, ArrayShape((3,))]
+    triad: Annotated[Array, ArrayShape((3, 3), is_triad=True)]
+    Psi: Annotated[Array, ArrayShape((6, "n_q"))]
+    members: Annotated[IntArray, ArrayShape(("n_members",))]
     has_rotation: bool = True
 
 
@@ -162,27 +162,27 @@ class ReducedBody:
     name: str
     units: Units
     frame: BodyFrame
-    M: Annotated[Array, Shape(("n_q", "n_q"))]
-    K: Annotated[Array, Shape(("n_q", "n_q"))]
-    D: Annotated[Array, Shape(("n_q", "n_q"))]
-    labels: Annotated[tuple[str, ...], Shape(("n_q",))]
-    energy_shares: Annotated[Array, Shape(("n_q", "n_sources"))]
-    sources: Annotated[tuple[str, ...], Shape(("n_sources",))]
+    M: Annotated[Array, ArrayShape(("n_q", "n_q"))]
+    K: Annotated[Array, ArrayShape(("n_q", "n_q"))]
+    D: Annotated[Array, ArrayShape(("n_q", "n_q"))]
+    labels: Annotated[tuple[str, ...], ArrayShape(("n_q",))]
+    energy_shares: Annotated[Array, ArrayShape(("n_q", "n_sources"))]
+    sources: Annotated[tuple[str, ...], ArrayShape(("n_sources",))]
     moments: Moments
-    free_frequencies: Annotated[Array, Shape((None,))]
-    nodes: Annotated[Array, Shape(("n_kept", 3))]
-    node_ids: Annotated[IntArray, Shape(("n_kept",))]
-    Phi: Annotated[Array, Shape(("n_kept", 3, "n_q"))]
-    surface: Annotated[IntArray, Shape((None, 3))]
+    free_frequencies: Annotated[Array, ArrayShape((None,))]
+    nodes: Annotated[Array, ArrayShape(("n_kept", 3))]
+    node_ids: Annotated[IntArray, ArrayShape(("n_kept",))]
+    Phi: Annotated[Array, ArrayShape(("n_kept", 3, "n_q"))]
+    surface: Annotated[IntArray, ArrayShape((None, 3))]
     interfaces: tuple[ReducedInterface, ...]
     provenance: Mapping[str, str] = field(default_factory=dict)
     columns: SourceColumns | None = None
     nodal_sums: NodalSums | None = None
     load_cases: tuple[ReducedLoadCase, ...] = ()
-    stress: Annotated[Array | None, Shape(("n_kept", 6, "n_q"))] = None
+    stress: Annotated[Array | None, ArrayShape(("n_kept", 6, "n_q"))] = None
     point_stress: PointStress | None = None
     geometric: GeometricStiffness | None = None
-    quadratic: Annotated[Array | None, Shape(("n_kept", 3, "n_q", "n_q"))] = None
+    quadratic: Annotated[Array | None, ArrayShape(("n_kept", 3, "n_q", "n_q"))] = None
     numbering: Numbering = field(default_factory=Numbering)
     kept: KeptPoints | None = None
     recovery: Mapping[str, RecoveryTable] = field(default_factory=dict)

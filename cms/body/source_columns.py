@@ -7,7 +7,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ArgumentError
-from fe_models.foundation.records import Shape, checked_fields, frozen_copies
+from fe_models.foundation.records import ArrayShape, checked_fields, frozen_copies
 
 __all__ = ["SourceColumns", "source_columns"]
 
@@ -23,10 +23,10 @@ class SourceColumns:
     and unit. Both are linear in the mode, so they can be transformed with the modes to another frame.
     """
 
-    labels: Annotated[tuple[str, ...], Shape(("n_columns",))]  #: label of each column
-    groups: Annotated[tuple[str, ...], Shape(("n_columns",))]  #: group of each column
-    A: Annotated[Array, Shape(("n_columns", "n_q"))]  #: coordinates of the modes in the columns [1/s]
-    F: Annotated[Array, Shape(("n_columns", "n_q"))]  #: forces of the modes on the columns [1/s]
+    labels: Annotated[tuple[str, ...], ArrayShape(("n_columns",))]  #: label of each column
+    groups: Annotated[tuple[str, ...], ArrayShape(("n_columns",))]  #: group of each column
+    A: Annotated[Array, ArrayShape(("n_columns", "n_q"))]  #: coordinates of the modes in the columns [1/s]
+    F: Annotated[Array, ArrayShape(("n_columns", "n_q"))]  #: forces of the modes on the columns [1/s]
 
     @property
     def sources(self) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ArgumentError
-from fe_models.foundation.records import Shape, checked_fields, frozen_copies
+from fe_models.foundation.records import ArrayShape, checked_fields, frozen_copies
 
 __all__ = ["PointStress", "stress_of", "von_mises", "von_mises_of"]
 
@@ -21,10 +21,10 @@ CHUNK_SIZE = 2_000_000  #: number of stress values held at a time
 class PointStress:
     """Stress modes at named points that are not nodes, such as the extreme fibres of beam sections."""
 
-    names: Annotated[tuple[str, ...], Shape(("n_points",))]  #: name of each point
-    positions: Annotated[Array, Shape(("n_points", 3))]  #: undeformed, in B [m]
+    names: Annotated[tuple[str, ...], ArrayShape(("n_points",))]  #: name of each point
+    positions: Annotated[Array, ArrayShape(("n_points", 3))]  #: undeformed, in B [m]
     #: stress xx yy zz yz xz xy for each mode, in axes of B [Pa per unit of q]
-    modes: Annotated[Array, Shape(("n_points", 6, "n_q"))]
+    modes: Annotated[Array, ArrayShape(("n_points", 6, "n_q"))]
 
 
 def von_mises(stress: Array) -> Array:

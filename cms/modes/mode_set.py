@@ -20,7 +20,7 @@ from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, frozen
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.ranks.spread_columns import spread_beside
-from fe_models.foundation.records import Shape, checked_fields
+from fe_models.foundation.records import ArrayShape, checked_fields
 from fe_models.foundation.tall.columns import beside
 
 __all__ = [
@@ -54,9 +54,9 @@ class ModeSet:
     """
 
     name: str
-    columns: Annotated[Array, Shape((None, "n_columns"))]
-    labels: Annotated[tuple[str, ...], Shape(("n_columns",))]
-    frequencies: Annotated[Array, Shape(("n_columns",), has_nan=True)]
+    columns: Annotated[Array, ArrayShape((None, "n_columns"))]
+    labels: Annotated[tuple[str, ...], ArrayShape(("n_columns",))]
+    frequencies: Annotated[Array, ArrayShape(("n_columns",), has_nan=True)]
     options: Mapping[str, str] = field(default_factory=dict)
     groups: tuple[str, ...] = ()
     data: Mapping[str, Array] = field(default_factory=dict)

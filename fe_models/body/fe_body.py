@@ -24,7 +24,7 @@ from fe_models.foundation.presentation import Summary, listed, presented
 from fe_models.foundation.ranks.row_layout import RowLayout
 from fe_models.foundation.ranks.spread_columns import spread_parts
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
-from fe_models.foundation.records import Shape, checked_fields
+from fe_models.foundation.records import ArrayShape, checked_fields
 from fe_models.foundation.tall.columns import elsewhere, in_memory
 from fe_models.foundation.tall.on_disk import is_on_disk, release, row_slices, zeros_like
 from fe_models.foundation.units import Units, unit_system
@@ -346,17 +346,17 @@ class FEBody:
     name: str
     M: sp.csc_array
     K: sp.csc_array
-    nodes: Annotated[Array, Shape(("n_nodes", 3))]
-    dofs: Annotated[IntArray, Shape(("n_dof", 2))]
+    nodes: Annotated[Array, ArrayShape(("n_nodes", 3))]
+    dofs: Annotated[IntArray, ArrayShape(("n_dof", 2))]
     interfaces: tuple[Interface, ...] = ()
     units: Units = field(default_factory=lambda: unit_system("m-kg-s"))
     D: sp.csc_array | None = None
-    surface: Annotated[IntArray, Shape((None, 3))] = field(default_factory=lambda: np.zeros((0, 3), np.int64))
+    surface: Annotated[IntArray, ArrayShape((None, 3))] = field(default_factory=lambda: np.zeros((0, 3), np.int64))
     element_model: ElementModel | None = None
     recovery: Recovery | None = None
     load_cases: tuple[LoadCase, ...] = ()
     stress_points: StressPointModel | None = None
-    node_volumes: Annotated[Array | None, Shape(("n_nodes",))] = None
+    node_volumes: Annotated[Array | None, ArrayShape(("n_nodes",))] = None
     provenance: Mapping[str, str] = field(default_factory=dict)
     is_held: bool = False
     numbering: Numbering = field(default_factory=Numbering)

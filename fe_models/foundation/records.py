@@ -1,6 +1,6 @@
 """Public objects and functions: what they are given is checked where it enters, and copies of objects are frozen too.
 
-Annotations say what is expected, also the shapes of arrays (`Shape`); a class that has a name for each of its objects
+Annotations say what is expected, also the shapes of arrays (`ArrayShape`); a class that has a name for each of its objects
 offers `of_name(text)`, and is taken by that name too. NumPy makes writable copies of read-only arrays, and a mapping
 proxy cannot be pickled at all.
 """
@@ -26,7 +26,14 @@ from fe_models.foundation.tall.on_disk import row_slices
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = [
-    "FrozenMapping", "MismatchError", "Shape", "Takes", "at_door", "checked_fields", "conformed", "frozen_copies",
+    "ArrayShape",
+    "FrozenMapping",
+    "MismatchError",
+    "Takes",
+    "at_door",
+    "checked_fields",
+    "conformed",
+    "frozen_copies",
 ]  # fmt: skip
 
 MOST_KINDS = 3  #: named in a message
@@ -88,8 +95,8 @@ def read_only(value: Any) -> Any:
 # arrays of records ----------------------------------------------------------------------------------------------------
 
 
-class Shape(NamedTuple):
-    """The shape of an array, or the length of a tuple, that a field holds: `Annotated[Array, Shape((3, "n_q"))]`.
+class ArrayShape(NamedTuple):
+    """The shape of an array, or the length of a tuple, that a field holds: `Annotated[Array, ArrayShape((3, "n_q"))]`.
 
     Parameters
     ----------
@@ -111,14 +118,14 @@ class Shape(NamedTuple):
 
 
 @cache
-def shapes_of(kind: Hashable) -> dict[str, tuple[Shape, Any]]:
+def shapes_of(kind: Hashable) -> dict[str, tuple[ArrayShape, Any]]:
     """Return the declared shapes of the fields of a data class, each with the type of the array."""
     annotated = {name: get_args(hint) for name, hint in hints_of(kind).items() if get_origin(hint) is Annotated}
-    return {name: (extra, held) for name, (held, extra, *_) in annotated.items() if isinstance(extra, Shape)}
+    return {name: (extra, held) for name, (held, extra, *_) in annotated.items() if isinstance(extra, ArrayShape)}
 
 
 def put_arrays(record: object, where: str, error: type[Exception]) -> None:
-    """Make the fields of a frozen record that declare a `Shape` read-only arrays, or tuples; refuse other shapes.
+    """Make the fields of a frozen record that declare a `ArrayShape` read-only arrays, or tuples; refuse other shapes.
 
     A large array on disk is read in slices of rows. `Columns` that are no array of this process stay where they are.
 
@@ -331,7 +338,7 @@ def checked_fields(error: type[Exception], *, misfit: type[Exception] = BodyErro
     error
         Raised if a field is of another kind.
     misfit
-        Raised if an array does not have its `Shape`.
+        Raised if an array does not have its `ArrayShape`.
     """
 
     def decorate(kind: Class) -> Class:

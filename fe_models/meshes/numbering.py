@@ -14,7 +14,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.errors import ArgumentError, BodyError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.records import Shape, checked_fields, frozen_copies
+from fe_models.foundation.records import ArrayShape, checked_fields, frozen_copies
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["NONE", "NO_NUMBERS", "NamedSet", "Numbering", "node_place", "numbering_side_by_side"]
@@ -45,7 +45,7 @@ class NamedSet:
 
     name: str
     kind: Literal["nodes", "elements"]
-    members: Annotated[IntArray, Shape(("n",))]
+    members: Annotated[IntArray, ArrayShape(("n",))]
     size: int
 
 
@@ -77,12 +77,12 @@ class Numbering:
         The user's sets of nodes and elements.
     """
 
-    nodes: Annotated[IntArray, Shape((None,))] = field(default_factory=lambda: NO_NUMBERS)
-    on_skin: Annotated[IntArray, Shape((None,))] = field(default_factory=lambda: NO_NUMBERS)
-    elements: Annotated[IntArray, Shape((None,))] = field(default_factory=lambda: NO_NUMBERS)
+    nodes: Annotated[IntArray, ArrayShape((None,))] = field(default_factory=lambda: NO_NUMBERS)
+    on_skin: Annotated[IntArray, ArrayShape((None,))] = field(default_factory=lambda: NO_NUMBERS)
+    elements: Annotated[IntArray, ArrayShape((None,))] = field(default_factory=lambda: NO_NUMBERS)
     instances: tuple[str, ...] = ()
-    node_instance: Annotated[IntArray, Shape((None,))] = field(default_factory=lambda: NO_NUMBERS)
-    element_instance: Annotated[IntArray, Shape((None,))] = field(default_factory=lambda: NO_NUMBERS)
+    node_instance: Annotated[IntArray, ArrayShape((None,))] = field(default_factory=lambda: NO_NUMBERS)
+    element_instance: Annotated[IntArray, ArrayShape((None,))] = field(default_factory=lambda: NO_NUMBERS)
     sets: tuple[NamedSet, ...] = ()
 
     def __post_init__(self) -> None:

@@ -157,9 +157,8 @@ def shake_command(
     Example: floatframe shake tower.h5 --base foot --Q 25 --sine 5:1,100:1 --rate 2 --random
     20:0.01,80:0.04,350:0.04,2000:0.007
     """
-    from floatframe.durability.shaking.light_record import light_record
     from floatframe.durability.shaking.page import shake_document
-    from floatframe.durability.shaking.record import shake_record, shake_table
+    from floatframe.durability.shaking.record import light_record, shake_record, shake_table
     from floatframe.durability.shaking.shake import shake
     from floatframe.errors import ModelError
 

@@ -9,15 +9,19 @@ from cms.assessment.quality.of_body.descriptions import (
     check_mesh_order,
     check_scope,
     check_step_size,
+    check_units,
 )
 from cms.assessment.quality.of_body.effective_mass import check_driven_mass
 from cms.assessment.quality.of_body.identities import (
+    check_definiteness,
     check_energy_shares,
     check_frame_condition,
     check_free_frequencies,
     check_inertia_tensor,
     check_inertia_terms,
+    check_kinetic_energy,
     check_modal_mass,
+    check_symmetry,
 )
 from cms.assessment.quality.of_body.interface_motions import (
     check_interface_motions,
@@ -31,8 +35,6 @@ from cms.assessment.quality.of_body.recovery_rows import (
     check_recovery_shapes,
 )
 from cms.assessment.quality.of_body.second_order import check_second_order, check_turned_loads
-from cms.assessment.quality.of_body.symmetry import check_definiteness, check_kinetic_energy, check_symmetry
-from cms.assessment.quality.of_body.unit_hints import check_units
 from cms.assessment.quality.record import QualityRecord
 from cms.body.reduced_body import ReducedBody
 

@@ -17,7 +17,7 @@ from cms.linear_algebra.solvers.slepc_modes import SlepcSearch, search_on_ranks
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
-from fe_models.foundation.records import Shape, checked_fields
+from fe_models.foundation.records import ArrayShape, checked_fields
 from fe_models.foundation.solver import Solver
 from fe_models.foundation.sparse.submatrix import PrincipalBlock
 from fe_models.foundation.tall.columns import combine, elsewhere, in_memory, of_this_process
@@ -47,11 +47,11 @@ class FactorMismatchError(EigenError):
 class EigenResult:
     """Modes by ascending frequency, M-orthonormal."""
 
-    omega2: Annotated[Array, Shape(("n_modes",))]  #: [1/s²]; exactly 0 for rigid-body modes
-    frequencies: Annotated[Array, Shape(("n_modes",))]  #: [Hz]
-    Phi: Annotated[Array, Shape((None, "n_modes"))]  #: `SpreadColumns` if the body is distributed
+    omega2: Annotated[Array, ArrayShape(("n_modes",))]  #: [1/s²]; exactly 0 for rigid-body modes
+    frequencies: Annotated[Array, ArrayShape(("n_modes",))]  #: [Hz]
+    Phi: Annotated[Array, ArrayShape((None, "n_modes"))]  #: `SpreadColumns` if the body is distributed
     #: |x - (omega² - sigma) (K - sigma M)⁻¹ M x|_M of x before its last inverse iteration; NaN: not measured
-    residuals: Annotated[Array, Shape(("n_modes",), has_nan=True)]
+    residuals: Annotated[Array, ArrayShape(("n_modes",), has_nan=True)]
     n_solves: int  #: number of columns solved
     method: str  #: solver and its settings
     is_proven: bool  #: whether the inertia of a second factorisation proved that no mode was missed

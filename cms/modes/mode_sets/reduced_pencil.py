@@ -16,7 +16,7 @@ from cms.modes.mode_sets.free_interface import rubin
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ArgumentError
-from fe_models.foundation.records import Shape, checked_fields
+from fe_models.foundation.records import ArrayShape, checked_fields
 from fe_models.foundation.tall.columns import in_memory
 
 __all__ = [
@@ -43,10 +43,10 @@ class ReducedPencil:
     """
 
     name: str
-    M: Annotated[Array, Shape(("n", "n"))]
-    K: Annotated[Array, Shape(("n", "n"))]
-    labels: Annotated[tuple[str, ...], Shape(("n",))]  #: label of each coordinate
-    interface: Annotated[Array, Shape(("n_b", "n"))]  #: L, rows in the order of the boundary dofs of the body
+    M: Annotated[Array, ArrayShape(("n", "n"))]
+    K: Annotated[Array, ArrayShape(("n", "n"))]
+    labels: Annotated[tuple[str, ...], ArrayShape(("n",))]  #: label of each coordinate
+    interface: Annotated[Array, ArrayShape(("n_b", "n"))]  #: L, rows in the order of the boundary dofs of the body
     is_dual: bool = False
 
 

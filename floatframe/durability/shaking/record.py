@@ -1,4 +1,4 @@
-"""A shake result as a record in plain types, and as a table; accelerations are in g."""
+"""A shake result as a record in plain types, also without its long curves, and as a table; accelerations are in g."""
 
 from typing import Any
 
@@ -14,10 +14,12 @@ from floatframe.durability.shaking.shake import ShakeResult
 from floatframe.durability.shaking.structure.model import Output, ShakenModel
 
 __all__ = [
-    "COLUMNS", "ROUNDING", "conversions", "in_tables", "shake_record", "shake_table", "table_rows", "worst_nodes",
+    "COLUMNS", "MOST_NUMBERS", "ROUNDING", "conversions", "in_tables", "light_record", "shake_record", "shake_table",
+    "size_of_curves", "table_rows", "worst_nodes",
 ]  # fmt: skip
 
 FEW = 50  #: length of a list above which it is a curve
+MOST_NUMBERS = 300_000  #: largest number of values in curves that remain in the record, about three megabytes
 DIGITS = 7  #: number of digits of the values of a curve
 
 ROUNDING = 1e-9  #: value, relative to the largest output of its kind, below which it is a rounding error
@@ -339,3 +341,56 @@ def reported_rows(outputs: tuple[Output, ...], values: Array) -> list[int]:
 def shake_table(result: ShakeResult) -> Table:
     """Return the table of all outputs and runs."""
     return Table.of_rows(COLUMNS, table_rows(result))
+
+
+# compact records ------------------------------------------------------------------------------------------------------
+
+
+def light_record(record: dict[str, Any], file_name: str) -> tuple[dict[str, Any], dict[str, Array]]:
+    """Return the record without its curves, and the curves by their paths; unchanged if there are few numbers.
+
+    Curves are lists of more than 50 numbers, or of lists of more than 50. In the record {"array": "random/0/densities",
+    "shape": [12, 804]} stands for each, and "curves" says in which file they are.
+
+    Parameters
+    ----------
+    record
+        As `shake_record` returns it.
+    file_name
+        Of the file of arrays (.npz).
+    """
+    if sum(size_of_curves(value) for value in record.values()) <= MOST_NUMBERS:
+        return record, {}
+    arrays: dict[str, Array] = {}
+    light = {key: without_curves(value, key, arrays) for key, value in record.items()}
+    return {**light, "curves": {"file": file_name, "key": "array", "missing": "NaN"}}, arrays
+
+
+def is_curve(value: Any) -> bool:
+    """Return whether a value is a long list of numbers, or of lists."""
+    if not isinstance(value, list) or not value:
+        return False
+    if isinstance(value[0], list):
+        return len(value[0]) > FEW and all(is_curve(each) for each in value)
+    return len(value) > FEW and all(isinstance(each, float | int | None) for each in value)
+
+
+def size_of_curves(value: Any) -> int:
+    """Return the number of values in the curves of a value."""
+    if is_curve(value):
+        return int(np.size(value))
+    if isinstance(value, dict):
+        return sum(size_of_curves(each) for each in value.values())
+    return sum(size_of_curves(each) for each in value) if isinstance(value, list) else 0
+
+
+def without_curves(value: Any, place: str, arrays: dict[str, Array]) -> Any:
+    """Return a value with references in place of its curves, which are added to the arrays."""
+    if is_curve(value):
+        arrays[place] = np.array(value, dtype=float)  # None becomes NaN
+        return {"array": place, "shape": list(arrays[place].shape)}
+    if isinstance(value, dict):
+        return {key: without_curves(each, f"{place}/{key}", arrays) for key, each in value.items()}
+    if isinstance(value, list):
+        return [without_curves(each, f"{place}/{k}", arrays) for k, each in enumerate(value)]
+    return value

@@ -1,10 +1,10 @@
-"""Descriptions of a reduced body: labels, damping, cells and dropped columns, its step sizes, and unverifiable data."""
+"""Descriptions of a reduced body: labels, damping, units, cells, dropped columns, step sizes, unverifiable data."""
 
 import numpy as np
 import scipy.linalg as la
 
 from cms.assessment.quality.record import QualityRecord, information, judge
-from cms.body.reduced_body import ReducedBody
+from cms.body.reduced_body import ReducedBody, unit_findings
 from cms.reduction.basis.damping import damping_of_words, modal_damping
 from fe_models.checks.first_order import PROVENANCE
 from fe_models.meshes.quadratic_mesh import FIRST_ORDER
@@ -18,6 +18,7 @@ __all__ = [
     "check_mesh_order",
     "check_scope",
     "check_step_size",
+    "check_units",
     "step_size",
 ]
 
@@ -154,3 +155,10 @@ def check_dropped_columns(reduced: ReducedBody) -> QualityRecord:
     labels = [] if told == "none" else told.split("; ")
     reason = "every column of the mode set is independent" if not labels else f"{len(labels)} dropped: {told}"
     return judge("dropped-columns", float(len(labels)), reason, {"labels": labels})
+
+
+def check_units(reduced: ReducedBody) -> QualityRecord:
+    """Count implausible values: size of the kept nodes, mass divided by their hull, 2 f L of the first frequency."""
+    texts = [text for _, text in unit_findings(reduced)]
+    reason = "; ".join(texts) or f"size, density and first frequency are plausible in {reduced.units.name}"
+    return judge("units", float(len(texts)), reason)

@@ -13,9 +13,8 @@ import cms
 import floatframe as ff
 from fe_models.foundation.documents.html import html_page
 from floatframe.cli.app import app
-from floatframe.durability.shaking.light_record import light_record, size_of_curves
 from floatframe.durability.shaking.page import shake_document
-from floatframe.durability.shaking.record import shake_record, shake_table
+from floatframe.durability.shaking.record import light_record, shake_record, shake_table, size_of_curves
 from floatframe.errors import SystemFileError
 from tests.bodies import bar
 
@@ -139,9 +138,9 @@ def back_in(light, arrays):
 def test_a_long_record_has_its_curves_in_a_file_of_arrays(folder, result, monkeypatch):
     record = shake_record(result)
     n = size_of_curves(record)
-    monkeypatch.setattr("floatframe.durability.shaking.light_record.MOST_NUMBERS", n)
+    monkeypatch.setattr("floatframe.durability.shaking.record.MOST_NUMBERS", n)
     assert light_record(record, "a.npz") == (record, {})  # few numbers stay
-    monkeypatch.setattr("floatframe.durability.shaking.light_record.MOST_NUMBERS", 1000)
+    monkeypatch.setattr("floatframe.durability.shaking.record.MOST_NUMBERS", 1000)
     found = CliRunner().invoke(app, ["shake", str(folder / "bar.toml"), "-o", str(folder / "long.json")])
     assert found.exit_code == 0, found.output
     assert "long.npz" in found.output

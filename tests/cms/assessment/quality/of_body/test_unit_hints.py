@@ -7,7 +7,7 @@ import pytest
 
 import cms
 import fe_models as fm
-from cms.assessment.quality.of_body.unit_hints import check_units
+from cms.assessment.quality.of_body.descriptions import check_units
 from cms.body.reduced_body import unit_findings
 from fe_models.body.unit_check import BodyNumbers, hull_volume, implausible_numbers
 from fe_models.foundation.units import unit_system
