@@ -1,8 +1,8 @@
 """Public objects and functions: what they are given is checked where it enters, and copies of objects are frozen too.
 
-Annotations say what is expected, also the shapes of arrays (`ArrayShape`); a class that has a name for each of its objects
-offers `of_name(text)`, and is taken by that name too. NumPy makes writable copies of read-only arrays, and a mapping
-proxy cannot be pickled at all.
+Annotations say what is expected, also the shapes of arrays (`ArrayShape`); a class that has a name for each of its
+objects offers `of_name(text)`, and is taken by that name too. NumPy makes writable copies of read-only arrays, and a
+mapping proxy cannot be pickled at all.
 """
 
 import inspect
