@@ -14,32 +14,21 @@ with one marker lies where this marker is, and asks for nothing. Joints that clo
 run closes them (initial.py).
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array, tilde
 from floatframe.engine.compiling.markers import MarkerData, find_marker
+from floatframe.errors import ModelError
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.bodies.mean_axes import FrameMotion
-from floatframe.model.joints import (
-    ConstantVelocityJoint,
-    CylindricalJoint,
-    FixedJoint,
-    Joint,
-    PlanarJoint,
-    PointOnLine,
-    PointOnPlane,
-    PrismaticJoint,
-    RevoluteJoint,
-    ScrewJoint,
-    SphericalJoint,
-    UniversalJoint,
-)
+from floatframe.model.joints import Joint
 from floatframe.model.joints.axis_frame import normals_of
+from floatframe.model.joints.rows import DOT, POINT, SCREW, SLIDE, Row
+from floatframe.model.joints.sliding import SlidingJoint
 from floatframe.model.rotations import euler_parameters, rotation_matrix
 from floatframe.model.state import State
 from floatframe.model.system import Body, System
@@ -47,40 +36,7 @@ from floatframe.model.system import Body, System
 __all__ = ["held_directions", "placed_bodies", "placed_state"]
 
 AT_JOINT = 1e-9  #: gap of a joint relative to the size of the system, up to which a body stays as drawn
-PARALLEL = 1e-12  #: sine of an angle that is rounding
-
-
-def point(joint: Any) -> Array:
-    """Return the held directions of a joint whose two points coincide, (3, 3)."""
-    return np.eye(3)
-
-
-def line(joint: Any) -> Array:
-    """Return the held directions of a joint whose point of B lies on a line of A, (2, 3)."""
-    return np.array(normals_of(joint.axis))
-
-
-def plane(joint: Any) -> Array:
-    """Return the held direction of a joint whose point of B lies in a plane of A, (1, 3)."""
-    return np.array([joint.axis])
-
-
-#: directions in the axes of marker A along which the points of a joint coincide; other joints ask for no position
-HELD: dict[type, Callable[[Any], Array]] = {
-    RevoluteJoint: point,
-    SphericalJoint: point,
-    FixedJoint: point,
-    UniversalJoint: point,
-    ConstantVelocityJoint: point,
-    ScrewJoint: point,
-    PrismaticJoint: line,
-    CylindricalJoint: line,
-    PointOnLine: line,
-    PlanarJoint: plane,
-    PointOnPlane: plane,
-}
-#: joints whose `axis_b` is parallel to their `axis`
-PARALLEL_AXES = (RevoluteJoint, CylindricalJoint, ScrewJoint, PlanarJoint)
+PARALLEL = 1e-9  #: sine of an angle up to which axes count as parallel
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +92,7 @@ def links_of(system: System) -> list[list[Link]]:
     """Return the joints of each body that may ask for its pose."""
     links: list[list[Link]] = [[] for _ in system.bodies]
     for joint in system.joints:
-        if not (isinstance(joint.marker_a, Marker) and isinstance(joint.marker_b, Marker)):
+        if isinstance(joint, SlidingJoint) or not all(isinstance(m, Marker) for m in (joint.marker_a, joint.marker_b)):
             continue
         a, b = (find_marker(system, f"joint {joint.name!r}: marker_{k}", getattr(joint, f"marker_{k}")) for k in "ab")
         if a.body >= 0:
@@ -159,13 +115,22 @@ def rank_of(bodies: list[Body], links: list[Link], done: set[int]) -> int:
     return int(np.linalg.matrix_rank(np.array(rows), tol=1e-6)) if rows else 0
 
 
+def rows_of(bodies: list[Body], link: Link) -> tuple[Row, ...]:
+    """Return the rows of a joint as its bodies stand; none where it is not defined, such as a rod without length."""
+    own, other = pose(bodies, link.own), pose(bodies, link.other)
+    (r_a, A_a), (r_b, A_b) = (other, own) if link.is_b else (own, other)
+    try:
+        return link.joint.rows(A_a, A_b, r_b - r_a)
+    except ModelError:
+        return ()
+
+
 def held(bodies: list[Body], link: Link) -> Array:
     """Return the directions in which a joint holds the distance of its points, ground axes, (n, 3)."""
-    directions = HELD.get(type(link.joint))
-    if directions is None:
-        return np.zeros((0, 3))
     _, A = pose(bodies, link.other if link.is_b else link.own)
-    return directions(link.joint) @ A.T
+    rows = [row for row in rows_of(bodies, link) if row.motion is None]
+    found = [row.x if row.kind == POINT else A @ row.x for row in rows if row.kind in (POINT, SLIDE, SCREW)]
+    return np.array(found).reshape(-1, 3)
 
 
 def pose(bodies: list[Body], marker: MarkerData) -> tuple[Array, Array]:
@@ -201,16 +166,24 @@ def placed(bodies: list[Body], i: int, links: list[Link], length: float) -> Body
 
 
 def asked_rotation(bodies: list[Body], link: Link) -> Array | None:
-    """Return the smallest rotation, (3, 3), by which a body fulfils the given axes of a joint; None: none are given."""
+    """Return the smallest rotation, (3, 3), by which a body fulfils the axes that a joint holds; None: it does already.
+
+    Two rows E · D = 0 with one axis E of A hold it along the normal of the two D of B. Three hold all axes: the k-th of
+    A along D of the row before.
+    """
+    rows = [row for row in rows_of(bodies, link) if row.kind == DOT and row.c == 0.0]
+    if len(rows) < 2:
+        return None
     own, other = pose(bodies, link.own)[1], pose(bodies, link.other)[1]
     A_a, A_b = (other, own) if link.is_b else (own, other)
-    if (rotation := getattr(link.joint, "rotation", None)) is not None:
-        wanted = A_a @ rotation @ A_b.T  # turns B
-        wanted = wanted if link.is_b else wanted.T
-        return None if np.abs(wanted - np.eye(3)).max() <= PARALLEL else wanted
-    if not isinstance(link.joint, PARALLEL_AXES) or link.joint.axis_b is None:
+    x, y = A_a @ np.array([row.x for row in rows]).T, A_b @ np.array([row.y for row in rows]).T  # columns
+    if len(rows) == 3:
+        turn = x @ np.roll(y, 1, axis=1).T  # turns B
+        turn = turn if link.is_b else turn.T
+        return None if np.abs(turn - np.eye(3)).max() <= PARALLEL else turn
+    if len(rows) > 3 or not np.allclose(x[:, 0], x[:, 1], rtol=0, atol=PARALLEL):
         return None
-    axes = (A_a @ link.joint.axis, A_b @ link.joint.axis_b)
+    axes = x[:, 0], np.cross(y[:, 0], y[:, 1])
     there, here = axes if link.is_b else axes[::-1]
     return rotation_between(here, there)
 
