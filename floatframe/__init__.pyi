@@ -162,6 +162,7 @@ from .model.bodies.ground import GROUND as GROUND
 from .model.bodies.ground import Ground as Ground
 from .model.bodies.markers import Marker as Marker
 from .model.bodies.rigid_body import RigidBody as RigidBody
+from .model.controller import Controller as Controller
 from .model.elements import Element as Element
 from .model.elements import ElementLaw as ElementLaw
 from .model.forces import BodyLoad as BodyLoad

@@ -14,6 +14,7 @@ from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.bodies.ground import GROUND
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.bodies.rigid_body import RigidBody
+from floatframe.model.controller import Controller
 from floatframe.model.elements.element import Element
 from floatframe.model.forces import Force, Gravity
 from floatframe.model.joints import Joint
@@ -106,6 +107,8 @@ class System:
         Actions of a run when a value passes a level.
     fmus
         Units of other programs, see `co_simulate`.
+    controllers
+        Sampled controllers (`Controller`), which act in runs; other analyses see the system without them.
     scene
         Surroundings: ground, road, track.
     source
@@ -135,6 +138,7 @@ class System:
     outputs: Sequence[Named] = field(default=(), kw_only=True)
     events: Sequence[Named] = field(default=(), kw_only=True)
     fmus: Sequence[Named] = field(default=(), kw_only=True)
+    controllers: Sequence[Controller] = field(default=(), kw_only=True)
     scene: Sequence[Shape | Geometry] = field(default=(), kw_only=True)
     source: str = field(default="", kw_only=True)
     data_files: Sequence[str] = field(default=(), kw_only=True)
@@ -143,7 +147,7 @@ class System:
     def __post_init__(self) -> None:
         for part in (
             "bodies", "joints", "forces", "couplers", "elements", "sensors", "inputs", "outputs", "events", "fmus",
-            "data_files",
+            "controllers", "data_files",
         ):  # fmt: skip
             object.__setattr__(self, part, tuple(getattr(self, part)))
         if self.units.name != "m-kg-s":
@@ -165,7 +169,7 @@ class System:
         require_names(
             f"{where}: joints, forces and elements", [joint.name for joint in (*self.joints, *self.couplers)] + named
         )
-        for kind in ("sensors", "inputs", "outputs", "events", "fmus"):
+        for kind in ("sensors", "inputs", "outputs", "events", "fmus", "controllers"):
             require_names(f"{where}: {kind}", [each.name for each in getattr(self, kind)])
         for body in self.bodies:
             if isinstance(body, FlexibleBody) and body.reduced.units != self.units:
@@ -178,7 +182,8 @@ class System:
     def summary(self) -> Summary:
         """Return what `repr` and notebooks show: bodies with their mass and modes, and the names of all else."""
         rows = [("units", self.units.name)]
-        for kind in ("joints", "couplers", "forces", "elements", "sensors", "inputs", "outputs", "events", "fmus"):
+        kinds = ("joints", "couplers", "forces", "elements", "sensors", "inputs", "outputs", "events", "fmus")
+        for kind in (*kinds, "controllers"):
             if names := [getattr(each, "name", type(each).__name__) for each in getattr(self, kind)]:
                 rows.append((kind, listed(names)))
         bodies = []

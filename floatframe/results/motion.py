@@ -25,7 +25,7 @@ from floatframe.model.system import System
 from floatframe.results.joint_coordinates import CoordinateMotion, joint_coordinate
 from floatframe.results.place_motion import PlaceMotion, interface_motion, nodal_stress
 from floatframe.results.recovery import nodal_displacements
-from floatframe.results.sensor_choice import chosen_measurements
+from floatframe.results.sensor_choice import chosen_measurements, controller_samples
 from floatframe.results.sensor_plots import figure_of, plot_columns, plot_sensors
 from floatframe.results.sensors import coordinate_sensors, measured, measurement_of, sensors_of
 from floatframe.results.sensors.measurement import Measurement
@@ -89,10 +89,23 @@ class Motion(Trajectory):
         """
         return measurement_of(self.system, self, name)
 
+    def controller(self, name: str) -> Measurement:
+        """Return outputs and states of a sampled controller at its sampling instants, whose times are its `t`.
+
+        Columns are the outputs by the names of their forces, and "state 1", "state 2", ...: the memory after each call.
+
+        Raises
+        ------
+        ResultsError
+            If there is no such controller.
+        """
+        return controller_samples(self.system, self, name)
+
     def measurements(self, *names: str) -> tuple[Measurement, ...]:
         """Return the measurements of sensors and coordinates by name, with * and ? for letters; without names, of all.
 
-        The name of a joint stands for its coordinates and its reaction, that of a body for the position of its origin.
+        The name of a joint stands for its coordinates and its reaction, that of a body for the position of its origin,
+        that of a controller for its outputs and states.
 
         Raises
         ------
@@ -120,8 +133,8 @@ class Motion(Trajectory):
         Parameters
         ----------
         names
-            Sensors, "tip" or "tip x", coordinates, "pin.angle", joints or bodies; without names: all sensors and
-            coordinates.
+            Sensors, "tip" or "tip x", coordinates, "pin.angle", joints, bodies or controllers; without names: all
+            sensors and coordinates.
         ax
             Axes of a figure, into which all columns are drawn; they must have one unit. None: a new figure, with a
             panel for each sensor and unit, and a dozen curves at most in each.

@@ -3,24 +3,30 @@
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
 
+import numpy as np
+
+from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
-from floatframe.errors import ModelError
+from floatframe.errors import ModelError, ResultsError
+from floatframe.model.forces import JointForce
 from floatframe.model.system import System
 from floatframe.results.sensors import coordinate_sensors, measured, measurement_of, sensor_of, sensors_of
 from floatframe.results.sensors.loads import CoordinateSensor, ReactionSensor
 from floatframe.results.sensors.measurement import Measurement, Sensor, unit_words, vector_columns
 from floatframe.results.trajectory import Trajectory
 
-__all__ = ["chosen_measurements"]
+__all__ = ["chosen_measurements", "controller_samples"]
 
 WILD = "*?"
+SAME_TIME = 1e-6  #: part of a period by which output times and sampling instants may differ
 
 
 def chosen_measurements(system: System, trajectory: Trajectory, names: Sequence[str]) -> list[Measurement]:
     """Return the measurements of the sensors with the given names, each once, in the order of the names.
 
     A name is that of a sensor, of a column, "sensor.column" or "sensor column", or of a coordinate, "joint.coordinate".
-    The name of a joint stands for its coordinates and its reaction, that of a body for the position of its origin.
+    The name of a joint stands for its coordinates and its reaction, that of a body for the position of its origin, that
+    of a controller for its outputs and states.
     In names of sensors and coordinates, * stands for any letters and ? for one letter; if none matches, also in
     "sensor.column".
 
@@ -75,8 +81,42 @@ def pattern_of(name: str) -> str:
     return name.replace("[", "[[]")
 
 
+def controller_samples(system: System, trajectory: Trajectory, name: str) -> Measurement:
+    """Return outputs and states of a controller at its sampling instants; columns are its outputs, "state 1", ...
+
+    Raises
+    ------
+    ResultsError
+        If the motion has no such controller, or was ended before its samples were stored.
+    """
+    stored = trajectory.head.summary.get("controllers", {})
+    if name not in stored:
+        raise ResultsError(f"motion: no samples of a controller {quoted(name)}{nearest(name, list(stored))}")
+    found = stored[name]
+    states = np.array(found["states"], dtype=float).reshape(len(found["t"]), -1)
+    columns = {key: np.array(values, dtype=float) for key, values in found["outputs"].items()}
+    columns |= {f"state {k + 1}": states[:, k] for k in range(states.shape[1])}
+    units = {key: output_unit(system, key) if key in found["outputs"] else "1" for key in columns}
+    return Measurement(name, np.array(found["t"], dtype=float), columns, units)
+
+
+def output_unit(system: System, name: str) -> str:
+    """Return the unit of an output: that of the motor of a joint force, "1" for a factor."""
+    force = next((each for each in system.forces if getattr(each, "name", "") == name), None)
+    if not isinstance(force, JointForce):
+        return "1"
+    return unit_words(system.units, "moment" if force.coordinate.startswith("angle") else "force")
+
+
+def held_between(samples: Measurement, t: Array) -> Measurement:
+    """Return samples, held from each instant to the next, at times t, (n_t,)."""
+    period = float(samples.t[1] - samples.t[0]) if len(samples.t) > 1 else 1.0
+    k = np.maximum(np.searchsorted(samples.t - SAME_TIME * period, t, side="right") - 1, 0)
+    return Measurement(samples.sensor, t, {key: values[k] for key, values in samples.columns.items()}, samples.units)
+
+
 def measurements_of_part(system: System, trajectory: Trajectory, name: str) -> dict[str, Measurement]:
-    """Return the measurements of a joint or a body of that name; none if there is neither."""
+    """Return the measurements of a joint, a body or a controller of that name; none if there is none."""
     for joint in system.joints:
         if joint.name == name:
             own: list[Sensor] = [CoordinateSensor(f"{name}.{each}", name, each) for each in joint.coordinates]
@@ -84,4 +124,6 @@ def measurements_of_part(system: System, trajectory: Trajectory, name: str) -> d
     if name in trajectory.body_names:
         columns, units = vector_columns(trajectory.body(name).r, unit_words(system.units, "length"))
         return {f"{name} position": Measurement(f"{name} position", trajectory.t, columns, units)}
+    if name in trajectory.head.summary.get("controllers", {}):
+        return {name: held_between(controller_samples(system, trajectory, name), trajectory.t)}
     return {}

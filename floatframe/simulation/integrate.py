@@ -23,7 +23,7 @@ import numpy as np
 from fe_models.foundation.records import checked_fields
 from fe_models.foundation.tasks.interrupts import heeded_interrupts
 from fe_models.foundation.words import nearest
-from floatframe.engine.compiling.callbacks import raise_errors_of
+from floatframe.engine.compiling.callbacks import cost_words, raise_errors_of
 from floatframe.engine.compiling.file_frames import rows_of_file
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.impulses import words_of_begun_drives
@@ -34,6 +34,7 @@ from floatframe.errors import ConvergenceError, ModelError, ResultsError
 from floatframe.integrators import CLASSES, has_fixed_steps, has_second_order, in_formulation, made_integrator
 from floatframe.integrators.integrator import Failure, Integrator, joined_rows
 from floatframe.model.checked_values import number
+from floatframe.model.forces import UserForce
 from floatframe.model.state import State
 from floatframe.model.system import System
 from floatframe.results.head import Head
@@ -50,6 +51,7 @@ from floatframe.simulation.jumps import jumps_of_steps, next_steps
 from floatframe.simulation.law_watch import LawWatch
 from floatframe.simulation.motion_head import head_of, joint_rows
 from floatframe.simulation.restart import RESTART_STEPS, memory_of_record, restart_record, system_digest
+from floatframe.simulation.sampling import Sampling
 from floatframe.simulation.step_advice import frequency_words, knot_words, step_advice
 from floatframe.simulation.step_watch import WATCHES, StepWatch
 from floatframe.simulation.validity_watch import ValidityWatch
@@ -64,6 +66,10 @@ LOOK_ROWS, LOOK_SECONDS = 1000, 0.2  #: rows of results are checked after this n
 SEGMENT_SECONDS = 2.0  #: a segment of the results is closed after this time
 TIMES = ("t_start", "t_end", "h", "output_every")  #: attributes of the run in the head
 MOST_STEPS = 1e12  #: of a run: months of computing
+MOST_OF_RUN, LONG_CALLS = (
+    0.5,
+    1.0,
+)  #: share of a run, and time [s], above which calls of a Python function are a warning
 SAME_TIME = 1e-6  #: fraction of a step by which a run may begin apart from the end of the one that it continues
 
 
@@ -183,6 +189,8 @@ def integrate(
     require_no_units(system)
     n_total = number_of_steps(t_start, t_end, h)
     step = (t_end - t_start) / n_total
+    sampling = Sampling.of(system, t_start, step, n_total)
+    system = system if sampling is None else sampling.system
     if abs(step - h) > 1e-9 * h:
         log.info("h = %g does not divide the time from %g to %g: h = %.9g is used", h, t_start, t_end, step)
     advice = step_advice(system, step)
@@ -204,10 +212,12 @@ def integrate(
         memory = integrator.start(begun, t_start, state)  # (1)
         run = Run(
             system, integrator, head, t_start, t_end, step, n_total, output_every,
-            writer=None, notes=tuple(acting), events=events,
+            writer=None, notes=tuple(acting), events=events, sampling=sampling,
         )  # fmt: skip
         run.words_of_start = lambda: words_of_begun_drives(begun, t_start, state, step)
         memory, rows = run.begin(memory, 0)
+        if sampling is not None and sampling.sample(0, rows, head):
+            memory, rows = run.begin(integrator.start(begun, t_start, state), 0)
         require_sensors(system, head, rows)
         run.writer = None if place is None else ResultsWriter(place, head)
         run.steps.begin(memory.state)
@@ -279,6 +289,9 @@ def resume(
         if kind is None or any(name not in run for name in (*TIMES, *(part.name for part in fields(kind)))):
             raise ResultsError(f"{output}: the interrupted run is of another version of this program; run it anew")
         integrator = kind(**{part.name: run[part.name] for part in fields(kind)})
+        n_total = round((run["t_end"] - run["t_start"]) / run["h"])
+        sampling = Sampling.of(system, run["t_start"], run["h"], n_total)
+        system = system if sampling is None else sampling.system
         if run.get("digest") != system_digest(system, integrator):
             raise ResultsError(
                 f"{output}: the interrupted run was of another system than {system.name!r}, or that or this program "
@@ -287,16 +300,18 @@ def resume(
         if record is None:
             raise ResultsError(f"{output}: the interrupted run has no restart record; run it anew")
         memory, n_done = memory_of_record(record, system)
+        if sampling is not None:
+            sampling.restore(record)
         watch = EventWatch(system, head) if has_events(system) else None
         if watch is not None:
             watch.restore(record)
         writer = ResultsWriter(place, head, goes_on=True)
-        n_total = round((run["t_end"] - run["t_start"]) / run["h"])
         again = Run(
             system, integrator, head, run["t_start"], run["t_end"], run["h"], n_total, run["output_every"], writer,
             notes=notes_from_json(validity_text(place.folder)),
             seconds_before=float(record.get("seconds", 0.0)),
             events=watch,
+            sampling=sampling,
         )  # fmt: skip
         again.steps.restore(record, again.notes)
         again.energy.restore(record, again.notes)
@@ -323,6 +338,7 @@ class Run:
     seconds_before: float = 0.0  #: time that the run took before its interruption
     began: float = field(default_factory=time.perf_counter)
     events: EventWatch | None = None
+    sampling: Sampling | None = None
     words_of_start: Callable[[], str] = lambda: ""  #: possible cause if the first steps fail
     jumps: dict[int, list[float]] = field(init=False)  #: times of jumps by step, from `advance` on
     work: Work = field(init=False)  #: working arrays of the kernels, from `begin` on
@@ -337,7 +353,8 @@ class Run:
         self.report(*self.energy.flush(self.system))
         events = {} if self.events is None else self.events.record()
         watches = self.steps.record() | self.energy.record()
-        return restart_record(memory, n_done) | {"seconds": np.array(self.seconds)} | events | watches
+        samples = {} if self.sampling is None else self.sampling.record()
+        return restart_record(memory, n_done) | {"seconds": np.array(self.seconds)} | events | watches | samples
 
     def record_where_due(self, memory: Memory, n_done: int) -> dict[str, np.ndarray] | None:
         """Return the data to resume from here, None if a run cannot be resumed here."""
@@ -346,8 +363,10 @@ class Run:
     def summary(self, memory: Memory) -> dict[str, Any]:
         """Return the counts and times of the run, and its events."""
         events = {} if self.events is None else {"events": self.events.happened}
+        samples = {} if self.sampling is None else {"controllers": self.sampling.summary()}
         return (
             events
+            | samples
             | self.watched()
             | {name: int(getattr(memory, name)) for name in ("n_steps", "n_rejected", "n_iterations")}
             | {"wall_time": self.seconds}
@@ -451,7 +470,7 @@ class Run:
                     self.work.solver.c_k[...] = 0.0  # factors are renewed, as after a resumption
                     if n_done and time.monotonic() - self.closed > SEGMENT_SECONDS:
                         self.close_segment(safe)
-                batch = self.step(memory, n_done, batch_steps - (n_done - n_told), batch_steps)  # (2)
+                batch = self.sampled(self.step(memory, n_done, batch_steps - (n_done - n_told), batch_steps))  # (2)
                 memory, failure, n_done = batch.end, batch.failure, batch.n_done
                 self.keep(batch.rows)
                 self.observe(batch, laws)  # (3)
@@ -488,6 +507,7 @@ class Run:
         """
         n_steps = min(n_left, self.steps.room(first, batch_steps), self.n_total - first)
         n_steps = min(n_steps, RESTART_STEPS - first % RESTART_STEPS)
+        n_steps = n_steps if self.sampling is None else min(n_steps, self.sampling.room(first))
         n_happened = self.n_happened
         starts_companion = self.steps.has_companion and self.steps.companion is None
         before = self.events.copied() if self.events is not None and starts_companion else None
@@ -500,6 +520,24 @@ class Run:
         has_stopped = self.events is not None and self.events.has_stopped
         return Batch(first, n_good, memory, end, rows, failure, before, self.n_happened > n_happened, has_stopped)
 
+    def sampled(self, batch: "Batch") -> "Batch":
+        """Call the controllers that are due at the end of a batch; return it with their outputs there."""
+        n_done = batch.n_done
+        if self.sampling is None or not batch.n_good or batch.failure is not None or n_done == self.n_total:
+            return batch
+        if not self.sampling.is_due(n_done):
+            return batch
+        t = self.t_start + n_done * self.h
+        end, row = self.integrator.observe(self.acting, t, batch.end, self.work)
+        if not self.sampling.sample(n_done, row, self.head):
+            return batch
+        self.jumps[n_done - 1] = [t]  # for companions of the run
+        end, row = self.integrator.after_jump(self.acting, t, batch.end, self.work)
+        rows = batch.rows
+        if n_done % self.output_every == 0:
+            rows = joined_rows([Rows(*(array[:-1] for array in rows)), row])
+        return replace(batch, end=end, rows=rows)
+
     def observe(self, batch: "Batch", laws: LawWatch) -> None:
         """Show a batch to the watches, and report what they find."""
         is_last = batch.n_done >= self.n_total or batch.failure is not None or batch.has_stopped
@@ -510,7 +548,7 @@ class Run:
             note = self.steps.take(
                 self.acting, batch.begin, batch.end, t0=self.t_start, h=self.h, first=batch.first,
                 n_steps=batch.n_good, events=batch.events_before,
-                is_cut=batch.is_switched or batch.first in self.jumps,
+                is_cut=batch.is_switched or batch.first in self.jumps or batch.n_done - 1 in self.jumps,
             )  # fmt: skip
             self.report(note)
         else:
@@ -547,9 +585,20 @@ class Run:
         if time.monotonic() - self.closed > SEGMENT_SECONDS:
             self.close_segment()
 
+    def report_costs(self) -> None:
+        """Log whether functions of users were compiled, and what their calls cost; a warning where it is the most."""
+        forces = [force.name for force in self.system.forces if isinstance(force, UserForce) and force.function]
+        for callback in compiled_system(self.acting).callbacks:
+            if callback.name in [f"force {name!r}" for name in forces]:
+                is_most = callback.seconds > max(MOST_OF_RUN * (self.seconds - self.seconds_before), LONG_CALLS)
+                log.log(logging.WARNING if is_most else logging.INFO, "%s", cost_words(callback))
+        for each in () if self.sampling is None else self.sampling.sampled:
+            log.info("%s", each.cost_words())
+
     def finished(self, memory: Memory) -> Motion:
         """Return the motion, whose steps have all been stored."""
         self.look()
+        self.report_costs()
         if self.writer is None:
             head = replace(self.head, summary=self.summary(memory))
             arrays = MemorySource(joint_rows(self.system, self.kept))

@@ -51,6 +51,8 @@ def system_digest(system: System, integrator: Integrator) -> str:
     digest = hashlib.sha256(repr((type(integrator).__name__, parameters)).encode())
     if events_of(system):
         digest.update(repr(events_of(system)).encode())
+    for controller in system.controllers:
+        digest.update(repr(controller.identity).encode())
     compiled = compiled_system(system)
     for each in compiled.laws:
         digest.update(repr(each.digest).encode())

@@ -8,9 +8,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
-from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.linear.channels import channel_unit, inputs_of
 from floatframe.engine.compiling.system import CompiledSystem
@@ -20,8 +17,9 @@ from floatframe.model.functions.time_functions import TimeFunction, constant
 from floatframe.model.system import System
 from floatframe.results.sensors.channels import Channel, CoordinateChannel
 from floatframe.results.sensors.measurement import unit_words
+from floatframe.simulation.held_functions import force_numbers
 
-__all__ = ["HeldInput", "function_numbers", "input_choices", "with_held_inputs", "write_function"]
+__all__ = ["HeldInput", "function_numbers", "input_choices", "with_held_inputs"]
 
 
 @dataclass(frozen=True)
@@ -105,6 +103,11 @@ def with_held_inputs(system: System, names: Sequence[str] | None = None) -> tupl
     ModelError
         If a name is not one of the choices, with the nearest.
     """
+    if system.controllers:
+        raise ModelError(
+            f"system {system.name!r}: controllers ({', '.join(each.name for each in system.controllers)}) act in plain "
+            "runs only; in a unit or beside units, let the other program control the system"
+        )
     choices = input_choices(system)
     for name in names or ():
         if name not in choices:
@@ -150,36 +153,7 @@ def function_numbers(system: System, compiled: CompiledSystem, held: HeldInput) 
     model = compiled.model
     names = {held.name, f"inputs.{held.name}", f"inputs.{held.name}.against"}
     names |= {held.name.removeprefix("forces.").removesuffix(end) for end in (".amplitude", ".motor")}
-    found: list[int] = []
     if held.is_drive:
         rows = zip(compiled.owners, compiled.coordinates, model.rows.motion, strict=True)
         return [int(f) for owner, coordinate, f in rows if f >= 0 and f"joints.{owner}.{coordinate}" == held.name]
-    for kind, factors in ((PointForce, model.loads.factor), (BodyLoad, model.body_loads.factor)):
-        forces = [force for force in system.forces if isinstance(force, kind)]
-        found += [int(f) for force, f in zip(forces, factors, strict=True) if force.name in names and f >= 0]
-    return found + [int(f) for f in motors_of(system, compiled, names) if f >= 0]
-
-
-def motors_of(system: System, compiled: CompiledSystem, names: set[str]) -> Iterator[int]:
-    """Yield the functions of motors by name of the force; forces of a row are in the order of the system."""
-    model = compiled.model
-    for k, (owner, coordinate) in enumerate(zip(compiled.owners, compiled.coordinates, strict=True)):
-        forces = [
-            f for f in system.forces if isinstance(f, JointForce) and (f.joint, f.coordinate) == (owner, coordinate)
-        ]
-        first, last = int(model.rows.force0[k]), int(model.rows.force1[k])
-        if first == last:
-            continue
-        for force, motor in zip(forces, model.joint_forces.motor[first:last], strict=True):
-            if force.name in names:
-                yield int(motor)
-
-
-def write_function(compiled: CompiledSystem, number: int, begin: float, coefficients: Array) -> None:
-    """Convert a function of one piece to Σ_k c_k (t - begin)^k, with up to six coefficients."""
-    functions = compiled.model.functions
-    piece = int(functions.piece0[number])
-    row = np.zeros(functions.piece.shape[1])
-    row[: len(coefficients)] = coefficients
-    functions.begin[piece] = begin
-    functions.piece[piece] = row
+    return force_numbers(system, compiled, names)

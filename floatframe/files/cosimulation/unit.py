@@ -14,7 +14,7 @@ from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.kernels.memory import Memory, Rows
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import ConvergenceError, ModelError, ResultsError
-from floatframe.files.cosimulation.held_inputs import HeldInput, function_numbers, with_held_inputs, write_function
+from floatframe.files.cosimulation.held_inputs import HeldInput, function_numbers, with_held_inputs
 from floatframe.integrators.integrator import Integrator
 from floatframe.model.system import System
 from floatframe.results.results_file import MemorySource
@@ -22,6 +22,7 @@ from floatframe.results.sensors import Measurement, sensor_of, sensors_of
 from floatframe.results.trajectory import Trajectory
 from floatframe.results.writer import arrays_of
 from floatframe.simulation.events import events_of
+from floatframe.simulation.held_functions import write_function
 from floatframe.simulation.integrate import number_of_steps
 from floatframe.simulation.jumps import jumps_of_steps, over_jumps
 from floatframe.simulation.motion_head import head_of

@@ -1,6 +1,7 @@
 """Functions of user forces as C functions that the kernels call by their address."""
 
 import ctypes
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +12,7 @@ from fe_models.foundation.arrays import Array
 from floatframe.errors import ModelError
 from floatframe.model.forces import UserForce
 
-__all__ = ["Callback", "callback_of", "raise_errors_of"]
+__all__ = ["Callback", "callback_of", "cost_words", "raise_errors_of"]
 
 C_FUNCTION = ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_double), ctypes.POINTER(ctypes.c_double))
 
@@ -24,6 +25,9 @@ class Callback:
     address: int
     keeps: Any  #: objects that must live as long as the address is used
     error: BaseException | None = None
+    is_python: bool = False  #: whether each call runs Python
+    n_calls: int = 0  #: of a Python function, since `cost_words`
+    seconds: float = 0.0  #: that these calls took
 
 
 def callback_of(force: UserForce, n_coordinates: int) -> Callback:
@@ -90,9 +94,10 @@ def python_callback(force: UserForce, n: int, n_forces: int, n_states: int) -> C
     function = force.function
     assert function is not None  # the caller knows
     n_in, n_out = 1 + 2 * n + n_states, n_forces + n_states
-    callback = Callback(f"force {force.name!r}", 0, None)
+    callback = Callback(f"force {force.name!r}", 0, None, is_python=True)
 
     def called(inputs: Any, outputs: Any) -> None:
+        began = time.perf_counter()
         x = np.ctypeslib.as_array(inputs, (n_in,)).copy()
         y: Array = np.zeros(n_out)
         try:
@@ -106,11 +111,26 @@ def python_callback(force: UserForce, n: int, n_forces: int, n_states: int) -> C
             callback.error = error
             y[:] = np.nan
         np.ctypeslib.as_array(outputs, (n_out,))[:] = y
+        callback.n_calls += 1
+        callback.seconds += time.perf_counter() - began
 
     kept = C_FUNCTION(called)
     callback.address = ctypes.cast(kept, ctypes.c_void_p).value or 0
     callback.keeps = kept
     return callback
+
+
+def cost_words(callback: Callback) -> str:
+    """Describe whether a function is compiled, or what its calls have cost since the last description; count anew."""
+    if not callback.is_python:
+        return f"{callback.name}: its function is compiled"
+    n, seconds = callback.n_calls, callback.seconds
+    callback.n_calls, callback.seconds = 0, 0.0
+    each = 1e6 * seconds / max(n, 1)
+    return (
+        f"{callback.name}: its Python function was called {n} times, {each:.3g} µs each, {seconds:.3g} s in all; "
+        "compiled by numba.njit it would cost next to nothing"
+    )
 
 
 def raise_errors_of(callbacks: Sequence[Callback]) -> None:
