@@ -2,15 +2,16 @@
 
 A body without a position begins where its mesh is drawn. Its joints then move it to the nearest pose that they ask for:
 
-    (1) the body with the most held directions to bodies already placed comes next; the ground and the bodies that give
-        a position are placed from the beginning, and so is the first body of a part without any of them
+    (1) the body with the most held directions to bodies already placed comes next; placed from the beginning are the
+        ground, bodies with a position, bodies with a joint to the ground as a whole (it lies where their marker is
+        drawn), and the first body of a part without any of them
     (2) orientation     its own; a body without one takes the smallest rotation that fulfils the first joint with
                         `axis_b` or `rotation`
     (3) position        the shortest translation d with n · (r_B + d - r_A) = 0, in the least squares, for the held
                         directions n of its joints to bodies already placed
 
 What the joints leave free stays as drawn: a distance along an axis, an angle, a body that only springs hold. A joint
-with one marker lies where this marker is, and asks for nothing. Joints that close loops can stay open; the start of a
+with one marker lies where this marker is, and asks for no pose. Joints that close loops can stay open; the start of a
 run closes them (initial.py).
 """
 
@@ -23,7 +24,8 @@ from fe_models.foundation.arrays import Array, tilde
 from floatframe.engine.compiling.markers import MarkerData, find_marker
 from floatframe.errors import ModelError
 from floatframe.model.bodies.flexible_body import FlexibleBody
-from floatframe.model.bodies.markers import Marker
+from floatframe.model.bodies.ground import GROUND
+from floatframe.model.bodies.markers import Marker, Place, body_name
 from floatframe.model.bodies.mean_axes import FrameMotion
 from floatframe.model.joints import Joint
 from floatframe.model.joints.axis_frame import normals_of
@@ -71,7 +73,10 @@ def place_bodies(system: System) -> PlacedBodies:
     """Return the bodies of a system, those without a position placed by their joints."""
     bodies = [body if body.position is not None else replace(body, position=np.zeros(3)) for body in system.bodies]
     waiting = {i for i, body in enumerate(system.bodies) if body.position is None}
-    names, n_held = [body.name for body in bodies], {}
+    names = [body.name for body in bodies]
+    drawn = waiting & on_ground(system)
+    waiting -= drawn
+    n_held = {names[i]: 3 for i in sorted(drawn)}
     links = links_of(system) if waiting else []
     length = length_of(bodies, links) if waiting else 1.0
     done = {-1, *range(len(bodies))} - waiting
@@ -86,6 +91,18 @@ def place_bodies(system: System) -> PlacedBodies:
         for k in {link.other.body for link in links[i]} & set(rank):
             rank[k] = rank_of(bodies, links[k], done)
     return PlacedBodies(tuple(bodies), n_held)
+
+
+def on_ground(system: System) -> set[int]:
+    """Return the bodies with a joint to the ground as a whole."""
+    ends = [(joint.marker_a, joint.marker_b) for joint in system.joints]
+    held = {body_name(b.body) for pair in ends for a, b in (pair, pair[::-1]) if is_ground(a) and isinstance(b, Marker)}
+    return {i for i, body in enumerate(system.bodies) if body.name in held}
+
+
+def is_ground(end: Place) -> bool:
+    """Whether the end of a joint is the ground without a marker."""
+    return not isinstance(end, Marker) and body_name(end) == GROUND.name
 
 
 def links_of(system: System) -> list[list[Link]]:

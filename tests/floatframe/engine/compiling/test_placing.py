@@ -224,3 +224,19 @@ def test_a_body_with_an_orientation_keeps_it_where_a_joint_gives_another():
     system = System([rigid("arm", orientation=near)], [joint])
     assert_array_equal(placed_bodies(system)[0].orientation, near)
     assert_allclose(np.abs(consistent_state(system).state.p[0]), [1, 0, 0, 0], rtol=0, atol=1e-9)
+
+
+def test_a_body_with_a_joint_to_the_ground_as_a_whole_stands_as_drawn():
+    """Its joint lies where its marker is; the others hang at it, although the block has a marker on the ground."""
+    rail = PrismaticJoint("rail", Marker(GROUND, position=(0.0, 0.1, 0.2)), Marker("block"), axis=(1, 0, 0))
+    joints = [
+        RevoluteJoint("main", GROUND, Marker("crank", position=(0.1, 0.1, 0.2))),
+        SphericalJoint("pin", Marker("crank", position=(0.4, 0.1, 0.2)), Marker("rod", position=(0.0, 0.2, 0.0))),
+        SphericalJoint("gudgeon", Marker("block"), Marker("rod", position=(0.8, 0.2, 0.0))),
+        rail,
+    ]
+    system = System([rigid("block"), rigid("rod"), rigid("crank")], joints)
+    placed = {body.name: body.drawn_position for body in placed_bodies(system)}
+    assert_array_equal(placed["crank"], np.zeros(3))
+    assert_allclose(placed["rod"], [0.4, -0.1, 0.2], rtol=0, atol=1e-14)
+    assert_allclose(placed["block"], [1.2, 0.1, 0.2], rtol=0, atol=1e-14)
