@@ -9,6 +9,8 @@ from functools import cache
 
 import pytest
 
+from floatframe.engine.kernels.compiler.garbage import without_garbage_collection
+from tests.import_graph import statements
 from tests.root import ROOT
 
 PACKAGES = ("fe_models", "cms", "floatframe")
@@ -150,10 +152,15 @@ def test_sources_that_are_cited_stand_in_the_bibliography():
     assert sorted(missing) == []
 
 
+@cache
 def docstrings(text):
     """Return the docstrings of a source file."""
-    kinds = (ast.Module, ast.ClassDef, ast.FunctionDef)
-    return [ast.get_docstring(node) or "" for node in ast.walk(ast.parse(text)) if isinstance(node, kinds)]
+    kinds = (ast.ClassDef, ast.FunctionDef)
+    with without_garbage_collection():
+        tree = ast.parse(text)
+    return [
+        ast.get_docstring(node) or "" for node in (tree, *statements(tree)) if node is tree or isinstance(node, kinds)
+    ]
 
 
 def comments(text):
