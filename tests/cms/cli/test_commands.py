@@ -13,6 +13,7 @@ from types import SimpleNamespace
 import h5py
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
@@ -30,6 +31,7 @@ from cms.reduction.basis.frames import TisserandFrame
 from cms.reduction.frame_conversion import convert_frame
 from fe_models.foundation.documents.document import Answer, Document
 from fe_models.foundation.extras import MissingExtraError
+from floatframe.cli.app import app as floatframe_app
 from tests.bodies import box_mesh
 from tests.decks import JOB, write_deck
 from tests.root import ROOT, heed_signals
@@ -348,28 +350,39 @@ def test_the_record_gives_the_centre_of_mass_in_mesh_coordinates(folder):
 
 
 def test_the_demo_runs_the_whole_line_and_lists_its_files(tmp_path, monkeypatch):
-    """All but `cms view` as processes, as a user starts them: drawing has its own tests, and pictures are blank here.
-
-    The film of the motion has few frames.
-    """
-    begun = demo.begun
+    """All commands in this process, with blank pictures: drawing and the start of processes have their own tests."""
 
     def blank(*arguments, **_):
-        next(a for a in arguments if isinstance(a, Path)).touch()
+        next(a for a in arguments if isinstance(a, Path)).write_bytes(b"")
 
-    def begun_without_pictures(running, folder, words):
+    def begun_here(running, folder, words):
         program, *arguments = words.split()
-        if arguments[0] != "view":
-            return begun(running, folder, words)
         with contextlib.chdir(folder):
-            drawn = run(*arguments)
-        assert (program, drawn.exit_code) == ("cms", 0), drawn.output
-        return demo.Begun(words, SimpleNamespace(returncode=0, wait=lambda: 0), io.BytesIO(drawn.output.encode()))
+            done = CliRunner().invoke({"cms": app, "floatframe": floatframe_app}[program], arguments)
+        assert done.exit_code == 0, done.output
+        return demo.Begun(words, SimpleNamespace(returncode=0, wait=lambda: 0), io.BytesIO(done.output.encode()))
 
-    for name in ("cms.assessment.report.view.view_mode", "cms.assessment.report.view.animate_mode"):
+    for name in (
+        "cms.assessment.report.view.view_mode", "cms.assessment.report.view.animate_mode",
+        "floatframe.pictures.animation.animate",
+    ):  # fmt: skip
         monkeypatch.setattr(name, blank)
-    monkeypatch.setattr(demo, "begun", begun_without_pictures)
-    monkeypatch.setattr(demo, "FPS", 2)
+    monkeypatch.setattr("floatframe.pictures.overview.plot_overview", lambda *_: Figure())
+    monkeypatch.setattr(demo, "begun", begun_here)
+    monkeypatch.setattr(demo, "kernels_compiled_beside", lambda: contextlib.nullcontext(lambda: None))
+    assert_demo_makes_its_files(tmp_path, monkeypatch)
+
+
+@pytest.mark.long
+def test_the_demo_as_a_user_starts_it_draws_all_its_pictures(tmp_path, monkeypatch):
+    files = assert_demo_makes_its_files(tmp_path, monkeypatch)
+    for name, magic in (("m3.png", b"\x89PNG"), ("m3.gif", b"GIF8"), ("crank.png", b"\x89PNG")):
+        assert files[name].startswith(magic)
+    assert b"ftyp" in files["crank.mp4"][:16]
+
+
+def assert_demo_makes_its_files(tmp_path, monkeypatch):
+    """Run the demo and return its files by name; raise `AssertionError` if a command or a file is missing."""
     monkeypatch.chdir(tmp_path)
     result = run("demo")
     assert result.exit_code == 0, result.output
@@ -380,6 +393,7 @@ def test_the_demo_runs_the_whole_line_and_lists_its_files(tmp_path, monkeypatch)
     for command in ("cms reduce", "cms info", "cms view", "floatframe run", "floatframe plot", "floatframe animate"):
         assert f"demo$ {command}" in result.stdout
     assert json.loads(files["rod.json"])["name"] == "rod"
+    return files
 
 
 def test_the_demo_needs_a_folder(tmp_path, monkeypatch):

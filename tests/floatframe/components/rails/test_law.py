@@ -12,6 +12,7 @@ from floatframe.components.rails.contact_search import rigid_contacts
 from floatframe.components.rails.irregularities import Irregularities
 from floatframe.components.rails.law import CONTACT_OUTPUTS, WHEEL_OUTPUTS, wheels_on_rails
 from floatframe.components.rails.track import Track, curve
+from floatframe.engine.compiling.callbacks.law_functions import callback, called_law
 from floatframe.model.rotations import rotation_exp
 from tests.floatframe.components.rails.examples import CONE, NEW
 from tests.floatframe.components.rails.linear_wheelset import Suspended, eigenvalues
@@ -25,25 +26,30 @@ def wheels_of(pair):
 
 
 class Law:
-    """The law of a wheelset, called with the motion of its axle."""
+    """The law of a wheelset as the engine compiles it, called with the motion of its axle."""
 
     def __init__(self, pair=CONE, track=None, **laws):
         self.wheels = wheels_of(pair)
         self.data = law_numbers(self.wheels, track or Track(), ContactLaws(**laws))
         self.names = output_names(self.wheels, WHEEL_OUTPUTS, CONTACT_OUTPUTS)[0]
         self.n_lam = 2 if laws.get("normal") == "constraint" else 0
+        self.head = (1, 18, 0, self.n_lam, len(self.names), len(self.data), 1, 0)
 
-    def __call__(self, r, A, v, omega, lam=()):
-        x = np.concatenate([r, np.ravel(A), v, omega])[None, :]
-        kind = np.result_type(x, np.array(lam, dtype=complex if np.iscomplexobj(lam) else float))
-        wrench, seen, g, z = (
-            np.zeros((1, 6), kind),
-            np.zeros(len(self.names), kind),
-            np.zeros(self.n_lam, kind),
-            np.zeros(0, kind),
-        )
-        wheels_on_rails(0.0, x.astype(kind), z, np.array(lam, kind), self.data, wrench, z.copy(), g, seen)
-        return wrench[0], g, seen
+    def outputs(self, kind, motion, n_out):
+        r, A, v, omega, *lam = motion
+        inputs = np.concatenate([[0.0], r, np.ravel(A), v, omega, *lam])
+        function = callback("wheels", wheels_on_rails, kind, self.head)
+        return called_law(function.address, self.head, self.data, inputs[None], n_out)[0]
+
+    def __call__(self, *motion):
+        """Return wrench, what is held and what is seen."""
+        n_out = 6 + self.n_lam
+        return np.split(self.outputs("value", motion, n_out + len(self.names)), [6, n_out])
+
+    def slopes(self, *motion):
+        """Return the derivatives of wrench and what is held, by dr, dphi, dv, domega and multipliers."""
+        n_out, n_columns = 6 + self.n_lam, 12 + self.n_lam
+        return self.outputs("complex", motion, n_out * n_columns).reshape(n_out, n_columns)
 
     def seen(self, *motion):
         return dict(zip(self.names, self(*motion)[2], strict=True))
@@ -95,22 +101,7 @@ def test_eigenvalues_of_a_suspended_wheelset_are_those_of_the_textbook():
             z -= g.mean()
             lam = lam + (2 * p.load - wrench[2]) / 2
             omega[1] += seen[law.names.index("left_tread_xi")] * V / p.r
-        step = 1e-30
-
-        def call(k, z=z, V=V, omega=omega, lam=lam, step=step):
-            d = 1j * step * np.eye(14)[k]
-            dphi = d[3:6]
-            tilde = np.array([[0, -dphi[2], dphi[1]], [dphi[2], 0, -dphi[0]], [-dphi[1], dphi[0], 0]])
-            wrench, g, _ = law(
-                np.array([0, 0, z]) + d[:3],
-                np.eye(3) + tilde,
-                np.array([V, 0, 0]) + d[6:9],
-                omega + d[9:12],
-                lam + d[12:],
-            )
-            return np.concatenate([wrench, g]).imag / step
-
-        slopes = np.column_stack([call(k) for k in range(14)])
+        slopes = law.slopes([0, 0, z], np.eye(3), [V, 0, 0], omega, lam)
         by_q, by_v, by_lam = slopes[:6, :6].copy(), slopes[:6, 6:12].copy(), slopes[:6, 12:]
         turn = np.array([[0, omega[2], -omega[1]], [-omega[2], 0, omega[0]], [omega[1], -omega[0], 0]])  # dphi × omega
         by_q[:, 3:] += by_v[:, 3:] @ turn
@@ -177,21 +168,20 @@ def test_the_tangent_by_imaginary_steps_is_that_of_differences(creep, normal):
         frame.axes @ np.array([0.01, 32.6, 0.04]),
     )
     lam = np.array([6e4, 5.5e4])[: law.n_lam]
-    motion = np.concatenate([r, A.ravel(), v, omega, lam])
 
-    def value(m):
-        wrench, g, seen = law(m[:3], m[3:12], m[12:15], m[15:18], m[18:])
-        return np.concatenate([wrench, g, seen])
+    def value(dr, dphi, dv, domega, dlam):
+        return np.concatenate(law(r + dr, tilted(dphi) @ A, v + dv, omega + domega, lam + dlam)[:2])
 
     assert dict(zip(law.names, law(r, A, v, omega, lam)[2], strict=True))["left_flange_N"] > 1e3
-    scale = np.abs(value(motion)[:6]).max()
-    for k in range(len(motion)):
-        h = 1e-7 * max(abs(motion[k]), 1e-2 if k >= 12 else 1e-3)
-        step = h * np.eye(len(motion))[k]
-        by_differences = (value(motion + step) - value(motion - step)) / (2 * h)
-        exact = value(motion + 1e-30j * step).imag / (1e-30 * h)
+    exact = law.slopes(r, A, v, omega, lam)
+    scale = np.abs(value(*np.zeros((4, 3)), 0 * lam)[:6]).max()
+    sizes = np.concatenate([np.fmax(np.abs(r), 1e-3), np.ones(3), np.fmax(np.abs([*v, *omega, *lam]), 1e-2)])
+    for k, (size, column) in enumerate(zip(sizes, exact.T, strict=True)):
+        h = 1e-7 * size
+        step = np.split(h * np.eye(len(sizes))[k], [3, 6, 9, 12])
+        by_differences = (value(*step) - value(*(-each for each in step))) / (2 * h)
         assert_allclose(
-            exact[:6], by_differences[:6], rtol=2e-4, atol=max(1e-4 * np.abs(exact[:6]).max(), 1e-6 * scale)
+            column[:6], by_differences[:6], rtol=2e-4, atol=max(1e-4 * np.abs(column[:6]).max(), 1e-6 * scale)
         )
 
 
