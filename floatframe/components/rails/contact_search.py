@@ -264,7 +264,8 @@ def quasi_elastic(
     def mean(values: Array) -> Array:
         return np.einsum("ij,ij->i", weights, np.broadcast_to(values, weights.shape))
 
-    slopes = np.where(weights > 0, pair.head.slope(np.clip(y, pair.head.y[0], pair.head.y[-1])), 0.0)
+    slopes, touching = np.zeros_like(weights), weights > 0
+    slopes[touching] = pair.head.slope(np.clip(y[touching], pair.head.y[0], pair.head.y[-1]))
     q = best[:, 0] + smoothing * np.log(total / width)
     slope, z_mean = mean(slopes), mean(z)
     lever = mean(y0 + slopes * z) - slope * z_mean

@@ -52,11 +52,10 @@ def test_a_disturbance_grows_and_moves_as_the_eigenvalues_say():
 
 
 def test_more_conicity_hunts_faster_and_independent_wheels_not_at_all():
-    low, high = hunting(on_cones(0.05, 110.0)), hunting(on_cones(0.2, 110.0))
+    low, high = hunting(on_cones(0.1, 110.0)), hunting(on_cones(0.3, 110.0))
     assert low.damping < 0 > high.damping
     assert high.frequency > 1.5 * low.frequency  # Klingel: with the root of the conicity
-    assert hunting(on_cones(0.2, 110.0, is_independent=True)).damping > 0.05
-    assert hunting(on_cones(0.05, 50.0)).damping > 0.1
+    assert hunting(on_cones(0.3, 110.0, is_independent=True)).damping > 0.05
 
 
 def test_the_critical_speed_lies_where_damping_ends():
