@@ -12,6 +12,7 @@ import pytest
 from tests.__main__ import GROUPS, TESTS, Group, environment, main, run
 from tests.floatframe.formulations import EXCEPTIONS, ROOMS, SHORT
 from tests.import_graph import modules, named_modules, used_modules
+from tests.mutants import guarding_files
 from tests.root import ROOT
 from tests.slowest import SLOWEST
 
@@ -52,6 +53,13 @@ def test_guards_of_a_module_are_the_tests_that_import_it_nearest_first(capsys):
     assert next(iter(found)).startswith(room)
     assert list(found.values()) == sorted(found.values())
     assert not [name for name in found if name.startswith(("tests/fe_models/", "tests/cms/"))]
+
+
+def test_tests_of_the_room_judge_mutants_first():
+    """Here beside the other test that reads the imports of all tests, so that they are read once."""
+    found = guarding_files(ROOT / "floatframe/components/hydraulics/circuit_data.py", 4)
+    assert len(found) == 4
+    assert found[0] == "tests/floatframe/components/hydraulics/test_circuit.py"
 
 
 def test_guards_of_what_is_no_module_are_refused_with_what_is_near(capsys):

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests import mutants
-from tests.mutants import WINGS, Bench, Changes, draw, guarding_files
+from tests.mutants import WINGS, Bench, Changes, draw
 from tests.root import ROOT
 
 SOURCE = '''
@@ -68,12 +68,6 @@ def test_mutants_of_a_seed_are_the_same_and_change_one_line_that_still_parses():
         assert [n for n, (a, b) in enumerate(zip(old, new, strict=True), start=1) if a != b] == [mutant.line]
         compile(mutant.text(), "mutant", "exec")
         assert str(mutant.path.relative_to(ROOT)).startswith(WINGS[wing])
-
-
-def test_tests_of_the_room_judge_first():
-    found = guarding_files(ROOT / "floatframe/components/hydraulics/circuit_data.py", 4)
-    assert len(found) == 4
-    assert found[0] == "tests/floatframe/components/hydraulics/test_circuit.py"
 
 
 @pytest.mark.parametrize(

@@ -67,10 +67,10 @@ def test_the_schema_that_a_copied_file_names_stands_beside_it(schemas, tmp_path)
 
 def test_a_schema_refuses_what_the_reader_refuses(schemas):
     content = {"system": {"units": "m-kg-s"}, "bodies": {"rod": {"mass": 1.0}}, "run": {"t_end": 1.0, "h": 1e-3}}
-    jsonschema.validate(content, schemas["system"])
+    validator = jsonschema.Draft202012Validator(schemas["system"])
+    validator.validate(content)
     for table, key, value in (("run", "scheme", "newmrk"), ("run", "h", -1.0), ("system", "unit", "m-kg-s")):
-        with pytest.raises(jsonschema.ValidationError):
-            jsonschema.validate({**content, table: {**content[table], key: value}}, schemas["system"])
+        assert not validator.is_valid({**content, table: {**content[table], key: value}})
 
 
 def test_a_schema_knows_parameters_and_repeat(schemas):
@@ -78,7 +78,7 @@ def test_a_schema_knows_parameters_and_repeat(schemas):
         "extends": "base.toml", "parameters": {"n": 3}, "system": {"units": "m-kg-s"},
         "bodies": {"rod": {"repeat": "{n}", "mass": "{2.0 * i}"}},
     }  # fmt: skip
-    jsonschema.validate(content, schemas["system"])
+    jsonschema.Draft202012Validator(schemas["system"]).validate(content)
 
 
 @pytest.mark.parametrize(("entry", "fits"), [("{-g}", True), (-9.81, True), ({}, False), ("g", False)])

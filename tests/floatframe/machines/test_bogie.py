@@ -21,7 +21,7 @@ from floatframe.machines.bogie import (
     vehicle,
 )
 from floatframe.machines.bogie.curves_and_comfort import weighted_rms, weighting
-from floatframe.machines.bogie.running import lateral_modes
+from floatframe.machines.bogie.running import Hunting, lateral_modes
 
 DATA = RailVehicle()
 LAWS = rails.ContactLaws(creep="kalker", friction=0.4)
@@ -61,8 +61,14 @@ def test_more_conicity_hunts_faster_and_independent_wheels_not_at_all():
 def test_the_critical_speed_lies_where_damping_ends():
     speed = critical_speed(lambda V: on_cones(0.1, V), 85.0, 93.0, tolerance=4.0)
     assert_allclose(speed, 88.4, rtol=0, atol=2.5)  # finely bisected: 88.4, see docs/bogie.md
-    with pytest.raises(ModelError, match="expected more damping than 0 at 110 m/s"):
-        critical_speed(lambda V: on_cones(0.1, V), 110.0, 120.0)
+
+
+def test_a_range_of_speeds_without_the_critical_one_is_refused(monkeypatch):
+    monkeypatch.setattr(
+        "floatframe.machines.bogie.running.hunting", lambda V: Hunting(damping=1 - V / 90, frequency=1.0)
+    )
+    with pytest.raises(ModelError, match=r"expected more damping than 0 at 110 m/s and less at 120 m/s, got -0\.222"):
+        critical_speed(lambda V: V, 110.0, 120.0)
 
 
 def test_the_files_make_the_vehicle(tmp_path):

@@ -46,15 +46,16 @@ def spoilt(values, number):
     return values
 
 
-@pytest.mark.parametrize("number", [np.nan, np.inf])
-def test_a_number_that_is_none_is_refused_wherever_it_stands(content, number, tmp_path):
-    """In each of all datasets of numbers, one value."""
+@pytest.mark.parametrize("first", [0, pytest.param(1, marks=pytest.mark.long)])
+def test_a_number_that_is_none_is_refused_wherever_it_stands(content, first, tmp_path):
+    """In each of all datasets of numbers, one value: NaN in every other one, infinity in the rest."""
     accepted = []
-    for path, dataset in content.datasets.items():
+    for k, (path, dataset) in enumerate(content.datasets.items(), start=first):
         values = np.asarray(dataset.values)
         if values.dtype.kind != "f" or not values.size or np.isinf(values).any():
             continue
-        file = resealed(content, tmp_path, **{path: lambda values: spoilt(values, number)})
+        number = (np.nan, np.inf)[k % 2]
+        file = resealed(content, tmp_path, **{path: lambda values, number=number: spoilt(values, number)})
         try:
             read(file)
         except ModalFileError:

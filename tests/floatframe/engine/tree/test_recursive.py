@@ -25,7 +25,7 @@ TREES = {
     "all charts": (25, 2, KINDS[:-1], {}),
     "all charts, free base": (25, 3, KINDS[:-1], {"free_base": True}),
     "a chain of balls": (10, 4, ("spherical",), {"branching": 0.0}),
-    "200 bodies": (200, 5, ("revolute", "prismatic", "universal", "planar"), {"branching": 0.6}),
+    "80 bodies": (80, 5, ("revolute", "prismatic", "universal", "planar"), {"branching": 0.6}),
 }
 
 
