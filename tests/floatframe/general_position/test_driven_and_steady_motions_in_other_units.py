@@ -182,7 +182,12 @@ def curve(units):
                          unknown={"steer": 0.04, "push": 10.0 * other.factor("N")}, axis=turn[:, 2])  # fmt: skip
 
 
-@pytest.mark.parametrize("units", [*UNITS, *SIZES])
+LONG = [
+    pytest.param(units, marks=pytest.mark.long) for units in ("in-slinch-s", "micrometres")
+]  # a second and more each
+
+
+@pytest.mark.parametrize("units", ["mm-kg-ms", "1000 km", *LONG])
 def test_a_steady_curve_is_alike_in_other_units(units):
     a, b, other = curve("m-kg-s"), curve(units), other_units(units)
     assert_allclose(b.found["steer"], a.found["steer"], rtol=1e-6)

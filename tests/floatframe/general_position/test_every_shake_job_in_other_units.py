@@ -39,7 +39,7 @@ from tests.floatframe.other_units import Other, in_units
 
 R = Rotation.from_rotvec([0.7, -0.4, 1.1]).as_matrix()
 PLACE = np.array([300.0, -200.0, 150.0])
-UNITS = ["mm-t-s", "mm-kg-ms", "in-slinch-s"]
+UNITS = ["mm-kg-ms", "in-slinch-s"]
 POINT, OTHER_POINT = np.array([0.3, 0.2, -0.1]), np.array([0.9, -0.2, 0.1])
 SQUARES = {"acceleration": "m/s^2", "displacement": "m", "rotation": "rad", "force": "N", "moment": "N m",
            "net force": "N", "stress": "Pa", "angular acceleration": "1/s^2", "von Mises": "Pa"}  # fmt: skip

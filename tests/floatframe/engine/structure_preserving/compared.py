@@ -42,10 +42,10 @@ def system_of(part):
     return ALL[part].make()
 
 
-def ends(part, method, h, n, n_outputs):
+def ends(part, method, h, n, n_outputs, **options):
     """Return places and Euler parameters of all bodies at the beginning and at times after it."""
     system = system_of(part)
-    motion = integrate(system, method, n * h, h, output_every=n // n_outputs)
+    motion = integrate(system, method, n * h, h, output_every=n // n_outputs, **options)
     return tuple(np.array([getattr(motion.body(b.name), key) for b in system.bodies]) for key in ("r", "p"))
 
 
@@ -58,7 +58,7 @@ def fine(part):
     """
 
     def divided(k):
-        return ends(part, FINE, ALL[part].h / k, ALL[part].n * k, 4)
+        return ends(part, FINE, ALL[part].h / k, ALL[part].n * k, 4, watch="off")
 
     if ALL[part].is_smooth:
         r, p = (fine + (fine - coarse) / 3 for coarse, fine in zip(divided(6), divided(12), strict=True))

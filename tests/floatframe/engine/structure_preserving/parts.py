@@ -46,7 +46,7 @@ __all__ = ["COUPLERS", "FORCES", "METHODS", "PARTS", "Part"]
 METHODS = {
     "generalized-alpha": GeneralizedAlpha(0.9, 1e-11),
     "the same, `relative`": RelativeGeneralizedAlpha(0.9, 1e-11),
-    "`RelativeOde`": RelativeOde("BDF", 1e-9, 1e-11),
+    "`RelativeOde`": RelativeOde("BDF", 1e-8, 1e-10),
     "`EnergyMomentum`": EnergyMomentum(),
     "`EnergyDecaying`": EnergyDecaying(0.5),
     "`Variational`": Variational(),
