@@ -1,3 +1,4 @@
+import io
 import json
 import math
 from dataclasses import replace
@@ -5,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from PIL import Image
 from scipy.linalg import eigh
 from typer.testing import CliRunner
 
@@ -431,7 +433,10 @@ def run(*arguments):
     return CliRunner().invoke(app, [str(a) for a in ("compare", *arguments)])
 
 
-def test_the_command_writes_table_page_and_numbers_that_agree(folder):
+def test_the_command_writes_table_page_and_numbers_that_agree(folder, monkeypatch):
+    """Charts of the PDF are white here: tests/fe_models/foundation/documents draws them."""
+    Image.new("RGB", (8, 8), "white").save(white := io.BytesIO(), "png")
+    monkeypatch.setattr("fe_models.foundation.documents.pdf.chart_png", lambda chart, width: white.getvalue())
     result = run(
         folder / "bar.toml", "--sets", "guyan,rubin,benfield-hruda", "--modes", "0:12:4", "-o", folder / "out",
         "--load", "right:mass=1e-5", "--stills", "0", "--reference-modes", "5",
