@@ -1,4 +1,4 @@
-"""What integrators have in common: their protocol, the reason of a failed step, and ways from memory to memory."""
+"""What integrators share: their protocol, the reason of a failed step, functions that make one memory of another."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace

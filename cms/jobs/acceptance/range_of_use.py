@@ -60,7 +60,8 @@ class RangeOfUse:
     """Band, speed and loads of a body."""
 
     band: UsableBand
-    speed: LargestSpeed | None  #: None: no interface can be held, or the body is held
+    #: None: unknown for a held body, without modes or inertia terms, or if no held frequency is above 0
+    speed: LargestSpeed | None
     loads: tuple[LargestLoad, ...]  #: three forces and three moments for each interface
     limits: Limits  #: limits of a linear frame
     stiffened_limits: Limits | None  #: None: the file has no geometric stiffness

@@ -126,7 +126,7 @@ def rayleigh(body: FEBody, X: Array) -> Array:
 
 
 def log_frequencies(where: str, body: FEBody, X: Array, frequencies: Array) -> None:
-    """Warn if stated frequencies are far from those of the energy of their columns: order, unit or body may be wrong.
+    """Warn if stated frequencies are far from the Rayleigh quotients of columns: order, unit or body may be wrong.
 
     Parameters
     ----------

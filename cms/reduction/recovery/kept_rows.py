@@ -93,7 +93,7 @@ def motion_rows(body: ReducedBody, rows: Rows, order: int, loads: LoadColumns) -
 
 
 def stress_rows(body: ReducedBody, rows: Rows) -> tuple[list[RowName], Array]:
-    """Return rows of stress over z in mesh axes."""
+    """Return rows of stress in mesh axes over z = (displacement, rotation, modal coordinates)."""
     names: list[RowName] = []
     modes = [np.zeros((0, 6, body.n_q))]
     points: tuple[str, ...] = () if body.point_stress is None else body.point_stress.names

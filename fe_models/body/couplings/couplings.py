@@ -5,6 +5,8 @@ them: the reference node follows the weighted mean motion of the members, u_refe
 multipliers enforce this; they stay in the body as massless interior dofs. K is then indefinite, but the motions that
 satisfy the constraints have positive energy. Eliminating the members instead would fill K with a dense block over all
 members.
+
+RBE3 elements of a whole deck that join its parts are constraints of fe_models/assembly/constraints.py.
 """
 
 from collections.abc import Sequence

@@ -13,7 +13,7 @@ __all__ = ["FACE_KINDS", "CadFace", "cad_faces"]
 
 FACE_KINDS = ("plane", "cylinder", "cone", "sphere", "torus", "other")
 NAMED = {"Plane": "plane", "Cylinder": "cylinder", "Cone": "cone", "Sphere": "sphere", "Torus": "torus"}
-SAMPLES = np.linspace(0.08, 0.92, 7)  #: of both parameters, at which a face is looked at
+SAMPLES = np.linspace(0.08, 0.92, 7)  #: fractions of the ranges of both surface parameters at which a face is sampled
 EQUAL = 1e-5  #: relative difference of curvatures or directions that are taken for one
 KERNEL_TOLERANCE = 1e-7  #: by which the kernel widens its boxes
 INSIDE = 1e-5  #: of the diagonal: how far from a face the side of the material is asked for

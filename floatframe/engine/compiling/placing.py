@@ -145,8 +145,10 @@ def rows_of(bodies: list[Body], link: Link) -> tuple[Row, ...]:
 def held(bodies: list[Body], link: Link) -> Array:
     """Return the directions in which a joint holds the distance of its points, ground axes, (n, 3)."""
     _, A = pose(bodies, link.other if link.is_b else link.own)
-    rows = [row for row in rows_of(bodies, link) if row.motion is None]
-    found = [row.x if row.kind == POINT else A @ row.x for row in rows if row.kind in (POINT, SLIDE, SCREW)]
+    rows = rows_of(bodies, link)
+    found = [row.x for row in rows if row.kind == POINT]
+    found += [A @ row.x for row in rows if row.kind == SLIDE and row.motion is None]
+    found += [A @ np.cross(row.x, row.z) for row in rows if row.kind == SCREW]  # along its axis
     return np.array(found).reshape(-1, 3)
 
 

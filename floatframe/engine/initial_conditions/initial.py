@@ -504,10 +504,10 @@ def stages(way: Array) -> list[Array]:
 # wrong roots of rotations: rows of products of axes also vanish at half a turn ----------------------------------------
 # A fixed orientation is held by x_A·y' = y_A·z' = z_A·x' = 0, where the axes x', y', z' of B should be parallel to
 # those of A. An axis is held by E·n_1 = E·n_2 = 0, E of A, n_1 × n_2 the axis of B. With R the rotation between the
-# two, the first are R_12 = R_23 = R_31 = 0: fulfilled where R = 1, at half a turn about x, y or z, and nowhere else (R
-# is orthogonal, so that the other numbers of R can only be 1 or -1, or all zero but R_13, R_21, R_32, a third of a turn
-# about the diagonal); the second where the axes are parallel or opposite. Newton's method converges to the nearest of
-# these.
+# two, the first equations are R_12 = R_23 = R_31 = 0. R is orthogonal, so that three cases are left: R = 1, half a turn
+# about x, y or z (1 and -1 on the diagonal), and a third of a turn about a diagonal of the cube (only R_13, R_21 and
+# R_32 are not zero). The second equations hold where the axes are parallel or opposite. Newton's method converges to
+# the nearest of these solutions.
 
 
 def require_no_half_turns(compiled: CompiledSystem, work: Work, state: State) -> None:
@@ -545,8 +545,8 @@ def require_no_half_turns(compiled: CompiledSystem, work: Work, state: State) ->
         if min(along) < 0.5:
             turn = "half a turn" if min(along) < -0.5 else "a third of a turn"
             raise ModelError(
-                f"joint {name!r} is closed {turn} away from its orientation, because its equations vanish "
-                "there too; place its bodies nearer to this orientation, or rotate its given axis (axis_b, rotation)"
+                f"joint {name!r} is closed {turn} away from its orientation: its equations have a solution there too; "
+                "place its bodies nearer to this orientation, or rotate its given axis (axis_b, rotation)"
             )
 
 

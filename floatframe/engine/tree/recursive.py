@@ -37,7 +37,7 @@ UNIT_DEFECT = 1e-6  #: allowed deviation of the length of Euler parameters from 
 class ForceDerivatives(NamedTuple):
     """Derivatives of the forces of a motion, each (n_rates, n_rates); row: force, column: coordinate."""
 
-    by_z: Array  #: by positions along the rates, with rates and accelerations fixed [N/rad, ...]
+    by_z: Array  #: by positions, varied in the directions of the rates, at fixed rates and accelerations [N/rad, ...]
     by_z_dot: Array
     by_z_ddot: Array  #: the mass matrix
 

@@ -537,7 +537,10 @@ def compare_table(case: Case, own: RecoveryTable, made: RecoveryTable) -> Iterat
 
 
 def typical_sizes(case: Case) -> dict[tuple[str, float], float]:
-    """Return the largest size of rows over modes of unit strain energy by quantity and exponent of length."""
+    """Return the largest motions and stresses in modes of unit strain energy, by quantity and exponent of length.
+
+    Differences of recovery rows are judged relative to them.
+    """
     shapes = case.Phi @ case.by_energy
     shape = float(np.abs(case.body.translations(shapes)).max(initial=0.0))
     sizes = {(each, length): shape * case.length ** (length - 1) for each in OF_MOTION for length in (0.0, 1.0)}

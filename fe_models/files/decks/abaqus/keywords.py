@@ -92,6 +92,8 @@ def check_parameters(block: DeckBlock, ledger: Ledger) -> None:
             ledger.note(f"*{block.keyword}", why, line=block.line_number)
 
 
+#: keywords that change neither mass nor stiffness: steps, output, loads, controls, properties of contacts (pairs in
+#: contact are refused elsewhere), laws of heat and failure
 HARMLESS = frozenset(
     " ".join(keyword.split())
     for keyword in """
@@ -120,4 +122,4 @@ HARMLESS = frozenset(
     MAGNETIC PERMEABILITY; FAIL STRESS; FAIL STRAIN; DAMAGE INITIATION; DAMAGE EVOLUTION; DAMAGE STABILIZATION;
     TENSILE FAILURE; SHEAR FAILURE
     """.split(";")
-)  #: steps, output, loads, controls, contact (whose pairs are refused), laws of heat and failure
+)

@@ -15,7 +15,8 @@ from fe_models.foundation.words import nearest, quoted
 __all__ = ["layers_of_block", "layups_in_axes"]
 
 PARALLEL = 1e-6  #: of axes 3 of two orientations, and of an axis 3 and the normals of a flat shell
-STEEP = 0.9  #: cosine between a normal and the direction of a layup beyond which another one is taken
+#: cosine between a shell normal and the direction of a layup, above which y replaces x or the layup is refused
+STEEP = 0.9
 
 
 def layers_of_block(here: str, block: DeckBlock) -> tuple[DeckLayer, ...]:

@@ -76,9 +76,9 @@ def squared_size(model, work, tree, tangent):
 
 @inner
 def move_by_screws(work, tree, tangent):
-    """Write the motion of bodies for the correction, own axes about their origins, into tangent.X.
+    """Write how the correction moves each body into tangent.X, in its own axes and about its own origin.
 
-    Y: about one point.
+    tangent.Y is the same motion about the origin that all bodies share.
     """
     for place in range(tree.order.shape[0]):
         i = tree.order[place]

@@ -168,7 +168,7 @@ def wrench_of(m, s, J, p, Q, x, x_w, y_w):
 
 @small
 def by_turning(p, Q, v, w):
-    """Return Nᵀ (v, w), its part along rotations."""
+    """Return the part of Nᵀ (v, w) along rotations; the part along translations is zero."""
     return add(scaled(2.0, cross(p, v)), turned_back(Q, w))
 
 

@@ -21,6 +21,7 @@ from floatframe import (
     PrismaticJoint,
     RevoluteJoint,
     RigidBody,
+    ScrewJoint,
     SphericalJoint,
     SpringDamper,
     System,
@@ -87,6 +88,15 @@ def test_a_body_that_fits_its_joints_stays_bitwise_where_it_is_drawn():
     (placed,) = placed_bodies(System([body], [joint]))
     assert_array_equal(placed.drawn_position, np.zeros(3))
     assert_array_equal(placed.orientation, body.orientation)
+
+
+@pytest.mark.parametrize("motions", [{}, {"angle": 0.0}, {"distance": 0.0}])
+def test_a_screw_begins_with_coinciding_points(motions):
+    axis, tip = np.array([1.0, 1.0, 0.0]) / np.sqrt(2), np.array([0.1, -0.2, 0.05])
+    place = Marker(GROUND, position=POST)
+    joint = ScrewJoint("screw", place, Marker("a", position=tip), axis=axis, lead=0.01, motions=motions)
+    (body,) = placed_bodies(System([rigid("a")], [joint]))
+    assert_allclose(body.position + tip, POST, rtol=0, atol=1e-15)
 
 
 def test_what_joints_leave_free_stays_as_drawn():
