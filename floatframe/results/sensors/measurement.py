@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import Summary, presented
 from fe_models.foundation.records import FrozenMapping, frozen_copies
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
@@ -19,6 +20,7 @@ from floatframe.results.trajectory import Trajectory
 __all__ = ["Measurement", "Sensor", "unit_words", "vector_columns"]
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Measurement:
@@ -34,6 +36,16 @@ class Measurement:
     def __post_init__(self) -> None:
         object.__setattr__(self, "columns", FrozenMapping(dict(self.columns)))
         object.__setattr__(self, "units", FrozenMapping(dict(self.units)))
+
+    def summary(self) -> Summary:
+        """Return what `repr` and notebooks show: the times, and the range of each column with its unit."""
+        t = f"{len(self.t)}, {self.t[0]:.6g} to {self.t[-1]:.6g}" if len(self.t) else "none"
+        table = [
+            (name, self.units[name], *((f"{values.min():.6g}", f"{values.max():.6g}") if len(values) else ("", "")))
+            for name, values in self.columns.items()
+        ]
+        rows = [("times", t), *(("place", words) for words in self.places)]
+        return Summary(f"Measurement {self.sensor!r}", rows, ("column", "unit", "least", "greatest"), table)
 
     def __getitem__(self, column: str) -> Array:
         """Return a column by its name, (n_t,); `ResultsError` if there is none."""

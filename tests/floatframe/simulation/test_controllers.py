@@ -25,6 +25,7 @@ from floatframe import (
     read_results,
     resume,
 )
+from floatframe.files.cosimulation.held_inputs import with_held_inputs
 from floatframe.integrators import Ida, RelativeOde
 from floatframe.model.bodies.coordinates import JointCoordinate
 from floatframe.model.forces import JointForce, UserForce
@@ -86,6 +87,8 @@ def test_outputs_and_states_are_stored_at_the_sampling_instants(motion):
     samples = motion.controller("pid")
     assert_allclose(samples.t, PERIOD * np.arange(100), rtol=0, atol=1e-12)
     assert samples.units == {"motor": "N m", "state 1": "1"}
+    assert repr(samples).splitlines()[:2] == ["Measurement 'pid'", "  times  100, 0 to 0.99"]
+    assert len(repr(samples)) < 300
     errors = 1.0 - motion.joint("pin").angle[::10][:100]
     assert_allclose(samples["state 1"], 0.2 + PERIOD * np.cumsum(errors), rtol=0, atol=1e-12)
     (held,) = motion.measurements("pid")
@@ -253,6 +256,11 @@ def test_controllers_beside_events_are_refused():
     events = [Event("half", "pin.angle", level=0.5, stop=True)]
     with pytest.raises(ModelError, match=r"expected no events.* beside controllers \(pid\)"):
         integrate(rotor(pid(), events=events), GeneralizedAlpha(), 0.1, 1e-3)
+
+
+def test_a_system_with_controllers_is_no_unit_of_co_simulation():
+    with pytest.raises(ModelError, match=r"controllers \(pid\) act in plain runs only"):
+        with_held_inputs(rotor(pid()))
 
 
 @pytest.mark.parametrize(("change", "words"), [
