@@ -126,8 +126,7 @@ def with_middle(body: cms.ReducedBody) -> cms.ReducedBody:
     middle = cms.ReducedInterface("middle", "nodes", np.zeros(3), np.eye(3), Psi, members, has_rotation=False)
     geometric = body.geometric
     if geometric is not None:
-        none = np.zeros((1, *geometric.interfaces.shape[1:]))
-        geometric = replace(geometric, interfaces=np.concatenate([geometric.interfaces, none]))
+        geometric = replace(geometric, is_loaded=(*geometric.is_loaded, False))
     return replace(body, interfaces=(*body.interfaces, middle), geometric=geometric)
 
 
