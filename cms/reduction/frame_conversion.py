@@ -78,7 +78,7 @@ def converted(reduced: ReducedBody, frame: Frame, *, damping: Damping | None = N
             f"reduced body {reduced.name!r}: a body that is held to the ground has the frame of the ground, and a "
             "free one any other; reduce it again with or without its supports"
         )
-    C, target = condition_of(reduced, frame)  # (1)
+    C, target = condition_of(reduced, frame)  # step (1)
     require_convertible(reduced, target)
     Y, M_R = rigid_mass(reduced.moments)
     M = reduced.M - C.T @ Y - Y.T @ C + C.T @ M_R @ C  # (2)
@@ -90,7 +90,7 @@ def converted(reduced: ReducedBody, frame: Frame, *, damping: Damping | None = N
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """Change from one frame B to another: the rigid motion removed, the new modes, and the place of the new frame."""
+    """Change to another body frame: the removed rigid motion, the new modes, and origin and axes of the new frame."""
 
     C: Array  #: rigid motion [d; theta] of each old shape about the old origin, old axes, (6, n_q)
     Z: Array  #: new modes as combinations of the old ones, (n_q, n_q)
@@ -111,7 +111,7 @@ class Change:
 
 
 def condition_of(reduced: ReducedBody, frame: Frame) -> tuple[Array, BodyFrame]:
-    """Return the rigid motion C that the frame removes from shapes, (6, n_q) about the old origin, and the frame."""
+    """Return the rigid motion C that the frame condition removes, (6, n_q) about the old origin, and the frame."""
     moments = reduced.moments
     center = in_mesh(reduced.frame, moments.center_of_mass)
     if isinstance(frame, TisserandFrame):
@@ -138,7 +138,7 @@ def condition_of(reduced: ReducedBody, frame: Frame) -> tuple[Array, BodyFrame]:
 
 
 def closest_rigid_motions(weight: float, c: Array, N_c: Array, U1: Array, U2: Array) -> Array:
-    """Return the rigid motions that fit the shapes best in a weighted norm, about the origin, (6, n_q).
+    """Return the rigid motions about the origin that fit the shapes best in a weighted norm, (6, n_q).
 
     About the weighted centre c the norm splits into translation and rotation: d_c = U1/w, N_c theta = U2 - c × U1.
     """
@@ -147,7 +147,7 @@ def closest_rigid_motions(weight: float, c: Array, N_c: Array, U1: Array, U2: Ar
 
 
 def nodal_condition(reduced: ReducedBody, frame: NodalFrame) -> tuple[Array, Array, IntArray]:
-    """Return rigid motions and shapes at the six held dofs, (6, 6) and (6, n_q), and the dofs (node, component)."""
+    """Return rigid motions and shapes at the six fixed dofs, (6, 6) and (6, n_q), and the dofs (node, component)."""
     where = f"reduced body {reduced.name!r}: nodal frame"
     if frame.dofs is not None:
         held = checked_dofs(frame, where, reduced.numbering, reduced.node_ids)
@@ -175,7 +175,7 @@ def nodal_condition(reduced: ReducedBody, frame: NodalFrame) -> tuple[Array, Arr
 
 
 def interface_dofs(reduced: ReducedBody, interface: ReducedInterface) -> tuple[Array, IntArray, Array, Array, IntArray]:
-    """Return the dofs that an interface offers to a nodal frame: points, components, rigid motions, shapes, nodes.
+    """Return the dofs of an interface that a nodal frame may fix: points, components, rigid motions, shapes, nodes.
 
     All are in mesh axes. They are the six dofs of the reference point, or the translations of the members if there is
     no such node (kind "nodes").
@@ -210,13 +210,13 @@ def rigid_mass(moments: Moments) -> tuple[Array, Array]:
     """Return Psi_Rᵀ M Phi, (6, n_q), and the rigid-body mass matrix Psi_Rᵀ M Psi_R, (6, 6), about the origin."""
     M_R = np.zeros((6, 6))
     M_R[:3, :3], M_R[3:, 3:] = moments.m * np.eye(3), moments.J0
-    M_R[3:, :3] = np.cross(moments.S, np.eye(3)).T  # column a: torque S × e_a
+    M_R[3:, :3] = np.cross(moments.S, np.eye(3)).T  # column a is the torque S × e_a
     M_R[:3, 3:] = M_R[3:, :3].T
     return np.vstack([moments.C1, moments.C2]), M_R
 
 
 def modes_of(reduced: ReducedBody, M: Array) -> tuple[Array, np.ndarray]:
-    """Return the modes of K and the new mass as combinations of the old shapes, (n_q, n_q), and which have mass."""
+    """Return the modes of K and the new mass in terms of the old shapes, (n_q, n_q), and whether each has mass."""
     stiffness, mass = np.diag(reduced.K), np.diag(M)
     omega2_1 = (2 * np.pi * reduced.free_frequencies.min()) ** 2 if len(reduced.free_frequencies) else 0.0
     if not omega2_1 > 0:
@@ -231,12 +231,12 @@ def modes_of(reduced: ReducedBody, M: Array) -> tuple[Array, np.ndarray]:
 
 
 def omega2_of(reduced: ReducedBody, Z: Array) -> Array:
-    """Return Z_kᵀ K Z_k, (n_q,)."""
+    """Return Z_kᵀ K Z_k for each mode k, (n_q,)."""
     return np.asarray(np.einsum("lk,l,lk->k", Z, np.diag(reduced.K), Z))
 
 
 def orienting_rows(reduced: ReducedBody, change: Change) -> Array:
-    """Return rows of the new shapes that fix their signs: kept nodes, else interfaces, else momenta, (n, n_q)."""
+    """Return rows of the new shapes that fix their signs, (n, n_q): kept nodes, or interfaces, or momenta."""
     if len(reduced.nodes):
         return change.translations(reduced.Phi, reduced.nodes).reshape(-1, reduced.n_q)
     if reduced.interfaces:
@@ -253,7 +253,7 @@ def in_mesh(frame: BodyFrame, points: Array) -> Array:
 
 
 def relative_place(old: BodyFrame, new: BodyFrame) -> tuple[Array, Array]:
-    """Return origin and axes of the new frame in the old one."""
+    """Return origin and axes of the new frame relative to the old frame."""
     return old.axes.T @ (new.origin - old.origin), old.axes.T @ new.axes
 
 
@@ -290,7 +290,7 @@ def changed_body(
         geometric=None
         if reduced.geometric is None
         else converted_geometric_stiffness(reduced, frame, C=change.C, Z=Z, p=change.p, R=change.R),
-        quadratic=None,  # quadratic modes belong to the reaction of the old frame
+        quadratic=None,  # quadratic modes depend on the reaction of the old frame
         point_stress=None if reduced.point_stress is None else changed_point_stress(reduced.point_stress, change),
         recovery={name: changed_table(table, change) for name, table in reduced.recovery.items()},
     )
@@ -318,7 +318,7 @@ def changed_moments(moments: Moments, change: Change) -> Moments:
 
 
 def changed_interface(reduced: ReducedBody, interface: ReducedInterface, change: Change) -> ReducedInterface:
-    """Return an interface in the new frame; without rotation, Psi is the translation of the mean of its members."""
+    """Return an interface in the new frame. If it has no rotation, Psi is the mean translation of its members."""
     middle = interface.position if interface.has_rotation else reduced.nodes[interface.members].mean(axis=0)
     Psi = (interface.Psi - six_motions(middle) @ change.C) @ change.Z
     rotation = Psi[3:] if interface.has_rotation else np.zeros_like(Psi[3:])
@@ -331,7 +331,7 @@ def changed_interface(reduced: ReducedBody, interface: ReducedInterface, change:
 
 
 def changed_sums(sums: NodalSums, change: Change) -> NodalSums:
-    """Return the weighted sums over the nodes in the new frame."""
+    """Return the weighted nodal sums in the new frame."""
     w, S, R, p, A = sums.w, np.asarray(sums.S), np.asarray(sums.R), change.p, change.R
     norm = np.trace(R) * np.eye(3) - R
     d, theta = change.C[:3], change.C[3:]
@@ -365,13 +365,13 @@ def changed_table(table: RecoveryTable, change: Change) -> RecoveryTable:
 
 
 def changed_point_stress(points: PointStress, change: Change) -> PointStress:
-    """Return the stress at named points in the new frame; rigid motion has no stress."""
+    """Return the stress of the new shapes at named points; a rigid motion has no stress."""
     modes = turned_stress(np.asarray(points.modes) @ change.Z, change.R)
     return replace(points, positions=change.points(np.asarray(points.positions)), modes=modes)
 
 
 def changed_labels(reduced: ReducedBody, Z: Array) -> tuple[tuple[str, ...], Array]:
-    """Return label and energy shares of the new modes; without source columns, in terms of the old modes.
+    """Return labels and energy shares of the new modes; without source columns, shares refer to the old modes.
 
     The energy Z_kᵀ K Z_k splits into Z_lk K_l Z_lk without mixed terms, because the old modes are K-orthogonal.
     """

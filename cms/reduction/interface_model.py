@@ -29,12 +29,13 @@ from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, IntArray
 
 __all__ = ["BoundaryNode", "InterfaceModel", "interface_model"]
 
-RANK_TOLERANCE = 1e-9  #: singular values of the scaled map below this share of the largest count as zero
+RANK_TOLERANCE = 1e-9  #: singular value of the scaled map over the largest one, below which it counts as zero
 ROUNDING_MOTION = (
     1e-12  #: interface motion of a mode below this share of its largest is rounding: the frame holds the interface;
 )
 #: rotations are multiplied by the extent of the body
-MASSLESS = 1e-14  #: mass of a fixed-interface mode of unit stiffness below this share of the largest counts as zero
+#: mass of a fixed-interface mode of unit stiffness over the largest one, below which it counts as zero
+MASSLESS = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +45,7 @@ class BoundaryNode:
     interface: str
     position: Array  #: in mesh coordinates, (3,) [m]
     components: IntArray  #: 0-2 translations, 3-5 rotations, mesh axes
-    first: int  #: row of its first dof among the boundary dofs
+    first: int  #: row of its first dof in the boundary vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +58,7 @@ class InterfaceModel:
     M: Array  #: (n, n), symmetric
     D: Array  #: (n, n), symmetric
     T: Array  #: z = T y: rigid motion of B (six rows; none for a held body), then q, (6 + n_q, n)
-    loads: Array  #: load cases of unit amplitude, (n, n_load_cases)
+    loads: Array  #: load cases of unit amplitude as forces on y, (n, n_load_cases)
 
     @property
     def n_boundary(self) -> int:
@@ -91,7 +92,7 @@ class InterfaceModel:
 
 
 def interface_model(body: ReducedBody) -> InterfaceModel:
-    """Return the body as matrices over its interfaces.
+    """Return mass, stiffness and damping of the body over its interface motions and fixed-interface modes.
 
     Raises
     ------
@@ -115,15 +116,15 @@ def interface_model(body: ReducedBody) -> InterfaceModel:
     T = np.hstack([Z, N @ X])
     n_b = len(B)
     K_y, M_y, D_y = (symmetric(T.T @ matrix @ T) for matrix in (K, M, D))
-    K_y[:n_b, n_b:] = K_y[n_b:, :n_b] = 0.0  # (2); nonzero values are rounding
-    for matrix in (K_y, M_y):  # (3)
+    K_y[:n_b, n_b:] = K_y[n_b:, :n_b] = 0.0  # step (2); nonzero values are rounding
+    for matrix in (K_y, M_y):  # step (3)
         inner = matrix[n_b:, n_b:]
         inner[...] = np.diag(np.diag(inner))
     return InterfaceModel(body, nodes, K_y, M_y, D_y, T, T.T @ loads)
 
 
 def free_matrices(body: ReducedBody) -> tuple[Array, Array, Array, Array]:
-    """Return M, K, D and loads over z; for a held body over q alone."""
+    """Return M, K, D and loads over z, or over q alone for a body that is fixed to the ground."""
     M, K, D = (np.array(matrix) for matrix in (body.M, body.K, body.D))
     loads = np.array([case.h for case in body.load_cases]).reshape(-1, body.n_q).T
     if body.is_held:
@@ -156,7 +157,7 @@ def boundary_of(body: ReducedBody) -> tuple[tuple[BoundaryNode, ...], Array]:
 
 
 def still_modes(body: ReducedBody, motion: Array, components: IntArray) -> Array:
-    """Return which modes move no interface beyond rounding, (n_q,).
+    """Return whether each mode moves the interfaces by no more than rounding, (n_q,) bool.
 
     `motion` has a row for each of `components`: 0-2 translations, 3-5 rotations, (n, n_q).
 
@@ -164,7 +165,7 @@ def still_modes(body: ReducedBody, motion: Array, components: IntArray) -> Array
     would otherwise be scaled up and replace the rigid motions.
     """
     extent = float(np.ptp(body.nodes, axis=0).max(initial=0.0))
-    if not len(motion) or extent == 0.0:  # a point has no length to measure rotations by
+    if not len(motion) or extent == 0.0:  # a single point has no length by which to scale rotations
         return np.zeros(body.n_q, dtype=bool)
     path = np.abs(motion) * np.where(components < 3, 1.0, extent)[:, None]
     return np.asarray(path.max(axis=0) <= ROUNDING_MOTION * np.abs(body.Phi).max(axis=(0, 1)))
@@ -184,7 +185,7 @@ def places_of(body: ReducedBody, interface: ReducedInterface) -> list[tuple[Arra
 
 
 def require_rank(body: ReducedBody, nodes: tuple[BoundaryNode, ...], scaled: Array) -> None:
-    """Raise `ExportError` that names the missing constraint modes, unless the map has full row rank."""
+    """Raise `ExportError`, which names the missing constraint modes, unless the map has full row rank."""
     names = [f"{node.interface} {MOTION_COMPONENTS[c]}" for node in nodes for c in node.components]
     n_b = len(scaled)
     _, R, order = la.qr(scaled.T, mode="economic", pivoting=True)
@@ -203,7 +204,7 @@ def require_rank(body: ReducedBody, nodes: tuple[BoundaryNode, ...], scaled: Arr
 
 
 def held_factor(body: ReducedBody, K_N: Array) -> tuple[Array, bool]:
-    """Return the Cholesky factor of the stiffness with held interfaces; raise `ExportError` if it is singular."""
+    """Return the Cholesky factor of the stiffness with fixed interfaces; raise `ExportError` if it is singular."""
     energy = la.eigvalsh(K_N) if len(K_N) else np.ones(0)
     free = int((energy <= 1e-12 * energy.max(initial=0.0)).sum())
     if free:
@@ -216,7 +217,7 @@ def held_factor(body: ReducedBody, K_N: Array) -> tuple[Array, bool]:
 
 
 def fixed_modes(K_N: Array, M_N: Array) -> Array:
-    """Return the eigenvectors of the pencil by ascending frequency, with unit mass (massless: unit stiffness)."""
+    """Return the eigenvectors by ascending frequency, scaled to unit mass, or to unit stiffness if massless."""
     if not len(K_N):
         return K_N
     mu, X = la.eigh(symmetric(M_N), symmetric(K_N))  # M x = mu K x, because K is definite but M may be singular
@@ -226,5 +227,5 @@ def fixed_modes(K_N: Array, M_N: Array) -> Array:
 
 
 def symmetric(matrix: Array) -> Array:
-    """Return the symmetric part of a matrix that is symmetric to rounding."""
+    """Return the symmetric part; the matrix is symmetric to rounding."""
     return np.asarray((matrix + matrix.T) / 2)

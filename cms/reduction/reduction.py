@@ -57,9 +57,9 @@ __all__ = ["assembled", "reduce"]
 log = logging.getLogger(__name__)
 
 FAR = 10.0  #: distance of the frame from the mesh origin over the radius of gyration, beyond which R loses two digits
-OF_MASSES = 1e-9  #: negativity of the moments up to which they are those of masses
-ROUNDING = 1e3 * np.finfo(float).eps  #: of a second moment about the mesh origin, relative
-SHAPES_AT_ONCE = 64  #: number of shapes whose displacements of all nodes are held at a time
+OF_MASSES = 1e-9  #: largest negativity of moments that mass distributions have by rounding
+ROUNDING = 1e3 * np.finfo(float).eps  #: relative rounding error of a second moment about the mesh origin
+SHAPES_AT_ONCE = 64  #: number of shapes whose displacements of all nodes are in memory at a time
 
 
 def reduce(
@@ -228,7 +228,7 @@ def kept_translations(body: FEBody, Phi: Array, nodes: IntArray, axes: Array) ->
     for first in range(0, Phi.shape[1], SHAPES_AT_ONCE):
         some = slice(first, first + SHAPES_AT_ONCE)
         moved = rows_times(rows, Phi[:, some]).reshape(len(nodes), 3, -1)
-        kept[:, :, some] = np.einsum("ba,nbk->nak", axes, moved)  # exact zeros stay exact if the axes are aligned
+        kept[:, :, some] = np.einsum("ba,nbk->nak", axes, moved)  # exact zeros remain exact if the axes are aligned
         release(kept)
     return kept
 
@@ -262,7 +262,7 @@ def with_near_second_moment(gram: Array, body: FEBody, frame: BodyFrame) -> Arra
         return gram
     turns = rigid_motion_of_dofs(body.nodes, body.to_mesh.dofs, frame.origin)[:, 3:]
     near = body.element_model.mass_gram(turns)
-    of = [0, 4 + 3 + 2, 4 + 6 + 0, 4 + 0 + 1]  # mass, y of the third column, z of the first, x of the second
+    of = [0, 4 + 3 + 2, 4 + 6 + 0, 4 + 0 + 1]  # rows of mass, y of the third column, z of the first, x of the second
     near = near[np.ix_(of, of)]
     near[1:] = frame.axes.T @ near[1:]
     near[:, 1:] = near[:, 1:] @ frame.axes
@@ -291,7 +291,7 @@ def gram_in_frame(gram: Array, frame: BodyFrame) -> Array:
 
 
 def reduced_nodal_sums(body: FEBody, Phi: Array, frame: BodyFrame) -> NodalSums | None:
-    """Return weighted sums over the nodes in the frame B; None if there is no Buckens frame."""
+    """Return weighted sums of the shapes over the nodes in frame B; None if there is no Buckens frame."""
     W_Psi_R = weighted_rigid_modes(body, frame.origin)
     if W_Psi_R is None:
         return None
@@ -308,7 +308,7 @@ def reduced_nodal_sums(body: FEBody, Phi: Array, frame: BodyFrame) -> NodalSums 
 
 
 def reduced_load_case(body: FEBody, case: LoadCase, Phi: Array, frame: BodyFrame) -> ReducedLoadCase:
-    """Return the modal forces of a load case, and its resultant about the origin of B."""
+    """Return the modal forces of a load case, and its resultant wrench about the origin of B."""
     wrench = geometric_rigid_modes(body, origin=frame.origin).T @ case.f
     R = frame.axes.T
     h = inner(Phi, case.f[:, None])[:, 0]
@@ -318,7 +318,7 @@ def reduced_load_case(body: FEBody, case: LoadCase, Phi: Array, frame: BodyFrame
 def reduced_interface(
     body: FEBody, interface: Interface, Phi: Array, frame: BodyFrame, index_of: IntArray
 ) -> ReducedInterface:
-    """Return the motion of an interface with the modes: of its reference node, or the mean motion of its nodes."""
+    """Return how an interface moves with the modes: motion of its reference node, or mean motion of its nodes."""
     motion = reference_motion(body, interface)
     Psi = rows_times(motion.rows, Phi)
     R = frame.axes.T
@@ -334,7 +334,7 @@ def reduced_interface(
 
 
 def reduced_damping(body: FEBody, finished: FinishedBasis, damping: Damping | StrainDamping | None) -> Array:
-    """Return D* = Phiᵀ D Phi plus the modal or Rayleigh damping, or that of strain patterns, (n_q, n_q) [1/s]."""
+    """Return Phiᵀ D Phi plus modal or Rayleigh damping or damping of strain patterns, (n_q, n_q) [1/s]."""
     D = np.zeros_like(finished.K)
     if body.D is not None:
         Phi = in_memory(finished.Phi)

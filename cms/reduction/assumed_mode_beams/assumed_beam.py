@@ -49,7 +49,7 @@ __all__ = ["beam_from_assumed_modes", "beam_geometric_stiffness", "tube"]
 
 
 N_RINGS, N_CORNERS = 21, 8
-THINNEST = 5e-3  #: radius of the skin relative to the length, for a beam without rotary inertia
+THINNEST = 5e-3  #: radius of the skin over the beam length, used if the beam has no rotary inertia
 
 
 def tube(line: BeamLine) -> tuple[Array, Array, IntArray]:
@@ -165,12 +165,12 @@ def beam_from_assumed_modes(
 
     A_K = strain_rows(line, x, weight, fields.strain)
     A_M = inertia_rows(line, x, weight, fields.motion - rigid @ C)
-    T, omega2, dropped = elastic_modes(fields, A_K, A_M)  # (2), (3)
+    T, omega2, dropped = elastic_modes(fields, A_K, A_M)  # steps (2), (3)
     x_skin, skin, triangles = tube(line)
     nodes_x = np.concatenate([x_station, x_skin])
 
     def shapes(at: Array) -> Array:
-        """Return the motion of the sections for the modes, (n, 6, n_q)."""
+        """Return the motion of the sections in each mode, (n, 6, n_q)."""
         motion = beam_fields(functions, counts, line, at).motion
         return np.asarray((motion - rigid_fields(at, np.zeros(3)) @ C) @ T)
 
@@ -238,7 +238,7 @@ def require_rotary_inertia(where: str, line: BeamLine, x: Array, counts: Mapping
 def stiffening(
     line: BeamLine, functions: str, counts: Mapping[str, int], C: Array, T: Array, x_station: Array, frame: BodyFrame
 ) -> GeometricStiffness:
-    """Return the geometric stiffness of the modes T; section forces have jumps at the stations."""
+    """Return the geometric stiffness of the modes T; section forces are discontinuous at the stations."""
     x, weight = gauss_points(line, functions, counts, breaks=x_station, more=CUBIC + 1)
     fields = beam_fields(functions, counts, line, x)
     motion = (fields.motion - rigid_fields(x, np.zeros(3)) @ C) @ T
@@ -273,7 +273,7 @@ def gauss_points(
 def frame_of_beam(
     where: str, line: BeamLine, frame: Frame, x_station: Array, names: list[str], integral: tuple[Array, Array, Array]
 ) -> BodyFrame:
-    """Return the body frame; its origin is the centre of mass, or the station of a nodal frame."""
+    """Return the body frame. Its origin is the centre of mass, or the station to which a nodal frame is attached."""
     x, weight, rigid = integral
     mass = weight * line.at("rho_A", x)
     center = np.array([mass @ x / mass.sum(), 0.0, 0.0])
@@ -296,7 +296,7 @@ def frame_of_beam(
 
 
 def held_dofs(where: str, frame: NodalFrame, x_station: Array, names: list[str]) -> IntArray:
-    """Return the six (station, component) that a nodal frame holds, (6, 2)."""
+    """Return the six (station, component) pairs that a nodal frame fixes, (6, 2)."""
     points = np.column_stack([x_station, np.zeros((len(x_station), 2))])
     if frame.dofs is not None:
         held = checked_dofs(frame, f"{where}: nodal frame", Numbering())
@@ -310,7 +310,7 @@ def held_dofs(where: str, frame: NodalFrame, x_station: Array, names: list[str])
 
 
 def rigid_part(frame: BodyFrame, rigid_rows: Array, rows: Array, at_stations: tuple[Array, Array]) -> Array:
-    """Return C, (6, n_columns): the rigid motion about x = 0 that the frame removes from the columns."""
+    """Return C, (6, n_columns): the rigid motion about x = 0 that the frame condition removes from each column."""
     if frame.kind == "tisserand":
         return np.asarray(np.linalg.lstsq(rigid_rows, rows, rcond=None)[0])
     x_station, motion = at_stations
@@ -321,7 +321,7 @@ def rigid_part(frame: BodyFrame, rigid_rows: Array, rows: Array, at_stations: tu
 
 
 def elastic_modes(fields: BeamFields, A_K: Array, A_M: Array) -> tuple[Array, Array, tuple[str, ...]]:
-    """Steps (2), (3): return the modes over the columns, (n_columns, n_q), their omega², and redundant labels."""
+    """Steps (2), (3): return the modes in terms of the columns, (n_columns, n_q), omega², and redundant labels."""
     mass, stiffness = (np.einsum("nk,nk->k", A, A) for A in (A_M, A_K))
     omega2_1 = float((stiffness / mass).min())
     A_W = np.vstack([A_K / np.sqrt(omega2_1), A_M])
@@ -340,7 +340,7 @@ def elastic_modes(fields: BeamFields, A_K: Array, A_M: Array) -> tuple[Array, Ar
 
 
 def free_frequencies(line: BeamLine, integral: tuple[Array, Array, Array], fields: BeamFields, A_K: Array) -> Array:
-    """Return the frequencies of the unsupported beam, ascending [Hz]; empty if it has no inertia about x."""
+    """Return the frequencies of the unsupported beam, ascending [Hz]; empty if its inertia about x is zero."""
     x, weight, rigid = integral
     rows = inertia_rows(line, x, weight, rigid)
     if not np.linalg.norm(rows[:, 3]) > 0:
@@ -379,17 +379,17 @@ E_X = np.array([1.0, 0.0, 0.0])
 
 @dataclass(frozen=True, eq=False)
 class BeamLoads:
-    """Loads per unit mass and wrenches on stations; load j is the sum of both."""
+    """Loads per unit mass and wrenches at stations; load j has a part of each kind."""
 
-    mass: MassLoads  #: k loads
-    x_station: Array  #: (n_stations,) [m]
-    wrench: Array  #: force and moment on the stations, (n_stations, 6, k) [N, N m]
+    mass: MassLoads  #: k loads per unit mass
+    x_station: Array  #: positions of the stations along the beam, (n_stations,) [m]
+    wrench: Array  #: force and moment at each station, (n_stations, 6, k) [N, N m]
 
 
 def beam_geometric_stiffness(
     line: BeamLine, points: tuple[Array, Array], motion: Array, strain: Array, x_station: Array, frame: BodyFrame
 ) -> GeometricStiffness:
-    """Return the geometric stiffness of the unit loads of a frame.
+    """Return the geometric stiffness under each unit load of a frame.
 
     Parameters
     ----------
@@ -416,7 +416,7 @@ def beam_geometric_stiffness(
 
 
 def unit_loads(x_station: Array, frame: BodyFrame) -> BeamLoads:
-    """Return the 12 loads per unit mass, then six for each station, along the axes of B."""
+    """Return the 12 loads per unit mass, then six unit wrench components for each station, in axes of B."""
     mass = unit_mass_loads(frame, 6 * len(x_station))
     wrench = np.zeros((len(x_station), 6, mass.k))
     for i in range(len(x_station)):
@@ -425,7 +425,7 @@ def unit_loads(x_station: Array, frame: BodyFrame) -> BeamLoads:
 
 
 def balanced(line: BeamLine, loads: BeamLoads, frame: BodyFrame) -> BeamLoads:
-    """Return each load with the reaction of the support: inertia of a rigid motion, or forces on held dofs."""
+    """Return each load with its support reaction: inertia forces of a rigid motion, or forces on fixed dofs."""
     x, weight = line.points(2)
     rigid = rigid_fields(x, np.zeros(3))
     q, mu, _ = densities(line, x, loads.mass)
@@ -444,7 +444,7 @@ def balanced(line: BeamLine, loads: BeamLoads, frame: BodyFrame) -> BeamLoads:
 
 
 def densities(line: BeamLine, x: Array, mass: MassLoads) -> tuple[Array, Array, Array]:
-    """Return force and couple, (n, 3, k), and V = Σ f oᵀ, (n, 3, 3, k), per length at positions x."""
+    """Return force and couple per length, (n, 3, k), and V = Σ f oᵀ per length, (n, 3, 3, k), at positions x."""
     centers = np.column_stack([x, np.zeros((len(x), 2))])
     q = line.at("rho_A", x)[:, None, None] * mass.at(centers)
     E = np.stack([np.zeros(len(x)), line.at("rho_Iz", x), line.at("rho_Iy", x)], axis=1)
@@ -458,12 +458,12 @@ def axial(V: Array) -> Array:
 
 
 def section_forces(line: BeamLine, x: Array, loads: BeamLoads) -> tuple[Array, Array]:
-    """Return n and m at positions x, (n, 3, k) each: loads beyond x, moments about x."""
+    """Return section force n and moment m at positions x, (n, 3, k) each: the resultants of the loads beyond x."""
     cuts = np.array([0.0, *line.breaks, line.length])
     xi, weight = np.polynomial.legendre.leggauss(line.degree // 2 + 2)
     k = loads.mass.k
     n, m = np.zeros((len(x), 3, k)), np.zeros((len(x), 3, k))
-    for start, end in pairwise(cuts):  # from x, or from the start of the piece, to its end
+    for start, end in pairwise(cuts):  # integrate from x, or from the start of the piece, to its end
         first = np.clip(x, start, end)
         half = (end - first) / 2
         for at, w in zip(xi, weight, strict=True):
@@ -487,7 +487,7 @@ def across(v: Array) -> Array:
 def work_of_second_order(
     line: BeamLine, points: tuple[Array, Array], motion: Array, strain: Array, loads: BeamLoads
 ) -> Array:
-    """Return the matrices of all loads over the modes, (k, n_q, n_q)."""
+    """Return the second-order work of each load as a matrix over the modes, (k, n_q, n_q)."""
     x, weight = points
     n, m = section_forces(line, x, loads)
     _, _, V = densities(line, x, loads.mass)

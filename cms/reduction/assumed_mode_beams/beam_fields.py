@@ -23,17 +23,18 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["BeamFields", "beam_fields", "beam_moments", "inertia_rows", "rigid_fields", "strain_rows"]
 
-PLANES = (("y", 1, 5, 1.0), ("z", 2, 4, -1.0))  #: name, translation, rotation, and sign of the rotation per slope
+#: plane, translation component, rotation component, and sign of the rotation for a positive slope
+PLANES = (("y", 1, 5, 1.0), ("z", 2, 4, -1.0))
 
 
 @dataclass(frozen=True, eq=False)
 class BeamFields:
-    """Columns at positions along the beam."""
+    """Displacement fields (columns) at positions along the beam."""
 
     motion: Array  #: motion of the sections, (n, 6, n_columns)
-    strain: Array  #: (n, 6, n_columns)
+    strain: Array  #: strains of the sections, (n, 6, n_columns)
     labels: tuple[str, ...]  #: label of each column
-    groups: tuple[str, ...]  #: group of each column
+    groups: tuple[str, ...]  #: group of each column: axial, torsion, bending or shear
 
 
 def beam_fields(family: str, counts: Mapping[str, int], line: BeamLine, x: Array) -> BeamFields:

@@ -29,14 +29,15 @@ __all__ = [
     "modal_damping",
 ]
 
-HEAVY = 0.2  #: ratio to critical damping above which it must be confirmed: 0.5 may be meant as 0.5 %
-CUSTOMARY_STEPS = ((100.0, 0.01), (1000.0, 0.1))  #: 1 % below 100 Hz, 10 % below 1 kHz, critical above
+HEAVY = 0.2  #: damping ratio above which the user must confirm it: 0.5 may be a mistake for 0.5 %
+#: (upper frequency [Hz], ratio): 1 % below 100 Hz, 10 % below 1 kHz, critical above
+CUSTOMARY_STEPS = ((100.0, 0.01), (1000.0, 0.1))
 
 
 @dataclass(frozen=True)
 @checked_fields(ArgumentError)
 class ModalDamping:
-    """The same damping ratio for every mode: D = diag(2 ratio omega).
+    """Modal damping with the same ratio for every mode: D = diag(2 ratio omega).
 
     Parameters
     ----------
@@ -110,7 +111,7 @@ class RampDamping:
 @dataclass(frozen=True)
 @checked_fields(ArgumentError)
 class RayleighDamping:
-    """D = alpha M + beta K.
+    """Rayleigh damping, D = alpha M + beta K.
 
     Parameters
     ----------
@@ -132,7 +133,7 @@ Damping = ModalDamping | PerModeDamping | RampDamping | RayleighDamping
 
 
 def damping_of_words(words: str) -> Damping | None:
-    """Return the damping that prints as this text, as in the provenance; None for "none" and for other texts."""
+    """Return the damping whose printed form is this text, as in the provenance; None for "none" and unknown texts."""
     known = {kind.__name__: kind for kind in (ModalDamping, PerModeDamping, RampDamping, RayleighDamping)}
     try:
         call = ast.parse(words, mode="eval").body
@@ -148,7 +149,7 @@ def damping_of_words(words: str) -> Damping | None:
 
 
 def modal_damping(damping: Damping, M: Array, K: Array, *, second: float = 1.0) -> Array:
-    """Return the damping matrix of a diagonal modal pencil, (n_q, n_q) [1/s]; massless shapes get none by ratios.
+    """Return the damping matrix for diagonal M and K, (n_q, n_q) [1/s]; damping ratios do not damp massless shapes.
 
     Parameters
     ----------
@@ -193,7 +194,7 @@ def _require_ratios(key: str, ratios: tuple[float, ...], *, heavy: bool) -> None
 
 
 def heavy_words(ratio: float) -> str:
-    """Return what is wrong with a ratio above `HEAVY` that is not confirmed."""
+    """Return the description of a damping ratio above `HEAVY` that the user has not confirmed."""
     return (
         f"this is {100 * ratio:g} % of critical damping; expected at most {HEAVY}. If it is meant, confirm it by "
         f"heavy = true in the table [damping] (heavy=True in Python, --heavy of a command); if {ratio:g} % is "

@@ -27,14 +27,14 @@ from fe_models.foundation.tall.columns import combine, combined, copied, dots, i
 __all__ = ["IN_SPAN", "FinishedBasis", "elastic_directions", "finish", "orthonormal_motions"]
 
 
-#: energy of a shape from a Gram matrix relative to its rounding, below which the energy is computed from the shape
+#: shape energy from a Gram matrix over its rounding error, below which the energy is computed from the shape
 SUSPECT_ENERGY = 1e3
 #: rounding error in PhiᵀMPhi, below which shapes are formed directly from the columns of the set
 TRUSTED_ROUNDING = 1e-11
-ORTHONORMAL_DEFECT = 1e-9  #: largest accepted entry of Phi.T M Phi - 1, unless M is known less well
-LOST_MASS = 1e-6  #: largest rounding of M in the mass of a shape, relative
-LOST_STIFFNESS = 1e-2  #: the same of K in its stiffness; its frequency is then known to half of that
-MARGIN = 10.0  #: factor from the rounding of the masses of shapes to that of their products
+ORTHONORMAL_DEFECT = 1e-9  #: largest accepted entry of Phi.T M Phi - 1, unless rounding of M is larger
+LOST_MASS = 1e-6  #: largest accepted rounding error of a modal mass due to M, relative to the modal mass
+LOST_STIFFNESS = 1e-2  #: largest accepted relative rounding error of a modal stiffness; the frequency has half of that
+MARGIN = 10.0  #: factor from the rounding errors of modal masses to those of their products
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,11 +44,11 @@ class FinishedBasis:
     Phi: Array  #: (n_dof, n_q); `SpreadColumns` if the columns of the mode set are distributed
     M: Array  #: Phi.T M Phi, (n_q, n_q): identity, zero rows for massless static shapes
     K: Array  #: Phi.T K Phi, (n_q, n_q), diagonal
-    columns: SourceColumns  #: the columns of the mode set, and their shares in the energy of each shape
+    columns: SourceColumns  #: columns of the mode set, and their shares in the energy of each shape
     dropped: tuple[str, ...]  #: labels of redundant columns
     n_rigid: int  #: number of independent rigid-body motions in the span of the columns
     free_omega2: Array  #: squared elastic frequencies of the unsupported reduced body, ascending
-    A: Array | None = None  #: coordinates of the shapes in the columns of the mode set, (n_columns, n_q), if known
+    A: Array | None = None  #: shapes as combinations of the columns of the mode set, (n_columns, n_q); None if unknown
 
 
 def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedBasis:
@@ -87,7 +87,7 @@ def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedB
         Z, Phi = Z @ again, combined(Phi, again)
         G_K, own = gram_in_blocks(Phi, products.K), np.ix_(is_massive, is_massive)
         turn = np.eye(len(again))
-        turn[own] = turn_to_diagonal(G_K[own])  # the correction of the mass mixes stiff modes
+        turn[own] = turn_to_diagonal(G_K[own])  # correcting the mass couples stiff modes
         Z, Phi, omega2 = Z @ turn, combined(Phi, turn), diagonal_within(G_K, turn)
     rounding = rounding_of_energy(body, Phi)
     is_suspect = is_massive & (omega2 < SUSPECT_ENERGY * rounding)
@@ -129,7 +129,7 @@ def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedB
 
 
 def normalised_again(Phi: Array, is_massive: np.ndarray, products: Products) -> tuple[Array, float]:
-    """Return the small matrix that makes the formed shapes M-orthonormal, and the remaining defect.
+    """Return the small matrix that makes the computed shapes M-orthonormal, and the remaining defect.
 
     The modal mass of a shape of light nodes is a small difference in the Gram matrix of the columns, but a sum of small
     terms in that of the formed shapes. Shapes are processed in the order of their frequency (Gram-Schmidt). Each is
@@ -151,14 +151,14 @@ def normalised_again(Phi: Array, is_massive: np.ndarray, products: Products) -> 
 
 @dataclass(frozen=True, eq=False)
 class ElasticPencil:
-    """Shapes of a basis in the frame, as small matrices: steps (2) to (4) of `finish`."""
+    """Elastic shapes relative to the frame, as small matrices: steps (2) to (4) of `finish`."""
 
     #: columns of the basis Q without their rigid part, (n_dof, l); the shapes are X Q.Z Z
     X: Array
     Z: Array  #: shapes as combinations of the basis, (k, n_q)
     elastic: Array  #: directions of the basis without rigid-body motions, (k, n_q)
     is_massive: np.ndarray  #: (n_q,) bool
-    free_omega2: Array  #: squared elastic frequencies of the unsupported reduced body, ascending
+    free_omega2: Array  #: squared elastic frequencies of the unsupported reduced body, ascending [1/s²]
     defect: float  #: largest entry of Zᵀ G_M Z - 1
     rounding: float  #: estimated rounding error of PhiᵀMPhi - 1 due to rounding of G_M
 
@@ -166,7 +166,7 @@ class ElasticPencil:
 def elastic_pencil(
     where: str, body: FEBody, Q: Basis, products: Products, condition: FrameCondition, omega2_1: float
 ) -> ElasticPencil:
-    """Return the shapes of a W-orthonormal basis.
+    """Return the elastic shapes in the span of a W-orthonormal basis.
 
     Raises
     ------
@@ -252,7 +252,7 @@ def free_elastic(Q: Basis, elastic: Array, condition: FrameCondition, omega2_1: 
 
 #: squared W-length of the remainder of a unit rigid-body motion, below which the span contains the motion
 IN_SPAN = 1e-6
-NO_INERTIA = 1e-12  #: eigenvalue of the scaled rigid mass matrix, below which a rigid-body motion has no inertia
+NO_INERTIA = 1e-12  #: eigenvalue of the scaled rigid mass matrix below which a rigid-body motion has no inertia
 
 
 def orthonormal_motions(rigid_mass: Array, omega2: float) -> Array:

@@ -29,15 +29,15 @@ __all__ = [
     "determinate_rows", "frame_condition",
 ]  # fmt: skip
 
-NO_INERTIA = 1e-12  #: moment of inertia about an axis, relative to the largest one, below which there is none
-RANK_TOLERANCE = 1e-8  #: smallest pivot of the held dofs: a lever arm divided by the extent of the nodes
+NO_INERTIA = 1e-12  #: moment of inertia over the largest one, below which it counts as zero
+RANK_TOLERANCE = 1e-8  #: smallest pivot of the fixed dofs: a lever arm over the extent of the nodes
 Axes = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 
 
 @dataclass(frozen=True)
 @checked_fields(ArgumentError)
 class NodalFrame:
-    """Frame attached to six dofs that do not deform: those of an interface, given ones, or automatically chosen.
+    """Frame attached to six dofs that do not deform: dofs of an interface, given dofs, or automatically chosen dofs.
 
     Its origin is the reference point of the interface (or the centre of mass if none is named); its axes are the mesh
     axes. Of an interface of kind "nodes" six determinate dofs are held, chosen by pivoted QR.
@@ -64,7 +64,7 @@ class NodalFrame:
 @dataclass(frozen=True)
 @checked_fields(ArgumentError)
 class TisserandFrame:
-    """Mean-axis frame: Psi_Rᵀ M u = 0, smallest relative kinetic energy; origin at the undeformed centre of mass [1]_.
+    """Mean-axis frame: Psi_Rᵀ M u = 0 minimises relative kinetic energy; origin at the undeformed centre of mass [1]_.
 
     Parameters
     ----------
@@ -103,10 +103,10 @@ class BuckensFrame:
 
 @dataclass(frozen=True)
 class HeldFrame:
-    """Frame of a body that is held to the ground: the mesh axes, which elastic displacement does not move."""
+    """Frame of a body that is fixed to the ground: the mesh axes, which elastic displacement does not move."""
 
-    origin: tuple[float, float, float] | None = None  #: in mesh coordinates [m], instead of the mesh origin
-    axes: Axes | None = None  #: x, y and z axis of the frame in mesh axes, orthonormal; None: the mesh axes
+    origin: tuple[float, float, float] | None = None  #: origin in mesh coordinates [m]; None: the mesh origin
+    axes: Axes | None = None  #: x, y and z axes of the frame in mesh axes, orthonormal; None: the mesh axes
 
 
 Frame = NodalFrame | TisserandFrame | BuckensFrame
@@ -120,13 +120,13 @@ class FrameCondition:
     frame: BodyFrame
     rigid_part: Callable[[Array], Array]  #: maps columns (n_dof, k) to C (6, k); the frame removes Psi_R C
     Psi_R: Array  #: rigid-body modes about the centre of mass, (n_dof, 6); (n_dof, 0) for a held body
-    M_Psi_R: Array  #: M times Psi_R, of the same shape
-    W: Array  #: W Psi_R, which defines the condition (W Psi_R)ᵀ u = 0, (n_dof, 6)
-    center: Array  #: centre of mass, reference point of Psi_R, mesh axes, (3,) [m]
+    M_Psi_R: Array  #: M Psi_R, the shape of Psi_R
+    W: Array  #: W Psi_R, (n_dof, 6); the frame condition is (W Psi_R)ᵀ u = 0
+    center: Array  #: centre of mass, the reference point of Psi_R, in mesh axes, (3,) [m]
 
 
 def frame_condition(body: FEBody, frame: Frame | HeldFrame) -> FrameCondition:
-    """Evaluate a frame for a body: its held dofs or mass matrix, and its origin.
+    """Evaluate a frame for a body: find its fixed dofs or its mass matrix, and its origin.
 
     Raises
     ------
@@ -204,7 +204,7 @@ def placed(kind: str, frame: Frame | HeldFrame, default_origin: Array, held: Int
 
 
 def nodal_rows(body: FEBody, frame: NodalFrame) -> tuple[IntArray, sp.csr_array]:
-    """Return the held dofs of a nodal frame, (node, component), (6, 2), and the rows S in u_held = S u, (6, n_dof)."""
+    """Return the fixed dofs of a nodal frame, (node, component), (6, 2), and S in u_fixed = S u, (6, n_dof)."""
     if frame.dofs is not None:
         return given_rows(body, frame)
     candidates = body.b if frame.at is None else body.interface(frame.at).dofs
@@ -219,7 +219,7 @@ def nodal_rows(body: FEBody, frame: NodalFrame) -> tuple[IntArray, sp.csr_array]
 
 
 def given_rows(body: FEBody, frame: NodalFrame) -> tuple[IntArray, sp.csr_array]:
-    """Return the dofs given by the user, after a check that they are six and hold the body."""
+    """Return the dofs given by the user, after checking that there are six and that they prevent rigid-body motion."""
     where = f"body {body.name!r}: nodal frame"
     held = checked_dofs(frame, where, body.numbering)
     rows = []
@@ -239,7 +239,7 @@ def given_rows(body: FEBody, frame: NodalFrame) -> tuple[IntArray, sp.csr_array]
 
 
 def checked_dofs(frame: NodalFrame, where: str, numbering: Numbering, index: IntArray | None = None) -> IntArray:
-    """Return the given dofs of a nodal frame as (node index, component), (6, 2), after a check of their form.
+    """Return the given dofs of a nodal frame as (node index, component), (6, 2), after checking their form.
 
     Parameters
     ----------
@@ -269,7 +269,7 @@ def checked_dofs(frame: NodalFrame, where: str, numbering: Numbering, index: Int
 
 
 def determinate_rows(points: Array, components: IntArray, where: str) -> IntArray:
-    """Choose six of the dofs (point, component) that just prevent rigid-body motion, ascending, (6,).
+    """Choose six of the dofs (point, component) that exactly prevent rigid-body motion, ascending, (6,).
 
     Pivoted QR of the rigid-body motions of the dofs about their mean, with rotations scaled by their radius. Only
     translations are used if they suffice.

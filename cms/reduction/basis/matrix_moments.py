@@ -1,4 +1,4 @@
-"""Canonical moments of a body made of bare matrices, from acceleration fields (docs/theory.md §5).
+"""Canonical moments of a body given only by matrices, from acceleration fields (docs/theory.md §5).
 
 A linear field u = E c has the nodal values (E c, rotation ½ curl). With nodal inertia, these rotations make the
 products below exact if the inertia is isotropic. Otherwise the result is labelled approximate.
@@ -16,8 +16,8 @@ from fe_models.foundation.tall.columns import in_memory
 
 __all__ = ["gram_from_matrices"]
 
-MASSLESS = 1e-12  #: inertia of a rigid motion, relative to the largest, below which it is rounding (masses on a line)
-ISOTROPIC = 1e-9  #: relative difference of the rigid mass matrix from m, S, J below which the body moves as masses do
+MASSLESS = 1e-12  #: inertia of a rigid motion over the largest one, below which it is rounding (masses on a line)
+ISOTROPIC = 1e-9  #: largest relative difference between the rigid mass matrix and that of m, S, J for an exact result
 
 
 def gram_from_matrices(body: FEBody, Phi: Array, origin: Array | None = None) -> Array:
@@ -41,7 +41,7 @@ def gram_from_matrices(body: FEBody, Phi: Array, origin: Array | None = None) ->
         (4 + 3 n_q, 4 + 3 n_q) in mesh axes.
     """
     at = np.zeros(3) if origin is None else origin
-    C = rigid_parts(body, in_memory(Phi), at)  # (0)
+    C = rigid_parts(body, in_memory(Phi), at)  # step (0)
     Psi_R = geometric_rigid_modes(body, origin=at)
     Phi = in_memory(Phi) - Psi_R @ C
     n = Phi.shape[1]
@@ -93,11 +93,11 @@ def gram_from_matrices(body: FEBody, Phi: Array, origin: Array | None = None) ->
 
 
 def rigid_parts(body: FEBody, Phi: Array, origin: Array) -> Array:
-    """Return the rigid motions [d; theta] of shapes that carry their momentum, about a point, (6, n_q).
+    """Return the rigid motions [d; theta] about a point that have the momentum of the shapes, (6, n_q).
 
-    They are zero where the mass matrix does not move rigidly as masses do, such as that of a body with held dofs.
+    They are zero if the mass matrix does not describe rigid motion, as for a body with fixed dofs.
     """
-    middle = body.nodes.mean(axis=0)  # about a point far away, the rotations would lose digits
+    middle = body.nodes.mean(axis=0)  # with a point far away, the rotations would lose digits
     Psi_R = geometric_rigid_modes(body, origin=middle)
     M_R = Psi_R.T @ (body.M @ Psi_R)
     m = np.trace(M_R[:3, :3]) / 3

@@ -27,7 +27,7 @@ __all__ = [
 
 
 def node_motion(body: FEBody, node: int) -> sp.csr_array | None:
-    """Return translation and rotation of a node as rows over u, (6, n_dof); None if it lacks some of the six."""
+    """Return translation and rotation of a node as rows over u, (6, n_dof); None if one of its six dofs is missing."""
     rows = np.flatnonzero((body.dofs[:, 0] == node) & (body.dofs[:, 1] >= 0))
     if len(rows) == 6:
         return sp.csr_array((np.ones(6), (body.dofs[rows, 1], rows)), shape=(6, body.n_dof))
@@ -54,12 +54,12 @@ def interface_node_motion(body: FEBody, interface: Interface) -> sp.csr_array | 
 
 
 class ReferenceMotion(NamedTuple):
-    """The motion of the reference point of an interface."""
+    """Motion of the reference point of an interface."""
 
     rows: sp.csr_array  #: translation and rotation of the point over the dofs of the body, mesh axes, (6, n_dof)
     point: Array  #: position of the point, (3,) [m]
     has_rotation: bool = True  #: whether the motion includes a rotation; otherwise rows 3-5 are zero
-    is_mean: bool = False  #: whether the point is no node of the body and follows the mean of several members
+    is_mean: bool = False  #: whether the point moves as the mean of several members because no node lies there
 
 
 def reference_motion(body: FEBody, interface: Interface) -> ReferenceMotion:
@@ -110,13 +110,13 @@ def translation_rows(body: FEBody, nodes: IntArray) -> sp.csr_array:
 
 
 def are_spread(points: Array) -> bool:
-    """Return whether the points are not collinear, so that their mean motion has a rotation."""
+    """Return whether the points are not collinear, so that a mean rotation exists."""
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     return bool(len(points) >= 3 and spread[1] > 1e-6 * spread[0])
 
 
 def mean_translation(weights: Array) -> Array:
-    """Return the matrix of the weighted mean translation of points, without rotation, (6, 3 n_points), node-major."""
+    """Return the matrix of the weighted mean translation of points, (6, 3 n_points), node-major, without rotation."""
     translation = np.kron(weights, np.eye(3))
     return np.vstack([translation, np.zeros_like(translation)])
 
@@ -125,7 +125,7 @@ def mean_translation(weights: Array) -> Array:
 
 
 def kept_points(body: FEBody, Phi: Array, axes: Array, row_of: IntArray) -> KeptPoints:
-    """Return the points that a body keeps with rotations.
+    """Return the kept points of a body, with their rotations.
 
     (1) if all three rotations of the node are dofs (beams, shells, leaders of rigid groups): these dofs
     (2) else, if the elements know the rotation: half the curl of the displacement
@@ -160,7 +160,7 @@ def kept_points(body: FEBody, Phi: Array, axes: Array, row_of: IntArray) -> Kept
 
 
 def rotations_of_dofs(body: FEBody, Phi: Array, u: Array, nodes: IntArray) -> tuple[Array, np.ndarray]:
-    """Return rotations that are dofs, (n, 3, n_q), zero for others, and which are dofs, (n, 3) bool.
+    """Return the rotation dofs, (n, 3, n_q), zero where there is none, and whether each is a dof, (n, 3) bool.
 
     A recovery row without entries gives no motion: that rotation had no stiffness and was removed from the model.
     """
@@ -182,7 +182,7 @@ def rotations_of_dofs(body: FEBody, Phi: Array, u: Array, nodes: IntArray) -> tu
 
 
 def node_weights(body: FEBody) -> Array:
-    """Return the weight of each node, (n_nodes,): its volume, or 1; 0 if it lacks a translation of its own.
+    """Return the weight of each node, (n_nodes,): its volume, or 1; 0 if a translation is not a dof of the node.
 
     Reference nodes of couplings have weight 0, because they represent no material.
     """
@@ -195,9 +195,9 @@ def node_weights(body: FEBody) -> Array:
 
 
 def weighted_rigid_modes(body: FEBody, origin: Array) -> Array | None:
-    """Return W Psi_R over the dofs of the body, (n_dof, 6); its product with columns gives their weighted sums.
+    """Return W Psi_R over the dofs of the body, (n_dof, 6); (W Psi_R)ᵀ u gives weighted sums of columns u.
 
-    None if there is no Buckens frame, because the nodes with three translations are too few or collinear.
+    None if there is no Buckens frame because too few nodes have three translations, or because they are collinear.
     """
     weights, dofs = node_weights(body), body.to_mesh.dofs
     used = weights > 0

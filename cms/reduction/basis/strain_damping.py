@@ -1,4 +1,4 @@
-"""Damping of strain patterns, which a part of a body has so that the whole body keeps its damping ratios.
+"""Damping of strain patterns: a part of a body gets such damping so that the whole body keeps its damping ratios.
 
 D = beta K + Σ_k d_k (K s_k)(K s_k)ᵀ, with patterns s_k of unit energy, s_kᵀ K s_l = 1 if k = l, else 0. Pattern k is
 damped as by (beta + d_k) K, all other strain as by beta K. D of a rigid-body motion is zero, because K of it
@@ -22,12 +22,12 @@ from fe_models.foundation.tall.columns import inner
 __all__ = ["StrainDamping", "read_strain_damping", "strain_damping_bytes"]
 
 KEYS = ("beta", "coefficients", "forces", "positions", "components", "units")
-SAME_PLACE = 1e-9  #: largest distance of a node from its position in the file, over the length of the body
+SAME_PLACE = 1e-9  #: largest distance between a node and its position in the file, relative to the body length
 
 
 @dataclass(frozen=True, eq=False)
 class StrainDamping:
-    """Damping of strain patterns of one coupled body, whose dofs it names by position and component.
+    """Damping of strain patterns of one coupled body. Positions and components identify its dofs.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class StrainDamping:
 
     @classmethod
     def of_body(cls, body: FEBody, beta: float, coefficients: Array, forces: Array) -> "StrainDamping":
-        """Make the damping of a coupled body."""
+        """Return the damping of a coupled body."""
         return cls(beta, coefficients, forces, body.nodes[body.dofs[:, 0]], body.dofs[:, 1], body.units.name)
 
     def reduced(self, body: FEBody, Phi: Array, K: Array) -> Array:
@@ -117,7 +117,7 @@ class StrainDamping:
 
 
 def strain_damping_bytes(damping: StrainDamping) -> bytes:
-    """Return the content of the .npz file of a damping."""
+    """Return the content of the .npz file of a strain damping."""
     buffer = io.BytesIO()
     arrays = {key: np.asarray(getattr(damping, key)) for key in KEYS}
     np.savez(buffer, allow_pickle=False, **arrays)
@@ -125,7 +125,7 @@ def strain_damping_bytes(damping: StrainDamping) -> bytes:
 
 
 def read_strain_damping(path: Path) -> StrainDamping:
-    """Read the file of a damping.
+    """Read a strain damping from its file.
 
     Raises
     ------

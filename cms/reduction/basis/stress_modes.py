@@ -11,16 +11,16 @@ from fe_models.foundation.tall.on_disk import is_on_disk, release, zeros_like
 
 __all__ = ["nodal_stress_modes", "point_stress_modes", "turned_stress"]
 
-FEWEST = 16  #: smallest number of columns processed at a time, for any body
-FEWEST_OF_RANKS = 4  #: the same for distributed columns, which belong to large bodies
+FEWEST = 16  #: smallest number of columns processed at a time
+FEWEST_OF_RANKS = 4  #: smallest number of distributed columns processed at a time; they belong to large bodies
 BYTES_AT_ONCE = 512e6  #: memory for the stress at all nodes, before the kept nodes are selected
 BYTES_FROM_DISK = (
-    64e6  #: the same if columns lie on disk or are distributed; with the columns themselves it takes five times as much
+    64e6  #: memory limit if columns lie on disk or are distributed; with the columns, five times as much is used
 )
 
 
 def nodal_stress_modes(body: FEBody, Phi: Array, nodes: IntArray, axes: Array) -> Array | None:
-    """Return the stress of the shapes at some nodes in the axes of B, (n, 6, n_q) [Pa per unit]; None if unknown.
+    """Return the stress of the shapes at given nodes in axes of B, (n, 6, n_q) [Pa per unit]; None if unknown.
 
     Parameters
     ----------
@@ -52,14 +52,14 @@ def nodal_stress_modes(body: FEBody, Phi: Array, nodes: IntArray, axes: Array) -
 
 
 def point_stress_modes(body: FEBody, points: StressPointModel, Phi: Array, frame: BodyFrame) -> PointStress:
-    """Return the stress of the shapes at the stress points of the body, in the frame B."""
+    """Return the stress of the shapes at the stress points of the body, in axes of B."""
     modes = points.stress(body.mesh_displacement(in_memory(Phi)))
     positions = (np.asarray(points.positions) - frame.origin) @ frame.axes
     return PointStress(points.names, positions, turned_stress(modes, frame.axes))
 
 
 def turned_stress(stress: Array, axes: Array) -> Array:
-    """Return stress components in other axes: Rᵀ sigma R, (n, 6, k), where R = axes has the new axes as columns."""
+    """Return stress components in rotated axes: Rᵀ sigma R, (n, 6, k), where R = axes has the new axes as columns."""
     if np.array_equal(axes, np.eye(3)):
         return np.asarray(stress)
     tensor = np.asarray(stress)[:, [[0, 5, 4], [5, 1, 3], [4, 3, 2]]]

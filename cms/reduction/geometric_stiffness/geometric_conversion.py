@@ -30,15 +30,15 @@ __all__ = ["converted_geometric_stiffness", "require_convertible"]
 
 log = logging.getLogger(__name__)
 
-OF_A_SHELL = re.compile(r"(^|: )shell \d+$")  #: key of the provenance for the thickness of a shell
+OF_A_SHELL = re.compile(r"(^|: )shell \d+$")  #: provenance key for the thickness of a shell
 
 
 @dataclass(frozen=True, eq=False)
 class Loads:
-    """k loads on a reduced body, in axes of its frame and about its origin."""
+    """Set of k loads on a reduced body, in axes of its frame and about its origin."""
 
     mass: MassLoads
-    wrenches: Array  #: force and moment at every loaded interface, (k, n_loaded, 6)
+    wrenches: Array  #: force and moment at each loaded interface, (k, n_loaded, 6)
     spread: Array  #: amplitudes of the loads distributed over the nodes, (k, 6); (k, 0) if the body has none
 
 
@@ -122,13 +122,13 @@ def converted_geometric_stiffness(
 
 
 def loaded_of(reduced: ReducedBody) -> list[ReducedInterface]:
-    """Return the interfaces whose loads are among the unit loads."""
+    """Return the interfaces whose wrenches are among the unit loads."""
     assert reduced.geometric is not None
     return [reduced.interfaces[k] for k in reduced.geometric.loaded]
 
 
 def warn_of_old_shells(reduced: ReducedBody) -> None:
-    """Warn that, in old files, a rotation does not exactly rotate the loads in shells."""
+    """Warn that, for bodies from old files, loads in shells do not rotate exactly with the frame."""
     if any(OF_A_SHELL.search(key) for key in reduced.provenance):
         log.warning(
             "body %r: its file is from before version 4 and it has shells, whose geometric stiffness in another frame "
@@ -137,7 +137,7 @@ def warn_of_old_shells(reduced: ReducedBody) -> None:
 
 
 def new_unit_loads(reduced: ReducedBody, p: Array, R: Array) -> Loads:
-    """Step (1): return loads in new axes about the new origin: per unit mass, unit wrenches, distributed over nodes."""
+    """Step (1): return new unit loads in new axes about the new origin: per unit mass, wrenches, distributed loads."""
     assert reduced.geometric is not None
     n, n_spread = len(reduced.geometric.interfaces), 0 if reduced.geometric.spread is None else 6
     k = 12 + 6 * n + n_spread
@@ -150,14 +150,14 @@ def new_unit_loads(reduced: ReducedBody, p: Array, R: Array) -> Loads:
 
 
 def placed_spread(p: Array, R: Array) -> Array:
-    """Return distributed loads e, e × (c - p) of other axes and origin as combinations of the old ones, (6, 6)."""
+    """Return distributed loads e, e × (c - p) of the new axes and origin in terms of the old ones, (6, 6)."""
     amounts = np.kron(np.eye(2), R.T)
     amounts[3:, :3] = -np.cross(R.T, p)
     return np.asarray(amounts, np.float64)
 
 
 def with_reaction(reduced: ReducedBody, loads: Loads, frame: BodyFrame) -> Loads:
-    """Step (2): return the loads together with the reaction that balances each."""
+    """Step (2): add to each load the reaction that balances it."""
     force, torque = resultants(reduced, loads)
     if frame.kind == "tisserand":
         m, S, J0 = reduced.moments.m, reduced.moments.S, reduced.moments.J0
@@ -191,7 +191,7 @@ def resultants(reduced: ReducedBody, loads: Loads) -> tuple[Array, Array]:
 
 
 def spread_resultants(reduced: ReducedBody) -> Array:
-    """Return force and torque about the origin of the six distributed loads, one row each, (6, 6)."""
+    """Return force and torque about the origin of the six distributed loads, one load in each row, (6, 6)."""
     sums = reduced.nodal_sums
     assert sums is not None
     center, R = sums.S / sums.w, sums.R / sums.w
@@ -200,7 +200,7 @@ def spread_resultants(reduced: ReducedBody) -> Array:
 
 
 def of_balanced(old: GeometricStiffness | RotatedLoads, loads: Loads, spread: Array | None) -> Array:
-    """Step (3): return the matrices of balanced loads over the old shapes, (k, ...), from those of the old unit loads.
+    """Step (3): return the matrices of balanced loads over the old shapes, (k, ...), from the old unit-load matrices.
 
     A c + b is a combination of the unit loads: b gives translations, the antisymmetric part of A gives rotations, and
     the symmetric part gives products of angular velocities, whose A is 1 - e_a e_aᵀ or -½ (e_a e_bᵀ + e_b e_aᵀ).
@@ -218,16 +218,16 @@ def of_balanced(old: GeometricStiffness | RotatedLoads, loads: Loads, spread: Ar
 
 
 def changed_rigid(reduced: ReducedBody, turned_rigid: Array, p: Array, R: Array) -> Array:
-    """Return `turned_rigid` for the distributed loads of the new frame, on rotations e_b × (c - p) about its origin."""
+    """Return `turned_rigid` for distributed loads of the new frame and rotations e_b × (c - p) about its origin."""
     forces = spread_resultants(reduced)[:, :3]
-    # e_x × F for each load, (6, 3, 3), which is its work on translations
+    # e_x × F for each load, (6, 3, 3): the work of the rotated load on translations
     turned = -np.cross(forces[:, None], np.eye(3))
     work = turned_rigid - turned @ np.cross(np.eye(3), p).T
     return np.einsum("ji,ixb->jxb", placed_spread(p, R), R.T @ work @ R)
 
 
 def turned_work(loads: Loads, C1: Array, P: Array, Psi: Array) -> Array:
-    """Return the work on shapes of the loads when rotated about each axis, (k, 3, n); moments count by half.
+    """Return the work of loads rotated about each axis on the shapes, (k, 3, n); moments contribute half of it.
 
     Parameters
     ----------
@@ -244,7 +244,7 @@ def turned_work(loads: Loads, C1: Array, P: Array, Psi: Array) -> Array:
 
 
 def rotation_moments(reduced: ReducedBody) -> tuple[Array, Array, Array]:
-    """Return C1, P and Psi of the three unit rotations e_k × c about the origin."""
+    """Return C1, P and Psi for the three unit rotations e_k × c about the origin."""
     e = np.stack([np.cross(axis, np.eye(3)).T for axis in np.eye(3)])  # e_k × c = e[k] c
     C1 = np.einsum("kab,b->ak", e, reduced.moments.S)
     P = np.einsum("kbc,ac->abk", e, reduced.moments.R)

@@ -87,8 +87,8 @@ def mean_second_order(points: Array, weights: Array, reference: Array, v: Array,
 # geometric reduction --------------------------------------------------------------------------------------------------
 
 
-COLLINEAR = 1e-12  #: members lie on a line if the second of their three spreads is smaller, relative to the largest
-LOADS_AT_ONCE = 60  #: number of loads whose mesh displacements are held at a time
+COLLINEAR = 1e-12  #: second largest spread of the members over the largest one, below which they count as collinear
+LOADS_AT_ONCE = 60  #: number of loads whose mesh displacements are in memory at a time
 
 
 def reduced_geometric_stiffness(body: FEBody | Families, Phi: Array, condition: FrameCondition) -> GeometricStiffness:
@@ -144,7 +144,7 @@ def elastic_part(body: FEBody, u: Array, mass: MassLoads, Phi: Array) -> Array:
     if body.recovery is None:
         return K
     T, dofs = body.recovery.matrix, body.recovery.dofs
-    nodes = dofs[_levers(T, dofs, body.dofs).row, 0]  # their translation follows a rotation
+    nodes = dofs[_levers(T, dofs, body.dofs).row, 0]  # nodes whose translation follows a rotation
     of_means = [dofs[np.unique(mean.follows.tocoo().row), 0] for mean in body.mean_nodes]
     asked = np.unique(np.concatenate([nodes, *of_means]))
     if not len(asked):
@@ -169,7 +169,7 @@ def mean_nodes_part(body: FEBody, forces: Array, Phi: Array) -> Array:
         points, weights = body.nodes[mean.members], np.asarray(mean.weights)
         x = points - weights @ points
         spread = np.linalg.eigvalsh(np.einsum("i,ia,ib->ab", weights, x, x))
-        if not spread[1] > COLLINEAR * spread[2]:  # their mean has no rotation
+        if not spread[1] > COLLINEAR * spread[2]:  # collinear members have no mean rotation
             continue
         rows = translation_rows(body, mean.members)
         v = rows_times(rows, Phi)
@@ -293,7 +293,7 @@ def link_work(T: sp.csr_array, row_dofs: IntArray, column_dofs: IntArray, forces
 
 
 def _levers(T: sp.csr_array, row_dofs: IntArray, column_dofs: IntArray) -> sp.coo_array:
-    """Return the entries that move a translation by a rotation."""
+    """Return the matrix entries by which a rotation moves a translation."""
     entries = sp.coo_array(T)
     row, column = row_dofs[entries.row, 1], column_dofs[entries.col, 1]
     chosen = (row >= 0) & (row < 3) & (column >= 3) & (entries.data != 0)

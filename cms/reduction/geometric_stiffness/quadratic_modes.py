@@ -1,4 +1,4 @@
-"""Quadratic modes: second-order displacement of every kept node in q, such as the shortening of a bent beam.
+"""Quadratic modes: second-order displacement of each kept node in terms of q, such as the shortening of a bent beam.
 
     r = c + Phi q + ½ Σ q_k q_l g_kl
 
@@ -27,7 +27,7 @@ MOST_NUMBERS = 2.5e7  #: largest number of values of the field, 200 MB
 
 
 def quadratic_modes(source: FEBody | Families, Phi: Array, condition: FrameCondition, nodes: IntArray) -> Array:
-    """Return g at some nodes in the frame B, (n_nodes, 3, n_q, n_q), symmetric in the modes [m per q²].
+    """Return the quadratic modes g at given nodes in frame B, (n_nodes, 3, n_q, n_q), symmetric [m per q²].
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def force_stiffness(
         Along the axes of B, node by node, one load a column, (3 n_nodes, k). Each costs a static solution.
     """
     axes = condition.frame.axes
-    # components in mesh axes, node by node
+    # force components in mesh axes, node by node
     along_b = np.einsum("ab,nbk->nak", axes, forces.reshape(len(nodes), 3, -1)).reshape(3 * len(nodes), -1)
     on_dofs = np.asarray(translation_rows(body, nodes).T @ along_b)
     loads = balanced(body, together(body, MassLoads.none(on_dofs.shape[1]), on_dofs), condition)

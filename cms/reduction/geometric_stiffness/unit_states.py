@@ -1,4 +1,4 @@
-"""Unit loads of a body, balanced by the frame, and their static states, for the geometric stiffness (theory.md §7).
+"""Unit loads of a body, balanced by the frame reaction, and their static states (theory.md §7).
 
 Loads per unit mass, about the origin and along the axes of the frame B: -e_a for the acceleration of the origin, -e_a ×
 c for the angular acceleration, -½ [e_a × (e_b × c) + e_b × (e_a × c)] for products of angular velocities. Then a unit
@@ -33,24 +33,24 @@ __all__ = [
 ]  # fmt: skip
 
 
-#: remainder of a load, relative to the load, that counts as zero, because the support carries all of it
+#: size of a balanced load over the original load, below which the support carries all of it
 BALANCED = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class UnitLoads:
-    """Loads per unit mass and loads on dofs; load j is the sum of both."""
+    """Loads per unit mass and loads on dofs; load j has a part of each kind."""
 
-    mass: MassLoads  #: k loads
+    mass: MassLoads  #: k loads per unit mass
     on_dofs: Array  #: over the dofs of the body, (n_dof, k) [N, N m]
-    F: Array  #: sum of both over the dofs of the body, (n_dof, k)
-    is_zero: np.ndarray  #: whether the remaining load is zero, (k,) bool
+    F: Array  #: total load on the dofs of the body, (n_dof, k)
+    is_zero: np.ndarray  #: whether the balanced load is zero, (k,) bool
 
 
 def unit_loads(
     body: FEBody, frame: BodyFrame, interfaces: Sequence[Interface], spread: Array | None = None
 ) -> UnitLoads:
-    """Return the 12 loads per unit mass, then six for each of these interfaces, then the given ones, (n_dof, 6)."""
+    """Return the 12 loads per unit mass, then six for each given interface, then the distributed loads, (n_dof, 6)."""
     turn = np.kron(np.eye(2), frame.axes)
     columns = [reference_motion(body, interface).rows.T @ turn for interface in interfaces]
     on_dofs = np.hstack([np.zeros((body.n_dof, 12)), *columns, *([] if spread is None else [spread])])
@@ -62,7 +62,7 @@ def unit_mass_loads(frame: BodyFrame, n_more: int = 0) -> MassLoads:
 
     `n_more` loads of zero follow, for loads that do not act on the mass.
     """
-    e = frame.axes.T  # e[a]: axis a of B
+    e = frame.axes.T  # e[a] is axis a of B
     A, b = np.zeros((12 + n_more, 3, 3)), np.zeros((12 + n_more, 3))
     b[:3] = -e
     for a in range(3):
@@ -93,7 +93,7 @@ def balanced(body: FEBody, loads: UnitLoads, condition: FrameCondition) -> UnitL
 
 
 def together(body: FEBody, mass: MassLoads, on_dofs: Array) -> UnitLoads:
-    """Return both kinds of loads, and their sum over the dofs of the body."""
+    """Combine loads per unit mass and loads on dofs, and compute their sum over the dofs of the body."""
     assert body.element_model is not None
     on_mesh = body.element_model.mass_forces(mass)
     F = on_dofs + (on_mesh if body.recovery is None else body.recovery.matrix.T @ on_mesh)
@@ -134,12 +134,12 @@ class UnitStates:
     condition: FrameCondition  #: the frame condition, which is also the support of all loads
     mass: MassLoads  #: k loads per unit mass
     on_dofs: Array  #: loads on the dofs of the body, (n_dof, k) [N, N m]
-    loaded: IntArray  #: indices of the loads that are not zero, (n_loaded,)
-    u: Array  #: responses to the loaded ones, up to a rigid motion, (n_dof, n_loaded)
+    loaded: IntArray  #: indices of the nonzero loads, (n_loaded,)
+    u: Array  #: response to each nonzero load, up to a rigid motion, (n_dof, n_loaded)
     #: the last six loads before balancing, (w_i/w) e_a and (w_i/w) e_a × c_i over the nodes, axes and origin of B,
     #: (n_dof, 6); None: not requested, or there is no Buckens frame
     spread: Array | None
-    interfaces: tuple[Interface, ...]  #: interfaces whose loads are included
+    interfaces: tuple[Interface, ...]  #: interfaces whose unit wrenches are included
 
 
 def unit_states(
@@ -190,12 +190,12 @@ def unit_states(
 
 
 def has_geometric_stiffness(body: FEBody) -> bool:
-    """Return whether the elements of the body know their geometric stiffness."""
+    """Return whether all elements of the body can compute their geometric stiffness."""
     return not body.is_held and body.element_model is not None and body.element_model.has_geometric_stiffness
 
 
 def require_geometric_stiffness(body: FEBody) -> None:
-    """Raise `BodyError` unless the elements know their geometric stiffness."""
+    """Raise `BodyError` unless the elements can compute their geometric stiffness."""
     if not has_geometric_stiffness(body):
         raise BodyError(
             f"body {body.name!r}: geometric stiffness needs the elements, and it came without them (bare matrices); "
@@ -205,7 +205,7 @@ def require_geometric_stiffness(body: FEBody) -> None:
 
 
 def static_states(families: Families, F: Array) -> Array:
-    """Return the response to balanced loads with R held, (n_dof, k). Unlike P, this needs no inertia.
+    """Return the response to balanced loads with the dofs R fixed, (n_dof, k). Unlike P, this needs no inertia.
 
     v = K_II⁻¹ f_I;  S_ee z_e = (f_h - K_hI v)_e with z = 0 at R;  u = v + Psi_C z.
     """

@@ -10,7 +10,7 @@ from fe_models.foundation.units import Dimensions
 
 __all__ = ["Block", "RowName"]
 
-FORCES_OF_PLACES = ("interface force", "net force")  #: quantities whose name includes the kind of object
+FORCES_OF_PLACES = ("interface force", "net force")  #: quantities whose labels omit the kind of entity
 
 
 @dataclass(frozen=True)
@@ -18,8 +18,8 @@ class RowName:
     """Name of a recovery row."""
 
     quantity: str
-    entity: str  #: "node", "element", "interface", "point" or "body"
-    number: int  #: number of the node or element; -1 if it only has a name
+    entity: str  #: kind of entity: "node", "element", "interface", "point" or "body"
+    number: int  #: number of the node or element; -1 if it has only a name
     place: str  #: number or name of the place, such as "17" or "tip"; "" for the body
     component: str
     dimensions: Dimensions

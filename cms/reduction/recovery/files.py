@@ -118,7 +118,7 @@ def write_recovery(
 
 
 def chosen(body: ReducedBody, name: str | None) -> RecoveryTable:
-    """Return the table of that name, or the only table."""
+    """Return the table with this name, or the only table."""
     known = list(body.recovery)
     if not known:
         raise RecoveryError(
@@ -183,7 +183,7 @@ def arrays_of(content: _Content) -> dict[str, Any]:
 
 
 def npz_files(path: Path, content: _Content) -> Files:
-    """Return a NumPy archive; texts are arrays of fixed length, and nothing is pickled."""
+    """Return a NumPy archive; texts are arrays of fixed length, without pickled objects."""
     buffer = io.BytesIO()
     arrays: dict[str, Any] = {
         name: np.array(value, dtype=str) if isinstance(value, tuple) else value
@@ -210,7 +210,7 @@ def mat_files(path: Path, content: _Content) -> Files:
 
 
 def op4_files(path: Path, content: _Content) -> Files:
-    """Return OUTPUT4 with names of eight characters, and two tables with the names of rows and columns."""
+    """Return an OUTPUT4 file with matrix names of eight characters, and two tables that name rows and columns."""
     matrices = {OP4_NAMES[name]: matrix for name, matrix in {**content.matrices, **content.equations}.items()}
     kept = {name: matrix for name, matrix in matrices.items() if matrix.size and np.any(matrix)}
     rows, columns = (path.with_name(f"{path.stem}_{what}.csv") for what in ("rows", "columns"))
@@ -251,7 +251,7 @@ def column_words(content: _Content) -> list[tuple[str, int, str, str]]:
 
 
 def csv_files(path: Path, content: _Content) -> Files:
-    """Return one table: names, number and unit of each row, then its entries; zero matrices are left out."""
+    """Return one table: names, number and unit of each row, then its entries; zero matrices are omitted."""
     table: dict[str, Any] = dict(Table.of_rows(ROW_HEAD, row_words(content.table)).columns)
     table_units: dict[str, str] = {}
     left: list[str] = []
@@ -278,7 +278,7 @@ RECOVERY_FORMATS: dict[str, Callable[[Path, _Content], Files]] = {
     ".mat": mat_files,
     ".op4": op4_files,
     ".csv": csv_files,
-}  #: by suffix
+}  #: writer of each file suffix
 
 
 # craig-Bampton matrices of a reduced body with its rigid part, and recovery rows over the same coordinates ------------
@@ -296,14 +296,14 @@ class InterfaceRows:
     """Rows over (u_b, eta): `displacement` @ y + `velocity` @ y' + `acceleration` @ y'' + `load` @ p."""
 
     table: RecoveryTable  #: table of the rows: labels, quantities, units
-    displacement: Array  #: (n_rows, n_b + n_modes)
-    velocity: Array  #: (n_rows, n_b + n_modes)
-    acceleration: Array  #: (n_rows, n_b + n_modes)
-    loads: tuple[str, ...]  #: loads of the table that do not act at interfaces
-    load: Array  #: (n_rows, n_loads)
+    displacement: Array  #: factor of y, (n_rows, n_b + n_modes)
+    velocity: Array  #: factor of the first derivative of y, (n_rows, n_b + n_modes)
+    acceleration: Array  #: factor of the second derivative of y, (n_rows, n_b + n_modes)
+    loads: tuple[str, ...]  #: loads of the table, except those at interfaces
+    load: Array  #: response of the rows to unit load amplitudes, (n_rows, n_loads)
 
     def values(self, y: Array, y_dot: Array, y_ddot: Array, p: Array | None = None) -> Array:
-        """Return the rows, (..., n_rows), for motions, (..., n_b + n_modes), and amplitudes, (..., n_loads)."""
+        """Return row values, (..., n_rows), for motions, (..., n_b + n_modes), and load amplitudes, (..., n_loads)."""
         total = y @ self.displacement.T + y_dot @ self.velocity.T + y_ddot @ self.acceleration.T
         return np.asarray(total if p is None else total + np.asarray(p) @ self.load.T)
 
@@ -311,7 +311,7 @@ class InterfaceRows:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class CraigBampton:
-    """Mass, stiffness and damping over (u_b, eta), and rigid motions in these coordinates.
+    """Mass, stiffness and damping over (u_b, eta), and the rigid motions in these coordinates.
 
     Parameters
     ----------
@@ -362,7 +362,7 @@ class CraigBampton:
         return np.asarray(np.sqrt(omega2) / (2 * np.pi))
 
     def recover(self, table: RecoveryTable | str) -> InterfaceRows:
-        """Return the rows of a table over (u_b, eta); interface loads are replaced by the equations of motion.
+        """Return the rows of a table over (u_b, eta); the equations of motion replace interface loads.
 
         Parameters
         ----------
@@ -395,9 +395,9 @@ class CraigBampton:
         return InterfaceRows(table, position, rate, acceleration, loads, load)
 
     def _split(self, table: RecoveryTable, T: Array) -> tuple[Array, list[int], Array]:
-        """Return the static part over f_b, the other columns, and the forces of the other loads on y, (n, n_other).
+        """Return the part that is static in f_b, the other columns, and the forces of other loads on y, (n, n_other).
 
-        A wrench at an interface acts on its single node, in axes of B.
+        A wrench at an interface acts on the single node of the interface, in axes of B.
         """
         A = self.body.frame.axes
         turn = np.kron(np.eye(2), A.T)
@@ -456,7 +456,7 @@ def boundary_words(model: InterfaceModel) -> tuple[str, ...]:
 
 
 def boundary_motion(model: InterfaceModel, about: Array) -> Array:
-    """Return the boundary dofs under the six rigid motions about a point, mesh axes, (n_b, 6)."""
+    """Return the boundary dofs in the six rigid motions about a point, mesh axes, (n_b, 6)."""
     rows = [np.zeros((0, 6))]
     for node in model.nodes:
         motion = np.vstack([rigid_motion_of_points(node.position[None], about)[0], np.eye(6)[3:]])

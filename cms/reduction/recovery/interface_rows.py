@@ -32,14 +32,14 @@ FORCE, MOMENT = Dimensions(1, 1, -2), Dimensions(1, 2, -2)
 
 @dataclass(frozen=True, eq=False)
 class PartOfTable:
-    """Some rows of a table, with their coefficients."""
+    """Some rows of a recovery table, with their coefficients."""
 
     names: tuple[RowName, ...]
-    dynamic: Array  #: (3, n_rows, 6 + n_q)
-    static: Array  #: (n_rows, n_loads)
+    dynamic: Array  #: factors of z and its first and second derivatives, (3, n_rows, 6 + n_q)
+    static: Array  #: response to unit load amplitudes, (n_rows, n_loads)
 
     def over(self, Z: Array | None) -> "PartOfTable":
-        """Return the rows over combinations of the modes, the columns of Z, (n_q, k); None: unchanged."""
+        """Return the rows over other modes, given by the columns of Z, (n_q, k); None keeps the modes."""
         if Z is None:
             return self
         dynamic = np.concatenate([self.dynamic[..., :N_RIGID], self.dynamic[..., N_RIGID:] @ Z], axis=2)
@@ -47,7 +47,7 @@ class PartOfTable:
 
 
 def interface_part(body: ReducedBody, rows: Rows, loads: LoadColumns, forces: Array) -> PartOfTable:
-    """Return rows of interface forces or of a net force, in mesh axes.
+    """Return rows of forces at single interfaces, or of the net force of several, in mesh axes.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def interface_part(body: ReducedBody, rows: Rows, loads: LoadColumns, forces: Ar
 
 
 def single_forces(body: ReducedBody, others: Array) -> tuple[tuple[BoundaryNode, ...], Array, Array]:
-    """Return the interface nodes, and the rows of f_b, (3, n_b, 6 + n_q) and (n_b, n_loads)."""
+    """Return the interface nodes, and the rows of f_b: (3, n_b, 6 + n_q) over z, (n_b, n_loads) over loads."""
     try:
         model = interface_model(body)
     except ExportError as error:
@@ -97,7 +97,7 @@ def single_forces(body: ReducedBody, others: Array) -> tuple[tuple[BoundaryNode,
 
 
 def node_words(nodes: tuple[BoundaryNode, ...]) -> list[str]:
-    """Return the names of interface nodes: the interface, with a counter if it has several nodes."""
+    """Return the names of interface nodes: the interface name, with a counter if it has several nodes."""
     names = [node.interface for node in nodes]
     count = dict.fromkeys(names, 0)
     words = []
@@ -108,7 +108,7 @@ def node_words(nodes: tuple[BoundaryNode, ...]) -> list[str]:
 
 
 def net_part(body: ReducedBody, rows: Rows, others: Array) -> PartOfTable:
-    """Return force and moment of all or some interfaces together about a point, mesh axes."""
+    """Return the resultant force and moment of all or some interfaces about a point, mesh axes."""
     about = np.asarray(rows.about, dtype=float)
     if rows.at or body.is_held:
         nodes, dynamic, static = single_forces(body, others)
@@ -133,7 +133,7 @@ def net_part(body: ReducedBody, rows: Rows, others: Array) -> PartOfTable:
 
 
 def wrench_about(node: BoundaryNode, about: Array) -> Array:
-    """Return the map from the forces of a boundary node to force and moment about a point, (6, n_components)."""
+    """Return the map from forces at a boundary node to force and moment about a point, (6, n_components)."""
     motion = np.zeros((6, 6))
     motion[:3] = rigid_motion_of_points(node.position[None], about)[0]
     motion[3:, 3:] = np.eye(3)
@@ -141,7 +141,7 @@ def wrench_about(node: BoundaryNode, about: Array) -> Array:
 
 
 def carried_wrench(body: ReducedBody, about: Array) -> Array:
-    """Return the map from force and torque about the origin of B, axes of B, to those about a point, mesh axes."""
+    """Return the map from force and torque in B about its origin to those in mesh axes about a point, (6, 6)."""
     A = body.frame.axes
     to_point = np.kron(np.eye(2), A)
     arm = body.frame.origin - about

@@ -56,7 +56,7 @@ def kept_part(body: ReducedBody, rows: Rows, loads: LoadColumns) -> PartOfTable:
 
 
 def motion_rows(body: ReducedBody, rows: Rows, order: int, loads: LoadColumns) -> tuple[list[RowName], Array, Array]:
-    """Return motions over z in mesh axes; accelerations also have the part omega × (omega × c) of a spin."""
+    """Return motions as rows over z in mesh axes; accelerations include the part omega × (omega × c) due to spin."""
     A = body.frame.axes
     names: list[RowName] = []
     values, static = [np.zeros((0, N_RIGID + body.n_q))], [np.zeros((0, len(loads.names)))]
@@ -123,7 +123,7 @@ def stress_rows(body: ReducedBody, rows: Rows) -> tuple[list[RowName], Array]:
 
 
 def kept_nodes(body: ReducedBody, at: str | int, *, skin: bool = False) -> IntArray:
-    """Return the rows of a kept node given by number, of a set, or of the members of an interface.
+    """Return the rows of the kept nodes that a node number, a set or an interface selects.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def kept_nodes(body: ReducedBody, at: str | int, *, skin: bool = False) -> IntAr
 
 
 def name_of(body: ReducedBody, row: int) -> str:
-    """Return the name of a kept node; a skin point is named by its node and its index among the kept points there."""
+    """Return the name of a kept node. A skin point is named by its node and its index among the skin points there."""
     numbering, name = body.numbering, body.node_name(row)
     if numbering.on_skin.size and numbering.on_skin[row]:
         same = np.flatnonzero((numbering.nodes == numbering.nodes[row]) & (numbering.on_skin == 1))
@@ -168,5 +168,5 @@ def number_of(body: ReducedBody, row: int) -> int:
 
 
 def rotation_of(body: ReducedBody, row: int) -> Array | None:
-    """Return the rotation of a kept node in B, (3, n_q); None if the body does not know it."""
+    """Return the rotation of a kept node, (3, n_q), in B; None if the body does not store it."""
     return None if body.kept is None else body.kept.of_node(row)

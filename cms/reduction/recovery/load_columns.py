@@ -50,7 +50,7 @@ class LoadColumns:
 
 
 class _Columns:
-    """Collects the names, dimensions and flags of loads."""
+    """Collector of names, dimensions and flags of loads."""
 
     def __init__(self) -> None:
         self.names: list[str] = []
@@ -69,7 +69,7 @@ class _Columns:
 
 
 def loads_of_body(body: ReducedBody) -> tuple[LoadColumns, Array]:
-    """Return the loads that a reduced body knows, and their forces on z, (6 + n_q, n_loads).
+    """Return the loads that a reduced body can represent, and their forces on z, (6 + n_q, n_loads).
 
     Spin is left out if the moments for its inertia forces are missing.
     """
@@ -94,7 +94,7 @@ def loads_of_body(body: ReducedBody) -> tuple[LoadColumns, Array]:
 
 
 def forces_of_loads(body: ReducedBody, names: Sequence[str]) -> Array:
-    """Return the forces on z of named loads, (6 + n_q, n): loads that the body knows, or loads at kept nodes.
+    """Return the forces of named loads on z, (6 + n_q, n): loads stored in the body, or forces at kept nodes.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def forces_of_loads(body: ReducedBody, names: Sequence[str]) -> Array:
 
 
 def node_force(body: ReducedBody, name: str) -> Array:
-    """Return the force on z of a load "node 17 fx" at a kept node, in axes of B, (6 + n_q,)."""
+    """Return the force on z due to a load such as "node 17 fx" at a kept node, in axes of B, (6 + n_q,)."""
     place, _, word = name.rpartition(" ")
     node = place.removeprefix("node ")
     flags = body.numbering.on_skin
@@ -135,7 +135,7 @@ def node_force(body: ReducedBody, name: str) -> Array:
 
 
 def spin_forces(body: ReducedBody) -> Array:
-    """Return the forces on z of the loads A c of `unit_mass_loads`, unit amplitude, (6 + n_q, 6)."""
+    """Return the forces on z due to the loads A c of `unit_mass_loads` with unit amplitude, (6 + n_q, 6)."""
     moments = body.moments
     columns = []
     for A in unit_mass_loads(BodyFrame("", np.zeros(3))).A[6:]:
@@ -146,7 +146,7 @@ def spin_forces(body: ReducedBody) -> Array:
 
 
 def on_q_alone(forces: Array, *, held: bool) -> Array:
-    """Return forces on z; for a held body, those on the rigid motions, which it does not have, are zero."""
+    """Return forces on z; for a body fixed to the ground, the forces on the rigid motions are zero."""
     forces = np.array(forces)
     if held:
         forces[:N_RIGID] = 0.0
@@ -154,7 +154,7 @@ def on_q_alone(forces: Array, *, held: bool) -> Array:
 
 
 def loads_of_model(body: FEBody, frame: BodyFrame, request: RecoveryRequest) -> tuple[LoadColumns, Array]:
-    """Return the loads on a finite element body, and their forces over its dofs, (n_dof, n_loads)."""
+    """Return the loads on a finite element body, and their forces on its dofs, (n_dof, n_loads)."""
     columns, forces = _Columns(), []
     turn = np.kron(np.eye(2), frame.axes)
     columns.add(GRAVITY, (ACCELERATION,) * 3)
@@ -184,14 +184,14 @@ def loads_of_model(body: FEBody, frame: BodyFrame, request: RecoveryRequest) -> 
 
 
 def nodes_of_loads(body: FEBody, requests: Iterable[RecoveryRequest]) -> IntArray:
-    """Return the nodes in `loads_at`, (n,); the reduced body keeps them to compute the work of the loads."""
+    """Return the nodes in `loads_at`, (n,). The reduced body keeps them so that it knows the work of these loads."""
     places = Places(body)
     found = [places.nodes(at) for request in requests for at in request.loads_at]
     return np.concatenate([np.zeros(0, np.int64), *found])
 
 
 def on_coordinates(body: ReducedBody) -> tuple[Array, Array, Array]:
-    """Return M, D and K over z = (d, theta, q), (6 + n_q, 6 + n_q) each; zero for rigid motions of a held body."""
+    """Return M, D and K over z = (d, theta, q), (6 + n_q, 6 + n_q) each; a fixed body has zeros for rigid motions."""
     M, K, D, _ = free_matrices(body)
     if not body.is_held:
         return M, D, K
@@ -204,6 +204,6 @@ def on_coordinates(body: ReducedBody) -> tuple[Array, Array, Array]:
 
 
 def rigid_rows(body: ReducedBody) -> Array:
-    """Return the matrix from accelerations of z to force and torque about the origin of B, (6, 6 + n_q)."""
+    """Return the matrix that maps accelerations of z to force and torque about the origin of B, (6, 6 + n_q)."""
     Y, M_R = rigid_mass(body.moments)
     return np.hstack([M_R, Y])

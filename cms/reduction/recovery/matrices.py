@@ -1,4 +1,4 @@
-"""Recovery tables of a reduced body, from its own data, or from its finite element model during the reduction.
+"""Recovery tables of a reduced body, computed from its own data or, during the reduction, from its FE model.
 
 For every row R over the dofs of the model (docs/theory.md §11):
 
@@ -44,7 +44,7 @@ OF_BODY = (
 def recovery_matrices(
     body: ReducedBody, requests: RecoveryRequest | Iterable[RecoveryRequest]
 ) -> Mapping[str, RecoveryTable]:
-    """Return tables of the rows that a reduced body knows without its model.
+    """Return recovery tables with the rows that a reduced body can compute without its FE model.
 
     These are motions and stress of kept nodes, motions of interfaces, interface forces and net forces. The static part
     of displacement and stress that the modes lack is missing. `reduce(..., recovery=requests)` adds it, and offers the
@@ -128,7 +128,7 @@ def recovery_of_model(
     *,
     over: Array | None = None,
 ) -> Mapping[str, RecoveryTable]:
-    """Return the tables of a body during its reduction.
+    """Compute the recovery tables of a body during its reduction.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def recovery_of_model(
 
 
 def residual_response(families: Families, condition: FrameCondition, Phi: Array, K: Array, F: Array) -> Array:
-    """Return the static response to load columns that the modes lack, (n_dof, k): steps (2) and (3)."""
+    """Return the part of the static response to load columns outside the modes, (n_dof, k): steps (2) and (3)."""
     if condition.Psi_R.shape[1]:
         F = F - condition.W @ np.linalg.solve(condition.Psi_R.T @ condition.W, condition.Psi_R.T @ F)
     u = families.static(F)
@@ -208,7 +208,7 @@ def part_of_block(block: Block, columns: Array, width: int, reduced: ReducedBody
 
 
 def spin_part(places: tuple[Array, Array], reduced: ReducedBody, loads: LoadColumns) -> Array:
-    """Return the acceleration omega × (omega × c) of rows at positions in directions, (n_rows, n_loads)."""
+    """Return the acceleration omega × (omega × c) at positions along given directions, (n_rows, n_loads)."""
     static = np.zeros((len(places[0]), len(loads.names)))
     if SPIN[0] in loads.names:
         first = loads.column(SPIN[0])

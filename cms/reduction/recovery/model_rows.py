@@ -20,7 +20,8 @@ from fe_models.foundation.words import nearest, quoted
 __all__ = ["chosen_components", "model_block", "node_rows"]
 
 STRESS, STRAIN = Dimensions(1, -1, -2), Dimensions()
-COLUMNS_AT_ONCE = 16  #: the stress is computed at all nodes before the requested nodes are selected
+#: number of columns per block; stress is computed at all nodes before the requested nodes are selected
+COLUMNS_AT_ONCE = 16
 
 
 def model_block(body: FEBody, rows: Rows) -> Block:
@@ -90,7 +91,7 @@ def motion_block(body: FEBody, rows: Rows) -> Block:
 
 
 def node_rows(body: FEBody, node: int) -> tuple[sp.csr_array, IntArray]:
-    """Return the motion of a node as rows over the dofs, (n, n_dof), and its components, (n,).
+    """Return the motion of a node as rows over the dofs, (n, n_dof), and the components, (n,).
 
     They come from the mesh if it contains the node, else from the dofs of the body. Rotations that no dof moves are
     left out.
@@ -145,7 +146,7 @@ def stress_block(body: FEBody, rows: Rows) -> Block:
 
 
 def strain_values(body: FEBody, nodes: IntArray) -> Callable[[Array], Array]:
-    """Return the strain as a function of displacement columns, (6 n_nodes, k)."""
+    """Return a function that maps displacement columns to strain, (6 n_nodes, k)."""
 
     def values(u: Array) -> Array:
         parts = []
@@ -158,7 +159,7 @@ def strain_values(body: FEBody, nodes: IntArray) -> Callable[[Array], Array]:
 
 
 def stress_values(body: FEBody, nodes: IntArray, points: list[int]) -> Callable[[Array], Array]:
-    """Return the stress as a function of displacement columns, (6 (n_nodes + n_points), k)."""
+    """Return a function that maps displacement columns to stress, (6 (n_nodes + n_points), k)."""
     wanted = np.unique(nodes)
 
     def values(u: Array) -> Array:
@@ -179,7 +180,7 @@ def stress_values(body: FEBody, nodes: IntArray, points: list[int]) -> Callable[
 
 
 def stressed_nodes(body: FEBody, places: Places, at: str | int, nodes: IntArray) -> IntArray:
-    """Return the nodes that have stress when the body deforms, without reference nodes and beam axes.
+    """Return the nodes at which deformation causes stress, without reference nodes and nodes of beam axes.
 
     Raises
     ------
@@ -204,7 +205,7 @@ def stressed_nodes(body: FEBody, places: Places, at: str | int, nodes: IntArray)
 
 
 def element_block(body: FEBody, rows: Rows) -> Block:
-    """Return forces, strains or stress of elements; a name among the places is a part or a cell type."""
+    """Return forces, strains or stresses of elements; a place may be the name of a part or a cell type."""
     groups = [group for group in element_groups(body) if group.quantity == rows.quantity]
     if not groups:
         known = tuple(dict.fromkeys(group.quantity for group in element_groups(body)))
@@ -228,7 +229,7 @@ def element_block(body: FEBody, rows: Rows) -> Block:
 
 
 def elements_of(body: FEBody, rows: Rows, groups: list[ElementGroup]) -> list[tuple[ElementGroup, IntArray]]:
-    """Return the requested elements of each group, in their order: all, by name or number, by set or part.
+    """Return the requested elements of each group, in their order, selected by name, number, set or part.
 
     If elements have no numbers, a number is an index into the only group.
     """

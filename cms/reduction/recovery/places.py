@@ -11,22 +11,22 @@ __all__ = ["Places"]
 
 
 class Places:
-    """Look-up of the places of one body for which rows are requested."""
+    """Look-up of the places at which rows of one body are requested."""
 
     def __init__(self, body: FEBody) -> None:
         self.body = body
         self.point_names: tuple[str, ...] = () if body.stress_points is None else tuple(body.stress_points.names)
 
     def interface(self, at: str | int) -> Interface | None:
-        """Return the interface of that name; None if there is none."""
+        """Return the interface with this name; None if there is none."""
         return next((interface for interface in self.body.interfaces if interface.name == at), None)
 
     def points(self, at: str | int) -> list[int]:
-        """Return the stress points with that name, or whose names begin with these words."""
+        """Return the stress points with this name, or those whose names begin with these words."""
         return [k for k, name in enumerate(self.point_names) if name == at or name.startswith(f"{at} ")]
 
     def nodes(self, at: str | int, *, skin: bool = False) -> IntArray:
-        """Return the rows of a node given by number, of a set, or of the members of an interface.
+        """Return the rows of the nodes that a node number, a set or an interface selects.
 
         Parameters
         ----------
@@ -57,7 +57,7 @@ class Places:
         return rows if skin else rows[:1]
 
     def _named(self, at: str, where: str, skin: bool) -> IntArray:
-        """Return the rows of a set, an interface or "INSTANCE.number"."""
+        """Return the rows of the nodes in a set or an interface, or of the node "INSTANCE.number"."""
         numbering = self.body.numbering
         interface = self.interface(at)
         if interface is not None:
@@ -76,7 +76,7 @@ class Places:
         raise RecoveryError(f"{where}: no node set or interface {quoted(at)}{nearest(at, choices)}")
 
     def word(self, node: int) -> str:
-        """Return the name of a node; a skin point is named by its node and its index among the points there."""
+        """Return the name of a node. A skin point is named by its node and its index among the skin points there."""
         numbering = self.body.numbering
         name = numbering.node_name(node)
         if numbering.on_skin.size and numbering.on_skin[node]:

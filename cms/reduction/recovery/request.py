@@ -11,7 +11,8 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["OF_ELEMENTS", "OF_NODES", "QUANTITIES", "RecoveryRequest", "Rows", "motion_dimensions"]
 
-OF_MOTION = ("displacement", "velocity", "acceleration")  #: in the order of the time derivatives of z
+#: quantities of motion, in the order of the time derivatives of z
+OF_MOTION = ("displacement", "velocity", "acceleration")
 OF_NODES = (*OF_MOTION, "stress", "strain")
 OF_ELEMENTS = (
     "beam force", "shell resultant", "spring force", "beam strain", "shell strain", "element stress", "element strain",
@@ -26,7 +27,7 @@ Place = str | int
 @dataclass(frozen=True)
 @checked_fields(ArgumentError)
 class Rows:
-    """Rows of one quantity at some places.
+    """Rows of one quantity at given places.
 
     Parameters
     ----------
@@ -71,7 +72,7 @@ class Rows:
 @dataclass(frozen=True)
 @checked_fields(ArgumentError)
 class RecoveryRequest:
-    """Rows of one table, in their order, and further loads for their static part.
+    """Ordered rows of one table, and additional loads whose static response it includes.
 
     Parameters
     ----------
@@ -100,5 +101,5 @@ class RecoveryRequest:
 
 
 def motion_dimensions(order: int, component: str) -> Dimensions:
-    """Return the dimensions of a displacement, velocity or acceleration; of rotations for "rx" to "rz"."""
+    """Return the dimensions of a displacement, velocity or acceleration; components "rx" to "rz" are rotations."""
     return Dimensions(0.0, 0.0 if component.startswith("r") else 1.0, -float(order))
