@@ -17,14 +17,14 @@ from fe_models.foundation.words import quoted
 __all__ = ["KINDS_OF_ADDRESS", "Address", "FoundNodes"]
 
 KINDS_OF_ADDRESS = ("node", "element", "set", "position")
-NEAREST = 3  #: how many nodes a message lists
+NEAREST = 3  #: number of nearby nodes that a message lists
 
 
 @presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class FoundNodes:
-    """The kept nodes that an address selects.
+    """Kept nodes that an address selects.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class FoundNodes:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class Address:
-    """One place on a body, given by exactly one of node, element, set and position.
+    """Address of a place on a body, given by exactly one of node, element, set and position.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class Address:
 
     @property
     def kind(self) -> str:
-        """Name of the field that is given."""
+        """Name of the given field: node, element, set or position."""
         return next(kind for kind in KINDS_OF_ADDRESS if getattr(self, kind) is not None)
 
     def __str__(self) -> str:
@@ -115,7 +115,7 @@ class Address:
         return f"{self.kind} {quoted(value) if self.kind == 'set' else value}"
 
     def find(self, reduced: ReducedBody, where: str, *, of_stress: bool = False, body: str = "") -> FoundNodes:
-        """Return the selected kept nodes.
+        """Return the kept nodes that the address selects.
 
         Parameters
         ----------
@@ -163,7 +163,7 @@ class Address:
         return FoundNodes(str(self), rows, distance, tuple(reduced.node_name(int(row)) for row in rows), place)
 
     def nearest_row(self, reduced: ReducedBody, where: str, among: np.ndarray | None) -> tuple[IntArray, float]:
-        """Return the kept node nearest to the position, (1,), among those that count, and its distance."""
+        """Return the kept node closest to the position among the eligible ones, (1,), and its distance."""
         frame, nodes = reduced.frame, reduced.nodes
         if not len(nodes):
             raise BodyError(f"{where}: it has no nodes; its place at {self} is not known")
@@ -190,7 +190,7 @@ class Address:
 
 
 def own_rows(reduced: ReducedBody, rows: IntArray) -> IntArray:
-    """Return the node itself, or its copy with rotations if there is one; if only its skin is kept, the skin points."""
+    """Return a node, or its copy with rotations if there is one, or its skin points if only these are kept."""
     flags = reduced.numbering.on_skin
     own = rows[flags[rows] == 0] if flags.size else rows
     if not len(own):
@@ -200,7 +200,7 @@ def own_rows(reduced: ReducedBody, rows: IntArray) -> IntArray:
 
 
 def has_stress(reduced: ReducedBody) -> np.ndarray:
-    """Return which kept nodes have stress in any mode, (n_kept,) bool; all nodes if there are no modes."""
+    """Return whether each kept node has stress in some mode, (n_kept,) bool; all True if there are no modes."""
     if reduced.stress is None or not reduced.n_q:
         return np.full(len(reduced.nodes), reduced.stress is not None)
     return np.asarray(np.abs(reduced.stress).max(axis=(1, 2)) > 0)

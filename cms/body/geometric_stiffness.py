@@ -18,7 +18,8 @@ __all__ = ["SPIN_PAIRS", "UNIT_LOADS", "GeometricStiffness", "RotatedLoads", "Sp
 #: kinds of unit loads; each is an array of `GeometricStiffness`
 UNIT_LOADS = ("translation", "rotation", "spin", "interfaces")
 
-SPIN_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))  #: (a, b) of omega_a omega_b, in the order of `spin`
+#: index pairs (a, b) of the products omega_a omega_b, in the order of `spin`
+SPIN_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
 
 
 @presented
@@ -138,26 +139,26 @@ class GeometricStiffness:
 
     @property
     def loaded(self) -> IntArray:
-        """The interfaces whose loads are in `interfaces`, in their order, (n_loaded,)."""
+        """Interfaces whose loads are in `interfaces`, in their order, (n_loaded,)."""
         return np.flatnonzero(self.is_loaded)
 
     def of_interface(self, k: int) -> Array:
-        """Return the matrices of interface k, (6, n_q, n_q); zero, without using memory, if its loads were left out."""
+        """Return the matrices of interface k, (6, n_q, n_q); zero, without using memory, if its loads are omitted."""
         if not self.is_loaded[k]:
             return np.broadcast_to(np.zeros(()), (6, self.n_q, self.n_q))
         return np.asarray(self.interfaces[sum(self.is_loaded[:k])])
 
     def transformed(self, Z: Array) -> "GeometricStiffness":
-        """Return the matrices over other modes, Zᵀ K_j Z, for shapes Phi Z; Z is (n_q, n_new)."""
+        """Return the matrices Zᵀ K_j Z for new shapes Phi Z; Z is (n_q, n_new)."""
         return self._changed(lambda K: np.asarray(Z.T @ K @ Z), lambda turned: np.asarray(turned @ Z))
 
     def of_modes(self, modes: IntArray) -> "GeometricStiffness":
-        """Return the matrices over some of the modes, in their order."""
+        """Return the matrices restricted to some of the modes, in the given order."""
         pick = np.asarray(modes, dtype=np.int64)
         return self._changed(lambda K: K[..., pick[:, None], pick], lambda turned: turned[..., pick])
 
     def _changed(self, squares: Callable[[Array], Array], rows: Callable[[Array], Array]) -> "GeometricStiffness":
-        """Apply `squares` to the matrices over two modes, and `rows` to those over a rotation and a mode."""
+        """Apply `squares` to the mode-mode matrices, and `rows` to the rotation-mode matrices."""
         turned, spread = self.turned, self.spread
         if turned is not None:
             turned = replace(turned, **{name: rows(getattr(turned, name)) for name in UNIT_LOADS})
@@ -167,10 +168,10 @@ class GeometricStiffness:
         return replace(self, **of_loads, turned=turned, spread=spread)
 
     def in_units(self, old: Units, new: Units) -> "GeometricStiffness":
-        """Return the same matrices in other units; qᵀ K_j q times the amplitude of its load is an energy."""
+        """Return the same matrices in other units; qᵀ K_j q times the load amplitude is an energy."""
         length, mass = old.length / new.length, old.mass / new.mass
-        q = np.sqrt(mass) * length  # change of a matrix for each mode fewer
-        force = 1 / (mass * length)  # for a unit force, over two modes
+        q = np.sqrt(mass) * length  # factor on a matrix for each mode index fewer
+        force = 1 / (mass * length)  # factor on the mode-mode matrix of a unit force
         of_wrench = force * np.array([1.0, 1, 1, 1 / length, 1 / length, 1 / length])[:, None, None]
         by_load = {"translation": 1 / length, "rotation": 1.0, "spin": 1.0, "interfaces": of_wrench}
         turned, spread = self.turned, self.spread
@@ -186,7 +187,7 @@ class GeometricStiffness:
 def stiffness_of_loads(
     K: Array, turned: Array | None, turned_rigid: Array | None, *, is_loaded: tuple[bool, ...]
 ) -> GeometricStiffness:
-    """Return the record that contains the matrices of all unit loads, given one after the other.
+    """Return the geometric stiffness, given the matrices of all unit loads in one array.
 
     Parameters
     ----------
@@ -211,7 +212,7 @@ def stiffness_of_loads(
 
 
 def by_kind(K: Array, n_loaded: int) -> dict[str, Array]:
-    """Return the matrices of the first 12 + 6 n_loaded loads by kind."""
+    """Split the matrices of the first 12 + 6 n_loaded loads by kind of load."""
     translation, rotation, spin, interfaces, _ = np.split(K, [3, 6, 12, 12 + 6 * n_loaded])
     interfaces = interfaces.reshape(n_loaded, 6, *K.shape[1:])
     return dict(zip(UNIT_LOADS, (translation, rotation, spin, interfaces), strict=True))

@@ -1,4 +1,4 @@
-"""Inertia invariants of a body with deformation modes, all from canonical moments (docs/theory.md §5)."""
+"""Inertia invariants of a body with deformation modes, all derived from canonical moments (docs/theory.md §5)."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -151,7 +151,7 @@ class Moments:
         return frozen(np.einsum("aakl->kl", self.S_kl))
 
     def require(self, *terms: str) -> None:
-        """Raise `BodyError` if one of these terms of `INERTIA_TERMS` is missing."""
+        """Raise `BodyError` if one of the given `INERTIA_TERMS` is missing."""
         missing = [term for term in terms if term in self.missing]
         if missing:
             raise BodyError(
@@ -162,7 +162,7 @@ class Moments:
 
     @property
     def trust(self) -> str:
-        """Describe for which motions the body can be trusted with the known terms."""
+        """Describe for which motions the known inertia terms are sufficient."""
         if not self.missing:
             return "every motion"
         exact = "exact: mass, frequencies, static answers, and motions to first order in speeds and deformation"
@@ -178,7 +178,7 @@ class Moments:
 
     @property
     def left_out(self) -> "Moments":
-        """The moments for a motion without the missing terms, with constant inertia in their place.
+        """Moments for a motion that neglects the missing terms, so that the inertia stays constant.
 
         Missing terms are zero, including the trace of a missing 5C. M* then only comes from `ReducedBody.M`.
         """
@@ -209,7 +209,7 @@ class Moments:
 
 
 def known_P(P: Array, missing: Iterable[str]) -> Array:
-    """Return P, (3, 3, n_q), with missing terms set to zero; its antisymmetric part, which is 2C, is always known."""
+    """Return P, (3, 3, n_q), with missing terms set to zero; the antisymmetric part (2C) is always known."""
     if "3C" not in missing:
         return P
     return np.asarray((P - P.swapaxes(0, 1)) / 2)
@@ -243,7 +243,7 @@ def moments_from_gram(gram: Array, *, is_exact: bool = True, missing: tuple[str,
     """
     n = (gram.shape[0] - 4) // 3
     # symmetric by definition; the averaged halves differ only by rounding
-    first = (gram[:4] + gram[:, :4].T) / 2  # rows of 1 and c
+    first = (gram[:4] + gram[:, :4].T) / 2  # rows of 1 and c in the Gram matrix
     phi_phi = gram[4:, 4:].reshape(3, n, 3, n).transpose(0, 2, 1, 3)
     S_kl = np.empty((3, 3, n, n))
     np.add(phi_phi, phi_phi.transpose(1, 0, 3, 2), out=S_kl)
@@ -267,17 +267,17 @@ def moments_from_gram(gram: Array, *, is_exact: bool = True, missing: tuple[str,
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class NodalSums:
-    """Weighted sums over all nodes about the origin of a frame B; w is the weight of a node; translations only.
+    """Sums over all nodes with weights w, about the origin of a frame B; only translations count.
 
     They are the parts of [1, c]ᵀ W [1, c, Phi] that a frame needs to compute the C of least weighted deformation.
     """
 
-    w: float  #: sum of the weights [m³; dimensionless if the nodes count equally]
-    S: Annotated[Array, ArrayShape((3,))]  #: Σ w c [w times m]
-    R: Annotated[Array, ArrayShape((3, 3))]  #: Σ w c_a c_b [w times m²]
-    U1: Annotated[Array, ArrayShape((3, "n_q"))]  #: Σ w phi_k
+    w: float  #: sum of the weights [m³, or dimensionless if all nodes have equal weight]
+    S: Annotated[Array, ArrayShape((3,))]  #: Σ w c, first moment of the weights [w times m]
+    R: Annotated[Array, ArrayShape((3, 3))]  #: Σ w c_a c_b, second moment of the weights [w times m²]
+    U1: Annotated[Array, ArrayShape((3, "n_q"))]  #: Σ w phi_k [w times unit of phi]
     U2: Annotated[Array, ArrayShape((3, "n_q"))]  #: Σ w c × phi_k [U1 times m]
-    is_volume: bool = True  #: False: every node has weight 1
+    is_volume: bool = True  #: whether the weight of a node is its volume; if not, every node has weight 1
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "w", float(self.w))

@@ -18,7 +18,7 @@ SOURCES = {
     "dofs": "rotations that are dofs of the model, as of beams and shells",
     "elements": "half the curl of the displacement, by the elements at the node, as of solids",
     "unknown": "not known: bare matrices and rods without rotations",
-}  #: origin of the rotations of a point
+}  #: origins of the rotations of a point
 
 
 @presented
@@ -26,7 +26,7 @@ SOURCES = {
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class KeptPoints:
-    """Rotations of kept nodes over the modes; the translations are in `ReducedBody.Phi`, as for all kept nodes.
+    """Rotations of kept nodes in the modes; their translations are in `ReducedBody.Phi`, as for all kept nodes.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class KeptPoints:
             raise BodyError(f"kept points: unknown source {quoted(word)}{nearest(word, SOURCES)}")
 
     def of_node(self, row: int) -> Array | None:
-        """Return the rotation of a kept node by its row, (3, n_q); None if the node has none or it is unknown."""
+        """Return the rotation of the kept node in a given row, (3, n_q); None if the rotation is unknown."""
         at = np.flatnonzero(self.nodes == row)
         return None if not len(at) or self.source[at[0]] == "unknown" else np.asarray(self.rotation[at[0]])
 
@@ -63,7 +63,7 @@ class KeptPoints:
         return replace(self, rotation=self.rotation @ Z)
 
     def moved(self, rotation: Array, R: Array, Z: Array) -> "KeptPoints":
-        """Return the points in another frame.
+        """Return the points with their rotations expressed in another frame.
 
         Parameters
         ----------

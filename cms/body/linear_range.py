@@ -10,11 +10,11 @@ __all__ = ["LEFT_OUT", "LINEAR", "STIFFENED", "Limits"]
 class Limits:
     """Largest values for which the deformation of a body is accurate to about one per cent."""
 
-    rotation: float  #: elastic rotation of an interface in the body frame [rad]
+    rotation: float  #: largest elastic rotation of an interface in the body frame [rad]
     #: relative change of stiffness due to loads; for a stiffened body: loads divided by the first buckling load
     load: float
-    speed: float  #: angular speed divided by the lowest angular frequency of the body, held at one of its joints
-    inertia: float = inf  #: the same ratio for a body whose unknown inertia terms are neglected
+    speed: float  #: largest angular speed over the lowest angular frequency of the body with one of its joints fixed
+    inertia: float = inf  #: largest such speed ratio for a body whose unknown inertia terms are neglected
 
 
 #: for a linear frame: its strain error is the square of the rotation, its stiffness error the neglected change by loads

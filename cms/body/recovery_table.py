@@ -26,7 +26,7 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["N_RIGID", "RecoveryTable", "spin_products"]
 
-N_RIGID = 6  #: number of coordinates of z before q: d and theta
+N_RIGID = 6  #: number of coordinates of z before q: three of d and three of theta
 ORDERS = ("position", "velocity", "acceleration")  #: derivatives of z, in the order of `dynamic`
 TEXTS = ("labels", "quantities", "entities", "components")
 
@@ -36,7 +36,7 @@ TEXTS = ("labels", "quantities", "entities", "components")
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class RecoveryTable:
-    """Named rows of a reduced body; row components are in mesh axes or element axes, columns in axes of B.
+    """Recovery matrices with named rows. Row components are in mesh or element axes, columns in axes of B.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ class RecoveryTable:
         return np.asarray(total)
 
     def rows(self, wanted: str) -> IntArray:
-        """Return the rows with that label or quantity, or whose label begins with these words.
+        """Return the rows with this label or quantity, or whose labels begin with these words.
 
         Raises
         ------
@@ -183,7 +183,7 @@ class RecoveryTable:
         return np.array(found, dtype=np.int64)
 
     def of_rows(self, rows: Sequence[int] | IntArray) -> "RecoveryTable":
-        """Return a table of some rows, in that order."""
+        """Return a table with some of the rows, in the given order."""
         rows = np.asarray(rows, dtype=np.int64)
         texts: dict[str, Any] = {name: tuple(getattr(self, name)[int(k)] for k in rows) for name in TEXTS}
         return replace(
@@ -237,7 +237,7 @@ class RecoveryTable:
 
 
 def spin_products(omega: Array) -> Array:
-    """Return amplitudes of the loads "spin xx yy zz xy yz zx", (..., 6), for angular velocities, (..., 3) [rad/s].
+    """Return amplitudes of the loads "spin xx yy zz xy yz zx", (..., 6), given angular velocities, (..., 3) [rad/s].
 
     The amplitudes are omega_a omega_b; those of two different axes are doubled, because each stands for both orders.
 
@@ -258,10 +258,10 @@ def spin_accelerations(c: Array) -> Array:
 
 
 def spin_change(R: Array) -> Array:
-    """Return the matrix from products in new axes to products in old axes, (6, 6), with omega_old = R omega_new."""
+    """Return the (6, 6) matrix from angular-velocity products in new axes to old axes; omega_old = R omega_new."""
     columns = []
     for a, b in SPIN_PAIRS:
-        both = np.outer(R[:, a], R[:, b])  # omega_a omega_b of the new axes, as a tensor in old axes
+        both = np.outer(R[:, a], R[:, b])  # product omega_a omega_b of the new axes, as a tensor in old axes
         both = (both + both.T) / 2
         columns.append([both[i, j] * (1.0 if i == j else 2.0) for i, j in SPIN_PAIRS])
     return np.array(columns).T

@@ -60,7 +60,7 @@ class BodyFrame:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class ReducedInterface:
-    """An interface of a reduced body: its reference point in B and the motion of that point with q.
+    """Interface of a reduced body: its reference point in B and how this point moves with q.
 
     Parameters
     ----------
@@ -263,12 +263,12 @@ class ReducedBody:
 
     @property
     def is_held(self) -> bool:
-        """Whether the body is intentionally held to the ground; a floating frame rejects it."""
+        """Whether the body is intentionally fixed to the ground; a floating frame rejects such a body."""
         return self.frame.kind == "held"
 
     @property
     def frequencies(self) -> Array:
-        """Frequencies of the modes with origin and axes of this frame held, (n_q,) [Hz]; inf for massless shapes."""
+        """Frequencies of the modes with origin and axes of this frame fixed, (n_q,) [Hz]; inf for massless shapes."""
         mass = np.diag(self.M)
         omega2 = np.divide(np.diag(self.K), mass, out=np.full(self.n_q, np.inf), where=mass > 0)
         return np.sqrt(np.maximum(omega2, 0.0)) / (2 * np.pi)
@@ -280,7 +280,7 @@ class ReducedBody:
         return f"index {self.node_ids[row]}"
 
     def interface(self, name: str) -> ReducedInterface:
-        """Return the interface of that name; raise `BodyError` with the known names if there is none."""
+        """Return the interface with this name; raise `BodyError` with the known names if there is none."""
         for interface in self.interfaces:
             if interface.name == name:
                 return interface
@@ -288,7 +288,7 @@ class ReducedBody:
         raise BodyError(f"reduced body {self.name!r}: no interface {quoted(name)}{nearest(name, choices)}")
 
     def load_case(self, name: str) -> ReducedLoadCase:
-        """Return the load case of that name; raise `BodyError` with the known names if there is none."""
+        """Return the load case with this name; raise `BodyError` with the known names if there is none."""
         for case in self.load_cases:
             if case.name == name:
                 return case
@@ -297,7 +297,7 @@ class ReducedBody:
 
 
 def unit_findings(body: ReducedBody) -> list[tuple[bool, str]]:
-    """Return (is an error, text) for each implausible number: size, mass over the hull, 2 f L of the first frequency.
+    """Return (is an error, text) for each implausible number: size, mass over hull volume, 2 f L of the first mode.
 
     Size and hull are those of the kept nodes, the frequency is the first of `free_frequencies`.
     """

@@ -16,7 +16,7 @@ __all__ = ["SourceColumns", "source_columns"]
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class SourceColumns:
-    """The columns from which a reduced body was made, with the data that give their shares in any mode.
+    """Columns from which a reduced body was computed, with data that give their shares in the energy of any mode.
 
     With phi_k = Σ_c v_c A_ck and F_ck = v_cᵀ K phi_k, the term A_ck F_ck is the contribution of column c to the energy
     phi_kᵀ K phi_k. It does not change if the column is scaled; the scale is chosen so that A and F have the same size
@@ -25,16 +25,17 @@ class SourceColumns:
 
     labels: Annotated[tuple[str, ...], ArrayShape(("n_columns",))]  #: label of each column
     groups: Annotated[tuple[str, ...], ArrayShape(("n_columns",))]  #: group of each column
-    A: Annotated[Array, ArrayShape(("n_columns", "n_q"))]  #: coordinates of the modes in the columns [1/s]
-    F: Annotated[Array, ArrayShape(("n_columns", "n_q"))]  #: forces of the modes on the columns [1/s]
+    A: Annotated[Array, ArrayShape(("n_columns", "n_q"))]  #: coordinates of the modes in terms of the columns [1/s]
+    #: work of the elastic force K phi_k of each mode on each column [1/s]
+    F: Annotated[Array, ArrayShape(("n_columns", "n_q"))]
 
     @property
     def sources(self) -> tuple[str, ...]:
-        """The groups, each once, in their order."""
+        """Groups of the columns, each listed once, in their order."""
         return tuple(dict.fromkeys(self.groups))
 
     def shares(self) -> Array:
-        """Return |A_ck F_ck| divided by their sum over c, (n_q, n_columns); rows sum to 1.
+        """Return |A_ck F_ck| over its sum over c, (n_q, n_columns); each row sums to 1.
 
         The terms without absolute value sum to the energy, but some are negative if columns work against each other.
         """
@@ -57,12 +58,12 @@ class SourceColumns:
         return tuple(found)
 
     def of_modes(self, Z: Array) -> "SourceColumns":
-        """Return the same columns for the modes Phi Z."""
+        """Return the source columns of the modes Phi Z."""
         return replace(self, A=np.asarray(self.A) @ Z, F=np.asarray(self.F) @ Z)
 
 
 def source_columns(labels: tuple[str, ...], groups: tuple[str, ...], A: Array, F: Array) -> SourceColumns:
-    """Return the columns with A and F scaled to equal size, column by column: A_c s and F_c / s, s² = |F_c| / |A_c|.
+    """Return the columns, with A and F of each scaled to equal size: A_c s and F_c / s with s² = |F_c| / |A_c|.
 
     A column without forces (a rigid-body motion) contributes to no energy; both rows are then zero.
     """

@@ -12,7 +12,7 @@ from fe_models.foundation.records import ArrayShape, checked_fields, frozen_copi
 
 __all__ = ["PointStress", "stress_of", "von_mises", "von_mises_of"]
 
-CHUNK_SIZE = 2_000_000  #: number of stress values held at a time
+CHUNK_SIZE = 2_000_000  #: number of stress values in memory at a time
 
 
 @frozen_copies
@@ -28,7 +28,7 @@ class PointStress:
 
 
 def von_mises(stress: Array) -> Array:
-    """Return the von Mises stress sqrt(3/2 s:s), with deviator s, of components xx yy zz yz xz xy on axis 1 [Pa].
+    """Return the von Mises stress sqrt(3/2 s:s) [Pa]; s is the deviator, components xx yy zz yz xz xy are on axis 1.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def von_mises(stress: Array) -> Array:
 
 
 def stress_of(modes: Array, q: Array) -> Array:
-    """Return the stress for modal coordinates: (n, 6) for q (n_q,), (n, 6, k) for q (k, n_q) [Pa].
+    """Return stress [Pa]: (n, 6) if q has shape (n_q,), or (n, 6, k) if q has shape (k, n_q).
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def stress_of(modes: Array, q: Array) -> Array:
 
 
 def von_mises_of(modes: Array, q: Array) -> Iterator[Array]:
-    """Yield the von Mises stress of many modal coordinates q (k, n_q) in blocks of rows: (rows, n) [Pa]."""
+    """Yield the von Mises stress in blocks of rows, (rows, n) [Pa], for many modal coordinates q (k, n_q)."""
     rows = max(1, CHUNK_SIZE // max(1, modes[..., 0].size))
     for first in range(0, len(q), rows):
         yield von_mises(stress_of(modes, q[first : first + rows])).T

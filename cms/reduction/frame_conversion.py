@@ -98,7 +98,7 @@ class Change:
     R: Array  #: new axes as columns, in old axes, (3, 3)
 
     def translations(self, Phi: Array, points: Array) -> Array:
-        """Return the new shapes at points of the old frame, (n, 3, n_q), from the old shapes there."""
+        """Return translations of the new shapes, (n, 3, n_q), from those of the old ones at points in the old frame."""
         off = Phi - rigid_motion_of_points(points, np.zeros(3)) @ self.C
         return np.einsum("ba,nbk->nak", self.R, off @ self.Z)
 

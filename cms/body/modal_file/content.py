@@ -25,12 +25,12 @@ __all__ = ["FORMAT", "Contents", "body_of", "content_of", "require_same_frequenc
 
 FORMAT = "modal-file"
 SI = UNIT_SYSTEMS["m-kg-s"]
-FREQUENCY_DEFECT = 1e-9  #: largest relative difference between a stored frequency and that of K and M
+FREQUENCY_DEFECT = 1e-9  #: largest relative difference between a stored frequency and that computed from K and M
 #: largest difference between a stored 1C-5C and that of the moments, relative to the largest entry
 INVARIANT_DEFECT = 1e-12
 #: unit loads of the geometric stiffness except those of the interfaces, which are stored with the interfaces
 OF_FRAME = UNIT_LOADS[:3]
-TURNED, SPREAD = "/geometric/turned", "/geometric/spread"  #: groups
+TURNED, SPREAD = "/geometric/turned", "/geometric/spread"  #: paths of the groups
 EPSILON = np.cross(np.eye(3)[:, None], np.eye(3)[None])  #: (a × b)_c = EPSILON_abc a_a b_b, (3, 3, 3)
 NUMBERS = {
     "/nodes/label": "nodes",
@@ -168,7 +168,7 @@ def geometric_values(geometric: GeometricStiffness) -> dict[str, Any]:
 
 
 def known_terms(missing: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the products P and S_kl, and the invariants, that a file stores: those without a missing part.
+    """Return the products P and S_kl and the invariants that a file stores: all without missing terms.
 
     M* is stored instead of an incomplete S_kl; 2C is among the invariants.
     """
@@ -246,7 +246,7 @@ def kept_of(contents: Contents) -> KeptPoints:
 
 
 def moments_of(contents: Contents) -> Moments:
-    """Return the moments; if terms are missing, they are made from the stored invariants."""
+    """Return the moments; if terms are missing, the stored invariants give the others."""
     missing: tuple[str, ...] = ()
     if "missing" in contents.content.attributes.get("/moments", {}):
         missing = tuple(contents.attribute("/moments", "missing", str).split())
@@ -268,7 +268,7 @@ def moments_of(contents: Contents) -> Moments:
 
 
 def interface_of(contents: Contents, group: str) -> ReducedInterface:
-    """Return one interface; version 1 did not distinguish a Psi without rotation from one that is zero by chance."""
+    """Return one interface; version 1 did not distinguish a Psi without rotation from a zero rotation."""
     kind = contents.attribute(group, "kind", str)
     arrays = contents.arrays(group, "position", "triad", "Psi", "members")
     if contents.content.version < 2:
@@ -313,7 +313,7 @@ def geometric_of(contents: Contents) -> GeometricStiffness:
 def loads_of(
     contents: Contents, group: str, of_interface: str, shape: tuple[int, int], is_loaded: list[bool]
 ) -> dict[str, np.ndarray]:
-    """Return the matrices of all unit loads by kind."""
+    """Return the matrices of all unit loads, by kind of load."""
     of_interfaces = [
         shaped(contents, f"{path}/{of_interface}", (6, *shape))
         for path, is_own in zip(contents.numbered("/interfaces"), is_loaded, strict=True)
@@ -324,14 +324,14 @@ def loads_of(
 
 
 def shaped(contents: Contents, path: str, shape: tuple[int, ...]) -> np.ndarray:
-    """Return the numbers of a dataset after a check of its shape."""
+    """Return the numbers of a dataset after checking its shape."""
     array = contents.array(path)
     require_shape(f"dataset {path}", array, shape)
     return array
 
 
 def units_of(contents: Contents) -> Units:
-    """Return the units of a file; the factors of a known system must be the known ones."""
+    """Return the units of a file, after checking that the factors of a named unit system are correct."""
     kinds = {field.name: type(getattr(SI, field.name)) for field in fields(Units)}
     units = Units(**{name: contents.attribute("/units", name, kind) for name, kind in kinds.items()})
     if UNIT_SYSTEMS.get(units.name, units) != units:
@@ -340,7 +340,7 @@ def units_of(contents: Contents) -> Units:
 
 
 def require_same_invariants(content: Content, moments: Moments) -> None:
-    """Raise `ModalFileError` unless the stored invariants, meant for other readers, follow from the moments."""
+    """Raise `ModalFileError` unless the stored invariants agree with the moments; they serve other readers."""
     for name in known_terms(moments.missing)[1]:
         stored = Contents(content).array(f"/invariants/{name}")
         expected = getattr(moments, name)
@@ -352,7 +352,7 @@ def require_same_invariants(content: Content, moments: Moments) -> None:
 
 
 def require_same_frequencies(content: Content, body: ReducedBody) -> None:
-    """Raise `ModalFileError` unless the stored frequencies, meant for other readers, follow from K and M."""
+    """Raise `ModalFileError` unless the stored frequencies agree with K and M; they serve other readers."""
     stored, own = Contents(content).array("/modes/frequencies"), body.frequencies
     if stored.shape != own.shape or not np.allclose(stored, own, rtol=FREQUENCY_DEFECT, atol=0.0):
         raise ModalFileError(

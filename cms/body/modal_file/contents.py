@@ -1,4 +1,4 @@
-"""The content of a file, datasets and attributes by path, and access to it by a reader."""
+"""Content of a file: datasets and attributes by path, with checked access for a reader."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -52,7 +52,7 @@ class Contents:
         return float(values)
 
     def arrays(self, group: str, *names: str) -> dict[str, Any]:
-        """Return the arrays of some datasets of a group, by name."""
+        """Return the arrays of the named datasets in a group."""
         return {name: self.array(f"{group}/{name}") for name in names}
 
     def strings(self, path: str) -> tuple[str, ...]:
@@ -63,7 +63,7 @@ class Contents:
         return values
 
     def attribute(self, path: str, name: str, kind: type) -> Any:
-        """Return an attribute of that type."""
+        """Return an attribute after checking its type."""
         value = self.content.attributes.get(path, {}).get(name)
         if not isinstance(value, kind):
             got = "nothing" if value is None else repr(value)
@@ -76,12 +76,12 @@ class Contents:
             return ()
         count = self.attribute(group, "count", int)
         held = sum(path.startswith(f"{group}/") for path in self.content.attributes)
-        if count != held:  # checked before that many paths are made
+        if count != held:  # checked before this many paths are created
             raise ModalFileError(f"attribute 'count' of {group}: expected {held}, as many as it holds, got {count:g}")
         return tuple(f"{group}/{k}" for k in range(count))
 
     def has(self, group: str, name: str | None = None) -> bool:
-        """Whether an optional group exists and, if it has such an attribute, is marked as present."""
+        """Return whether an optional group exists and, if it has this attribute, is marked as present."""
         there = group in self.content.attributes
         return there and (name is None or bool(self.attribute(group, name, int)))
 

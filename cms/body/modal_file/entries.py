@@ -26,16 +26,17 @@ VOLUME = Dimensions(0, 3)
 
 @dataclass(frozen=True)
 class Entry:
-    """Description of one dataset, or of one dataset in every numbered group."""
+    """Description of one dataset, or of one dataset in each numbered group."""
 
     dimensions: Dimensions
     description: str
-    last_rows: Dimensions | None = None  #: dimensions of rows 3-5, if these are rotations and rows 0-2 translations
-    unit: str = ""  #: text, if each row or column has its own unit
+    #: dimensions of rows 3-5 if these are rotations while rows 0-2 are translations; None: as the other rows
+    last_rows: Dimensions | None = None
+    unit: str = ""  #: text in place of a unit, if each row or column has its own unit
 
 
 def entry(description: str, dimensions: Dimensions = NONE, last_rows: Dimensions | None = None) -> Entry:
-    """Return an entry; dimensionless by default."""
+    """Return the description of a dataset, dimensionless by default."""
     return Entry(dimensions, description, last_rows)
 
 
@@ -139,12 +140,12 @@ ENTRIES = {
                                    "order derivative, row, component of z", unit="of the row per that of z"),
     "/recovery/<i>/static": Entry(NONE, "residual static response to each load; index order row, load",
                                   unit="of the row per that of the load"),
-}  #: by path; `<i>` stands for the number of a group
+}  #: description by path; `<i>` stands for the number of a group
 # fmt: on
 
 
 def entry_of(path: str) -> Entry:
-    """Return the entry of a dataset; raise `ModalFileError` if a modal file has no such dataset."""
+    """Return the description of a dataset; raise `ModalFileError` if a modal file has no such dataset."""
     found = ENTRIES.get(re.sub(r"/\d+/", "/<i>/", path))
     if found is None:
         raise ModalFileError(f"dataset {path} is not among those of a modal file: {', '.join(ENTRIES)}")

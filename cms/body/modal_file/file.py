@@ -36,8 +36,8 @@ from fe_models.foundation.units import Units, unit_system
 __all__ = ["FORMAT", "VERSION", "convert_units", "digest", "read", "write"]
 
 SUFFIXES = (".h5", ".hdf5")
-LARGE = 1 << 26  #: bytes of numbers above which the file is written directly, not first in memory
-VERSION = 6  #: version of the format; a reader rejects later versions and reads all earlier ones
+LARGE = 1 << 26  #: size of the numbers above which the file is written directly, without an image in memory [bytes]
+VERSION = 6  #: version of the format; a reader accepts all versions up to this one
 KIND = Kind(FORMAT, VERSION, ModalFileError, "`cms reduce` or `cms.write`")
 
 
@@ -110,7 +110,7 @@ def read(path: str | os.PathLike[str], *, units: Units | str | None = None) -> R
 
 
 def convert_units(reduced: ReducedBody, units: Units | str) -> ReducedBody:
-    """Return the same body in other units; the body itself if it is already in these units.
+    """Return the same body in other units; the body itself if it already has these units.
 
     q has the unit mass^(1/2) length, so modal coordinates, such as initial values, are different numbers in other
     units.
@@ -184,7 +184,7 @@ def write_sealed(content: Content, path: str | os.PathLike[str]) -> None:
 
 
 def read_sealed(path: str | os.PathLike[str], kind: Kind) -> Content:
-    """Read a file of this kind, up to its version, after checks of its seal and its digest.
+    """Read a file of this kind after checking its version, seal and digest.
 
     Raises
     ------
@@ -198,7 +198,7 @@ def read_sealed(path: str | os.PathLike[str], kind: Kind) -> Content:
 
 
 def stated_version(file: Any, path: Path, kind: Kind) -> int:
-    """Return the version of a file; raise the error of the kind if it is of another kind, or of a later version."""
+    """Return the version of a file; raise an error if the file is of another kind or of a later version."""
     found = as_attribute(file.attrs.get("format"))
     if found != kind.format:
         what = f"a {str(found)[:80]!r}" if found else "HDF5 of another program"
@@ -223,7 +223,7 @@ def fill(file: Any, content: Content) -> None:
 
 
 def walk(file: Any, path: Path, kind: Kind) -> tuple[dict[str, Dataset], dict[str, dict[str, Attribute]]]:
-    """Return all datasets and all group attributes; raise the error of the kind if one differs from its digest."""
+    """Return all datasets and group attributes; raise an error if one differs from its digest."""
     import h5py
 
     datasets, groups, entries = {}, {}, []

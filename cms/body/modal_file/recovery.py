@@ -16,7 +16,7 @@ __all__ = ["GROUP", "recovery_attributes", "recovery_of", "recovery_values"]
 GROUP = "/recovery"
 TEXTS = ("labels", "quantities", "entities", "components", "loads")
 ARRAYS = ("numbers", "dimensions", "dynamic", "load_dimensions", "static")
-UNITS = ("units", "load_units")  #: meant for other readers; they follow from the dimensions
+UNITS = ("units", "load_units")  #: texts for other readers; they follow from the dimensions
 
 
 def recovery_attributes(tables: Mapping[str, RecoveryTable]) -> dict[str, Mapping[str, Attribute]]:
