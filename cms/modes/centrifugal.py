@@ -9,12 +9,12 @@ from fe_models.foundation.arrays import Array, IntArray
 __all__ = ["CENTRIFUGAL", "centrifugal_loads"]
 
 CENTRIFUGAL = "centrifugal"  #: kind of these load cases
-PRODUCTS = ("xx", "yy", "zz", "yz", "xz", "xy")  #: omega_a omega_b, one load each
+PRODUCTS = ("xx", "yy", "zz", "yz", "xz", "xy")  #: products omega_a omega_b, one load for each
 COLUMNS = 60  #: number of unit displacements whose moments are computed at a time
 
 
 def centrifugal_loads(body: FEBody) -> tuple[LoadCase, ...]:
-    """Return the loads -∫ ρ [e_a × (e_b × c) + e_b × (e_a × c)] / 2 for the products omega_a omega_b, one case each.
+    """Return the loads -∫ ρ [e_a × (e_b × c) + e_b × (e_a × c)] / 2, one load case for each product omega_a omega_b.
 
     (1) solid nodes: the field is linear in the position c, which isoparametric elements interpolate exactly. With a
         consistent mass, f = M u with the nodal values u is therefore exact. The field has no curl, so nodal rotations
@@ -49,7 +49,7 @@ def centrifugal_loads(body: FEBody) -> tuple[LoadCase, ...]:
 
 
 def _moments(body: FEBody, dofs: IntArray) -> Array:
-    """Return the moments ∫ c_a u_b over mass of unit displacements of these dofs, (3, 3, n_dofs)."""
+    """Return the mass moments ∫ c_a u_b dm of unit displacements of these dofs, (3, 3, n_dofs)."""
     assert body.element_model is not None
     parts = []
     for first in range(0, len(dofs), COLUMNS):

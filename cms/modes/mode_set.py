@@ -33,7 +33,7 @@ __all__ = [
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError, misfit=ModeSetError)
 class ModeSet:
-    """Columns over all dofs of a coupled body, before the finishing step of `reduce`.
+    """Columns of a mode set over all dofs of a coupled body, before the finishing step of `reduce`.
 
     Parameters
     ----------
@@ -82,30 +82,30 @@ class ModeSet:
 class Block:
     """Named columns of one family."""
 
-    columns: Array  #: (n_dof, k)
-    labels: Sequence[str]  #: (k,)
-    groups: Sequence[str]  #: (k,)
-    frequencies: Array | None = None  #: (k,); None for static columns
+    columns: Array  #: displacement columns, (n_dof, k)
+    labels: Sequence[str]  #: label of each column, (k,)
+    groups: Sequence[str]  #: group of each column, (k,)
+    frequencies: Array | None = None  #: frequency of each column, (k,); None for static columns
 
 
 def boundary_block(body: FEBody, columns: Array, family: str) -> Block:
-    """Return the static columns of a family, one for each boundary dof."""
+    """Return a block with the static columns of a family, one for each boundary dof."""
     return Block(columns, *boundary_names(body, family))
 
 
 def constraint_block(families: Families) -> Block:
-    """Return the constraint modes."""
+    """Return the block of constraint modes."""
     return Block(families.Psi_C, *families.held_names("constraint"))
 
 
 def rigid_block(families: Families, columns: Array, family: str) -> Block:
-    """Return the columns of a family, one for each rigid-body mode."""
+    """Return a block with the columns of a family, one for each rigid-body mode."""
     labels = [f"{family} {MOTION_COMPONENTS[k]}" for k in families.rigid_components]
     return Block(columns, labels, [family] * len(labels))
 
 
 def vibration_block(kind: str, modes: EigenResult, columns: Array | None = None) -> Block:
-    """Return a block of vibration modes, or of columns made from them, one for each mode."""
+    """Return a block of vibration modes, or of columns derived from them, one for each mode."""
     n = len(modes.frequencies)
     return Block(
         modes.Phi if columns is None else columns,
@@ -125,7 +125,7 @@ def mode_set(
     options: Mapping[str, str] | None = None,
     data: Mapping[str, Array] | None = None,
 ) -> ModeSet:
-    """Assemble blocks to a mode set, and record the requested options and the solver used."""
+    """Assemble blocks into a mode set, and record the requested options and the solver used."""
     recorded = {"solver": families.fixed.factorization.description}
     if modes is not None:
         recorded |= {"n_modes": str(len(modes.frequencies))}
@@ -134,7 +134,7 @@ def mode_set(
     if wanted is not None and wanted.cutoff is not None:
         recorded["cutoff"] = repr(float(wanted.cutoff))
     columns, layout = [block.columns for block in blocks], families.body.layout
-    if layout is not None:  # columns of a distributed body are distributed, also where none of the blocks is
+    if layout is not None:  # a distributed body needs distributed columns, even if none of the blocks is distributed
         whole: Any = spread_beside(layout, *columns)
     else:
         whole = beside(*columns) if len(columns) > 1 else columns[0]
@@ -153,13 +153,13 @@ def mode_set(
 
 
 class Finder(Protocol):
-    """A method of `Families` that computes vibration modes."""
+    """Method of `Families` that computes vibration modes."""
 
     def __call__(self, n_modes: ModeCount) -> EigenResult: ...
 
 
 def require_interfaces(name: str, body: FEBody) -> None:
-    """Raise `ModeSetError` if the body has no interface but the set consists of interface modes."""
+    """Raise `ModeSetError` if a set of interface modes is requested for a body without interfaces."""
     if len(body.b) == 0:
         raise ModeSetError(f"{name}: body {body.name!r} has no interface; give it at least one, or take free modes")
 
@@ -171,7 +171,7 @@ def checked_modes(
     body: FEBody,
     wanted: ModeCount,
 ) -> EigenResult:
-    """Compute the modes that a set requests.
+    """Compute the vibration modes that a set requests, after a check of their number.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Cost of a reduction, reported before the work: of interfaces with very many dofs, and of the geometric stiffness.
+"""Estimated cost of a reduction, reported before the work: interfaces with very many dofs, and geometric stiffness.
 
 The geometric stiffness has a matrix over all modes for each unit load: 12 loads of the frame, 6 distributed over the
 nodes, and 6 for each interface (for kind "nodes", of the mean motion of its nodes). Forty interfaces and two thousand
@@ -21,32 +21,33 @@ __all__ = [
     "left_out_words", "reduction_cost", "require_room_for_stiffness", "stiffness_bytes", "stiffness_words",
 ]  # fmt: skip
 
-MANY = 600  #: boundary dofs of one interface from which its cost is reported
+MANY = 600  #: number of boundary dofs of one interface above which its cost is reported
 PROPOSED = 20  #: number of interface modes that the report proposes
 SQUARES = 26  #: number of matrices over the modes in a modal file: moments, invariants, M, K, D, columns
-TALL = 3  #: number of arrays over all dofs and columns held at the same time: columns, shapes, mesh displacement
+TALL = 3  #: number of arrays over all dofs and columns in memory together: columns, shapes, mesh displacement
 TALL_PRODUCTS = 10.0  #: number of products of two such arrays: Gram matrices, shapes, moments
-CUBES = 100.0  #: operations of eigenproblems and matrix products, per cubed number of columns
-UNASKED = 2e9  #: size of the geometric stiffness [bytes] up to which it is computed by default
-HELD = 4.0  #: peak memory during the computation, relative to its size
-SPARSE = 10.0  #: time of an operation of a sparse product relative to a dense product
-NAMED = 5  #: number of interfaces that a note names
+CUBES = 100.0  #: operations of eigenproblems and matrix products over the cubed number of columns
+UNASKED = 2e9  #: largest size of a geometric stiffness that is computed by default [bytes]
+HELD = 4.0  #: peak memory of its computation over its size
+SPARSE = 10.0  #: time of an operation in a sparse product over that in a dense product
+NAMED = 5  #: largest number of interfaces that a note lists
 
-Asked = bool | Sequence[str] | None  #: whether to compute it, or the interfaces whose loads it includes
+#: whether to compute the geometric stiffness, or the interfaces whose loads it includes
+Asked = bool | Sequence[str] | None
 
 
 @dataclass(frozen=True)
 class ReductionCost:
-    """Estimated cost, without the geometric stiffness."""
+    """Estimated cost of a reduction without its geometric stiffness."""
 
     n_columns: int
-    memory: float  #: [bytes]
-    file: float  #: [bytes]
-    seconds: float  #: [s] of one processor, without factorisation and solves
+    memory: float  #: peak memory [bytes]
+    file: float  #: size of the modal file [bytes]
+    seconds: float  #: time on one processor, without factorisation and solves [s]
 
     @property
     def description(self) -> str:
-        """Description in one line."""
+        """Description of the cost in one line."""
         return (
             f"{self.n_columns} columns, about {self.memory / 1e9:.2g} GB of memory, a file of {self.file / 1e9:.2g} GB "
             f"and {duration(self.seconds)} of processor time"
@@ -121,7 +122,7 @@ def duration(seconds: float) -> str:
 
 
 def n_loads(body: FEBody, asked: Asked = None) -> int:
-    """Return the number of unit loads."""
+    """Return the number of unit loads in the geometric stiffness."""
     return 18 + 6 * (len(body.interfaces) if asked is None or isinstance(asked, bool) else len(set(asked)))
 
 
@@ -131,7 +132,7 @@ def stiffness_bytes(body: FEBody, n_modes: int, asked: Asked = None) -> float:
 
 
 def stiffness_seconds(body: FEBody, n_modes: int, asked: Asked = None) -> float:
-    """Estimate its processor time [s]: Phiᵀ (S Phi) with a sparse S over the nodes for each load."""
+    """Estimate the processor time of the geometric stiffness [s]: Phiᵀ (S Phi) with a sparse S for each load."""
     each = float(body.n_dof) * n_modes**2 + SPARSE * (2 * body.K.nnz / 9) * 3 * n_modes
     return n_loads(body, asked) * each / operations_per_second()
 
@@ -176,7 +177,7 @@ def chosen_words(body: FEBody, asked: Asked) -> str:
 
 
 def remedies(body: FEBody, n_modes: int) -> str:
-    """Describe how to make the geometric stiffness small, with the lines to write."""
+    """Describe how to make the geometric stiffness small, with the lines to add to the job."""
     few = interface_reduction_size(body, PROPOSED) + max(0, n_modes - len(body.b))
     reduced = ""
     if few < n_modes:

@@ -37,7 +37,7 @@ from fe_models.foundation.words import quoted
 __all__ = ["Families", "body_of", "families_of"]
 
 
-GROUNDED = 1e-6  #: |K Psi_R| / (|K| |Psi_R|) above which a body is not free
+GROUNDED = 1e-6  #: |K Psi_R| / (|K| |Psi_R|) above which a body is attached to the ground
 
 
 log = logging.getLogger(__name__)
@@ -57,7 +57,7 @@ class Families(AbstractContextManager["Families"]):
     def __init__(
         self, body: FEBody, *, announce: bool = True, solver: str | Solver | None = None, to_disk: bool = False
     ) -> None:
-        """Find the rigid-body modes and held dofs of a coupled body; families are computed when they are first used.
+        """Find the rigid-body modes and fixed dofs of a coupled body; families are computed when they are first used.
 
         Parameters
         ----------
@@ -101,14 +101,14 @@ class Families(AbstractContextManager["Families"]):
         self._is_open = False
 
     def forget_vibration_modes(self) -> None:
-        """Recompute vibration modes at the next request; an earlier requested number affects roundoff."""
+        """Discard the vibration modes: their roundoff depends on the number of modes requested before."""
         self._modes.clear()
 
     # -- Partition -------------------------------------------------------------------------------------------------
 
     @cached_property
     def e(self) -> IntArray:
-        """Excess boundary dofs E = B without R, in the order of `body.b`, (n_e,)."""
+        """Excess boundary dofs E: the boundary dofs B without R, in the order of `body.b`, (n_e,)."""
         return self.body.b[~np.isin(self.body.b, self.r)]
 
     @property
@@ -144,7 +144,7 @@ class Families(AbstractContextManager["Families"]):
 
     @cached_property
     def condensed(self) -> CondensedBody:
-        """Common parts of all flexibilities."""
+        """Parts that all flexibilities have in common."""
         return CondensedBody(self.fixed, self.Psi_C, self.S, self.Psi_R)
 
     @cached_property
@@ -181,15 +181,15 @@ class Families(AbstractContextManager["Families"]):
         return unrestrained_attachment_modes(self.free)
 
     def residual_attachment(self, free_modes: EigenResult) -> Array:
-        """Return Psi_U minus the contribution of the kept free modes, (n_dof, n_b)."""
+        """Return residual attachment modes: Psi_U minus the contribution of the retained free modes, (n_dof, n_b)."""
         return residual_attachment_modes(self.body, self.Psi_U, free_modes)
 
     def static(self, F: Array) -> Array:
-        """Return G_R F, the static response to load columns with R held, (n_dof, k)."""
+        """Return G_R F, the static response to load columns with R fixed, (n_dof, k)."""
         return self.free.held(F)
 
     def project(self, F: Array) -> Array:
-        """Return P F, load columns in equilibrium with the rigid-body accelerations that they cause, (n_dof, k)."""
+        """Return P F, load columns balanced by the inertia of the rigid-body acceleration they cause, (n_dof, k)."""
         return F - self.free.M_N @ (self.free.N.T @ F)
 
     def flexibility(self, F: Array) -> Array:
@@ -232,7 +232,7 @@ class Families(AbstractContextManager["Families"]):
     # -- Labels ----------------------------------------------------------------------------------------------------
 
     def held_names(self, family: str) -> tuple[list[str], list[str]]:
-        """Return a label and a group for each held dof."""
+        """Return a label and a group for each fixed dof."""
         labels, groups = boundary_names(self.body, family)
         for node, component in self.body.dofs[self.interior_r]:
             labels.append(f"{family} node {self.body.numbering.called(node)} {MOTION_COMPONENTS[component]}")
@@ -243,7 +243,7 @@ class Families(AbstractContextManager["Families"]):
 
     def _require_free(self) -> None:
         if self.body.is_held:
-            return  # the body is intentionally held, and has no rigid-body motion
+            return  # a body fixed to the ground has no rigid-body motion
         force = np.abs(self.body.K @ self.Psi_R).max(axis=0)
         scale = largest_entry(self.body.K) * np.abs(self.Psi_R).max(axis=0)
         if (force > GROUNDED * scale).any():
@@ -270,7 +270,7 @@ class Families(AbstractContextManager["Families"]):
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """Modes computed earlier, of which fewer may be requested later."""
+    """Modes computed earlier. A later request may be for fewer of them."""
 
     modes: EigenResult
     cutoff: float | None
@@ -313,5 +313,5 @@ def families_of(body: FEBody | Families) -> Iterator[Families]:
 
 
 def body_of(body: FEBody | Families) -> FEBody:
-    """Return the body, from the body itself or from its families."""
+    """Return the body, given the body itself or its families."""
     return body.body if isinstance(body, Families) else body

@@ -1,4 +1,4 @@
-"""The body with all boundary dofs held: interior stiffness, factorised once; its modes; stiffness condensed to B."""
+"""Body with all boundary dofs fixed: factorised interior stiffness, fixed-interface modes, stiffness condensed to B."""
 
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
@@ -26,21 +26,21 @@ class FixedInterfaceBody(AbstractContextManager["FixedInterfaceBody"]):
     """Interior partition of a coupled body, and the factorisation of K_II; the context manager frees it."""
 
     body: FEBody
-    i: IntArray  #: interior dofs, which are all others, ordered so that neighbours are near, (n_i,)
+    i: IntArray  #: interior dofs (all dofs not in b), ordered such that neighbours are close, (n_i,)
     b: IntArray  #: held dofs: boundary dofs in the order of `body.b`, then extra dofs, (n_b,)
-    factorization: Factorization  #: of K_ii
+    factorization: Factorization  #: factorisation of K_ii
 
     def __exit__(self, *_: object) -> None:
         self.factorization.close()
 
     @property
     def K_ii(self) -> sp.csc_array:
-        """Interior stiffness, (n_i, n_i) [N/m]; recomputed, because a large body cannot hold it in addition to K."""
+        """Interior stiffness, (n_i, n_i) [N/m], extracted from K at each call to save memory."""
         return principal_block(self.body.K, self.i)
 
     @property
     def M_ii(self) -> sp.csc_array:
-        """Interior mass, (n_i, n_i) [kg]; recomputed."""
+        """Interior mass, (n_i, n_i) [kg], extracted from M at each call."""
         return principal_block(self.body.M, self.i)
 
     @property
@@ -52,7 +52,7 @@ class FixedInterfaceBody(AbstractContextManager["FixedInterfaceBody"]):
 def fix_interfaces(
     body: FEBody, extra: IntArray | None = None, *, solver: str | Solver | None = None
 ) -> FixedInterfaceBody:
-    """Hold all boundary dofs of a coupled body and factorise its interior stiffness.
+    """Fix all boundary dofs of a coupled body and factorise its interior stiffness.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def fixed_interface_modes(fixed: FixedInterfaceBody, wanted: ModeCount) -> Eigen
 
 
 def _mechanism_message(body: FEBody, i: IntArray, K_ii: sp.csc_array, M_ii: sp.csc_array, solver: Solver) -> str:
-    """Describe which nodes move without energy while the interfaces are held."""
+    """Describe which nodes move without energy while the interfaces are fixed."""
     start = f"body {body.name!r}: with all interfaces held its stiffness is singular"
     try:
         modes = eigenmodes(K_ii, M_ii, n_modes=min(7, len(i) - 1), solver=solver)
@@ -121,7 +121,7 @@ def _mechanism_message(body: FEBody, i: IntArray, K_ii: sp.csc_array, M_ii: sp.c
 
 @dataclass(frozen=True, eq=False)
 class CondensedBody:
-    """A body with its held dofs h: the boundary B, and further dofs needed to hold it (`determinate_partition`)."""
+    """Body condensed to its fixed dofs h: the boundary B, and further dofs that prevent its rigid-body motion."""
 
     fixed: FixedInterfaceBody  #: interior factorisation; `fixed.b` are the held dofs h
     Psi_C: Array  #: constraint modes, (n_dof, n_h); `SpreadColumns` if the body is distributed

@@ -1,4 +1,4 @@
-"""The inverse of K under any boundary conditions of the interfaces, from one factorisation of K_II, and its modes.
+"""Inverse of K under any boundary conditions of the interfaces, from one factorisation of K_II, and vibration modes.
 
 Boundary conditions, springs and loads at the interfaces only change the boundary block: the condensed stiffness S =
 K_BB - K_BI K_II⁻¹ K_IB, which is small and dense. Rigid-body motions that remain free are projected out. The operator
@@ -28,13 +28,13 @@ from fe_models.foundation.tall.columns import combine, inner, of_this_process
 
 __all__ = ["BoundaryConditions", "Flexibility", "elastic_modes"]
 
-RIGID_MOTION = 1e-7  #: motion against the conditions, below which a rigid-body motion is free
-COUNTED = 1e-11  #: eigenvalue of the scaled boundary block relative to its largest, above which its sign is certain
+RIGID_MOTION = 1e-7  #: violation of the boundary conditions by a unit rigid-body motion, below which the motion is free
+COUNTED = 1e-11  #: eigenvalue of the scaled boundary block over the largest one, above which its sign is certain
 
 
 @dataclass(frozen=True, eq=False)
 class BoundaryConditions:
-    """Admissible motion of the held dofs, u_h = Z z, with springs and masses of the neighbours on them."""
+    """Admissible motion of the fixed dofs, u_h = Z z, with stiffness and mass of the neighbours attached to them."""
 
     Z: Array  #: free directions, orthonormal columns, (n_h, n_z)
     K_load: Array | None = None  #: stiffness of the neighbours over the held dofs, (n_h, n_h) [N/m]
@@ -42,12 +42,12 @@ class BoundaryConditions:
 
     @classmethod
     def free(cls, n_h: int) -> "BoundaryConditions":
-        """Return the conditions of a free body."""
+        """Return the boundary conditions of a free body."""
         return cls(np.eye(n_h))
 
     @property
     def key(self) -> bytes:
-        """Bytes that identify these conditions."""
+        """Bytes that identify these boundary conditions."""
         parts = (self.Z, self.K_load, self.M_load)
         return b"|".join(b"" if part is None else np.ascontiguousarray(part).tobytes() for part in parts)
 
@@ -66,7 +66,7 @@ class Flexibility:
     """
 
     def __init__(self, condensed: CondensedBody, conditions: BoundaryConditions, r: IntArray | None = None) -> None:
-        """Make the operator; r gives pivots among the columns of Z, instead of a choice by pivoted QR."""
+        """Prepare the operator; r gives the pivots among the columns of Z, which pivoted QR would choose otherwise."""
         self.condensed, self.conditions = condensed, conditions
         body, h, Z = condensed.fixed.body, condensed.fixed.b, conditions.Z
         self._K_hi = sp.csr_array(body.K[:, h].T)[:, condensed.fixed.i]
@@ -87,7 +87,7 @@ class Flexibility:
 
     @property
     def numbering(self) -> IntArray | None:
-        """Numbers of the rows, independent of the order of interior dofs (see `eigenmodes`), (n,); None: as stored."""
+        """Row numbers, (n,), independent of the order of interior dofs (see `eigenmodes`); None: the stored order."""
         if self.T is None:
             return None
         i = self.condensed.fixed.i
@@ -105,7 +105,7 @@ class Flexibility:
 
     @property
     def inertia(self) -> Inertia:
-        """Inertia of K - sigma M at a shift between the rigid-body motions and the first elastic mode."""
+        """Inertia of K - sigma M at a shift sigma between the rigid-body motions and the first elastic mode."""
         n_negative = self.condensed.fixed.n_multipliers + self.n_rigid
         return Inertia(n_negative, 0, self.n - n_negative)
 
@@ -119,7 +119,7 @@ class Flexibility:
         return u
 
     def held(self, f: Array) -> Array:
-        """Return the static response to f with the pivots held, (n, k): steps (2) to (4)."""
+        """Return the static response to f with the pivots fixed, (n, k): steps (2) to (4)."""
         fixed, Z = self.condensed.fixed, self.conditions.Z
         i, h = fixed.i, fixed.b
         n_i = len(i)
@@ -195,7 +195,7 @@ class Flexibility:
         return A
 
     def _orthonormal(self, motions: Array) -> tuple[Array, Array]:
-        """Return M-orthonormal rigid-body motions, and M times them."""
+        """Return M-orthonormal combinations N of the rigid-body motions, and M N."""
         if not motions.shape[1]:
             return motions, motions
         M_N = self.M @ motions
@@ -213,11 +213,11 @@ class Flexibility:
 
 
 def _free_motions(condensed: CondensedBody, conditions: BoundaryConditions) -> Array:
-    """Return the rigid-body motions that the conditions leave free, (n_dof, n_n)."""
+    """Return the rigid-body motions that the boundary conditions allow, (n_dof, n_n)."""
     h, Z = condensed.fixed.b, conditions.Z
     Psi_R = condensed.Psi_R
     if not Psi_R.shape[1]:
-        return Psi_R  # a held body has no rigid-body motions
+        return Psi_R  # a body fixed to the ground has no rigid-body motions
     size = _lengths(condensed.fixed.body, h, np.eye(len(h)))
     scaled = Psi_R[h] / size[:, None]
     column = np.abs(scaled).max(axis=0)
@@ -247,14 +247,14 @@ def _root_of_load(condensed: CondensedBody, conditions: BoundaryConditions, size
 
 
 def _lengths(body: FEBody, h: IntArray, Z: Array) -> Array:
-    """Return the unit of every direction: 1 for translations, 1 / body length for rotations, (n_z,)."""
+    """Return the scale of each direction: 1 for translations, 1 / body length for rotations, (n_z,)."""
     is_rotation = (body.dofs[h, 1] >= 3).astype(float)
     turned = Z.T**2 @ is_rotation > 0.5
     return np.where(turned, 1 / body.length, 1.0)
 
 
 def _pivots(motions: Array) -> IntArray:
-    """Return as many rows as there are motions, such that holding them prevents the motions, ascending."""
+    """Return as many rows as there are motions such that fixing these rows prevents the motions, ascending."""
     n = motions.shape[1]
     if n == 0:
         return np.zeros(0, np.int64)
@@ -327,7 +327,7 @@ def _lost_in_rounding(flexibility: Flexibility) -> EigenError:
 
 
 def _proven(flexibility: Flexibility, modes: EigenResult, asked: ModeCount) -> EigenResult:
-    """Return the modes after their number agrees with the inertia, counted for boundary and interior separately.
+    """Return the modes after a check that the inertia confirms their number, counted for boundary and interior.
 
     The proof of `eigenmodes` factorises K - sigma M as a whole. The reference node of a distributing interface has
     neither mass nor stiffness, only multipliers, so that its pivots there are zero.
@@ -340,7 +340,7 @@ def _proven(flexibility: Flexibility, modes: EigenResult, asked: ModeCount) -> E
             more = eigenmodes(
                 flexibility.K, flexibility.M, k + n_extra, factorization=flexibility, numbering=flexibility.numbering
             )
-        except EigenError:  # there are no more modes
+        except EigenError:  # no more modes exist
             break
         last, sigma = counting_shift(more.omega2, k, wanted, 0.0)
         if last < k + n_extra:

@@ -16,8 +16,8 @@ from fe_models.foundation.tall.columns import of_this_process
 
 __all__ = ["InterfaceLoad", "boundary_load", "condensed_load", "point_load"]
 
-INDEFINITE = 1e-10  #: negative eigenvalue of a scaled load relative to its largest that is more than rounding
-COLLINEAR = 1e-6  #: second radius of the members relative to the first, as for couplings
+INDEFINITE = 1e-10  #: negative eigenvalue of a scaled load over the largest one, above which it is more than rounding
+COLLINEAR = 1e-6  #: second radius of the members over the first, below which they are collinear, as for couplings
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ def point_load(
     stiffness: float | Sequence[float] = 0.0,
     rotational_stiffness: float | Sequence[float] = 0.0,
 ) -> InterfaceLoad:
-    """Return the load of a point mass at the reference point of an interface, and of springs from there to the ground.
+    """Return the load of a point mass and of springs to the ground at the reference point of an interface.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def point_load(
 
 
 def condensed_load(neighbour: FEBody, interfaces: Mapping[str, str]) -> InterfaceLoad:
-    """Return the load of a neighbouring body, condensed statically (Guyan) to the shared interfaces.
+    """Return the load of a neighbouring body, statically condensed (Guyan) to the shared interfaces.
 
     Its other interfaces are free. Its shared interfaces must be rigid or distributing, with the reference points and
     axes of the interfaces to which they are joined.
@@ -159,7 +159,7 @@ def boundary_load(body: FEBody, loads: Sequence[InterfaceLoad]) -> tuple[Array, 
 
 
 def interface_motion(body: FEBody, interface: Interface) -> Array:
-    """Return A in [d; theta] = A u, (6, n), along the axes of the interface, where u are its boundary dofs.
+    """Return A in [d; theta] = A u, (6, n): motion along the axes of an interface, from its boundary dofs u.
 
     This is the motion of its single node, or the mean motion of its nodes (mean translation if they are collinear).
     """

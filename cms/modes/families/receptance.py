@@ -1,4 +1,4 @@
-"""Receptance of the boundary: displacement of every boundary dof per unit force on every other, over frequency."""
+"""Receptance of the boundary: displacement of each boundary dof per unit force on each boundary dof, over frequency."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ __all__ = ["Receptance", "boundary_scale", "largest_error", "receptance_of_modes
 
 
 def boundary_scale(body: FEBody) -> Array:
-    """Return the lever that converts every boundary dof to a translation: 1, or the body length for rotations, (n_b,).
+    """Return the length that converts each boundary dof to a translation: 1, or the body length for rotations, (n_b,).
 
     A rotation times this length is comparable to a translation, and a moment divided by it is comparable to a force.
     """
@@ -21,7 +21,7 @@ def boundary_scale(body: FEBody) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Receptance:
-    """Sum over modes: H(omega) = Σ_k b_k b_kᵀ / ((1 + i eta) k_k - omega² m_k) with diagonal k and m."""
+    """Receptance as a sum over modes: H(omega) = Σ_k b_k b_kᵀ / ((1 + i eta) k_k - omega² m_k), diagonal k and m."""
 
     b: Array  #: modes at the boundary dofs, scaled, (n_b, n)
     k: Array  #: modal stiffness, (n,)
@@ -40,12 +40,12 @@ class Receptance:
 
 
 def receptance_of_modes(body: FEBody, Phi: Array, omega2: Array, *, loss: float) -> Receptance:
-    """Return the receptance of M-orthonormal modes, (n_dof, n); omega² = 0 for rigid-body modes."""
+    """Return the receptance of M-orthonormal modes, (n_dof, n); rigid-body modes have omega² = 0."""
     return Receptance(boundary_scale(body)[:, None] * Phi[body.b], omega2, np.ones(len(omega2)), loss)
 
 
 def receptance_of_pencil(b: Array, K: Array, M: Array, *, loss: float, omega2: float) -> Receptance:
-    """Return the receptance of a reduced pencil.
+    """Return the receptance of reduced matrices K and M.
 
     Parameters
     ----------
@@ -61,5 +61,5 @@ def receptance_of_pencil(b: Array, K: Array, M: Array, *, loss: float, omega2: f
 
 
 def largest_error(H: np.ndarray, reference: np.ndarray) -> float:
-    """Return the largest |H - H_ref| / |H_ref| over the frequencies, in the Frobenius norm."""
+    """Return the largest |H - H_ref| / |H_ref| over the frequencies, with Frobenius norms."""
     return float((np.linalg.norm(H - reference, axis=(1, 2)) / np.linalg.norm(reference, axis=(1, 2))).max())

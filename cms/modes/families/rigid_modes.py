@@ -1,4 +1,4 @@
-"""Motions without strain energy: rigid-body modes (docs/theory.md §2), and those of mechanisms.
+"""Motions without strain energy: rigid-body modes (docs/theory.md §2), and motions of mechanisms.
 
 Rigid-body modes are computed in three ways that must give the same space.
 """
@@ -29,7 +29,7 @@ __all__ = [
     "without_energy",
 ]
 
-HOLDS = 1e-4  #: pivot above which a dof holds a motion well enough for a factorisation
+HOLDS = 1e-4  #: pivot above which fixing a dof prevents a motion well enough for a factorisation
 #: tolerance for rigid-body modes restricted to some dofs, with rotations scaled by the body length
 RANK_TOLERANCE = 1e-8
 
@@ -51,7 +51,7 @@ def geometric_rigid_modes(body: FEBody, *, origin: Array | None = None) -> Array
 
 
 def determinate_dofs(body: FEBody, candidates: IntArray) -> IntArray:
-    """Choose six of the candidate dofs that just prevent rigid-body motion (the set R of docs/theory.md §1).
+    """Choose six candidate dofs that exactly prevent rigid-body motion (the set R of docs/theory.md §1).
 
     The choice uses pivoted QR of the rigid-body modes restricted to the candidates, rotations scaled by the body
     length.
@@ -76,7 +76,7 @@ def determinate_dofs(body: FEBody, candidates: IntArray) -> IntArray:
 
 
 def independent_rigid_modes(body: FEBody) -> tuple[Array, IntArray]:
-    """Return rigid-body modes about the mean of the nodes, without those that the dofs cannot make; none if held.
+    """Return independent rigid-body modes about the mean of the nodes; none if the body is fixed to the ground.
 
     Returns
     -------
@@ -140,7 +140,7 @@ def determinate_partition(body: FEBody, Psi_R: Array) -> tuple[IntArray, IntArra
 
 
 def _in_lengths(body: FEBody, Psi_R: Array) -> Array:
-    """Return rigid-body modes in which a rotational dof counts as the translation at one body length."""
+    """Return rigid-body modes with rotational dofs scaled to the translation at one body length."""
     scaled = Psi_R.copy()
     scaled[body.dofs[:, 1] >= 3] *= body.length
     return scaled
@@ -175,17 +175,17 @@ def null_space_rigid_modes(body: FEBody) -> Array:
 # stiffest part.
 
 
-WITHIN_ROUNDING = 30.0  #: energy below which a motion is free, in units of its rounding; free motions have 0.01 to 1
-SUSPECT = 1e-6  #: energy above which a direction is certainly not free, relative to the sum of K_kk u_k²
+WITHIN_ROUNDING = 30.0  #: energy over its rounding error, below which a motion is free; free motions have 0.01 to 1
+SUSPECT = 1e-6  #: energy over the sum of K_kk u_k², above which a direction is certainly not free
 
 
 def rounding_of_energy(body: FEBody, u: Array) -> Array:
-    """Size of the rounding in the strain energy of each column: eps times the sum of |K_kk| u_k², (k,)."""
+    """Return the rounding error of the strain energy of each column: eps times Σ |K_kk| u_k², (k,)."""
     return np.finfo(float).eps * dots(u, u, np.abs(body.K.diagonal()))
 
 
 def free_motions(body: FEBody, X: Array, C: Array, S: Array, terms: Array, load: Array | None = None) -> Array:
-    """Return the motions in the span of X C without energy, (n_dof, n_free).
+    """Return the motions in the span of X C without strain energy, (n_dof, n_free).
 
     (1) eigenvectors v of S, scaled by the size of its terms; only those with small eigenvalues are suspect
     (2) a suspect motion u = X C v has no strain energy in the body if uᵀ K u is within its rounding
@@ -222,12 +222,12 @@ def free_motions(body: FEBody, X: Array, C: Array, S: Array, terms: Array, load:
 
 
 def without_energy(body: FEBody, u: Array) -> np.ndarray:
-    """Return whether the strain energy of each motion is within its rounding, (k,) bool."""
+    """Return whether the strain energy of each motion is no more than rounding, (k,) bool."""
     return np.asarray(dots(u, body.K @ u) < WITHIN_ROUNDING * rounding_of_energy(body, u))
 
 
 def mechanism_words(body: FEBody, u: Array) -> str:
-    """Describe the motions without energy besides the rigid ones: their number, and where they are largest."""
+    """Describe the number of non-rigid motions without energy, and where they are largest."""
     several = u.shape[1] > 1
     return (
         f"body {body.name!r}: {u.shape[1]} motion{'s' if several else ''} besides the rigid ones "

@@ -25,15 +25,15 @@ __all__ = [
     "unrestrained_attachment_modes",
 ]
 
-RESIDUAL = 1e-12  #: energy of a residual attachment mode relative to the attachment mode, below which it is rounding
-STIFF = 1e-14  #: compliance relative to the largest (rotations times body length squared), below which it is rounding
-ROUNDING_ENERGY = 1e-24  #: the same for the energy of a response to inertia loads, where both factors are rounding
-BLOCK = 60  #: right-hand sides solved at a time; wider blocks are not faster and need more memory
-BLOCK_OF_RANKS = 16  #: the same for a distributed body, whose columns pass through rank 0
+RESIDUAL = 1e-12  #: energy of a residual attachment mode over that of the attachment mode, below which it is rounding
+STIFF = 1e-14  #: compliance over the largest (rotations times body length squared), below which it is rounding
+ROUNDING_ENERGY = 1e-24  #: energy of an inertia-load response over the largest, below which both factors are rounding
+BLOCK = 60  #: number of right-hand sides per solve; wider blocks are not faster and need more memory
+BLOCK_OF_RANKS = 16  #: number of right-hand sides per solve of a distributed body, whose columns pass through rank 0
 
 
 def constraint_modes(fixed: FixedInterfaceBody, *, to_disk: bool = False) -> Array:
-    """Return constraint modes Psi_C: unit displacement of one boundary dof, with the other boundary dofs held.
+    """Return constraint modes Psi_C: unit displacement of one boundary dof, with the other boundary dofs fixed.
 
     The interior part is -K_II⁻¹ K_IB; columns have the order of the held dofs `fixed.b`. They are solved in blocks of
     `BLOCK`. They are put on disk (`fe_models.foundation.tall.on_disk`) if requested, and distributed (`SpreadColumns`)
@@ -68,7 +68,7 @@ def _blocks_of_constraint_modes(fixed: FixedInterfaceBody, width: int) -> Iterat
 
 
 def redundant_constraint_modes(free: Flexibility) -> Array:
-    """Return redundant constraint modes Psi_RC: unit displacement of one E dof, with the other E dofs and R held.
+    """Return redundant constraint modes Psi_RC: unit displacement of one E dof, with the other E dofs and R fixed.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def redundant_constraint_modes(free: Flexibility) -> Array:
 
 
 def attachment_modes(free: Flexibility) -> Array:
-    """Return attachment modes Psi_A: unit force on one E dof, with R held; Psi_A = Psi_C,E S_EE⁻¹.
+    """Return attachment modes Psi_A: unit force on one E dof, with R fixed; Psi_A = Psi_C,E S_EE⁻¹.
 
     Returns
     -------
@@ -95,7 +95,7 @@ def attachment_modes(free: Flexibility) -> Array:
 
 
 def inertia_relief_modes(fixed: FixedInterfaceBody, Psi_R: Array) -> Array:
-    """Return inertia-relief modes Psi_H: static response to the loads M Psi_R of rigid accelerations, with B held.
+    """Return inertia-relief modes Psi_H: response to inertia loads M Psi_R of rigid accelerations, with B fixed.
 
     The interior part is K_II⁻¹ (M Psi_R)_I.
 
@@ -132,7 +132,7 @@ def unrestrained_attachment_modes(free: Flexibility) -> Array:
         rounding, if the free body responds to a load by acceleration alone.
     """
     n_b, h = len(free.condensed.fixed.body.b), free.condensed.fixed.b
-    on_boundary = np.zeros((len(h), n_b))  # u_h of the unit forces with R held
+    on_boundary = np.zeros((len(h), n_b))  # u_h under the unit forces, with R fixed
     on_boundary[free.e] = free.solve_boundary(np.eye(len(h), n_b)[free.e])
     u = of_this_process(combine(free.condensed.Psi_C, on_boundary))
     u -= combine(free.held(free.M_N), free.N[h[:n_b]].T)
@@ -144,7 +144,7 @@ def unrestrained_attachment_modes(free: Flexibility) -> Array:
 
 
 def residual_attachment_modes(body: FEBody, Psi_U: Array, free_modes: EigenResult) -> Array:
-    """Return residual attachment modes Psi_U - Phi Lambda⁻¹ Phi_Bᵀ: Psi_U minus the contribution of kept modes.
+    """Return residual attachment modes Psi_U - Phi Lambda⁻¹ Phi_Bᵀ: Psi_U minus the contribution of retained modes.
 
     Parameters
     ----------
@@ -163,13 +163,13 @@ def residual_attachment_modes(body: FEBody, Psi_U: Array, free_modes: EigenResul
     residual = Psi_U - combine(free_modes.Phi, (free_modes.Phi[body.b] / free_modes.omega2).T)
     residual[:, ~Psi_U.any(axis=0)] = 0.0  # a load without elastic response leaves no residual
     n_multipliers = int((body.dofs[:, 1] == MULTIPLIER).sum())
-    n_elastic = body.n_dof - 2 * n_multipliers - 6  # motions that satisfy the constraints
+    n_elastic = body.n_dof - 2 * n_multipliers - 6  # number of independent motions that satisfy the constraints
     is_full = n_multipliers and len(free_modes.omega2) + residual.shape[1] > n_elastic
     return without_rounding(body, residual, Psi_U) if is_full else residual
 
 
 def without_rounding(body: FEBody, residual: Array, Psi_U: Array) -> Array:
-    """Return residual attachment modes without the combinations that are rounding of the attachment modes.
+    """Return residual attachment modes without combinations that are only rounding of the attachment modes.
 
     In a body with multipliers such a combination breaks the constraints. It would count as a motion without mass.
     """

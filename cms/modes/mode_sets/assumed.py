@@ -16,7 +16,7 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["assumed_modes"]
 
-NEGLIGIBLE = 1e-9  #: largest displacement of a column relative to its beam field, below which the column is left out
+NEGLIGIBLE = 1e-9  #: largest displacement of a column over that of its beam field, below which the column is omitted
 #: relative difference of the two smallest principal moments of inertia that is needed to identify the axis
 SLENDER_RATIO = 1e-6
 
@@ -93,7 +93,7 @@ def assumed_modes(
     if not np.ptp(span) > 0:
         raise ModeSetError(f"assumed_modes: body {body.name!r} has no length along ({_numbers(t)})")
 
-    # skin nodes of a beam follow other nodes, and have no dofs of their own
+    # skin nodes of a beam follow other nodes, and have no dofs themselves
     moving = body.dofs[body.dofs[:, 1] >= 0, 0]
     has_sections = bool(np.ptp(r[moving], axis=0).max() > NEGLIGIBLE * np.ptp(span))
 
@@ -183,7 +183,7 @@ def _counts(n_modes: int | None, axial: int | None, bending: int | None, torsion
 def _fields(
     motion: str, f: AxisFunctions, k: int, t: Array, e: Array | None, r: Array, poisson: float | None
 ) -> Iterator[tuple[str, tuple[Array, Array]]]:
-    """Yield beam field and contraction of function k: translations and rotations of all nodes, (n_nodes, 3) each."""
+    """Yield beam field and lateral contraction of each function: translations and rotations, (n_nodes, 3) each."""
     value, slope, curvature = (table[:, k, None] for table in (f.values, f.slopes, f.curvatures))
     still = np.zeros_like(r)
     if motion == "torsion":

@@ -19,9 +19,9 @@ CUBIC = 3
 class AxisFunctions:
     """Functions of the axis coordinate s and their derivatives at given points."""
 
-    values: Array  #: (n_points, n) [-]
-    slopes: Array  #: d/ds, (n_points, n) [1/m]
-    curvatures: Array  #: d²/ds², (n_points, n) [1/m²]
+    values: Array  #: function values, (n_points, n) [-]
+    slopes: Array  #: first derivatives with respect to s, (n_points, n) [1/m]
+    curvatures: Array  #: second derivatives with respect to s, (n_points, n) [1/m²]
     names: tuple[str, ...]  #: name of each function, such as "P4"
 
 
@@ -39,12 +39,12 @@ def _polynomials(
 
 
 def monomials(s: Array, span: Array, n: int, first: int) -> AxisFunctions:
-    """Return monomials of xi in [-1, 1], degrees `first` and up."""
+    """Return n monomials of xi in [-1, 1], beginning with degree `first`."""
     return _polynomials(Polynomial, "xi^", s, span, n, first)
 
 
 def legendre(s: Array, span: Array, n: int, first: int) -> AxisFunctions:
-    """Return Legendre polynomials of xi in [-1, 1], degrees `first` and up."""
+    """Return n Legendre polynomials of xi in [-1, 1], beginning with degree `first`."""
     return _polynomials(Legendre, "P", s, span, n, first)
 
 

@@ -27,8 +27,8 @@ __all__ = ["BalancedSystem", "balance", "balanced_truncation"]
 # Balancing of a second-order system in modal coordinates: Gramians, Hankel and position-velocity singular values.
 
 
-NOTHING_NEW = 1e-6  #: remainder of a unit direction after removal of earlier ones, below which it adds nothing
-NEGATIVE = 1e-9  #: share of the largest eigenvalue of a Gramian by which rounding may make another eigenvalue negative
+NOTHING_NEW = 1e-6  #: remainder of a unit direction outside the span of earlier ones, below which it is dependent
+NEGATIVE = 1e-9  #: largest negative eigenvalue of a Gramian, over the largest eigenvalue, that counts as rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class BalancedSystem:
     """Result of balancing 1 q_ddot + D q_dot + diag(omega²) q = B u, y = Cᵀ q."""
 
     hankel: Array  #: Hankel singular values of u -> y, descending, (2 n,)
-    signs: Array  #: +1 or -1 for each: if C = B, the system is balanced up to these signs; else +1, (2 n,)
+    signs: Array  #: sign of each singular value, +1 or -1, (2 n,), up to which a system with C = B is balanced; else +1
     position_velocity: Array  #: position-velocity singular values, descending, (n,)
     T: Array  #: balanced directions as orthonormal columns over q, (n, n)
 
@@ -101,7 +101,7 @@ def balance(omega2: Array, D: Array, B: Array, C: Array | None = None) -> Balanc
 
 
 def gramian(A: Array, B: Array) -> Array:
-    """Return P of A P + P Aᵀ + b bᵀ = 0, b = (0, B), (2 n, 2 n)."""
+    """Return P that satisfies A P + P Aᵀ + b bᵀ = 0 with b = (0, B), (2 n, 2 n)."""
     b = np.concatenate([np.zeros_like(B), B])
     try:
         P = la.solve_continuous_lyapunov(A, -b @ b.T)
@@ -114,7 +114,7 @@ def gramian(A: Array, B: Array) -> Array:
 
 
 def root(P: Array) -> Array:
-    """Return R with P = R Rᵀ; negative eigenvalues count as zero if they are rounding, otherwise an error is raised."""
+    """Return R with P = R Rᵀ; negative eigenvalues within rounding count as zero, larger ones raise an error."""
     values, vectors = la.eigh(P)
     if values.min() < -NEGATIVE * values.max():
         raise ModeSetError(
@@ -125,7 +125,7 @@ def root(P: Array) -> Array:
 
 
 def in_turn(reached: Array, seen: Array) -> Array:
-    """Return an orthonormal basis, (n, n), of both kinds of directions in turn; dependent directions are left out.
+    """Return an orthonormal basis, (n, n), of reached and observed directions in turn; dependent ones are omitted.
 
     Parameters
     ----------
@@ -152,12 +152,13 @@ def in_turn(reached: Array, seen: Array) -> Array:
 log = logging.getLogger(__name__)
 
 FEWEST_RICH = 60  #: smallest number of free modes of the rich basis
-LOWER_PART = 0.6  #: share of all modes of a small body that the rich basis takes by default
+LOWER_PART = 0.6  #: default number of modes in the rich basis of a small body, as a share of all its modes
 RICH_FACTOR = 3  #: number of free modes of the rich basis per requested mode
-NOTHING_LEFT = 1e-7  #: length of a residual attachment mode relative to the attachment mode, below which it is rounding
-STIFF = 1e-12  #: compliance of a boundary dof relative to the largest, below which it is rounding
+#: length of a residual attachment mode over that of the attachment mode, below which it is rounding
+NOTHING_LEFT = 1e-7
+STIFF = 1e-12  #: compliance of a boundary dof over the largest, below which it is rounding
 FEWEST_FOUND = 4  #: smallest number of free modes that balancing needs
-REPORTED = 12  #: number of singular values in the options of the set; its data contain all of them
+REPORTED = 12  #: number of singular values reported in the options of the set; its data contain all of them
 
 
 def balanced_truncation(
@@ -252,7 +253,7 @@ def balanced_truncation(
         is_symmetric = np.array_equal(into, out_of)
         system = balance(rich.omega2, D, loads[:, into], None if is_symmetric else loads[:, out_of])
         sigma = system.position_velocity
-        sides = 1 if is_symmetric else 2  # directions per singular value: one of loads and one of responses
+        sides = 1 if is_symmetric else 2  # directions per singular value: one for loads and one for responses
         if n_modes is None:
             left = 1 - np.cumsum(sigma) / sigma.sum()
             n_modes = min(n, sides * (int(np.argmax(left <= (tolerance or 0.0))) + 1))
@@ -302,8 +303,8 @@ def chosen_dofs(body: FEBody, key: str, names: Sequence[str] | None) -> IntArray
 class RichBasis:
     """M-orthonormal, K-diagonal elastic columns of the free body."""
 
-    Phi: Array  #: (n_dof, n)
-    omega2: Array  #: (n,) [1/s²]
+    Phi: Array  #: displacement columns, (n_dof, n)
+    omega2: Array  #: squared angular frequencies, (n,) [1/s²]
 
 
 def rich_basis(families: Families, n_asked: int | None, n_default: int) -> RichBasis:
@@ -327,7 +328,7 @@ def rich_basis(families: Families, n_asked: int | None, n_default: int) -> RichB
 
 
 def most_free_modes(families: Families, n: int) -> EigenResult:
-    """Return n free modes, or as many as the eigensolver finds to its tolerance; the highest ones are difficult.
+    """Return n free modes, or as many as the eigensolver can compute to its tolerance; the highest may not converge.
 
     Raises
     ------
@@ -348,7 +349,7 @@ def most_free_modes(families: Families, n: int) -> EigenResult:
 
 
 def _stiffness(body: FEBody, u: Array) -> Array:
-    """Return twice the strain energy of every column, (k,)."""
+    """Return twice the strain energy of each column, (k,)."""
     return np.einsum("nk,nk->k", u, body.K @ u)
 
 

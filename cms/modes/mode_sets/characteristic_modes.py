@@ -116,7 +116,7 @@ class _Part:
 
     names: tuple[str, ...]  #: names of the interfaces
     dofs: IntArray  #: dofs that the constraint modes move, one for each mode, (n,)
-    columns: IntArray  #: their constraint modes, as columns of the set, (n,)
+    columns: IntArray  #: indices of these constraint modes among the columns of the set, (n,)
     R: Array  #: rigid-body motions of each interface, (n, n_r)
 
 
@@ -141,7 +141,7 @@ def _rigid_motions(body: FEBody, interface: Interface, Psi_R: Array) -> Array:
 
 
 def _side_of(columns: Array, chosen: IntArray) -> Array:
-    """Return some columns, without a copy if they are contiguous."""
+    """Return some of the columns, without a copy if they are contiguous."""
     first, last = int(chosen[0]), int(chosen[-1]) + 1
     if np.array_equal(chosen, np.arange(first, last)):
         return columns[:, first:last]
@@ -158,7 +158,7 @@ def _side_by_side(parts: list[_Part]) -> _Part:
 
 
 def _characteristic(body: FEBody, Psi_C: Array, part: _Part, wanted: ModeCount) -> tuple[Array, Array]:
-    """Return the lowest deforming modes of the constraint modes, and their frequencies: steps (1) to (3)."""
+    """Return the lowest characteristic modes and their frequencies: steps (1) to (3)."""
     # K Psi_C is zero in the interior; Psi_C is the identity on its own boundary dofs and zero on the others
     rows = sp.csr_array(body.K[:, part.dofs].T)
     blocks = range(0, len(part.dofs), COLUMNS_AT_ONCE)
@@ -167,7 +167,7 @@ def _characteristic(body: FEBody, Psi_C: Array, part: _Part, wanted: ModeCount) 
     M_c = gram_in_blocks(Psi_C, SymmetricProduct(body.M))
     n, n_r = part.R.shape
     Q, _ = la.qr(M_c @ part.R)
-    X = Q[:, n_r:]  # Rᵀ M_c X = 0
+    X = Q[:, n_r:]  # the columns X satisfy Rᵀ M_c X = 0
     n_most = n - n_r
     if n_most == 0 or wanted.n == 0:
         return np.zeros((n, 0)), np.zeros(0)

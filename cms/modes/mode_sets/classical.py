@@ -208,7 +208,7 @@ def benfield_hruda(
 
 
 def free_directions(body: FEBody, free: Mapping[str, Sequence[str]]) -> Array:
-    """Return the directions over boundary dofs that the fixed-interface problem leaves free, orthonormal, (n_b, k).
+    """Return the boundary directions that stay free in the fixed-interface problem, orthonormal, (n_b, k).
 
     Parameters
     ----------
@@ -241,7 +241,7 @@ def free_directions(body: FEBody, free: Mapping[str, Sequence[str]]) -> Array:
 
 
 def _directions(body: FEBody, interface: Interface, component: str) -> Array:
-    """Return this component at every node of the interface, over its dofs, (n_dofs, n_nodes)."""
+    """Return one component at each node of an interface as columns over the interface dofs, (n_dofs, n_nodes)."""
     where = f"body {body.name!r}: free dofs of interface {interface.name!r}"
     if component not in MOTION_COMPONENTS:
         raise BodyError(f"{where}: unknown component {quoted(component)}{nearest(component, MOTION_COMPONENTS)}")
@@ -359,9 +359,9 @@ def _held_modes(
     wanted: ModeCount,
     free: Mapping[str, Sequence[str]],
 ) -> tuple[Block, EigenResult, dict[str, str]]:
-    """Return the modes with B held, or with B held except its free dofs (then made zero on B by means of Psi_C).
+    """Return fixed-interface modes; if some dofs of B are free, their modes minus the constraint-mode part.
 
-    Beside their block and the modes themselves, the options to record: the free dofs, if there are any.
+    The result also contains the block of columns and the options to record (the free dofs, if any).
     """
     body = families.body
     directions = free_directions(body, free) if free else np.zeros((len(body.b), 0))

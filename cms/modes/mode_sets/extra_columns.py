@@ -19,7 +19,7 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["EXTRA_COLUMNS", "with_centrifugal", "with_load_cases"]
 
-IN_THE_SPAN = 1e-6  #: part of a response, in the energy norm, below which it counts as already in the span
+IN_THE_SPAN = 1e-6  #: part of a response outside the span, in the energy norm, below which the response is not added
 #: energy of a column, relative to the energy of its dofs taken singly, below which it is rigid-body motion
 ROUNDING = 1e-13
 
@@ -138,7 +138,7 @@ def _with_responses(modes: ModeSet, source: FEBody | Families, cases: Sequence[L
 
 
 def _not_in_span(body: FEBody, V: Array, U: Array, F: Array) -> tuple[Array, np.ndarray]:
-    """Return K-orthonormal parts of the responses U to F outside the span of V and earlier ones, and which count."""
+    """Return K-orthonormal parts of the responses U to loads F outside the span of V, and which responses are new."""
     K = SymmetricProduct(body.K)
     KV = K @ V
     G = V.T @ KV
@@ -150,11 +150,11 @@ def _not_in_span(body: FEBody, V: Array, U: Array, F: Array) -> tuple[Array, np.
     energy = np.abs(np.einsum("nk,nk->k", U, F))
     local = np.einsum("n,nk,nk->k", np.divide(1.0, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0), F, F)
     rest = U
-    for _ in range(2):  # twice is enough
+    for _ in range(2):  # two passes suffice
         rest = rest - V @ np.linalg.lstsq(G, KV.T @ rest, rcond=ROUNDING)[0]
     new, is_new = np.zeros((len(U), 0)), np.zeros(U.shape[1], bool)
     for k in range(U.shape[1]):
-        x = rest[:, [k]] - new @ (new.T @ (K @ rest[:, [k]]))  # responses to proportional loads count once
+        x = rest[:, [k]] - new @ (new.T @ (K @ rest[:, [k]]))  # responses to proportional loads are added only once
         left = abs(float(x[:, 0] @ (K @ x)[:, 0]))
         # A load that is balanced by rigid-body acceleration leaves only rounding, far less than its dofs taken singly.
         is_new[k] = left > IN_THE_SPAN**2 * energy[k] and energy[k] > IN_THE_SPAN**2 * local[k]

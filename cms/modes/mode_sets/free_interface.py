@@ -25,7 +25,7 @@ from fe_models.foundation.tall.columns import combine
 
 __all__ = ["craig_chang", "dual_craig_bampton", "herting", "macneal", "normal_modes", "rubin"]
 
-DEPENDENT = 1e-12  #: eigenvalue of the scaled residual flexibility relative to the largest, below which it is rounding
+DEPENDENT = 1e-12  #: eigenvalue of the scaled residual flexibility over the largest, below which it is rounding
 
 
 def normal_modes(
@@ -226,7 +226,7 @@ def _residual_block(families: Families, modes: EigenResult) -> Block:
 
 
 def _pseudo_inverse(G: Array) -> Array:
-    """Return the pseudo-inverse of a symmetric positive semidefinite matrix, scaled with its diagonal."""
+    """Return the pseudo-inverse of a symmetric positive semidefinite matrix, scaled by its diagonal."""
     diagonal = np.diag(G)
     size = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
     scaled = G * np.outer(size, size)

@@ -1,4 +1,4 @@
-"""Check whether given columns are over the dofs of the coupled body or of its mesh, which may be equally many."""
+"""Identify the dofs of given columns: those of the coupled body or those of its mesh, which may be equally many."""
 
 import logging
 import os
@@ -21,13 +21,13 @@ __all__ = ["OVER", "coupled_columns", "log_frequencies", "user_basis"]
 log = logging.getLogger(__name__)
 
 
-OVER = ("coupled", "mesh")  #: dofs over which columns can be given
+OVER = ("coupled", "mesh")  #: kinds of dofs over which columns can be given
 WORDS = {"coupled": "coupled dofs", "mesh": "dofs of the mesh"}
 #: ratio of the median omega² of the columns to that of the other interpretation, above which the other one is meant
 DEARER = 10.0
 #: share of the motion of a rigid interface that its members cannot follow, above which a warning is given
 NOT_RIGID = 0.1
-APART = 3.0  #: ratio between a stated frequency and that from the energy of its column, above which a warning is given
+APART = 3.0  #: ratio between a stated frequency and the Rayleigh quotient frequency above which a warning is given
 
 
 def coupled_columns(where: str, body: FEBody, V: Array, over: str | None) -> tuple[Array, dict[str, str]]:
@@ -84,7 +84,7 @@ def coupled_columns(where: str, body: FEBody, V: Array, over: str | None) -> tup
 
 
 def stated_or_counted(where: str, body: FEBody, V: Array, over: str | None) -> str:
-    """Return over which dofs the columns are given."""
+    """Return the dofs over which the columns are given: as stated, or from the number of rows."""
     if over is not None and over not in OVER:
         raise ModeSetError(f"{where}: columns_over = {quoted(over)}: unknown{nearest(str(over), OVER)}")
     rows = {"coupled": body.n_dof, "mesh": n_mesh(body)}
@@ -109,24 +109,24 @@ def n_mesh(body: FEBody) -> int:
 
 
 def has_own_mesh(body: FEBody) -> bool:
-    """Whether mesh dofs and coupled dofs differ in number or order."""
+    """Return whether mesh dofs and coupled dofs differ in number or order."""
     return body.recovery is not None and not np.array_equal(body.recovery.dofs, body.dofs)
 
 
 def is_ambiguous(body: FEBody) -> bool:
-    """Whether mesh dofs and coupled dofs differ but are equally many."""
+    """Return whether mesh dofs and coupled dofs differ although they are equally many."""
     return has_own_mesh(body) and n_mesh(body) == body.n_dof
 
 
 def rayleigh(body: FEBody, X: Array) -> Array:
-    """Return the Rayleigh quotient of every column, (k,) [1/s²]; 0 for columns without mass."""
+    """Return the Rayleigh quotient of each column, (k,) [1/s²]; 0 for columns without mass."""
     mass = np.einsum("nk,nk->k", X, body.M @ X)
     energy = np.maximum(np.einsum("nk,nk->k", X, body.K @ X), 0.0)
     return np.divide(energy, mass, out=np.zeros_like(energy), where=mass > 0)
 
 
 def log_frequencies(where: str, body: FEBody, X: Array, frequencies: Array) -> None:
-    """Warn if stated frequencies are far from the Rayleigh quotients of columns: order, unit or body may be wrong.
+    """Warn if stated frequencies differ greatly from Rayleigh quotients: order, unit or body may be wrong.
 
     Parameters
     ----------

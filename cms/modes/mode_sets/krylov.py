@@ -22,8 +22,8 @@ from fe_models.foundation.sparse.submatrix import PrincipalBlock
 
 __all__ = ["krylov"]
 
-DEFLATION = 1e-7  #: remainder of a unit column outside the span, below which it is left out
-MOST_BLOCKS = 30  #: largest number of blocks per shift, if a tolerance decides
+DEFLATION = 1e-7  #: remainder of a unit column outside the span, below which the column is omitted
+MOST_BLOCKS = 30  #: largest number of blocks per shift if a tolerance ends the expansion
 LOSS = 0.02  #: loss factor of the transfer function in the error estimate: 1 % of critical at resonance
 BAND_POINTS = 60  #: number of frequencies in the band at which transfer functions are compared
 
@@ -124,10 +124,10 @@ class _Expansion:
     """One expansion point: its operator, its first block, and the directions for the next block."""
 
     name: str
-    first_block: Callable[[], Array]  #: X_1, (n_dof, n_f)
-    apply: Callable[[Array], Array]  #: X -> (K - sigma M)⁻¹ X, or the elastic flexibility
+    first_block: Callable[[], Array]  #: function that returns X_1, (n_dof, n_f)
+    apply: Callable[[Array], Array]  #: operator X -> (K - sigma M)⁻¹ X, or the elastic flexibility
     last: Array | None = None  #: M times the last directions, (n_dof, k); None before the first block
-    ends: tuple[int, ...] = ()  #: number of columns of the span after each block of this expansion
+    ends: tuple[int, ...] = ()  #: number of columns of the whole span after each block of this expansion
 
     @property
     def is_exhausted(self) -> bool:
@@ -184,7 +184,7 @@ class _Span:
         is_there = size > np.finfo(float).tiny
         X = X[:, is_there] / size[is_there]
         block = self._products(X)
-        for _ in range(2):  # twice is enough
+        for _ in range(2):  # two passes suffice
             block = self._without_span(block)
         rest = np.einsum("nk,nk->k", block.X, block.KX + self.omega2 * block.MX)
         block = block[np.flatnonzero(rest > self.deflation**2)]
@@ -257,7 +257,7 @@ def _check(
     tolerance: float | None,
     band: tuple[float, float] | None,
 ) -> None:
-    """Raise `ModeSetError` for contradictory options and numbers out of range."""
+    """Raise `ModeSetError` for contradictory options and for numbers out of range."""
     given = {"n_modes": n_modes, "n_blocks": n_blocks, "tolerance": tolerance}
     if sum(value is not None for value in given.values()) != 1:
         raise ModeSetError(

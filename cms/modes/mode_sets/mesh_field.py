@@ -18,7 +18,7 @@ __all__ = ["CoupledField", "coupled_field"]
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class CoupledField:
-    """Columns over the dofs of a coupled body, and the part of the motion that rigid interfaces cannot follow.
+    """Columns over the dofs of a coupled body, and the part of the motion that its rigid interfaces cannot follow.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def coupled_field(body: FEBody, u_mesh: Array) -> CoupledField:
 
 
 def _nearest_rigid(body: FEBody, interface: Interface, u_mesh: Array) -> tuple[Array, float]:
-    """Return the motion of the reference node that fits the members best, (6, k), and the relative remainder."""
+    """Return the rigid motion that fits the members best, (6, k), and the relative remainder."""
     assert body.recovery is not None
     rows = np.flatnonzero(np.isin(body.recovery.dofs[:, 0], interface.nodes))
     scale = np.where(body.recovery.dofs[rows, 1] >= 3, body.length, 1.0)[:, None]

@@ -114,12 +114,12 @@ def multilevel(
 def _modes_of(
     families: Families, wanted: ModeCount, tolerance: float, cutoff_factor: float | None, workers: Workers
 ) -> MultilevelResult:
-    """Compute the modes over all dofs; the tree becomes the factorisation of the families if they have none."""
+    """Compute the modes over all dofs. The tree becomes the factorisation of the families if they have none yet."""
     body = families.body
     i = body.i
     K, M = principal_block(body.K, i), principal_block(body.M, i)
     interior = Interior(K, M, body.dofs[i, 0], body.nodes, body.dofs[i, 1] == MULTIPLIER)
-    if current_process().daemon:  # a task of a fleet or sweep may not start processes
+    if current_process().daemon:  # a task of a fleet or sweep cannot start processes
         workers = None
     with nullcontext() if workers is None else tasks_of(workers) as tasks:
         try:

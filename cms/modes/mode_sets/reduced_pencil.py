@@ -29,8 +29,8 @@ __all__ = [
     "receptance",
 ]
 
-INFINITE = 1e-10  #: eigenvalue of M in the norm of K + omega² M, below which a frequency is infinite
-DEPENDENT = 1e-10  #: squared remainder of a unit column, below which it is left out
+INFINITE = 1e-10  #: eigenvalue of M in the norm of K + omega² M, below which the frequency counts as infinite
+DEPENDENT = 1e-10  #: squared remainder of a unit column outside the span, below which the column is omitted
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class ReducedPencil:
 
 
 def pencil_of_modes(body: FEBody, modes: ModeSet) -> ReducedPencil:
-    """Return the pencil of a mode set in its own columns: M = Vᵀ M V, K = Vᵀ K V, L = V_B."""
+    """Return the reduced matrices in the columns V of a mode set: M = Vᵀ M V, K = Vᵀ K V, L = V_B."""
     V = in_memory(modes.columns)
     return ReducedPencil(modes.name, gram(V, body.M @ V), gram(V, body.K @ V), modes.labels, V[body.b])
 
@@ -77,7 +77,7 @@ def macneal_pencil(
 
 
 def _macneal_pencil(families: Families, modes: ModeSet) -> ReducedPencil:
-    """Return MacNeal's pencil of Rubin's columns."""
+    """Return MacNeal's reduced matrices, given Rubin's columns."""
     body = families.body
     n_r, n_b = families.Psi_R.shape[1], len(body.b)
     n = modes.columns.shape[1]
@@ -126,7 +126,7 @@ def dual_craig_bampton_pencil(
 
 
 def receptance(pencil: ReducedPencil, omega: float) -> Array:
-    """Return H of u_B = H f at the angular frequency omega [rad/s], (n_b, n_b) [m/N].
+    """Return the receptance H in u_B = H f at the angular frequency omega [rad/s], (n_b, n_b) [m/N].
 
     Raises
     ------
@@ -149,7 +149,7 @@ def receptance(pencil: ReducedPencil, omega: float) -> Array:
 
 
 def free_frequencies(pencil: ReducedPencil) -> Array:
-    """Return the finite frequencies with free interfaces, ascending, with rigid-body motions as 0 [Hz]."""
+    """Return the finite frequencies with free interfaces, ascending [Hz]; rigid-body motions have frequency 0."""
     if pencil.is_dual:  # interface forces are zero
         free = np.flatnonzero(~pencil.interface.any(axis=0))
         return _frequencies(pencil.K[np.ix_(free, free)], pencil.M[np.ix_(free, free)])
@@ -157,10 +157,10 @@ def free_frequencies(pencil: ReducedPencil) -> Array:
 
 
 def fixed_frequencies(pencil: ReducedPencil) -> Array:
-    """Return the finite frequencies with all boundary dofs held, ascending [Hz].
+    """Return the finite frequencies with all boundary dofs fixed, ascending [Hz].
 
-    The dual pencil holds them through f. Its eigenvalues that are not positive are dropped, and the others are no
-    bounds.
+    The dual equations enforce this by the forces f. Their nonpositive eigenvalues are dropped; the others bound
+    nothing.
     """
     if not pencil.is_dual:
         Z = la.null_space(pencil.interface / np.abs(pencil.interface).max(axis=1, keepdims=True))
