@@ -66,10 +66,8 @@ LOOK_ROWS, LOOK_SECONDS = 1000, 0.2  #: rows of results are checked after this n
 SEGMENT_SECONDS = 2.0  #: a segment of the results is closed after this time
 TIMES = ("t_start", "t_end", "h", "output_every")  #: attributes of the run in the head
 MOST_STEPS = 1e12  #: of a run: months of computing
-MOST_OF_RUN, LONG_CALLS = (
-    0.5,
-    1.0,
-)  #: share of a run, and time [s], above which calls of a Python function are a warning
+MOST_OF_RUN = 0.5  #: share of a run above which calls of a Python function are a warning
+LONG_CALLS = 1.0  #: time that such calls take at least [s]
 SAME_TIME = 1e-6  #: fraction of a step by which a run may begin apart from the end of the one that it continues
 
 
