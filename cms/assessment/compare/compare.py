@@ -55,7 +55,7 @@ def compare(
     workers: Workers = None,
     source: Callable[[], FEBody] | None = None,
 ) -> Comparison:
-    """Judge mode sets with several numbers of vibration modes against the full model.
+    """Assess mode sets with several numbers of vibration modes against the full model.
 
     (1) the full model once: free modes, static responses, response of the interfaces, a short motion
     (2) every set once, with the most modes, from the same families and their one factorisation
@@ -141,7 +141,7 @@ def compare(
 
 
 def check_request(options: Mapping[str, Any], counts: Sequence[int]) -> None:
-    """Raise an error before any work if a comparison is impossible."""
+    """Raise an error before any computation if the requested comparison is impossible."""
     if not options:
         raise CompareError(f"sets: expected at least one mode set; choices: {', '.join(sorted(MODE_SETS))}")
     for name in options:
@@ -152,22 +152,22 @@ def check_request(options: Mapping[str, Any], counts: Sequence[int]) -> None:
 
 
 def progress_of(advance: Any) -> Callable[[int, int], None] | None:
-    """Return the progress display of a stage that reports its finished fraction, if there is one."""
+    """Return the progress callback of a stage that reports its finished fraction; None without progress display."""
     return (lambda done, all_: advance(done / all_)) if callable(advance) else None
 
 
 def provenance(body: FEBody) -> dict[str, str]:
-    """Record where the body came from, and versions."""
+    """Return a record of the source of the body and of the program versions."""
     versions = {f"version {name}": metadata.version(name) for name in ("numpy", "scipy")}
     try:
         versions["version floatframe"] = metadata.version("floatframe")
-    except metadata.PackageNotFoundError:  # run from a checkout that is not installed
+    except metadata.PackageNotFoundError:  # the program runs from a checkout that is not installed
         versions["version floatframe"] = "unknown"
     return {**dict(body.provenance), "version python": platform.python_version(), **versions}
 
 
 class _Clock:
-    """Times of the stages, with the progress display of the caller."""
+    """Times of the stages, together with the progress display of the caller."""
 
     def __init__(self, stage: Stage | None) -> None:
         self.seconds: dict[str, float] = {}
@@ -193,12 +193,12 @@ class _Timed:
 # surface of a body and its free modes, thinned to the resolution of a screen ------------------------------------------
 
 
-MOST_TRIANGLES = 16_000  #: of a surface on the screen
-MOST_LINES = 20_000  #: of a body without a surface
+MOST_TRIANGLES = 16_000  #: largest number of triangles of a surface on the screen
+MOST_LINES = 20_000  #: largest number of lines of a body without a surface
 
 
 def draw_modes(body: FEBody, Phi: Array) -> Drawing:
-    """Return the surface of the body, or the lines of a body without one, with its modes.
+    """Return the surface of a body, or its lines if it has no surface, with the free modes.
 
     Parameters
     ----------
@@ -222,13 +222,13 @@ def draw_modes(body: FEBody, Phi: Array) -> Drawing:
 
 
 def sharp_edges(nodes: Array, triangles: IntArray) -> IntArray:
-    """Return the sharp edges of a surface, (n_lines, 2)."""
+    """Return the sharp edges of a surface as pairs of nodes, (n_lines, 2)."""
     ends, _, is_sharp = surface_edges(nodes, triangles)
     return ends[is_sharp]
 
 
 def thinned_surface(nodes: Array, triangles: IntArray, most: int = MOST_TRIANGLES) -> IntArray:
-    """Return at most about `most` triangles between nodes of the given ones, (n_tri, 3)."""
+    """Return about `most` triangles at most, whose corners are some of the given nodes, (n_tri, 3)."""
     if len(triangles) <= most:
         return triangles
     import pyvista as pv
@@ -242,7 +242,7 @@ def thinned_surface(nodes: Array, triangles: IntArray, most: int = MOST_TRIANGLE
 
 
 def stiffness_lines(body: FEBody) -> IntArray:
-    """Return pairs of nodes that a stiffness joins, (n_lines, 2): the elements of a body of beams or springs."""
+    """Return pairs of nodes that a stiffness connects, (n_lines, 2): the elements of a body of beams or springs."""
     rows = whole_matrix(body.K).tocoo()
     node = body.dofs[:, 0]
     a, b = node[rows.row], node[rows.col]
@@ -258,7 +258,7 @@ def stiffness_lines(body: FEBody) -> IntArray:
 
 @dataclass(frozen=True, eq=False)
 class SetTask:
-    """A mode set with some of the numbers of modes."""
+    """Task of a worker: a mode set with some of the numbers of modes."""
 
     name: str
     options: Mapping[str, Any]
@@ -266,7 +266,7 @@ class SetTask:
 
 
 class SetJudge:
-    """The function that assesses a task; the body and all derived data remain in the worker for the next task.
+    """Function that assesses a task; the body and all derived data remain in the worker for the next task.
 
     Parameters
     ----------
@@ -290,14 +290,14 @@ class SetJudge:
         return SetJudge, self.given
 
     def __call__(self, task: SetTask) -> SetPart:
-        """Return a part of a set, judged."""
+        """Assess one part of a mode set."""
         if self.made is None:
             self.made = self.make()
         self.made[0].forget_vibration_modes()
         return set_part(task.name, dict(task.options), task.counts, *self.made)
 
     def make(self) -> tuple[Families, ReferenceBasis, Reference]:
-        """Return families of the body, the basis of the reference, and the reference."""
+        """Return the mode families of the body, the reference basis, and the reference."""
         source, cache, digest, question, damping = self.given
         body = source()
         if reference_digest(body, question) != digest:
@@ -310,7 +310,7 @@ class SetJudge:
 
 
 def reference_basis(families: Families, full: FullModel) -> ReferenceBasis:
-    """Return the basis that all sets share."""
+    """Return the reference basis that all sets share."""
     ports = Ports.of_body(families.body)
     return ReferenceBasis(families, ports, full.columns, full.rigid.shape[1], float(full.omega2[0]))
 
@@ -322,7 +322,7 @@ def set_results(
     workers: Workers,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[SetResult]:
-    """Return the results of all sets, whose parts are tasks for workers."""
+    """Return the results of all sets. Their parts are tasks for the workers."""
     tasks = [SetTask(name, extra, part) for name, extra in options.items() for part in counts_of_parts(name, counts)]
     with tasks_of(workers, len(tasks), threads=None) as where:
         parts = where.map(judge, tasks, progress=progress, files=[os.path.abspath(judge.given[1])])

@@ -18,28 +18,28 @@ from fe_models.foundation.tall.columns import inner, subtract
 
 __all__ = ["Coordinates", "ReferenceBasis"]
 
-NOISE = 1e-11  #: W-length of the remainder of a unit column, below which it is rounding
+NOISE = 1e-11  #: remainder of a unit column outside the span, in the W-norm, below which it is rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Coordinates:
     """K, M, the nodal norm and the displacements of a comparison in a W-orthonormal basis Q, (n_dof, n_Q)."""
 
-    K: Array  #: Qᵀ K Q, (n_Q, n_Q)
-    M: Array  #: Qᵀ M Q, (n_Q, n_Q)
-    nodal: Array  #: Qᵀ Q over the translations of all nodes, (n_Q, n_Q)
-    MGM: Array  #: Qᵀ M G M Q, G the elastic flexibility of the free body, (n_Q, n_Q)
-    at_b: Array  #: rows of Q at the boundary dofs, (n_b, n_Q)
-    at_ports: Array  #: motion of the reference points of the interfaces with Q, (6 n_ports, n_Q)
-    reference: Array  #: the reference columns, (n_Q, n_reference)
-    columns: Array  #: the columns of the mode set, (n_Q, n_columns)
+    K: Array  #: reduced stiffness Qᵀ K Q, (n_Q, n_Q)
+    M: Array  #: reduced mass Qᵀ M Q, (n_Q, n_Q)
+    nodal: Array  #: Qᵀ Q restricted to the translations of all nodes, (n_Q, n_Q)
+    MGM: Array  #: Qᵀ M G M Q with the elastic flexibility G of the free body, (n_Q, n_Q)
+    at_b: Array  #: rows of Q that belong to the boundary dofs, (n_b, n_Q)
+    at_ports: Array  #: motion of the interface reference points in the columns of Q, (6 n_ports, n_Q)
+    reference: Array  #: coordinates of the reference columns, (n_Q, n_reference)
+    columns: Array  #: coordinates of the columns of the mode set, (n_Q, n_columns)
 
 
 class ReferenceBasis:
     """The part of Q that all mode sets of a body share: the span of the reference columns."""
 
     def __init__(self, families: Families, ports: Ports, columns: Array, n_rigid: int, omega2: float) -> None:
-        """Make the basis.
+        """Compute the basis of the reference columns.
 
         Parameters
         ----------
@@ -79,7 +79,7 @@ class ReferenceBasis:
             # nearly dependent columns lose their orthogonality to the reference when they are brought to unit length
             basis, _ = independent_columns(self._without_reference(basis), self.body, self.omega2)
             basis = self._products(self._without_reference(basis))
-        if basis.X.shape[1]:  # a small body may have no dof that the reference does not span
+        if basis.X.shape[1]:  # in a small body, the reference may span all dofs
             G = self._inner(basis, basis)
             basis = basis @ la.solve_triangular(la.cholesky((G + G.T) / 2), np.eye(len(G)))
         T_V = self._inner(basis, V)
@@ -100,14 +100,14 @@ class ReferenceBasis:
         )
 
     def _translations(self, X: Array) -> Array:
-        """Return the translations of all nodes, including those of rigid interfaces, (3 n_nodes, k)."""
+        """Return the translations of all nodes, including nodes of rigid interfaces, (3 n_nodes, k)."""
         return self.body.translations(X).reshape(3 * len(self.body.nodes), X.shape[1])
 
     def _inner(self, Q: DisplacementColumns, V: DisplacementColumns) -> Array:
         return inner(Q.KX, V.X) + self.omega2 * inner(Q.MX, V.X)
 
     def _remainder(self, V: DisplacementColumns) -> Array:
-        """Return unit columns without their part in the reference, if the remainder exceeds rounding."""
+        """Return unit columns minus their part in the span of the reference; remainders within rounding are omitted."""
         length = np.sqrt(np.maximum(self._length2(V), 0.0))
         rest = V.X / np.where(length > 0, length, 1.0)
         subtract(rest, self._Q.X, self._inner(self._Q, V) / np.where(length > 0, length, 1.0))
@@ -125,6 +125,6 @@ class ReferenceBasis:
 
 
 def _joined(X: Array, AX: Array, Y: Array, AY: Array) -> Array:
-    """Return [X Y]ᵀ A [X Y] of a symmetric A."""
+    """Return [X Y]ᵀ A [X Y] for a symmetric matrix A."""
     XAY = inner(AX, Y) if Y.shape[1] else np.zeros((X.shape[1], 0))
     return np.block([[gram(X, AX), XAY], [XAY.T, gram(Y, AY)]])

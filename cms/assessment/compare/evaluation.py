@@ -1,4 +1,4 @@
-"""One mode set with one number of modes, judged in small coordinates by the records of `cms.assessment.quality`."""
+"""Assessment of one mode set with one number of modes, in small coordinates, by records of `cms.assessment.quality`."""
 
 from dataclasses import dataclass, replace
 
@@ -28,21 +28,22 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["Reference", "drawn_entry", "judge_subset"]
 
-HELD = 1e-9  #: motion of the interfaces over the largest, of a combination of unit shapes, below which they are held
+#: interface motion of a combination of unit shapes over the largest one, below which interfaces count as fixed
+HELD = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """What every subset is judged by; the same for all sets."""
+    """Reference data for the assessment of every subset, the same for all sets."""
 
     full: FullModel
-    response: FrequencyResponse  #: of the full model at its ports
-    damping: float  #: ratio of every mode in it
+    response: FrequencyResponse  #: frequency response of the full model at its ports
+    damping: float  #: damping ratio of every mode in this response
     port_names: tuple[str, ...]
-    drawn: tuple[int, int]  #: entry of the response that is drawn: output, input
-    static_labels: tuple[tuple[str, ...], ...]  #: of the loads of Psi_A, Psi_H and Psi_L
-    length: float  #: of the body, that makes rotations comparable to translations
-    time: float  #: [s] of the body's time unit
+    drawn: tuple[int, int]  #: entry of the response shown in the chart: (output, input)
+    static_labels: tuple[tuple[str, ...], ...]  #: names of the loads of Psi_A, Psi_H and Psi_L
+    length: float  #: body length, which converts rotations to translations
+    time: float  #: time unit of the body [s]
 
 
 def judge_subset(reference: Reference, c: Coordinates, subset: Subset) -> tuple[QualityRecord, ...]:
@@ -66,7 +67,7 @@ def judge_subset(reference: Reference, c: Coordinates, subset: Subset) -> tuple[
 
 
 def nodal_root(c: Coordinates) -> Array:
-    """Return L, (n_Q, n_Q), with Lᵀ L = Qᵀ Q over the translations of the nodes: L x is as long as that field of x."""
+    """Return L, (n_Q, n_Q), with Lᵀ L = Qᵀ Q over nodal translations: |L x| is the nodal norm of the field Q x."""
     values, vectors = la.eigh(c.nodal)
     return np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
 
@@ -74,7 +75,7 @@ def nodal_root(c: Coordinates) -> Array:
 def frequency_part(
     reference: Reference, c: Coordinates, basis: FreeBasis, Phi: Array, root: Array
 ) -> tuple[QualityRecord, ...]:
-    """Free-free frequencies and shapes in the band; see `cms.assessment.quality.of_reduction.frequencies`."""
+    """Assess free-free frequencies and shapes in the band; see `cms.assessment.quality.of_reduction.frequencies`."""
     n, time, shapes = reference.full.n_band, reference.time, basis.vibrating
     massed = np.minimum(mac(Phi, shapes, c.M @ shapes), 1.0)
     full, reduced = reference.full.frequencies[:n] / time, basis.frequencies(time)
@@ -85,7 +86,7 @@ def frequency_part(
 def static_part(
     reference: Reference, c: Coordinates, basis: FreeBasis, targets: dict[str, Array]
 ) -> tuple[QualityRecord, ...]:
-    """Static completeness for interface loads, rigid-body accelerations and the load cases of the body."""
+    """Assess static completeness for interface loads, rigid-body accelerations and load cases of the body."""
     interface_loads, inertia_loads, cases = reference.static_labels
     loaded = targets["Psi_L"]
     records = completeness_records(
@@ -100,7 +101,7 @@ def static_part(
 
 
 def energy_error(c: Coordinates, basis: FreeBasis, U: Array) -> Array:
-    """Relative energy error of the best approximation of columns U without rigid motion, (k,); NaN: no energy."""
+    """Return the relative energy error of the best approximation of columns U, (k,); NaN if they have no energy."""
     E = U - basis.Phi @ ((basis.Phi.T @ (c.K @ U)) / basis.omega2[:, None])
     energy, error = (np.einsum("nk,nk->k", X, c.K @ X) for X in (U, E))
     has_energy = energy > NO_ENERGY * energy.max(initial=0.0)
@@ -108,7 +109,7 @@ def energy_error(c: Coordinates, basis: FreeBasis, U: Array) -> Array:
 
 
 def response_part(reference: Reference, c: Coordinates, basis: FreeBasis) -> QualityRecord:
-    """Response at the interfaces over the band."""
+    """Assess the frequency response at the interfaces over the band."""
     model = PortModel(
         reference.port_names, basis.omega2, basis.is_massive, c.at_ports @ basis.Phi, c.at_ports @ basis.N
     )
@@ -122,7 +123,7 @@ def response_part(reference: Reference, c: Coordinates, basis: FreeBasis) -> Qua
 
 
 def drawn_entry(full: FrequencyResponse) -> tuple[int, int]:
-    """Choose the entry to draw: force on the first port, answer of the last, in the translation with most peaks."""
+    """Choose the entry for the chart: force on the first port, motion of the last, in the direction with most peaks."""
     curves = [np.abs(full.H[:, len(full.outputs) - 6 + k, k]) for k in range(3)]
     peaks = [int(((h[1:-1] > h[:-2]) & (h[1:-1] > h[2:])).sum()) for h in curves]
     k = int(np.argmax(peaks))
@@ -130,7 +131,7 @@ def drawn_entry(full: FrequencyResponse) -> tuple[int, int]:
 
 
 def motion_part(reference: Reference, c: Coordinates, basis: FreeBasis, U: Array, root: Array) -> QualityRecord:
-    """Deformation error of the reference motion; see `deformation_error` of `cms.assessment.quality`."""
+    """Assess the deformation error of the reference motion; see `deformation_error` of `cms.assessment.quality`."""
     a, X = reference.full.amplitudes, basis.vibrating
     in_M = U - X @ (X.T @ (c.M @ U))
     in_K = U - basis.Phi @ ((basis.Phi.T @ (c.K @ U)) / basis.omega2[:, None])
@@ -142,7 +143,7 @@ def motion_part(reference: Reference, c: Coordinates, basis: FreeBasis, U: Array
 
 
 def mass_part(reference: Reference, c: Coordinates, basis: FreeBasis, directions: Array) -> QualityRecord:
-    """Effective mass of the subset's shapes with all interfaces held, against that of all fixed-interface modes."""
+    """Assess the effective mass with all interfaces fixed against that of all fixed-interface modes."""
     full = reference.full
     B = np.hstack([basis.N, basis.Phi])
     B = B / np.linalg.norm(B, axis=0)
@@ -170,7 +171,7 @@ def mass_part(reference: Reference, c: Coordinates, basis: FreeBasis, directions
 
 
 def residual_part(reference: Reference, c: Coordinates, basis: FreeBasis) -> QualityRecord:
-    """Residual bound of the frequencies in the band; see `cms.assessment.quality.of_reduction.residuals`.
+    """Compute residual bounds of frequencies in the band; see `cms.assessment.quality.of_reduction.residuals`.
 
     |phi - theta G M phi|²_K / theta = theta phiᵀ M G M phi - 1 for phiᵀ M phi = 1, known to about 1e-8 in the bound.
     """

@@ -1,4 +1,4 @@
-"""The free-free vibration of a subset of a mode set, in the coordinates of a comparison."""
+"""Free-free vibration modes of a subset of a mode set, in the coordinates of a comparison."""
 
 from dataclasses import dataclass
 
@@ -18,10 +18,10 @@ __all__ = ["Subset", "independent_subset", "judged_subset"]
 
 @dataclass(frozen=True, eq=False)
 class Subset:
-    """Some columns of a mode set, as free-free shapes in small coordinates."""
+    """Some columns of a mode set, and their free-free modes in small coordinates."""
 
-    basis: FreeBasis  #: rows are coordinates over Q, (n_Q, …), not dofs
-    condition: float  #: of the independent columns at unit length in the W-norm [-]
+    basis: FreeBasis  #: free-free modes; rows are coordinates over Q, (n_Q, …), not dofs
+    condition: float  #: condition number of the independent columns, scaled to unit length in the W-norm [-]
     n_columns: int
 
     @property
@@ -31,7 +31,7 @@ class Subset:
 
 
 def independent_subset(T: Array) -> tuple[Array, IntArray, float]:
-    """Orthonormal basis of columns T by pivoted QR at unit length, the redundant ones, and the condition of the rest.
+    """Return an orthonormal basis of columns T, the redundant columns, and the condition number of the others.
 
     The tolerance is that of the finishing step (docs/theory.md §3).
     """

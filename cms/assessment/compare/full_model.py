@@ -1,4 +1,4 @@
-"""The reference solution of the full model that mode sets are compared with, computed once and kept in a file."""
+"""Reference solution of the full model, to which mode sets are compared; computed once and stored in a file."""
 
 import hashlib
 import logging
@@ -29,37 +29,39 @@ __all__ = ["FullModel", "read_full_model", "reference_digest", "solve_full_model
 
 log = logging.getLogger(__name__)
 
-VERSION = "2"  #: version of the computation; a file of another version is computed again
-MODES_BEYOND = 2.0  #: frequency relative to the band up to which free modes respond dynamically
-FIRST_SEARCH = 3  #: free modes found at first for each one in the band; mostly enough for twice its frequency
+VERSION = "2"  #: version of the computation; results from files of another version are computed again
+MODES_BEYOND = 2.0  #: frequency over the band up to which free modes are included dynamically
+#: number of free modes first requested per mode in the band; this mostly suffices for twice its frequency
+FIRST_SEARCH = 3
 MASS_TOLERANCE = 1e-10  #: relative residual of the solutions with M_II
 
 
 @dataclass(frozen=True, eq=False)
 class FullModel:
-    """Free modes, static responses, response of the interfaces and a motion of the full model.
+    """Free modes, static responses, interface response and reference motion of the full model.
 
     Frequencies are in cycles per time unit of the body, displacements over all its dofs, without rigid-body motion.
     """
 
-    band: float  #: highest frequency of the comparison
-    omega2: Array  #: elastic free modes, to twice the band, (n_modes,) [1/s²]
+    band: float  #: highest frequency of the comparison [1 / time unit]
+    omega2: Array  #: squared frequencies of the elastic free modes up to twice the band, (n_modes,) [1/s²]
     rigid: Array  #: M-orthonormal rigid-body modes, (n_dof, n_r)
     Phi: Array  #: M-orthonormal elastic free modes in the band, (n_dof, n_band)
-    Psi_A: Array  #: attachment modes: static interface loads, (n_dof, n_e)
-    Psi_H: Array  #: inertia-relief modes: static inertia loads, (n_dof, n_r)
-    Psi_L: Array  #: the free body under its load cases, (n_dof, n_load_cases); zero: the load does not deform it
-    moved: Array  #: columns of the motion, (n_dof, k)
-    amplitudes: Array  #: of those columns, (k, n_t)
-    t: Array  #: of the motion, (n_t,) [time unit]
-    port_omega2: Array  #: modes of the response at the interfaces, (n,) [1/s²]
-    port_is_massive: Array  #: 1 where such a mode has mass, (n,)
-    port_modes: Array  #: those modes at the ports, (6 n_ports, n)
-    port_rigid: Array  #: rigid-body modes at the ports, (6 n_ports, n_r)
-    port_error: float  #: estimated error of that response at the top of the band, over its size
+    Psi_A: Array  #: attachment modes: static responses to interface loads, (n_dof, n_e)
+    Psi_H: Array  #: inertia-relief modes: static responses to inertia loads, (n_dof, n_r)
+    #: static responses of the free body to its load cases, (n_dof, n_load_cases); zero if a load does not deform it
+    Psi_L: Array
+    moved: Array  #: displacement columns of the reference motion, (n_dof, k)
+    amplitudes: Array  #: amplitudes of these columns over time, (k, n_t)
+    t: Array  #: times of the reference motion, (n_t,) [time unit]
+    port_omega2: Array  #: squared frequencies of the modes in the interface response, (n,) [1/s²]
+    port_is_massive: Array  #: 1 for each of these modes that has mass, else 0, (n,)
+    port_modes: Array  #: motion of the ports in these modes, (6 n_ports, n)
+    port_rigid: Array  #: motion of the ports in the rigid-body modes, (6 n_ports, n_r)
+    port_error: float  #: estimated relative error of the interface response at the top of the band
     directions: Array  #: geometric rigid-body modes about the centre of mass, (n_dof, 6)
-    held_mass: Array  #: for these directions, the inertia that moves while the interfaces are held, (6,) [kg, kg m²]
-    mass: Array  #: for these directions, the inertia of the whole body, (6,) [kg, kg m²]
+    held_mass: Array  #: inertia that moves in these directions while the interfaces are fixed, (6,) [kg, kg m²]
+    mass: Array  #: inertia of the whole body in these directions, (6,) [kg, kg m²]
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -68,7 +70,7 @@ class FullModel:
 
     @property
     def frequencies(self) -> Array:
-        """Elastic free frequencies, (n_modes,)."""
+        """Frequencies of the elastic free modes, (n_modes,)."""
         return np.sqrt(self.omega2) / (2 * np.pi)
 
     @property
@@ -78,7 +80,7 @@ class FullModel:
 
     @property
     def parts(self) -> dict[str, slice]:
-        """Indices of the families in `columns`."""
+        """Column indices of each family in `columns`."""
         slices, at = {}, 0
         for name in ("rigid", "Phi", "Psi_A", "Psi_H", "Psi_L", "moved", "directions"):
             width = getattr(self, name).shape[1]
@@ -87,11 +89,11 @@ class FullModel:
 
     @property
     def columns(self) -> Array:
-        """All displacements side by side, (n_dof, n_columns)."""
+        """All displacement columns side by side, (n_dof, n_columns)."""
         return np.hstack([getattr(self, name) for name in self.parts])
 
     def ports(self, names: tuple[str, ...]) -> PortModel:
-        """Return the body with ports at the interfaces of those names."""
+        """Return the modes at the ports of the named interfaces."""
         return PortModel(names, self.port_omega2, self.port_is_massive > 0.5, self.port_modes, self.port_rigid)
 
 
@@ -133,7 +135,7 @@ def solve_full_model(
     if band is None:
         n_most = body.n_dof - families.Psi_R.shape[1]
         n_first = max(FIRST_SEARCH * n_modes, n_expected)
-        if n_first <= n_most // 4:  # a larger part of all modes is not worth a search beforehand
+        if n_first <= n_most // 4:  # a preliminary search does not pay for a larger part of all modes
             families.free_modes(n_modes=n_first)
         band = float(families.free_modes(n_modes=min(n_modes, n_most)).frequencies[-1]) * (1 + 1e-9)
     modes = families.free_modes(ModeCount(cutoff=MODES_BEYOND * band))
@@ -172,14 +174,14 @@ def solve_full_model(
 
 
 def static_labels(families: Families, full: FullModel) -> tuple[tuple[str, ...], ...]:
-    """Return names of the loads of Psi_A, Psi_H and Psi_L."""
+    """Return the names of the loads that cause Psi_A, Psi_H and Psi_L."""
     held = families.held_names("load")[0]
     cases = tuple(case.name for case in families.body.load_cases)
     return tuple(held[k] for k in families.free.e), acceleration_labels(full.Psi_H.shape[1]), cases
 
 
 def deformation(families: Families, u: Array) -> Array:
-    """Return displacements without their rigid-body motion, u - N Nᵀ M u, which costs the energy norm its digits."""
+    """Return displacements without rigid-body motion, u - N Nᵀ M u; rigid-body motion would spoil their energy."""
     free = families.free
     return u - free.N @ (free.M_N.T @ u)
 
@@ -198,9 +200,9 @@ def centered_directions(body: FEBody) -> Array:
 
 
 def held_mass(families: Families, directions: Array) -> Array:
-    """Return sum of the effective masses of all fixed-interface modes, (6,): b_Iᵀ M_II⁻¹ b_I, b = M d.
+    """Return the sum of the effective masses of all fixed-interface modes, (6,): b_Iᵀ M_II⁻¹ b_I, b = M d.
 
-    Its complement sits at the interfaces and moves with them.
+    The rest of the mass is at the interfaces and moves with them.
     """
     body, fixed = families.body, families.fixed
     M_ii, b = fixed.M_ii, (body.M @ directions)[fixed.i]
@@ -220,7 +222,7 @@ def held_mass(families: Families, directions: Array) -> Array:
 
 
 def reference_digest(body: FEBody, *asked: object) -> str:
-    """Return a digest of everything that determines the reference solution: matrices, dofs, interfaces, request."""
+    """Return a digest of all input of the reference solution: matrices, dofs, interfaces, request."""
     digest = hashlib.sha256(repr((VERSION, body.units.name, asked)).encode())
     for matrix in (whole_matrix(body.K), whole_matrix(body.M)):
         for array in (matrix.data, matrix.indices, matrix.indptr):
@@ -238,7 +240,7 @@ def reference_digest(body: FEBody, *asked: object) -> str:
 
 
 def write_full_model(path: Path, full: FullModel, digest: str) -> None:
-    """Write a reference solution; `OSError` if that fails."""
+    """Write a reference solution to a file; raise `OSError` if this fails."""
     buffer = BytesIO()
     arrays = {field.name: getattr(full, field.name) for field in fields(full)}
     np.savez(buffer, digest=np.frombuffer(bytes.fromhex(digest), np.uint8), **arrays)
@@ -246,7 +248,7 @@ def write_full_model(path: Path, full: FullModel, digest: str) -> None:
 
 
 def read_full_model(path: Path, digest: str) -> FullModel | None:
-    """Return the reference solution with that digest, or None if the file has another one or an incomplete one."""
+    """Return the reference solution with this digest; None if the file has another digest or is incomplete."""
     if not path.is_file():
         return None
     try:

@@ -7,11 +7,11 @@ from fe_models.foundation.words import quoted
 
 __all__ = ["mode_counts"]
 
-MOST_COUNTS = 500  #: numbers of modes in one comparison; more is a slip of the hand
+MOST_COUNTS = 500  #: largest number of mode counts in one comparison; a longer list is probably a typing error
 
 
 def mode_counts(text: str) -> tuple[int, ...]:
-    """Return the numbers of modes that a range or a list names, ascending.
+    """Return the mode counts in a range or a list, ascending.
 
     >>> mode_counts("0:4"), mode_counts("0:10:5"), mode_counts("3,1,8:10")
     ((0, 1, 2, 3, 4), (0, 5, 10), (1, 3, 8, 9, 10))

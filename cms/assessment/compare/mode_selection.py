@@ -27,30 +27,30 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["MEASURES", "Selection", "Trial", "select_modes"]
 
-FEWEST = 8  #: modes of the first set that is made
-MOST = 300  #: modes at which the search gives up, by default
+FEWEST = 8  #: number of modes of the first set that is computed
+MOST = 300  #: default number of modes above which the search fails
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One number of modes and its result."""
+    """Result of a set with one number of modes."""
 
     n_modes: int
-    n_columns: int  #: of the mode set, including static ones
-    error: float  #: by the measure; inf where the set lacks a mode of the band, or could not be made
+    n_columns: int  #: number of columns of the mode set, including static columns
+    error: float  #: error in the chosen measure; inf if a mode of the band is missing, or the set could not be computed
     where: str  #: place of the largest error, for messages
 
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """The chosen set and why it was chosen."""
+    """Chosen mode set and the reason for the choice."""
 
     modes: ModeSet
     n_modes: int
-    error: float  #: with that number
-    history: tuple[Trial, ...]  #: all numbers that were tried, ascending
-    sentence: str  #: the choice and its reason, for people
-    options: Mapping[str, str] = field(default_factory=dict)  #: what was asked for
+    error: float  #: error with the chosen number of modes
+    history: tuple[Trial, ...]  #: results for all numbers of modes that were tried, ascending
+    sentence: str  #: the choice and its reason in words
+    options: Mapping[str, str] = field(default_factory=dict)  #: options that the caller gave
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "options", MappingProxyType(dict(self.options)))
@@ -131,12 +131,12 @@ def select_modes(
 
 
 class _Judge(Protocol):
-    """A measure made ready for one body and band."""
+    """Error measure, prepared for one body and band."""
 
-    words: str  #: what it measures
+    words: str  #: description of the measure
 
     def __call__(self, basis: FreeBasis, at_ports: Array) -> tuple[float, str]:
-        """Return the error of the free-free shapes of a set, and where it is largest."""
+        """Return the error of the free-free modes of a set, and the place of the largest error."""
 
 
 class _FrequencyError:
@@ -189,7 +189,7 @@ MEASURES: dict[str, Callable[[FullReference, tuple[float, float]], _Judge]] = {
 
 @dataclass(frozen=True, eq=False)
 class _Maker:
-    """Makes the set with a number of modes."""
+    """Function that computes the set with a given number of modes."""
 
     name: str
     families: Families
@@ -203,13 +203,13 @@ class _Maker:
 
     @property
     def n_most(self) -> int:
-        """Number of modes above which no set can be made."""
+        """Largest number of modes for which the set can be computed."""
         body = self.families.body
         return min(self.most, max(0, body.n_dof - len(body.b) - 1))
 
 
 def _by_subspaces(make: _Maker, judge: _Judge, reference: FullReference, error: float) -> Iterator[Trial]:
-    """Judge all numbers of modes as subspaces of the set with the most, from the fewest up: (2)."""
+    """Step (2): assess all numbers of modes, in ascending order, as subspaces of the largest set."""
     basis, n_r = _reference_basis(make, reference)
     n, first = min(make.n_most, max(FEWEST, 2 * reference.n_band)), 0
     while True:
@@ -220,7 +220,7 @@ def _by_subspaces(make: _Maker, judge: _Judge, reference: FullReference, error: 
             C, labels = SUBSETS[make.name](modes, at_b, k)
             try:
                 subset = judged_subset(c, c.columns @ C, labels, c.reference[:, :n_r], basis.omega2)
-            except ModeSetError as problem:  # normal modes, none of them
+            except ModeSetError as problem:  # the set of normal modes with no modes
                 yield Trial(k, len(labels), np.inf, str(problem))
                 continue
             found, where = judge(subset.basis, c.at_ports)
@@ -233,7 +233,7 @@ def _by_subspaces(make: _Maker, judge: _Judge, reference: FullReference, error: 
 
 
 def _by_bisection(make: _Maker, judge: _Judge, reference: FullReference, error: float) -> Iterator[Trial]:
-    """Assess sets that are recomputed for each number of modes, by doubling and bisection: (3)."""
+    """Step (3): recompute the set for each number of modes, and find the smallest by doubling and bisection."""
     basis, n_r = _reference_basis(make, reference)
 
     def tried(n: int) -> Trial:
@@ -262,7 +262,7 @@ def _by_bisection(make: _Maker, judge: _Judge, reference: FullReference, error: 
 
 
 def _reference_basis(make: _Maker, reference: FullReference) -> tuple[ReferenceBasis, int]:
-    """Coordinates of rigid-body and free modes in the small basis, and the number of rigid-body modes."""
+    """Return coordinates of rigid-body and free modes in the small basis, and the number of rigid-body modes."""
     N = make.families.free.N
     columns, n_r = np.hstack([N, reference.modes.Phi]), N.shape[1]
     return ReferenceBasis(make.families, reference.ports, columns, n_r, float(reference.modes.omega2[0])), n_r

@@ -11,8 +11,8 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["Pulse", "default_pulse"]
 
-STEPS_A_PERIOD = 40  #: of the top of the band
-PERIODS = 4.0  #: of the first elastic mode, after the pulse
+STEPS_A_PERIOD = 40  #: time steps per period of the highest frequency in the band
+PERIODS = 4.0  #: periods of the first elastic mode after the pulse
 MOST_STEPS = 4000
 FEWEST_STEPS = 200
 
@@ -24,10 +24,10 @@ class Pulse:
     The main lobe of its spectrum ends at the band, so that it drives what the comparison looks at and little else.
     """
 
-    at: str  #: interface
+    at: str  #: name of the interface on which the force acts
 
     def load(self, body: FEBody, *, band: float, first: float) -> LoadHistory:
-        """Return the force over time, until some periods of the first mode have passed.
+        """Return the force over time, until `PERIODS` periods of the first mode after the pulse.
 
         Parameters
         ----------
@@ -43,22 +43,22 @@ class Pulse:
         return interface_forces(body, {self.at: history}, t)
 
     def force(self, t: Array, band: float) -> Array:
-        """Return the force over its peak, (n_t,)."""
+        """Return the force divided by its peak, (n_t,)."""
         duration = self.duration(band)
         return np.where(t < duration, np.sin(np.pi * t / duration) ** 2, 0.0)
 
     def duration(self, band: float) -> float:
-        """Return T [time unit of the body]."""
+        """Return the pulse duration T [time unit of the body]."""
         return 2.0 / band
 
     @property
     def words(self) -> str:
-        """What it is."""
+        """Return a description of the pulse."""
         return f"a unit force pulse at {self.at}, equal along x, y and z"
 
 
 def default_pulse(body: FEBody, interface: str | None = None) -> Pulse:
-    """Return the pulse at an interface, the first by default.
+    """Return the pulse on an interface, by default the first.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A request of a comparison to the full model, its result, and the file of this result."""
+"""Request of a comparison to the full model, its solution, and the file that stores the solution."""
 
 import hashlib
 from dataclasses import dataclass
@@ -25,17 +25,17 @@ from cms.modes.families.families import Families
 
 __all__ = ["Question", "Solution", "full_results", "reference_of", "solution"]
 
-POINTS = 800  #: frequencies of the response: peaks are drawn round
+POINTS = 800  #: number of frequencies in the response; enough for smooth peaks
 
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """The request to the full model."""
+    """Request to the full model."""
 
-    pulse: Pulse  #: of the default motion
-    damping: float  #: ratio of every mode in response and motion
-    band: float | None = None  #: highest frequency [Hz]; None: that of mode n_reference
-    n_reference: int = 10  #: elastic free modes in the band, where no band is given
+    pulse: Pulse  #: pulse of the default motion
+    damping: float  #: damping ratio of every mode in response and motion
+    band: float | None = None  #: highest frequency [Hz]; None: the frequency of mode n_reference
+    n_reference: int = 10  #: number of elastic free modes in the band if no band is given
     motion: Snapshots | None = None  #: reference motion; None: the response to the pulse
 
     def __post_init__(self) -> None:
@@ -58,7 +58,7 @@ class Question:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The answer of the full model, and where it came from."""
+    """Solution of the full model, and whether it was computed or read."""
 
     full: FullModel
     was_cached: bool
@@ -66,7 +66,7 @@ class Solution:
 
 
 def solution(families: Families, question: Question, *, n_expected: int = 0, cache: Path | None = None) -> Solution:
-    """Return the solution of the full model, from the file of an earlier comparison if that answers the question.
+    """Return the solution of the full model, from the file of an earlier comparison if its request was the same.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def solution(families: Families, question: Question, *, n_expected: int = 0, cac
 
 
 def reference_of(families: Families, full: FullModel, damping: float) -> Reference:
-    """Return the reference data of every set."""
+    """Return the reference data for the assessment of all sets."""
     body = families.body
     time_ = body.units.time
     names = tuple(interface.name for interface in body.interfaces)
@@ -134,6 +134,6 @@ def full_results(reference: Reference, question: Question, solved: Solution) -> 
 
 
 def place(label: str) -> str:
-    """Return 'small_end along z' of 'small_end uz'."""
+    """Return 'small_end along z', given 'small_end uz'."""
     name, component = label.rsplit(" ", 1)
     return f"{name} {'about' if component.startswith('r') else 'along'} {component[-1]}"

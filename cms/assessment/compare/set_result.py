@@ -1,4 +1,4 @@
-"""The result of one mode set: its points for every number of modes, its verdict, or why it could not be made."""
+"""Result of one mode set: a point for each number of modes and a verdict, or the reason why there is none."""
 
 import inspect
 import time
@@ -26,12 +26,12 @@ __all__ = ["SetPart", "counts_of_parts", "joined_parts", "set_part", "set_result
 
 @dataclass(frozen=True, eq=False)
 class SetPart:
-    """A mode set with some of the numbers of modes."""
+    """Result of a mode set for some of the numbers of modes."""
 
-    points: tuple[Point, ...]  #: by ascending number of modes
-    columns: tuple[dict[str, int], ...]  #: family -> number of columns, of each point
-    refused: Mapping[int, str]  #: number of modes -> why it cannot be had
-    error: str  #: why the set cannot be judged at all
+    points: tuple[Point, ...]  #: results by ascending number of modes
+    columns: tuple[dict[str, int], ...]  #: number of columns of each family, for each point
+    refused: Mapping[int, str]  #: reason for each number of modes that is impossible
+    error: str  #: reason if the set cannot be assessed at all
     seconds: float
 
 
@@ -48,7 +48,7 @@ def set_result(
 
 
 def joined_parts(name: str, parts: Sequence[SetPart]) -> SetResult:
-    """Return the result of one set from its parts, which hold all numbers of modes."""
+    """Return the result of one set, joined from its parts, which together contain all numbers of modes."""
     words = first_sentence(MODE_SETS[name].__doc__)
     refused = {n_modes: why for part in parts for n_modes, why in part.refused.items()}
     found = [pair for part in parts for pair in zip(part.points, part.columns, strict=True)]
@@ -68,7 +68,7 @@ def joined_parts(name: str, parts: Sequence[SetPart]) -> SetResult:
 
 
 def counts_of_parts(name: str, counts: Sequence[int]) -> list[tuple[int, ...]]:
-    """Return numbers of modes that are judged together: all, where sets with fewer modes are columns of the largest."""
+    """Return numbers of modes to assess together: all of them if smaller sets are columns of the largest."""
     asked = tuple(sorted(set(counts)))
     is_one = name in SUBSETS or "n_modes" not in inspect.signature(MODE_SETS[name]).parameters
     return [asked] if is_one else [(n_modes,) for n_modes in asked]
@@ -82,7 +82,7 @@ def set_part(
     basis: ReferenceBasis,
     reference: Reference,
 ) -> SetPart:
-    """Return the points of one set, the number of columns of each family in each, and which are refused."""
+    """Return the points of one set, the column count of each family, and the impossible numbers of modes."""
     began = time.perf_counter()
     try:
         points, columns, refused = judged_points(name, options, counts, families, basis, reference)
@@ -99,7 +99,7 @@ def judged_points(
     basis: ReferenceBasis,
     reference: Reference,
 ) -> tuple[list[Point], list[dict[str, int]], dict[int, str]]:
-    """Return the points of one set, the number of columns of each family in each, and why others are refused."""
+    """Return the points of one set, the column count of each family, and why other numbers are impossible."""
     make = MODE_SETS[name]
     takes = inspect.signature(make).parameters
     body = families.body
@@ -146,7 +146,7 @@ def refused_words(refused: Mapping[int, str]) -> str:
 
 
 def without_curves(point: Point) -> Point:
-    """Return the point with only values and sentences of its records, and frequencies and effective masses."""
+    """Return the point without curves: values and sentences of its records, frequencies and effective masses."""
     kept = ("frequency-error", "effective-mass")
     records = (record if record.name in kept else replace(record, data={}) for record in point.records)
     return replace(point, records=tuple(records))

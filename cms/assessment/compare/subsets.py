@@ -1,4 +1,4 @@
-"""How the mode set with fewer vibration modes is made from the columns of the largest one: V_n = V C_n."""
+"""Mode sets with fewer vibration modes, made from the columns of the largest set: V_n = V C_n."""
 
 from collections.abc import Callable
 
@@ -13,7 +13,7 @@ Subset = Callable[[ModeSet, Array, int], tuple[Array, tuple[str, ...]]]
 
 
 def column_subset(modes: ModeSet, at_b: Array, n_modes: int) -> tuple[Array, tuple[str, ...]]:
-    """Take the static columns and the first vibration columns.
+    """Select the static columns and the first n_modes vibration columns.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def column_subset(modes: ModeSet, at_b: Array, n_modes: int) -> tuple[Array, tup
 
 
 def residual_subset(modes: ModeSet, at_b: Array, n_modes: int) -> tuple[Array, tuple[str, ...]]:
-    """Use fewer free modes; the static contribution of the removed modes is added to the residual attachment modes.
+    """Use fewer free modes, and add the static contribution of the removed modes to the residual attachment modes.
 
     residual_n = Psi_U - Phi_n Lambda_n⁻¹ Phi_n,Bᵀ = residual_N + sum over n < k <= N of phi_k omega_k⁻² phi_k,Bᵀ, for
     M-orthonormal phi_k; parameters and returns as `column_subset`.
@@ -51,13 +51,13 @@ def residual_subset(modes: ModeSet, at_b: Array, n_modes: int) -> tuple[Array, t
 
 
 def leading_subset(modes: ModeSet, at_b: Array, n_modes: int) -> tuple[Array, tuple[str, ...]]:
-    """Take the columns the number of modes does not count, and the first of the others; as `column_subset`."""
+    """Select the columns that n_modes does not count, and the first n_modes of the others."""
     n = min(int(modes.data["n_static"][0]) + n_modes, len(modes.labels))
     return np.eye(len(modes.labels), n), modes.labels[:n]
 
 
 def whole_set(modes: ModeSet, at_b: Array, n_modes: int) -> tuple[Array, tuple[str, ...]]:
-    """Take all columns: of a set without vibration modes."""
+    """Select all columns, for a set without vibration modes."""
     return np.eye(len(modes.labels)), modes.labels
 
 

@@ -1,4 +1,4 @@
-"""Which mode set is good enough, with how few modes, and why: sentences from records."""
+"""Verdict of each mode set: whether it is good enough, with how few modes, and why, in sentences from records."""
 
 import math
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ __all__ = [
     "shown_point",
 ]
 
-EXACT = 1e-8  #: value that reads as exact in a sentence
+EXACT = 1e-8  #: value below which a sentence says "exact"
 #: records that decide whether a set is good enough, and their names in a sentence
 DECIDING = {
     "frequency-error": "free frequencies",
@@ -35,7 +35,7 @@ DECIDING = {
     "frequency-response": "frequency response",
     "deformation-error": "deformation in the motion",
 }
-#: further records that are reported and decide nothing
+#: further reported records, which do not decide
 DOUBTS = {
     "residual-bound": "residual bound",
     "effective-mass": "missing effective mass",
@@ -45,7 +45,7 @@ DOUBTS = {
 
 
 def is_good(records: Sequence[QualityRecord]) -> bool:
-    """Whether every deciding record passes; "info" (not applicable) does not decide."""
+    """Return whether every deciding record passes; "info" (not applicable) does not decide."""
     return all(record.verdict in ("pass", "info") for record in records if record.name in DECIDING)
 
 
@@ -59,7 +59,7 @@ def severity(points: Sequence[Point]) -> Literal["pass", "warn", "fail"]:
 
 
 def accuracy(point: Point) -> float:
-    """Return the largest deciding value over its limit, three digits: the smaller, the more accurate."""
+    """Return the largest ratio of a deciding value to its limit, with three digits; smaller is more accurate."""
     shares = [
         record.value / record.tolerance
         for record in point.records
@@ -70,14 +70,14 @@ def accuracy(point: Point) -> float:
 
 
 def shown_point(points: Sequence[Point]) -> int | None:
-    """Return the index of the smallest point that is good enough, else of the largest; None if there is none."""
+    """Return the index of the smallest sufficient point, else of the largest point; None if there are no points."""
     if not points:
         return None
     return next((k for k, point in enumerate(points) if point.is_good), len(points) - 1)
 
 
 def set_sentence(points: Sequence[Point]) -> str:
-    """Say with how many modes a set is good enough and which limits fewer miss, or what the largest number misses."""
+    """State the sufficient number of modes and the limits that fewer modes exceed, or those the largest set exceeds."""
     shown = shown_point(points)
     if shown is None:
         return "it has no columns to judge"
@@ -99,7 +99,7 @@ def missed(point: Point) -> list[QualityRecord]:
 
 
 def miss(record: QualityRecord) -> str:
-    """Say by how much a record misses its limit."""
+    """State by how much a record exceeds its limit."""
     return f"{DECIDING[record.name]} {number_words(record.value)}, limit {number_words(LIMITS[record.name].tolerance)}"
 
 
@@ -114,7 +114,7 @@ def ranking(sets: Sequence[SetResult]) -> tuple[str, ...]:
 
 
 def answer(sets: Sequence[SetResult], order: Sequence[str], band_hz: float) -> str:
-    """Say which set to take."""
+    """State which set is recommended."""
     band = f"up to {band_hz:.5g} Hz"
     if not order:
         tried = [result for result in sets if result.detail is not None]
@@ -155,12 +155,12 @@ def answer(sets: Sequence[SetResult], order: Sequence[str], band_hz: float) -> s
 
 
 def listed(words: Sequence[str]) -> str:
-    """Return 'a', 'a and b', 'a, b and c'."""
+    """Return the words as a list: 'a', 'a and b', or 'a, b and c'."""
     return " and ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
 
 
 def crossings(sets: Sequence[SetResult], name: str) -> str:
-    """Say from how many modes on each set keeps the limit of a record."""
+    """State the number of modes from which on each set keeps the limit of a record."""
     limit = LIMITS[name].tolerance
     if limit is None:
         return ""
@@ -191,7 +191,7 @@ def modes_words(n_modes: int) -> str:
 
 
 def number_words(value: float | None) -> str:
-    """Return a number without unit as in reports; words for missing ones."""
+    """Return a dimensionless number as in reports, or words if it is missing."""
     if value is None:
         return "none"
     return share(value) if math.isfinite(value) else "with modes missing"

@@ -36,12 +36,12 @@ __all__ = [
 
 
 LEAST_MAC = 0.5
-WINDOW = 0.5  #: relative distance from the measured frequency within which a computed mode may be its partner
+WINDOW = 0.5  #: frequency difference over the measured frequency, within which a computed mode may be the partner
 
 
 @dataclass(frozen=True)
 class ModePair:
-    """A measured mode and its partner, by index from 0."""
+    """Measured mode and its computed partner, by index from 0."""
 
     measured: int
     computed: int
@@ -58,7 +58,7 @@ def pair_modes(
     least_mac: float = LEAST_MAC,
     window: float = WINDOW,
 ) -> tuple[ModePair, ...]:
-    """Pair modes such that the sum of their MAC is largest, after the manual pairs.
+    """Pair modes such that the sum of their MAC is largest; manual pairs have priority.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def pair_modes(
 
 
 def comac(A: Array, B: Array) -> Array:
-    """Return the coordinate MAC of paired shapes (n_rows, n) at each row, (n_rows,): (sum |a b|)² / (sum a² sum b²).
+    """Return the coordinate MAC of paired shapes at each row, (n_rows,): (Σ |a b|)² / (Σ a² Σ b²).
 
     Shapes are first scaled to unit length, so that every pair has equal weight. Rows without motion have the value 1.
     """
@@ -131,7 +131,7 @@ def mass_at_rows(shapes: Array) -> Array:
 
 
 def orthogonality(measured: Array, M_a: Array, computed: Array | None = None) -> Array:
-    """Return products of measured shapes, with each other or with computed ones, in the mass at their rows."""
+    """Return mass-weighted products of measured shapes with each other, or with computed shapes."""
 
     def scaled(X: Array) -> Array:
         mass = np.einsum("rk,rs,sk->k", X, M_a, X)
@@ -148,7 +148,8 @@ def orthogonality(measured: Array, M_a: Array, computed: Array | None = None) ->
 class Pairing:
     """Rules for pairing modes."""
 
-    by_hand: tuple[tuple[int, int], ...] = ()  #: pairs (measured, computed), counted from 1; 0: no partner
+    #: pairs (measured, computed), counted from 1; computed 0: the measured mode has no partner
+    by_hand: tuple[tuple[int, int], ...] = ()
     least_mac: float = LEAST_MAC
     window: float = WINDOW
 
@@ -160,18 +161,18 @@ class Correlation:
     measured: MeasuredModes
     model: ModelModes
     points: PointPairs
-    mac: Array  #: (n_t, n_m)
+    mac: Array  #: MAC of measured and computed modes, (n_t, n_m)
     auto_mac: Array  #: MAC of the test with itself, (n_t, n_t); shows modes that its points do not distinguish
     pairs: tuple[ModePair, ...]
     comac: Array  #: COMAC of each measured row over the pairs, (n_rows,); empty without pairs
     #: orthogonality of the paired measured shapes in the mass of the model, (n, n); None: unknown
     orthogonality: Array | None
     cross_orthogonality: Array | None  #: orthogonality of the paired measured shapes to their partners, (n, n)
-    why_not: str = ""  #: reason if there is no orthogonality
+    why_not: str = ""  #: reason if orthogonality is unknown
 
     @property
     def errors(self) -> Array:
-        """Relative frequency errors of the pairs, computed / measured - 1, (n,)."""
+        """Relative frequency error of each pair, computed / measured - 1, (n,)."""
         return np.array([self.model.frequencies[p.computed] / self.measured.frequencies[p.measured] - 1
                          for p in self.pairs])  # fmt: skip
 
@@ -181,7 +182,7 @@ class Correlation:
         return at_rows(self.model, self.points.rows, self.points.directions)
 
     def point_comac(self) -> list[tuple[int, str, float]]:
-        """Return point, node, and the smallest COMAC of its directions, worst first."""
+        """Return point, node and the smallest COMAC over the directions, worst point first."""
         if not self.comac.size:
             return []
         least = [float(self.comac[self.measured.points == point].min()) for point in self.points.points]
@@ -263,7 +264,7 @@ def correlate(
 
 
 def paired_shapes(measured: MeasuredModes, shapes: Array, pairs: Sequence[ModePair]) -> tuple[Array, Array]:
-    """Return measured and computed shapes of the pairs, the measured ones scaled to the computed, (n_rows, n) each."""
+    """Return measured and computed shapes of the pairs, with the measured ones scaled to fit, (n_rows, n) each."""
     a = measured.shapes[:, [pair.measured for pair in pairs]]
     b = shapes[:, [pair.computed for pair in pairs]]
     return a * scale_factors(a, b), b
@@ -274,16 +275,16 @@ def paired_shapes(measured: MeasuredModes, shapes: Array, pairs: Sequence[ModePa
 
 @dataclass(frozen=True, eq=False)
 class DampingFit:
-    """A fitted damping with its uncertainty."""
+    """Fitted damping with its uncertainty."""
 
     kind: str  #: "ratio" or "rayleigh"
-    values: Array  #: ratio; or alpha [1/s] and beta [s]
+    values: Array  #: damping ratio, or alpha [1/s] and beta [s]
     spread: Array  #: standard deviation of each value
-    misfit: float  #: root mean square of measured minus fitted ratio
-    time: float = 1.0  #: time unit of the job that receives the table [s]
+    misfit: float  #: root mean square difference between measured and fitted ratio
+    time: float = 1.0  #: time unit of the job that uses the damping [s]
 
     def table(self) -> str:
-        """Return the table [damping] of a job in its units: alpha per time unit, beta in time units."""
+        """Return the table [damping] of a job in job units: alpha per time unit, beta in time units."""
         factors = {"ratio": 1.0} if self.kind == "ratio" else {"alpha": self.time, "beta": 1 / self.time}
         rows = (f"{name} = {v * factor:.6g}" for (name, factor), v in zip(factors.items(), self.values, strict=True))
         return "\n".join(["[damping]", *rows])

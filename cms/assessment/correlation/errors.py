@@ -6,4 +6,4 @@ __all__ = ["CorrelationError"]
 
 
 class CorrelationError(CmsError):
-    """Measured modes are damaged, cannot be located on the model, or do not determine the requested result."""
+    """Measured modes are damaged, do not match points of the model, or do not determine the requested result."""

@@ -12,7 +12,7 @@ __all__ = ["MeasuredModes", "phase_collinearity", "real_shapes"]
 
 @dataclass(frozen=True, eq=False)
 class MeasuredModes:
-    """Modes of a test over the directions that were measured.
+    """Modes of a test, given along the measured directions.
 
     Raises
     ------
@@ -20,9 +20,9 @@ class MeasuredModes:
         If sizes do not fit, a number is not finite, frequencies are not positive, or a direction has zero length.
     """
 
-    frequencies: Array  #: (n,) [Hz]
-    shapes: Array  #: real shapes, (n_rows, n), with any scale
-    points: IntArray  #: number of the point of each row, (n_rows,)
+    frequencies: Array  #: natural frequencies, (n,) [Hz]
+    shapes: Array  #: real shapes, (n_rows, n), arbitrarily scaled
+    points: IntArray  #: point number of each row, (n_rows,)
     directions: Array  #: unit vector of each row, in the axes of the test, (n_rows, 3)
     #: position of the point of each row, in the length unit of the model, (n_rows, 3); NaN if the test does not give it
     places: Array
@@ -66,7 +66,7 @@ class MeasuredModes:
         return len(self.frequencies)
 
     def chosen(self, modes: list[int]) -> "MeasuredModes":
-        """Return some of the modes, by index from 0."""
+        """Return some of the modes, selected by index from 0."""
         return replace(
             self,
             frequencies=self.frequencies[modes],

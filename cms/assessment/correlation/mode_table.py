@@ -79,7 +79,7 @@ def read_mode_table(path: Path, length: float, *, given: float | None = None) ->
 
 
 def number(where: str, cell: str) -> float:
-    """Return a number."""
+    """Return the number in a cell."""
     try:
         return float(cell)
     except ValueError:
@@ -87,14 +87,14 @@ def number(where: str, cell: str) -> float:
 
 
 def whole_number(where: str, cell: str) -> int:
-    """Return the number of a point, an integer."""
+    """Return the point number in a cell, an integer."""
     if not re.fullmatch(r"\s*\d+\s*", cell):
         raise CorrelationError(f"{where}: expected the number of a point, got {cell.strip()!r}")
     return int(cell)
 
 
 def direction_of(where: str, cell: str) -> Array:
-    """Return the vector of a direction: x, +x, -y, or three numbers separated by blanks."""
+    """Return the unit vector of a direction: x, +x, -y, or three numbers separated by blanks."""
     word = cell.strip().lower()
     if (axis := word.lstrip("+-")) in AXES and len(word) - len(axis) <= 1:
         return (-1.0 if word.startswith("-") else 1.0) * np.array(AXES[axis])

@@ -1,4 +1,4 @@
-"""Modes of the model for comparison with a test: of a full model, free or held, or of a modal file."""
+"""Computed modes for comparison with a test: of a full model, free or fixed to the ground, or of a modal file."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,9 +25,9 @@ class ModelModes:
     """Elastic modes of a model, in mesh axes."""
 
     name: str
-    frequencies: Array  #: ascending (n,) [Hz]
-    shapes: Array  #: translations at the nodes, (n_nodes, 3, n)
-    nodes: Array  #: positions in the mesh, (n_nodes, 3)
+    frequencies: Array  #: natural frequencies, ascending, (n,) [Hz]
+    shapes: Array  #: translations of the nodes, (n_nodes, 3, n)
+    nodes: Array  #: node positions in the mesh, (n_nodes, 3)
     numbering: Numbering
     columns: Array | None = None  #: modes of a full model over its dofs, M-orthonormal, (n_dof, n)
     is_free: bool = True
@@ -90,5 +90,5 @@ def modes_of_file(reduced: ReducedBody) -> ModelModes:
 
 
 def at_rows(model: ModelModes, rows: IntArray, directions: Array) -> Array:
-    """Return the shapes at nodes along directions, (n_rows, n)."""
+    """Return the shapes at nodes, along given directions, (n_rows, n)."""
     return np.asarray(np.einsum("ra,rak->rk", directions, model.shapes[rows]))

@@ -1,4 +1,4 @@
-"""Nodes of the model that belong to the measured points: by number, by position, or manually."""
+"""Assignment of model nodes to measured points: by number, by position, or manually."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["Placement", "PointPairs", "pair_points"]
 
-TOLERANCE = 0.02  #: largest distance between a node and its point, relative to the size of the model
+TOLERANCE = 0.02  #: largest distance between a node and its point, over the size of the model
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class Placement:
     """Position of the test axes in the mesh, and the assignment of points to nodes."""
 
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  #: origin of the test in the mesh [length of the model]
-    #: axes of the test in the mesh
+    #: axes of the test in mesh axes
     axes: tuple[tuple[float, float, float], ...] = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
     nodes: Mapping[int, int | str] = field(default_factory=dict)  #: node number of each manually assigned point
     match: str = "place"  #: "place": the nearest node; "number": the node with the number of the point
@@ -39,14 +39,14 @@ class Placement:
 
 @dataclass(frozen=True, eq=False)
 class PointPairs:
-    """The node of each measured row, and its direction in mesh axes."""
+    """Node and direction of each measured row."""
 
-    rows: IntArray  #: node index of each row, (n_rows,)
-    directions: Array  #: (n_rows, 3)
+    rows: IntArray  #: index of the node of each row, (n_rows,)
+    directions: Array  #: direction of each row in mesh axes, (n_rows, 3)
     points: IntArray  #: distinct measured points, (n_points,)
-    nodes: tuple[str, ...]  #: names of their nodes
+    nodes: tuple[str, ...]  #: name of the node of each point
     distances: Array  #: distance between point and node, NaN if the test has no positions, (n_points,)
-    size: float  #: size of the model
+    size: float  #: size of the model, by which distances are judged
 
 
 def pair_points(measured: MeasuredModes, model: ModelModes, placement: Placement | None = None) -> PointPairs:
@@ -99,7 +99,7 @@ def pair_points(measured: MeasuredModes, model: ModelModes, placement: Placement
 
 
 def node_of(model: ModelModes, node: int | str, where: str) -> int:
-    """Return the index of a node with a given number; if the model has no numbers, the number is the index."""
+    """Return the index of the node with a given number; the number is the index if the model has no numbers."""
     if not model.numbering.nodes.size:
         if not isinstance(node, int) or not 0 <= node < len(model.nodes):
             raise CorrelationError(f"{where}: the model knows no numbers of nodes; expected an index, got {node!r}")
@@ -108,6 +108,6 @@ def node_of(model: ModelModes, node: int | str, where: str) -> int:
 
 
 def listed(numbers: IntArray) -> str:
-    """Return some numbers as text."""
+    """Return the first numbers of a list as text."""
     shown = ", ".join(str(number) for number in numbers[:5])
     return f"{shown}, ..." if len(numbers) > 5 else shown

@@ -13,7 +13,7 @@ __all__ = ["read_universal"]
 
 #: length unit in metres for each code of dataset 164 (SI, British, metric, ..., mm, cm, inch, mm)
 LENGTHS = {1: 1.0, 2: 0.3048, 3: 1.0, 4: 0.3048, 5: 1e-3, 6: 1e-2, 7: 0.0254, 8: 1e-3, 10: 1e-3}
-NORMAL, COMPLEX = 2, (3, 7)  #: analysis types of dataset 55
+NORMAL, COMPLEX = 2, (3, 7)  #: analysis types of dataset 55 for normal and complex modes
 GLOBAL = (0, 1)  #: displacement systems that are the axes of the test
 NODES, SHAPES, UNITS = (15, 2411), 55, 164
 
@@ -75,9 +75,9 @@ def read_universal(path: Path, length: float, *, given: float | None = None) -> 
 
 
 def require_whole(path: Path) -> None:
-    """Raise `CorrelationError` if the last dataset of a text file has no end; the reader would ignore it."""
+    """Raise `CorrelationError` if the last dataset of a text file has no end; pyuff would ignore this dataset."""
     content = path.read_bytes()
-    if b"    58b" in content:  # bytes of measured time series may have any value
+    if b"    58b" in content:  # the binary data of measured time series may contain any byte
         return
     marks = sum(line.rstrip() == b"    -1" for line in content.splitlines())
     if marks % 2:

@@ -30,21 +30,21 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["Parameter", "Update", "update_model"]
 
-STEP = 1e-3  #: step of theta for the differences of the matrices
-SMALLEST_STEP = 1e-5  #: step of theta below which the update has converged
+STEP = 1e-3  #: step of theta for finite differences of the matrices
+SMALLEST_STEP = 1e-5  #: size of a theta step below which the update has converged
 MOST_ITERATIONS = 20
 HALVINGS = 8
-MODES_BEYOND = 1.3  #: modes are computed up to this multiple of the highest measured frequency
+MODES_BEYOND = 1.3  #: highest computed frequency over the highest measured frequency
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number of the job to update."""
+    """Parameter of the job to update."""
 
     name: str
     path: str  #: key path in the job, such as "materials.steel.young"
     start: float  #: initial value, not 0
-    spread: float = 0.1  #: expected standard deviation, relative to the initial value
+    spread: float = 0.1  #: expected standard deviation over the initial value
     least: float = -0.9  #: lower bound of theta = p / start - 1
     most: float = 9.0
 
@@ -54,19 +54,19 @@ class Update:
     """Result of the update."""
 
     parameters: tuple[Parameter, ...]
-    values: Array  #: updated values, (n,), each in its unit
-    spread: Array  #: standard deviation of each, relative to its initial value, (n,)
+    values: Array  #: updated value of each parameter, in its unit, (n,)
+    spread: Array  #: standard deviation of each parameter over its initial value, (n,)
     correlation: Array  #: correlation matrix of the parameters, (n, n)
-    jacobian: Array  #: relative change of frequency per relative change of parameter at the end, (n_pairs, n)
+    jacobian: Array  #: relative change of frequency per relative change of parameter at the solution, (n_pairs, n)
     frequency_spread: float  #: relative standard deviation of the measured frequencies
-    history: tuple[tuple[float, ...], ...]  #: objective, then values, of each step
+    history: tuple[tuple[float, ...], ...]  #: objective and parameter values after each step
     before: Correlation
     after: Correlation
     is_converged: bool
 
     @property
     def determined(self) -> Array:
-        """Information gained about each parameter, (n,): 1 - (spread / prior spread)²; 0: none."""
+        """Information gained about each parameter, (n,): 1 - (spread / prior spread)²; 0 means none."""
         prior = np.array([parameter.spread for parameter in self.parameters])
         return np.asarray(1 - (self.spread / prior) ** 2)
 
@@ -98,7 +98,7 @@ def update_model(
     frequency_spread: float = 0.005,
     most_iterations: int = MOST_ITERATIONS,
 ) -> Update:
-    """Find the parameter values for which the model has the measured frequencies.
+    """Find the parameter values for which the model reproduces the measured frequencies.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Quality: numbers with a tolerance, a verdict, the reason and the next action, for any reduced body.
 
-`check_body` asks a modal file alone, `check_reduction` compares with the full model.
+`check_body` reads a modal file alone, `check_reduction` compares it with the full model.
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""What is in a reduced body, as one record: `cms info` prints it, `--json` writes it, reports may read it."""
+"""Content of a reduced body as one record: `cms info` prints it, `--json` writes it, reports may read it."""
 
 from dataclasses import asdict
 from typing import Any
@@ -25,7 +25,7 @@ def body_size(body: ReducedBody) -> float:
 
 
 def in_hertz(body: ReducedBody, frequencies: Array) -> Array:
-    """Return frequencies in Hz that are in cycles per time unit of the body."""
+    """Return frequencies in Hz, given in cycles per time unit of the body."""
     return np.asarray(frequencies) / body.units.time
 
 
@@ -126,19 +126,19 @@ def numbering_record(body: ReducedBody) -> dict[str, Any]:
 
 
 def range_of(numbers: IntArray) -> dict[str, int] | None:
-    """Return how many different numbers there are, the least and the greatest; None if there are none."""
+    """Return the number of distinct numbers, the smallest and the largest; None if there are none."""
     known = np.unique(numbers[numbers != NONE])
     return {"count": len(known), "from": int(known[0]), "to": int(known[-1])} if len(known) else None
 
 
 def kept_of_set(body: ReducedBody, named: NamedSet) -> int:
-    """Return how many nodes or elements of a set the file keeps."""
+    """Return how many nodes or elements of a set the file contains."""
     numbers = body.numbering.nodes if named.kind == "nodes" else body.numbering.elements
     return len(np.unique(numbers[named.members])) if numbers.size else len(named.members)
 
 
 def effective_mass_record(body: ReducedBody, at: str) -> dict[str, Any]:
-    """Return the effective masses while an interface is held and driven, in plain types; frequencies in Hz."""
+    """Return the effective masses for a fixed, driven interface as plain types; frequencies in Hz."""
     from cms.assessment.quality.of_body.effective_mass import effective_mass_at, mass_record
 
     return mass_record(effective_mass_at(body, at))

@@ -6,4 +6,4 @@ __all__ = ["QualityError"]
 
 
 class QualityError(CmsError, ValueError):
-    """A quality check was requested for something that does not exist: a full model, an interface, a band."""
+    """A quality check was requested for a missing full model, interface or band."""

@@ -1,4 +1,4 @@
-"""Every threshold of the quality checks, written once."""
+"""All thresholds of the quality checks, each defined once."""
 
 from dataclasses import dataclass
 
@@ -7,12 +7,12 @@ __all__ = ["LIMITS", "Limit"]
 
 @dataclass(frozen=True)
 class Limit:
-    """What a value without unit may be."""
+    """Limit for a dimensionless value."""
 
     title: str  #: title of the record
-    tolerance: float | None  #: largest value that passes; None: information only
-    failing: float | None  #: above it fails, between both is a warning; None: never fails
-    action: str  #: remedy if it does not pass
+    tolerance: float | None  #: largest value that passes; None: the value is only information
+    failing: float | None  #: value above which the verdict is "fail"; between both it is "warn"; None: never fails
+    action: str  #: remedy if the value does not pass
 
 
 REDUCE_AGAIN = "reduce the body again; the file does not say one thing"

@@ -1,4 +1,4 @@
-"""What a finer mesh of the same solid would change of its free frequencies: a direct estimate of the mesh error.
+"""Estimate of the mesh error: change of the free frequencies of a solid when its mesh is refined.
 
 (1) the bare solid, without couplings: cells of first order are raised to second, of second order divided by two along
     every edge, on the same curved surface
@@ -27,7 +27,7 @@ from fe_models.meshes.refined import refined_mesh
 
 __all__ = ["MOST_DOFS", "MeshRefinement", "mesh_refinement"]
 
-MOST_DOFS = 600_000  #: of the finer model, by default
+MOST_DOFS = 600_000  #: default for the largest number of dofs of the refined model
 ORDER = 1.0
 
 
@@ -35,16 +35,16 @@ ORDER = 1.0
 class MeshRefinement:
     """Free frequencies of a solid and of the same solid with a finer mesh."""
 
-    how: str  #: "second order" or "half the size"
-    n_dof: tuple[int, int]  #: as it is, finer
-    frequencies: Array  #: as it is and finer, (2, n) [Hz]
+    how: str  #: kind of refinement: "second order" or "half the size"
+    n_dof: tuple[int, int]  #: number of dofs of the given mesh and of the refined mesh
+    frequencies: Array  #: frequencies with the given mesh and with the refined mesh, (2, n) [Hz]
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "frequencies", frozen(self.frequencies))
 
     @property
     def error(self) -> Array:
-        """Estimated relative error of the frequencies of the mesh as it is, (n,), by step (3)."""
+        """Estimated relative error of the frequencies with the given mesh, (n,), by step (3)."""
         change = self.frequencies[0] / self.frequencies[1] - 1
         return np.asarray(change if self.how == "second order" else change / (1 - 0.5**ORDER))
 
@@ -59,7 +59,7 @@ def mesh_refinement(
     most_dofs: int = MOST_DOFS,
     stages: Stages | None = None,
 ) -> MeshRefinement:
-    """Compare the free frequencies of a solid with those of a finer mesh of the same solid.
+    """Compare the free frequencies of a solid with those for a refined mesh.
 
     Parameters
     ----------

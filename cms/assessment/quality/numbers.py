@@ -1,4 +1,4 @@
-"""Numbers without unit as sentences, tables and reports write them: percent, or powers of ten."""
+"""Dimensionless numbers as text for sentences, tables and reports: percent, or powers of ten."""
 
 import math
 
@@ -6,7 +6,7 @@ __all__ = ["factor", "share", "superscript"]
 
 
 def share(value: float) -> str:
-    """Return a number without unit: as percent if readable, as powers of ten below, a dash if missing."""
+    """Return a number as percent, or as a power of ten if it is small; a dash if it is missing."""
     if math.isnan(value):
         return "\u2013"
     if math.isinf(value):
@@ -22,7 +22,7 @@ def share(value: float) -> str:
 
 
 def factor(value: float) -> str:
-    """Return a number above 1 with two digits, large ones as powers of ten."""
+    """Return a number above 1 with two digits, or as a power of ten if it is large."""
     if not math.isfinite(value):
         return "\u221e"
     if value < 995:

@@ -1,4 +1,4 @@
-"""Plots of quality results, which draw computed data and compute nothing."""
+"""Plots of quality results; they draw existing data and compute nothing."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -26,7 +26,7 @@ def plot_frf(
     *,
     is_inertance: bool = False,
 ) -> "Axes":
-    """Magnitude of one entry of frequency responses over frequency, both logarithmic.
+    """Plot the magnitude of one entry of frequency responses over frequency, both logarithmic.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def plot_phase(
     *,
     is_inertance: bool = False,
 ) -> "Axes":
-    """Phase of one entry of frequency responses, in degrees; parameters as `plot_frf`."""
+    """Plot the phase of one entry of frequency responses in degrees; parameters as in `plot_frf`."""
     ax = ax or new_axes()
     for k, (name, response) in enumerate(curves.items()):
         values = response.inertance if is_inertance else response.H
@@ -72,7 +72,7 @@ def frf_figure(
     is_inertance: bool = False,
     title: str = "",
 ) -> "Figure":
-    """Magnitude above phase, one column per entry (output, input) of the responses."""
+    """Return a figure with magnitude above phase, one column for each entry (output, input) of the responses."""
     from matplotlib.figure import Figure
 
     n = len(entries)
@@ -90,7 +90,7 @@ def frf_figure(
 
 
 def plot_deformation_error(errors: Mapping[str, DeformationError], norm: str = "K", ax: "Axes | None" = None) -> "Axes":
-    """Deformation error eps(t) of mode sets in one norm, logarithmic, over the size of the deformation itself.
+    """Plot the deformation error eps(t) of mode sets in one norm, logarithmic, and the size of the deformation.
 
     Parameters
     ----------
@@ -109,12 +109,12 @@ def plot_deformation_error(errors: Mapping[str, DeformationError], norm: str = "
 
 
 def positive(values: np.ndarray) -> np.ndarray:
-    """Return values a logarithmic axis can show; the others as gaps."""
+    """Return the values with gaps where a logarithmic axis cannot show them."""
     return np.where(values > 0, values, np.nan)
 
 
 def style(k: int) -> dict[str, object]:
-    """Line style of curve k: the first one wide, so that a second one on it shows."""
+    """Return the line style of curve k; the first curve is wide, so that it remains visible below a second one."""
     return {"color": f"C{k}" if k >= len(COLORS) else COLORS[k], "linestyle": STYLES[min(k, 1)], "linewidth": 1.6}
 
 
@@ -126,7 +126,7 @@ def new_axes() -> "Axes":
 
 
 def finished(ax: "Axes", x: str) -> "Axes":
-    """Label x, add grid and legend."""
+    """Label the x axis, and add grid and legend."""
     ax.set_xlabel(x)
     ax.grid(alpha=0.3, which="both")
     if ax.get_legend_handles_labels()[0]:

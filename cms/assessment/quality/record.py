@@ -1,6 +1,6 @@
-"""Quality records: a number without unit, its tolerance, a verdict, the reason, and what to do next.
+"""Quality records: a dimensionless number, its tolerance, a verdict, the reason, and the next action.
 
-Tests, command line, reports and plots read the same record; every threshold of the package stands once, in `LIMITS`.
+Tests, command line, reports and plots read the same record; `LIMITS` defines all thresholds.
 """
 
 import math
@@ -21,14 +21,14 @@ from fe_models.foundation.words import nearest, quoted
 __all__ = ["VERDICTS", "QualityRecord", "Verdict", "has_failed", "information", "judge", "plain", "worst"]
 
 Verdict = Literal["pass", "warn", "fail", "info"]
-VERDICTS: tuple[Verdict, ...] = ("info", "pass", "warn", "fail")  #: from harmless to bad
+VERDICTS: tuple[Verdict, ...] = ("info", "pass", "warn", "fail")  #: verdicts in order of severity
 
 
 @presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class QualityRecord:
-    """One question about a reduced body, and its answer.
+    """Result of one quality check of a reduced body.
 
     Parameters
     ----------
@@ -63,12 +63,12 @@ class QualityRecord:
         object.__setattr__(self, "data", MappingProxyType(dict(self.data)))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A view of a dict cannot be sent to another process; the dict can."""
+        """Reduce to a dict, because a view of a dict cannot be sent to another process."""
         values = (getattr(self, each.name) for each in fields(self))
         return type(self), tuple(dict(value) if isinstance(value, MappingProxyType) else value for value in values)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the record in plain types, ready for JSON; numbers that are not finite become None."""
+        """Return the record in JSON types; non-finite numbers become None."""
         return {
             "name": self.name,
             "title": self.title,
@@ -84,7 +84,7 @@ class QualityRecord:
 def judge(
     name: str, value: float, reason: str, data: Mapping[str, Any] | None = None, *, action: str | None = None
 ) -> QualityRecord:
-    """Make the record of a value by the limit of that name; a value that is not a number fails.
+    """Return the record of a value, with the verdict by the limit of this name; NaN fails.
 
     Parameters
     ----------
@@ -114,23 +114,23 @@ def judge(
 
 
 def information(name: str, reason: str, data: Mapping[str, Any] | None = None, *, action: str = "") -> QualityRecord:
-    """Make the record of a question that cannot be answered here, or needs no answer; its value is NaN."""
+    """Return the record of a check that is not applicable or only informs; its value is NaN."""
     limit = LIMITS[name]
     return QualityRecord(name, limit.title, math.nan, limit.tolerance, "info", reason, action, data or {})
 
 
 def worst(records: Iterable[QualityRecord]) -> Verdict:
-    """Return the worst verdict; "info" where there are no records."""
+    """Return the worst verdict; "info" if there are no records."""
     return max((record.verdict for record in records), key=VERDICTS.index, default="info")
 
 
 def has_failed(records: Iterable[QualityRecord]) -> bool:
-    """Whether any record failed."""
+    """Return whether any record failed."""
     return worst(records) == "fail"
 
 
 def plain(value: Any) -> Any:
-    """Return a value in the types of JSON: lists, numbers, text; non-finite numbers become None."""
+    """Return a value in JSON types: lists, numbers, text; non-finite numbers become None."""
     if isinstance(value, np.ndarray):
         if np.iscomplexobj(value):
             return {"real": plain(value.real), "imag": plain(value.imag)}

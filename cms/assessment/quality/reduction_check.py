@@ -45,7 +45,7 @@ def check_reduction(
     own: tuple[QualityRecord, ...] | None = None,
     options: ReductionOptions | None = None,
 ) -> tuple[QualityRecord, ...]:
-    """Check a reduced body on its own and against its full model.
+    """Check a reduced body alone and against its full model.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def check_reduction(
 
 
 def response_of(reference: FullReference, reduced: ReducedBody) -> QualityRecord:
-    """Compare the responses at the interfaces; a file whose mass is not positive has none."""
+    """Compare the responses at the interfaces; the check fails if the mass in the file is not positive."""
     try:
         return response_record(response_comparison(reference, port_model(reduced)))
     except np.linalg.LinAlgError as error:
@@ -138,7 +138,7 @@ def response_of(reference: FullReference, reduced: ReducedBody) -> QualityRecord
 
 
 def require_same_units(body: FEBody, reduced: ReducedBody) -> None:
-    """Raise `QualityError` unless full model and reduced body are in the same units."""
+    """Raise `QualityError` unless full model and reduced body have the same units."""
     if body.units != reduced.units:
         raise QualityError(
             f"check: body {body.name!r} is in units {body.units.name}, the reduced body {reduced.name!r} in "

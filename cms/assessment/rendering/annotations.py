@@ -20,11 +20,11 @@ INK, FAINT, AXIS_COLORS = "#1f2a33", "#5b6770", ("#c8403a", "#3a9a4b", "#2f6fc4"
 
 @dataclass(frozen=True)
 class Layout:
-    """Positions of the elements, in pixels."""
+    """Positions of the elements of a picture, in pixels."""
 
-    size: tuple[int, int]  #: size of the picture
-    view: tuple[int, int, int, int]  #: left, top, width, height of the view
-    unit: int  #: size of the small text; all other sizes scale with it
+    size: tuple[int, int]  #: width and height of the picture
+    view: tuple[int, int, int, int]  #: left, top, width and height of the view
+    unit: int  #: size of the small text, with which all other sizes scale
 
 
 def layout_of(scene: Scene) -> Layout:
@@ -41,7 +41,7 @@ def layout_of(scene: Scene) -> Layout:
 
 
 def compose(scene: Scene, layout: Layout, camera: Camera, view: Image, frame: int) -> Image:
-    """Return the finished picture, (height, width, 3) uint8, around a view of the given layout."""
+    """Return the finished picture, (height, width, 3) uint8: the view with all annotations."""
     from PIL import Image as PilImage
     from PIL import ImageDraw
 
@@ -88,7 +88,7 @@ def draw_color_bar(draw: Any, scene: Scene, layout: Layout) -> None:
 
 
 def round_ticks(low: float, high: float) -> Array:
-    """Return 4 to 8 multiples of 1, 2 or 5 times a power of ten between low and high."""
+    """Return 4 to 8 tick values between low and high: multiples of 1, 2 or 5 times a power of ten."""
     span = high - low
     step = 10.0 ** np.floor(np.log10(span / 4))
     step *= max((m for m in (1, 2, 5) if span / (m * step) >= 4), default=1)
@@ -97,7 +97,7 @@ def round_ticks(low: float, high: float) -> Array:
 
 
 def draw_triads(draw: Any, scene: Scene, layout: Layout, camera: Camera, frame: int) -> None:
-    """Draw the triads of a frame, then their labels, each below the labels that it would cover."""
+    """Draw the triads of a frame, then their labels; each label moves below labels that it would cover."""
     u, offset = layout.unit, np.array(layout.view[:2], dtype=float)
     words, pad = font(round(0.9 * u)), 0.25 * u
     labels: list[tuple[float, float, str]] = []
@@ -120,7 +120,7 @@ def draw_triads(draw: Any, scene: Scene, layout: Layout, camera: Camera, frame: 
 
 
 def drop_below(box: tuple[float, float, float, float], drawn: list[tuple[float, float, float, float]]) -> float:
-    """Return how far a box (left, top, right, bottom) [px] has to move down so that it covers none of those drawn."""
+    """Return how far down a box (left, top, right, bottom) [px] must move so that it covers no drawn box."""
     down = 0.0
     for left, top, right, bottom in sorted(drawn, key=lambda other: other[1]):
         beside = box[2] < left or right < box[0]
@@ -130,7 +130,7 @@ def drop_below(box: tuple[float, float, float, float], drawn: list[tuple[float, 
 
 
 def draw_axes(draw: Any, origin: Any, arms: Array, depth: Array, u: int, names: str) -> None:
-    """Draw three axes whose arms in the picture are the columns of arms, (2, 3) [px]; the farthest first.
+    """Draw three axes whose arms in the picture are the columns of `arms`, (2, 3) [px], the farthest axis first.
 
     y of the arms may point down (triads) or up (the corner axes, with names and inverted y).
     """

@@ -1,4 +1,4 @@
-"""The camera: its position such that every frame fits, and the projection of points."""
+"""Camera: a position from which every frame fits into the picture, and the projection of points."""
 
 from dataclasses import dataclass
 
@@ -9,31 +9,31 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["Camera", "fitted_camera"]
 
-VIEW_ANGLE = 16.0  #: vertical angle of view [deg], that of a long lens; parallel edges stay nearly parallel
+VIEW_ANGLE = 16.0  #: vertical angle of view [deg]; it is narrow, so that parallel edges stay nearly parallel
 FILL = 0.92  #: share of the picture that the scene may fill
 
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A pinhole camera; axes (right, up, forward) as rows."""
+    """Pinhole camera."""
 
-    eye: Array  #: (3,) [m]
-    axes: Array  #: rows right, up, forward, (3, 3)
+    eye: Array  #: position of the eye, (3,) [m]
+    axes: Array  #: unit vectors right, up and forward as rows, (3, 3)
     distance: float  #: distance from the eye to the centre of the scene [m]
     size: tuple[int, int]  #: width and height [px]
 
     @property
     def focal_point(self) -> Array:
-        """Centre of the scene, (3,) [m]."""
+        """Centre of the scene, at which the camera points, (3,) [m]."""
         return np.asarray(self.eye + self.distance * self.axes[2])
 
     @property
     def pixels(self) -> float:
-        """Focal length [px]."""
+        """Focal length in pixels [px]."""
         return float(self.size[1] / 2 / np.tan(np.deg2rad(VIEW_ANGLE) / 2))
 
     def project(self, points: Array) -> Array:
-        """Return x (to the right), y (down) [px] and depth [m] of points, (..., 3) -> (..., 3)."""
+        """Return x (to the right), y (down) [px] and depth [m] of points; shape (..., 3) for both."""
         seen = (points - self.eye) @ self.axes.T
         scale = self.pixels / seen[..., 2]
         x = self.size[0] / 2 + scale * seen[..., 0]
@@ -42,7 +42,7 @@ class Camera:
 
 
 def fitted_camera(scene: Scene, size: tuple[int, int]) -> Camera:
-    """Return the camera along the scene's direction such that every point of every frame is in the picture.
+    """Return a camera along the view direction of the scene that shows every point of every frame.
 
     A point at (x, y, z) from the centre, in camera axes, is in the picture if |x| <= a_x (d + z) and |y| <= a_y (d +
     z), where d is the distance of the centre. The required d is a maximum over the points. The centre is then moved to
@@ -65,13 +65,13 @@ def fitted_camera(scene: Scene, size: tuple[int, int]) -> Camera:
 
 
 def fitting_distance(relative: Array, half: Array) -> float:
-    """Return the smallest distance from which points, (n, 3) in camera axes, fit between tangents +-half, (2,)."""
+    """Return the smallest distance at which points, (n, 3) in camera axes, fit; `half` has the two tangents."""
     distance = float(((np.abs(relative[:, :2]) / half).max(axis=1) - relative[:, 2]).max())
-    return distance if distance > 0 else 1.0  # for a single point any distance is valid
+    return distance if distance > 0 else 1.0  # every distance is valid for a single point
 
 
 def seen_points(scene: Scene) -> Array:
-    """Return the points that must be in the picture, (n, 3): all nodes, because corners of boxes would waste space."""
+    """Return the points that must be in the picture, (n, 3): all nodes; corners of boxes would waste space."""
     found = [surface.nodes[..., np.unique(surface.triangles), :].reshape(-1, 3) for surface in scene.surfaces]
     found += [lines.points[..., np.unique(lines.segments), :].reshape(-1, 3) for lines in scene.lines]
     return np.concatenate([part for part in found if len(part)])

@@ -1,4 +1,4 @@
-"""Drawing of a scene into a file with a given view function: frames are drawn one after the other, then written."""
+"""Drawing of a scene into a file with a given view function: each frame is drawn, then written."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,16 +11,16 @@ from cms.assessment.rendering.scene import Scene
 __all__ = ["OnFrame", "ViewMaker", "draw_animation", "draw_picture"]
 
 ViewMaker = Callable[[Scene, Camera], Callable[[int], Image]]
-OnFrame = Callable[[int, int], None]  #: receives the number of finished frames and of all frames
+OnFrame = Callable[[int, int], None]  #: callback that receives the number of finished frames and of all frames
 
 
 def draw_picture(scene: Scene, path: Path, view_maker: ViewMaker) -> None:
-    """Draw the first frame into a PNG."""
+    """Draw the first frame into a PNG file."""
     write_picture(next(frames_of(scene, view_maker, lambda done, all_: None)), path)
 
 
 def draw_animation(scene: Scene, path: Path, view_maker: ViewMaker, *, fps: float, on_frame: OnFrame) -> None:
-    """Draw all frames into a film."""
+    """Draw all frames into a film file."""
     write_film(frames_of(scene, view_maker, on_frame), path, fps=fps)
 
 

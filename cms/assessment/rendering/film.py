@@ -21,14 +21,14 @@ __all__ = [
     "write_picture",
 ]
 
-Image = NDArray[np.uint8]  #: (height, width, 3)
+Image = NDArray[np.uint8]  #: pixels, (height, width, 3)
 
 PICTURE_SUFFIXES = (".png",)
 FILM_SUFFIXES = (".gif", ".mp4")
 #: ordered dither, added before rounding to a
 DITHER = np.array([[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]]) - 7.5
 # colour; it replaces bands by a fine pattern that does not change from frame to frame
-PALETTE_FRAMES = 60  #: frames of a GIF held in memory, from which the common palette is chosen
+PALETTE_FRAMES = 60  #: number of GIF frames in memory, from which the common palette is chosen
 
 
 def require_suffix(path: Path, suffixes: tuple[str, ...]) -> None:
@@ -38,7 +38,7 @@ def require_suffix(path: Path, suffixes: tuple[str, ...]) -> None:
 
 
 def average_of_blocks(image: Image, n: int) -> Image:
-    """Return an image, (n height, n width, >= 3) uint8, reduced n times by averaging, which smooths edges."""
+    """Return an image, (n height, n width, >= 3) uint8, averaged over blocks of n by n pixels, which smooths edges."""
     height, width = (size // n for size in image.shape[:2])
     blocks = image[..., :3].astype(np.uint16).reshape(height, n, width, n, 3)
     return np.asarray(blocks.sum(axis=(1, 3)) // n**2, dtype=np.uint8)
@@ -63,7 +63,7 @@ def write_film(frames: Iterable[Image], path: Path, *, fps: float) -> None:
 
 
 def write_gif(frames: Iterable[Image], path: Path, fps: float) -> None:
-    """Write a GIF with one palette for all frames, so that static parts do not flicker."""
+    """Write a GIF with one palette for all frames, so that parts at rest do not flicker."""
     from PIL import Image as PilImage
 
     source = iter(frames)
@@ -87,7 +87,7 @@ def write_gif(frames: Iterable[Image], path: Path, fps: float) -> None:
 
 
 def palette_of(frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return colours, (<= 256, 3), for frames, (n, height, width, 3): the exact background colour, and 255 others.
+    """Return colours, (<= 256, 3), for frames, (n, height, width, 3): the exact background, and up to 255 others.
 
     The background covers most pixels. It would otherwise take most of the colours, none of them exact.
     """
@@ -102,7 +102,7 @@ def palette_of(frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def nearest_colors(colors: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return the index of the nearest colour for each cell of 4 levels per side, (64, 64, 64)."""
+    """Return the index of the closest colour for each cell of the colour cube with 64 levels, (64, 64, 64)."""
     from scipy.spatial import KDTree
 
     levels = np.arange(64) * 4 + 1.5
@@ -113,7 +113,7 @@ def nearest_colors(colors: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def write_mp4(frames: Iterable[Image], path: Path, fps: float) -> None:
-    """Write an H.264 film that common players and browsers show (4:2:0, even size)."""
+    """Write an H.264 film in a form that common players and browsers can show (4:2:0, even size)."""
     try:
         import imageio_ffmpeg
 

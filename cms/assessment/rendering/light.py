@@ -16,21 +16,21 @@ LIGHTS = (
     (np.array([0.9, 0.1, 0.9]), 0.34),
     (np.array([-0.1, -1.0, 0.35]), 0.34),
 )
-GLOSS = {True: 0.08, False: 0.18}  #: strength of highlights, by whether colours represent numbers
+GLOSS = {True: 0.08, False: 0.18}  #: strength of highlights, depending on whether colours represent numbers
 
 
 def ambient(*, shows_numbers: bool) -> float:
-    """Return the share of ambient light."""
+    """Return the ambient share of the light."""
     return 0.55 if shows_numbers else 0.28
 
 
 def diffuse(*, shows_numbers: bool) -> float:
-    """Return the share of directional light."""
+    """Return the directional share of the light."""
     return 0.48 if shows_numbers else 0.8
 
 
 def brightness(normals: Array, *, shows_numbers: bool) -> Array:
-    """Return the brightness of faces with these unit normals (right, up, towards the eye), (n, 3) -> (n,)."""
+    """Return the brightness of faces, (n,), from their unit normals (right, up, towards the eye), (n, 3)."""
     total = np.zeros(len(normals))
     for towards, strength in LIGHTS:
         total += strength * np.clip(normals @ (towards / np.linalg.norm(towards)), 0, 1)

@@ -14,11 +14,12 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["matplotlib_view"]
 
-OVERSAMPLING = 2  #: scale of drawing without smoothing, before averaging; smoothing of neighbours would show seams
+#: size of a drawing without smoothing over the size after averaging; smoothing neighbours would show seams
+OVERSAMPLING = 2
 
 
 def matplotlib_view(scene: Scene, camera: Camera) -> Callable[[int], Image]:
-    """Return the function that draws a frame: frame -> (height, width, 3) uint8."""
+    """Return a function that draws a frame as (height, width, 3) uint8."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.colors import to_rgb
@@ -58,7 +59,7 @@ def matplotlib_view(scene: Scene, camera: Camera) -> Callable[[int], Image]:
 
 
 class DrawnSurface:
-    """A surface with data that are the same in all frames: sharp edges, and smoothing of faces."""
+    """Surface with data that all frames share: sharp edges, and smoothing of faces."""
 
     def __init__(self, surface: Surface, scene: Scene) -> None:
         from matplotlib.colors import to_rgb
@@ -91,7 +92,7 @@ class DrawnSurface:
         shown = np.flatnonzero(is_solid & (faces_eye | (not self.is_closed)))
         ends = self.edges[edge_shown]
         rgba = self.shaded(normals, faces_eye, camera, frame)[shown]
-        edge_depth = seen[ends, 2].mean(axis=1) - 0.004 * camera.distance  # in front of the faces that they bound
+        edge_depth = seen[ends, 2].mean(axis=1) - 0.004 * camera.distance  # edges are drawn in front of their faces
         edge_color = np.tile([0.13, 0.18, 0.22, 0.75 if is_solid else 0.32], (len(ends), 1))
         return (
             np.concatenate([seen[triangles[shown], 2].mean(axis=1), edge_depth]),
@@ -113,7 +114,7 @@ class DrawnSurface:
         return np.concatenate([rgb, np.ones((len(rgb), 1))], axis=1)
 
     def face_colors(self, frame: int) -> Array:
-        """Return the colour of each triangle without lighting, (n_triangles, 3)."""
+        """Return the unlit colour of each triangle, (n_triangles, 3)."""
         if self.surface.scalars is None:
             return np.tile(self.color, (len(self.surface.triangles), 1))
         low, high = self.limits
@@ -122,12 +123,12 @@ class DrawnSurface:
 
 
 def line_collection(kind: Any, lines: Lines, camera: Camera, frame: int) -> Any:
-    """Return the segments of a frame as a collection, without those that start behind the eye."""
+    """Return the segments of a frame as a collection, without segments that start behind the eye."""
     seen = camera.project(frame_of(lines.points, frame, 2))[lines.segments]
     seen = seen[(seen[..., 2] > 0).all(axis=1)]
     return kind(seen[..., :2], colors=lines.color, linewidths=OVERSAMPLING * lines.width * 0.72, alpha=lines.opacity)
 
 
 def unit(vector: Array) -> Array:
-    """Return the vector at length 1."""
+    """Return the unit vector."""
     return np.asarray(vector / np.linalg.norm(vector))

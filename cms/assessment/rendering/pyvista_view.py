@@ -1,4 +1,4 @@
-"""Views drawn by pyvista (VTK, OpenGL), off-screen; for the worker only, because VTK without OpenGL can crash."""
+"""Views drawn off-screen by pyvista (VTK, OpenGL), only in the worker process: VTK without OpenGL can crash."""
 
 from collections.abc import Callable
 from typing import Any
@@ -16,7 +16,7 @@ __all__ = ["pyvista_view"]
 
 
 def pyvista_view(scene: Scene, camera: Camera) -> Callable[[int], Image]:
-    """Return the function that draws a frame: frame -> (height, width, 3) uint8."""
+    """Return a function that draws a frame as (height, width, 3) uint8."""
     import pyvista
     from matplotlib.colors import ListedColormap
 
@@ -45,7 +45,7 @@ def pyvista_view(scene: Scene, camera: Camera) -> Callable[[int], Image]:
 
 
 def add_surface(plotter: Any, surface: Surface, scene: Scene, colors: Any) -> Callable[[int], None]:
-    """Add a surface with its sharp edges; return the function that moves it to a frame."""
+    """Add a surface with its sharp edges; return the function that updates it for a frame."""
     import pyvista
 
     rest = frame_of(surface.nodes, 0, 2)
@@ -93,7 +93,7 @@ def add_surface(plotter: Any, surface: Surface, scene: Scene, colors: Any) -> Ca
 
 
 def add_lines(plotter: Any, lines: Lines) -> Callable[[int], None]:
-    """Add lines; return the function that moves them to a frame."""
+    """Add lines; return the function that updates them for a frame."""
     mesh = line_mesh(frame_of(lines.points, 0, 2), lines.segments)
     plotter.add_mesh(mesh, color=lines.color, line_width=1.5 * lines.width, opacity=lines.opacity, lighting=False)
 

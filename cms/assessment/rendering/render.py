@@ -1,4 +1,4 @@
-"""Scenes to files: with pyvista in a separate process or, if that fails, with matplotlib; the user is informed."""
+"""Drawing of scenes to files by pyvista in a separate process or, if that fails, by matplotlib, with a note."""
 
 import logging
 import os
@@ -26,20 +26,20 @@ log = logging.getLogger(__name__)
 
 # -P: files in the user's folder must not shadow modules
 WORKER = (sys.executable, "-P", "-m", "cms.assessment.rendering.worker")
-SILENCE = 120.0  #: time without a new frame after which the worker counts as dead [s]
+SILENCE = 120.0  #: time without a new frame after which the worker is considered dead [s]
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """A drawn file, and the library that drew it."""
+    """Picture or film in a file, and the library that drew it."""
 
     path: Path
     backend: str  #: "pyvista" or "matplotlib"
-    note: str = ""  #: reason why pyvista was not used; "": it was used
+    note: str = ""  #: reason why pyvista was not used; empty if it was used
 
 
 def render_picture(scene: Scene, path: str | Path) -> Drawing:
-    """Draw the first frame of a scene into a PNG.
+    """Draw the first frame of a scene into a PNG file.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def render_picture(scene: Scene, path: str | Path) -> Drawing:
 
 
 def render_animation(scene: Scene, path: str | Path, *, fps: float = 25.0, on_frame: OnFrame | None = None) -> Drawing:
-    """Draw all frames of a scene into a film.
+    """Draw all frames of a scene into a film file.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def render_animation(scene: Scene, path: str | Path, *, fps: float = 25.0, on_fr
 def drawn(
     scene: Scene, target: Path, options: tuple[str, ...], fallback: Callable[[Path], None], tell: OnFrame
 ) -> Drawing:
-    """Draw to a temporary file beside the target, and rename it, so that no half-written file is visible."""
+    """Draw to a temporary file next to the target, and rename it, so that the target is always complete."""
     if is_stream(target):
         raise RenderError(f"{target}: this is a device or a pipe; expected the name of a file")
     try:
@@ -114,7 +114,7 @@ def drawn(
 
 
 def run_worker(scene: Scene, scene_path: Path, out: Path, options: tuple[str, ...], tell: OnFrame) -> str:
-    """Draw in a separate process; return "", or the reason why there is no drawing."""
+    """Draw in a separate process; return "" on success, or the reason for the failure."""
     write_scene(scene, scene_path)
     search = os.pathsep.join([str(Path(cms.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
     with (scene_path.parent / "errors.txt").open("w+b") as errors:
@@ -128,7 +128,7 @@ def run_worker(scene: Scene, scene_path: Path, out: Path, options: tuple[str, ..
         try:
             is_silent = follow(worker, tell)
         finally:
-            worker.kill()  # no effect if it has ended; an interrupted caller leaves no process
+            worker.kill()  # no effect if the worker has ended; an interrupted caller leaves no process behind
             code = worker.wait()
             if worker.stdout is not None:
                 worker.stdout.close()
@@ -147,7 +147,7 @@ def follow(worker: subprocess.Popen[str], tell: OnFrame) -> bool:
     lines: queue.Queue[str] = queue.Queue()
 
     def listen() -> None:
-        assert worker.stdout is not None  # it was opened as a pipe
+        assert worker.stdout is not None  # the pipe was opened with the process
         for line in worker.stdout:
             lines.put(line)
         lines.put("")
@@ -171,7 +171,7 @@ def follow(worker: subprocess.Popen[str], tell: OnFrame) -> bool:
 
 
 def ending(code: int, said: str) -> str:
-    """Describe how a process ended: the signal, or its last line of output."""
+    """Describe how a process ended: by a signal, or with its last line of output."""
     if code < 0:
         name = signal.Signals(-code).name if -code in signal.Signals._value2member_map_ else str(-code)
         return f"its process died of {name}, most likely there is no OpenGL here"

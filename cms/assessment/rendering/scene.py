@@ -1,4 +1,4 @@
-"""Content of a picture or an animation: surfaces, lines and triads over frames, and text."""
+"""Content of a picture or film: surfaces, lines and triads over frames, and text."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -14,14 +14,14 @@ __all__ = ["Lines", "Scene", "Surface", "Triad", "frame_of"]
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A surface of triangles, static or with one set of positions per frame."""
+    """Surface of triangles, at rest or with node positions for each frame."""
 
-    triangles: IntArray  #: (n_triangles, 3) indices of nodes
+    triangles: IntArray  #: node indices of each triangle, (n_triangles, 3)
     nodes: Array  #: positions, (n_nodes, 3) or (n_frames, n_nodes, 3) [m]
     #: value that colours each node, (n_nodes,) or (n_frames, n_nodes); None: a single colour
     scalars: Array | None = None
     color: str = "#b8c4d0"  #: colour if there are no scalars
-    opacity: float = 1.0  #: 0 < opacity <= 1
+    opacity: float = 1.0  #: opacity, 0 < opacity <= 1
     has_edges: bool = True  #: whether sharp edges are drawn
     name: str = ""
 
@@ -55,14 +55,14 @@ class Surface:
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """Straight segments between points: a grid, a link, the trail of a point."""
+    """Straight segments between points: a grid, a link, the path of a point."""
 
-    segments: IntArray  #: (n_segments, 2) indices of points
-    points: Array  #: (n_points, 3) or (n_frames, n_points, 3) [m]
+    segments: IntArray  #: point indices of each segment, (n_segments, 2)
+    points: Array  #: point positions, (n_points, 3) or (n_frames, n_points, 3) [m]
     color: str = "#5b6770"
-    width: float = 1.5  #: [px]
+    width: float = 1.5  #: line width [px]
     opacity: float = 1.0
-    is_backdrop: bool = False  #: whether it is drawn behind everything else, such as a ground
+    is_backdrop: bool = False  #: whether the lines are drawn behind everything else, such as a ground
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "segments", frozen(self.segments, np.int64))
@@ -81,9 +81,9 @@ class Lines:
 
 @dataclass(frozen=True, eq=False)
 class Triad:
-    """Three short axes at a point, with a label, for an interface or a marker; drawn in front of everything else."""
+    """Three short axes at a point with a label, for an interface or a marker, drawn in front of everything else."""
 
-    position: Array  #: (3,) or (n_frames, 3) [m]
+    position: Array  #: position of the origin, (3,) or (n_frames, 3) [m]
     axes: Array  #: axes as columns, (3, 3) or (n_frames, 3, 3)
     size: float  #: length of the axes [m]
     label: str = ""
@@ -107,17 +107,17 @@ class Triad:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Everything to draw. Parts with a single frame are static while the others move."""
+    """All content of a picture. Parts with a single frame do not move."""
 
     surfaces: tuple[Surface, ...] = ()
     lines: tuple[Lines, ...] = ()
     triads: tuple[Triad, ...] = ()
     title: str = ""
     captions: tuple[str, ...] = ()  #: lines under the title
-    frame_notes: tuple[str, ...] = ()  #: note for each frame, such as the time; or empty
+    frame_notes: tuple[str, ...] = ()  #: text for each frame, such as the time; empty: none
     scalar_title: str = ""  #: quantity that the colours represent
-    scalar_unit: str = ""  #: unit of that quantity; "": none
-    scalar_range: tuple[float, float] | None = None  #: ends of the colour bar; None: extremes over all frames
+    scalar_unit: str = ""  #: unit of that quantity; "": no unit
+    scalar_range: tuple[float, float] | None = None  #: limits of the colour bar; None: extremes over all frames
     #: direction from the eye into the scene, (3,)
     direction: Array = field(default_factory=lambda: np.array([-1.0, 2.0, -1.0]))
     #: direction that points up in the picture, (3,)
@@ -150,18 +150,18 @@ class Scene:
 
     @property
     def frame_counts(self) -> tuple[int, ...]:
-        """Number of frames of every part."""
+        """Number of frames of each part."""
         parts: tuple[Surface | Lines | Triad, ...] = (*self.surfaces, *self.lines, *self.triads)
         return tuple(part.n_frames for part in parts)
 
     @property
     def has_scalars(self) -> bool:
-        """Whether a surface is coloured by numbers."""
+        """Whether colours of a surface represent numbers."""
         return any(surface.scalars is not None for surface in self.surfaces)
 
     @property
     def color_limits(self) -> tuple[float, float]:
-        """Ends of the colour bar: as given, or the smallest and largest scalar of all frames."""
+        """Limits of the colour bar: as given, or the extremes of the scalars over all frames."""
         if self.scalar_range is not None:
             return self.scalar_range
         values = [surface.scalars for surface in self.surfaces if surface.scalars is not None and surface.scalars.size]
@@ -170,14 +170,14 @@ class Scene:
 
 
 def frame_of(values: Array, frame: int, still_ndim: int) -> Array:
-    """Return the values of one frame; values with only `still_ndim` axes, or one frame, are the same in all frames."""
+    """Return the values in one frame; values with `still_ndim` axes or a single frame are the same in all frames."""
     if values.ndim == still_ndim:
         return values
     return np.asarray(values[0 if len(values) == 1 else frame])
 
 
 def positions(where: str, values: Any) -> Array:
-    """Return finite positions, (n, 3) or (n_frames, n, 3), read-only."""
+    """Return positions as a read-only array, (n, 3) or (n_frames, n, 3), after checking that they are finite."""
     array = finite(where, values)
     if array.ndim not in (2, 3) or array.shape[-1] != 3 or 0 in array.shape:
         raise SceneError(f"{where}: expected positions (n, 3) or (n_frames, n, 3), got {array.shape}")
@@ -185,7 +185,7 @@ def positions(where: str, values: Any) -> Array:
 
 
 def finite(where: str, values: Sequence[float] | Array) -> Array:
-    """Return a read-only array after a check that it contains no NaN and no infinity."""
+    """Return a read-only array after checking that it contains no NaN and no infinity."""
     array = frozen(values)
     if not np.isfinite(array).all():
         raise SceneError(f"{where}: expected finite numbers, got NaN or infinity")

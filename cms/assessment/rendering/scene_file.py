@@ -1,4 +1,4 @@
-"""A scene as a file for the drawing process: arrays in an .npz, everything else as JSON in it; no pickles."""
+"""File of a scene for the drawing process: an .npz with arrays, and everything else as JSON in it; no pickles."""
 
 import json
 from dataclasses import fields
@@ -38,7 +38,7 @@ def write_scene(scene: Scene, path: Path) -> None:
 
 
 def read_scene(path: Path) -> Scene:
-    """Return the scene from a file of `write_scene`."""
+    """Read a scene from a file that `write_scene` wrote."""
     with np.load(path, allow_pickle=False) as archive:
         values: dict[str, Any] = json.loads(archive["__plain__"].tobytes())
         values |= {name: archive[name] for name in archive.files if name != "__plain__"}

@@ -23,7 +23,7 @@ def triangle_normals(nodes: Array, triangles: IntArray) -> Array:
 
 
 def surface_edges(nodes: Array, triangles: IntArray) -> tuple[IntArray, IntArray, NDArray[np.bool_]]:
-    """Return all edges of a surface, and which are sharp, free, or shared by more than two triangles.
+    """Return all edges of a surface, and the edges that are sharp, free, or shared by more than two triangles.
 
     Returns
     -------
@@ -46,7 +46,7 @@ def surface_edges(nodes: Array, triangles: IntArray) -> tuple[IntArray, IntArray
 
 
 def smooth_neighbours(nodes: Array, triangles: IntArray) -> sp.csr_array:
-    """Return the matrix that sums, for each triangle, the area normals of neighbours at less than the feature angle.
+    """Return the matrix that sums, for each triangle, area normals of neighbours at less than the feature angle.
 
     It is (n_triangles, n_triangles), with entries 0 and 1, and includes the triangle itself.
     """
@@ -62,7 +62,7 @@ def smooth_neighbours(nodes: Array, triangles: IntArray) -> sp.csr_array:
 
 @lru_cache(maxsize=1)
 def colormap() -> Array:
-    """Return the colour map, (256, 3) in 0..1: cool to warm, with equal perceived differences (CIE76)."""
+    """Return the colour map, (256, 3) from 0 to 1: cool to warm, with equal perceived differences (CIE76)."""
     from matplotlib.colors import LinearSegmentedColormap
 
     fine = LinearSegmentedColormap.from_list("", COLOR_STOPS)(np.linspace(0, 1, 2048))[:, :3]
@@ -73,7 +73,7 @@ def colormap() -> Array:
 
 
 def cie_lab(rgb: Array) -> Array:
-    """Return L*, a*, b* (D65) of sRGB colours, (n, 3)."""
+    """Return L*, a*, b* (D65) for sRGB colours, (n, 3)."""
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     xyz = linear @ np.array([[0.4124, 0.2126, 0.0193], [0.3576, 0.7152, 0.1192], [0.1805, 0.0722, 0.9505]])
     ratio = xyz / np.array([0.9505, 1.0, 1.089])

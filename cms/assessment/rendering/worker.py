@@ -15,7 +15,7 @@ __all__ = ["main"]
 
 
 def main(scene_path: str, out: str, fps: str = "") -> None:
-    """Draw the scene of one file into another: a film if fps is given, otherwise a picture."""
+    """Draw the scene in a file into another file: a film if fps is given, otherwise a picture."""
     leave_no_core_file()
     scene = read_scene(Path(scene_path))
     if fps:

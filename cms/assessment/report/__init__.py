@@ -1,4 +1,4 @@
-"""Reports: they present records, and compute nothing."""
+"""Reports: presentation of records without computation."""
 
 import lazy_loader
 

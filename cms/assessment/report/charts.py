@@ -21,13 +21,13 @@ __all__ = [
     "response_error_chart",
 ]
 
-FLOOR = 1e-10  #: smallest error drawn over time or frequency; smaller values are rounding
-DECADES = 4  #: decades below its limit that the chart of a record shows; smaller values are drawn at its lower end
+FLOOR = 1e-10  #: smallest error in charts over time or frequency; smaller values are rounding
+DECADES = 4  #: decades below the limit in the chart of a record; smaller values are drawn at the lower end
 DIRECTIONS = ("x", "y", "z", "about x", "about y", "about z")
 
 
 def convergence_chart(comparison: Comparison, name: str) -> Chart:
-    """Return the value of one record against the number of modes (or coordinates), one line per set, with its limit."""
+    """Return the chart of one record against the number of modes or coordinates: one line per set, and the limit."""
     tolerance = LIMITS[name].tolerance
     floor = 10.0 ** math.floor(math.log10(tolerance or 1.0) - DECADES)
     lines = []
@@ -51,7 +51,7 @@ def convergence_chart(comparison: Comparison, name: str) -> Chart:
 
 
 def response_chart(comparison: Comparison) -> Chart:
-    """Return the magnitude of the drawn response entry: full model, and every set at its shown point."""
+    """Return the chart of one response entry: full model, and every set at its shown point."""
     full, units = comparison.full, comparison.units
     lines = [Line(full.response_hz, full.response, "full model", FULL_MODEL, width=4, opacity=0.35)]
     lines += curves(comparison, full.response_hz, lambda p: p.record("frequency-response").data["drawn"])
@@ -60,7 +60,7 @@ def response_chart(comparison: Comparison) -> Chart:
 
 
 def response_error_chart(comparison: Comparison) -> Chart:
-    """Return the relative error of the complete response matrix of the interfaces at every frequency."""
+    """Return the chart of the relative error of the complete interface response over frequency."""
     lines = curves(
         comparison, comparison.full.response_hz,
         lambda p: np.maximum(p.record("frequency-response").data["error"], FLOOR),
@@ -70,7 +70,7 @@ def response_error_chart(comparison: Comparison) -> Chart:
 
 
 def deformation_chart(comparison: Comparison, norm: str = "K") -> Chart:
-    """Return the deformation error over time of every set at its shown point, and the exciting force."""
+    """Return the chart of the deformation error over time for every set at its shown point, with the force."""
     full = comparison.full
     t = full.t * 1e3
     lines = curves(comparison, t, lambda p: np.maximum(p.record("deformation-error").data["error"][norm], FLOOR))
@@ -82,7 +82,7 @@ def deformation_chart(comparison: Comparison, norm: str = "K") -> Chart:
 
 
 def effective_mass_chart(comparison: Comparison) -> Chart:
-    """Return the share of effective mass in every set with its interfaces held, by direction."""
+    """Return the chart of the share of effective mass in every set with fixed interfaces, by direction."""
     bars = []
     for k, result, point in detailed_sets(comparison):
         remainder = np.asarray(point.record("effective-mass").data["remainder"], dtype=float)
@@ -92,7 +92,7 @@ def effective_mass_chart(comparison: Comparison) -> Chart:
 
 
 def mac_chart(result: SetResult, point: Point, frequencies_hz: Array) -> Chart:
-    """Return the MAC of the free modes of the full model (down) and those of a set (across)."""
+    """Return the MAC matrix between free modes of the full model (rows) and those of a set (columns)."""
     mac = np.asarray(point.record("mac").data["mac"])
     n, k = mac.shape
     notes = tuple(f"{f:.5g} Hz" for f in frequencies_hz[:n])
@@ -104,12 +104,12 @@ def mac_chart(result: SetResult, point: Point, frequencies_hz: Array) -> Chart:
 
 
 def detailed_sets(comparison: Comparison) -> list[tuple[int, SetResult, Point]]:
-    """Return the sets with a shown point, with their index (which gives the style)."""
+    """Return the sets with a shown point, with their index, which determines the line style."""
     return [(k, result, result.detail) for k, result in enumerate(comparison.sets) if result.detail is not None]
 
 
 def curves(comparison: Comparison, x: Array, values: Callable[[Point], Array]) -> list[Line]:
-    """Return a line for every set with a shown point."""
+    """Return one line for each set with a shown point."""
     return [
         Line(x, values(point), legend(result, point), style_of(k).color, style_of(k).dash)
         for k, result, point in detailed_sets(comparison)
@@ -117,12 +117,12 @@ def curves(comparison: Comparison, x: Array, values: Callable[[Point], Array]) -
 
 
 def legend(result: SetResult, point: Point) -> str:
-    """Return the name of a set and its number of modes."""
+    """Return the legend of a set: its name and number of modes."""
     return f"{result.name}, {point.n_modes}"
 
 
 def log_axis(label: str, arrays: Sequence[Array], more: Sequence[float] = ()) -> Axis:
-    """Return a logarithmic axis of errors over whole decades that contain the values."""
+    """Return a logarithmic error axis over whole decades that contain the values."""
     values = np.concatenate([*arrays, np.asarray(more, dtype=float)])
     positive = values[np.isfinite(values) & (values > 0)]
     low = math.floor(math.log10(positive.min(initial=math.inf) if len(positive) else 1e-3) + 1e-9)
@@ -131,5 +131,5 @@ def log_axis(label: str, arrays: Sequence[Array], more: Sequence[float] = ()) ->
 
 
 def limits_of(tolerance: float | None) -> tuple[LimitLine, ...]:
-    """Return the line of a limit with its words."""
+    """Return the line for a limit, with its text."""
     return (LimitLine(tolerance, f"limit {share(tolerance)}"),) if tolerance else ()

@@ -90,7 +90,7 @@ def comparison_document(comparison: Comparison, *, stills: int = 4) -> Document:
 
 
 def head(comparison: Comparison) -> tuple[str, Answer]:
-    """Return the facts, and the answer."""
+    """Return the head of the document: the facts and the answer."""
     full, units = comparison.full, comparison.units
     ends = ", ".join(f"{name} ({kind})" for name, kind, _ in comparison.interfaces)
     facts = (
@@ -113,13 +113,13 @@ def head(comparison: Comparison) -> tuple[str, Answer]:
 
 
 def judged(comparison: Comparison) -> list[str]:
-    """Return the deciding quantities that were judged for at least one set; a body may have no load cases."""
+    """Return the deciding quantities that were assessed for at least one set; a body may have no load cases."""
     points = [result.detail for result in comparison.sets if result.detail is not None]
     return [name for name in DECIDING if any(point.record(name).verdict != "info" for point in points)]
 
 
 def verdict_section(comparison: Comparison) -> Section:
-    """Return the verdict of every set, with the numbers that it depends on."""
+    """Return the section with the verdict of every set and the numbers that determine it."""
     names = judged(comparison)
     headings = ["set", "verdict", "modes>", "coordinates>", *(f"{COLUMNS[name]}>" for name in names)]
     limits = [Cell("limit", "name"), Cell(""), Cell(""), Cell("")]
@@ -187,7 +187,7 @@ def shape_section(comparison: Comparison, stills: int) -> Section:
 
 
 def columns_section(comparison: Comparison) -> Section:
-    """Return the section about the columns of the sets."""
+    """Return the section about the columns of the mode sets."""
     rows: list[Sequence[Cell]] = []
     for k, result in enumerate(comparison.sets):
         point = result.detail
@@ -317,7 +317,7 @@ def frequency_section(comparison: Comparison) -> Section:
 
 
 def error_kind(error: float) -> str:
-    """Return the verdict of one frequency, according to the limit of the record."""
+    """Return the verdict for one frequency error by the limit of the record."""
     limit = LIMITS["frequency-error"]
     if math.isnan(error) or (limit.failing is not None and abs(error) > limit.failing):
         return "fail"

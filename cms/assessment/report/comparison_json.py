@@ -1,4 +1,4 @@
-"""A comparison in plain types, with every number that the other reports show, and as a table."""
+"""Comparison as plain types, with every number that the other reports show, and as a table."""
 
 import json
 import math
@@ -24,7 +24,7 @@ def comparison_json(comparison: Comparison) -> str:
 def comparison_record(comparison: Comparison) -> dict[str, Any]:
     """Return a comparison in plain types; frequencies are in Hz, times in s, the rest in units of the body.
 
-    The drawing is left out, because it only serves to be looked at.
+    The drawing is omitted, because it contains no results.
     """
     return {
         "format": FORMAT,
@@ -58,7 +58,7 @@ def set_record(result: SetResult) -> dict[str, Any]:
 
 
 def point_record(point: Point) -> dict[str, Any]:
-    """Return one number of modes in plain types."""
+    """Return the result for one number of modes in plain types."""
     return {
         "n_modes": point.n_modes,
         "n_columns": point.n_columns,

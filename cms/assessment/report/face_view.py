@@ -19,13 +19,13 @@ __all__ = ["draw_faces", "visible_points"]
 
 COLOURS = ("#a9c4de", "#e8c39e", "#b5d6a7", "#d9b3d1", "#e5dc9a", "#a8d5d1", "#e0aaa5", "#c2bbe0", "#cdbfa8", "#b6c9c0")
 CHOSEN, OTHERS = "#e07b39", "#d5dbe0"
-EDGEWISE = 0.05  #: cosine between normal and line of sight below which a triangle is invisible
-TRIED = 60  #: triangles of a face that are tried as a place for its number
-SIZE = (1000, 800)  #: size of each of the two views [px]
+EDGEWISE = 0.05  #: cosine between normal and line of sight below which a triangle counts as invisible
+TRIED = 60  #: number of triangles of a face that are tried as a place for its number
+SIZE = (1000, 800)  #: width and height of each of the two views [px]
 
 
 def draw_faces(surface: CadSurface, path: str | Path, *, chosen: Iterable[int] = ()) -> Drawing:
-    """Draw all faces with their numbers into a PNG, two views side by side.
+    """Draw all faces with their numbers into a PNG file, in two views side by side.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def _colour(number: int, chosen: set[int]) -> str:
 
 
 def visible_points(nodes: Array, triangles: dict[int, IntArray], eye: Array) -> dict[int, Array]:
-    """Return for each visible face the centre of one of its unobstructed triangles, near the centre of the face.
+    """Return for each visible face the centre of one of its visible triangles, near the centre of the face.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def _unit_normals(X: Array) -> Array:
 
 
 def _is_hidden(point: Array, eye: Array, corners: Array) -> bool:
-    """Whether a triangle, corners (n, 3, 3), lies between point and eye: p + t (e - p) = a + u (b - a) + v (c - a)."""
+    """Return whether a triangle, corners (n, 3, 3), hides a point: p + t (e - p) = a + u (b - a) + v (c - a)."""
     towards = eye - point
     edge_1, edge_2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     across = np.cross(towards, edge_2)

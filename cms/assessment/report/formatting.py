@@ -10,12 +10,12 @@ MINUS = "\u2212"
 
 
 def hertz(value: float) -> str:
-    """Return a frequency with five digits."""
+    """Return a frequency with five digits [Hz]."""
     return f"{value:.5g}" if math.isfinite(value) else "\u2013"
 
 
 def signed_percent(value: float) -> str:
-    """Return an error with its sign; '–' if it is missing, '0' if it is rounding."""
+    """Return an error with its sign; '–' if it is missing, '0' if it is within rounding."""
     if not math.isfinite(value):
         return "\u2013"
     if abs(value) < 5e-7:
@@ -27,7 +27,7 @@ def signed_percent(value: float) -> str:
 
 
 def count(value: int) -> str:
-    """Return an integer in groups of three digits."""
+    """Return an integer with its digits in groups of three."""
     return f"{value:,}".replace(",", "\u202f")
 
 

@@ -1,4 +1,4 @@
-"""Colours, symbols and dashes of the sets, distinguishable with any colour vision and on a grey printer."""
+"""Colours, symbols and dashes of the sets, distinguishable with any colour vision and in grey print."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ __all__ = ["FULL_MODEL", "Style", "style_of"]
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#6B4E9B", "#7F6A3A")
 SYMBOLS = ("circle", "square", "diamond", "triangle-up", "cross", "x", "triangle-down", "star")
 DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
-FULL_MODEL = "#1b1f24"  #: colour of the full model, in every plot
+FULL_MODEL = "#1b1f24"  #: colour of the full model in every plot
 
 
 @dataclass(frozen=True)

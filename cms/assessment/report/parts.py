@@ -38,19 +38,19 @@ COLUMNS = {
 
 
 def limit_words(name: str) -> str:
-    """Return the text of the limit of a record."""
+    """Return the limit of a record as text."""
     tolerance = LIMITS[name].tolerance
     return "" if tolerance is None else f"\u2264 {share(tolerance)}"
 
 
 def verdict_cell(record: QualityRecord) -> Cell:
-    """Return the value of a record in the colour of its verdict."""
+    """Return a table cell with the value of a record in the colour of its verdict."""
     kind = record.verdict if record.verdict != "info" else "blank"
     return Cell(share(record.value) if record.verdict != "info" else "n/a", f"n {kind}")
 
 
 def swatch(k: int) -> tuple[str, str]:
-    """Return the line of a set as in the charts: colour and dash."""
+    """Return a short line in colour and dash of set k, as in the charts."""
     return style_of(k).color, style_of(k).dash
 
 
@@ -90,6 +90,6 @@ GLYPHS = {
 
 
 def nothing_to_show() -> Paragraph:
-    """Return the text shown if no set could be made."""
+    """Return the text for a comparison in which no set could be computed."""
     words = "No set could be made, so there is nothing to show here; the reasons stand with the verdicts."
     return Paragraph(words, "notice")

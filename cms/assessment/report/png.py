@@ -1,4 +1,4 @@
-"""A picture for a page, drawn into a temporary file, or left out with a warning."""
+"""Picture for a page, drawn into a temporary file, or omitted with a warning."""
 
 import logging
 import tempfile
@@ -13,7 +13,7 @@ log = logging.getLogger(__name__)
 
 
 def png_of(draw: Callable[[Path], object], what: str) -> bytes | None:
-    """Return the PNG that a function draws into a path; None, with a warning, if it cannot be drawn.
+    """Return the PNG bytes that a drawing function writes to a path; None, with a warning, if it fails.
 
     Parameters
     ----------

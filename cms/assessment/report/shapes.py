@@ -18,12 +18,12 @@ __all__ = ["shapes_json", "still_pictures"]
 
 log = logging.getLogger(__name__)
 
-SCALE = 0.09  #: largest displacement of a still picture, relative to the diagonal of the body
-SIZE = (900, 560)  #: size of a still picture [px]
+SCALE = 0.09  #: largest displacement of a still picture over the diagonal of the body
+SIZE = (900, 560)  #: width and height of a still picture [px]
 
 
 def shapes_json(drawing: Drawing) -> str:
-    """Return the data of the viewer: 32-bit positions, and shapes as 16-bit fractions of their largest, in base64."""
+    """Return the viewer data in base64: positions as 32-bit numbers, shapes as 16-bit fractions of their largest."""
     direction, up = view_axes(drawing.nodes)
     return json.dumps(
         {
@@ -61,7 +61,7 @@ def still_pictures(comparison: Comparison, modes: int) -> list[tuple[str, bytes]
 
 
 def mode_scene(drawing: Drawing, k: int, title: str) -> Scene:
-    """Return the scene of a free mode: deformed body coloured by displacement, with the undeformed body behind."""
+    """Return the scene of a free mode: deformed body coloured by displacement, in front of the undeformed body."""
     shape = drawing.shapes[k]
     diagonal = float(np.linalg.norm(np.ptp(drawing.nodes, axis=0)))
     moved = drawing.nodes + SCALE * diagonal * shape

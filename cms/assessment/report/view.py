@@ -1,4 +1,4 @@
-"""Pictures and films of a body's modes on its real surface."""
+"""Pictures and films of the modes of a body on its real surface."""
 
 from pathlib import Path
 
@@ -13,12 +13,12 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["animate_mode", "mode_scene", "view_mode"]
 
-DEFAULT_SCALE = 0.09  #: largest displacement drawn, relative to the diagonal of the body
-FRAMES, FPS = 36, 24.0  #: number of frames and frames per second of one period in a film, which lasts 1.5 s
+DEFAULT_SCALE = 0.09  #: largest displacement in the picture over the diagonal of the body
+FRAMES, FPS = 36, 24.0  #: frames per film of one period, and frames per second; the film lasts 1.5 s
 
 
 def view_mode(body: ReducedBody, mode: int, path: str | Path, *, scale: float | None = None) -> Drawing:
-    """Draw a mode into a PNG: deformed surface coloured by displacement, undeformed surface, interfaces.
+    """Draw a mode into a PNG file: deformed surface coloured by displacement, undeformed surface, interfaces.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def animate_mode(
 def mode_scene(
     body: ReducedBody, mode: int, amplitudes: Array, *, scale: float | None = None, size: tuple[int, int] = (1280, 800)
 ) -> Scene:
-    """Return the scene of a mode at amplitudes between -1 and 1, one per frame, (n_frames,)."""
+    """Return the scene of a mode with one frame for each amplitude between -1 and 1, (n_frames,)."""
     where = f"mode {mode} of body {body.name!r}"
     scale = DEFAULT_SCALE if scale is None else scale
     if not 1 <= mode <= body.n_q:
@@ -90,14 +90,14 @@ def mode_scene(
 
 
 def moved_triad(interface: ReducedInterface, mode: int, amplitudes: Array, length: float) -> Triad:
-    """Return the axes of an interface, moved and rotated with the mode, at each amplitude [units of q]."""
+    """Return the axes of an interface, moved and rotated by the mode, at each amplitude [units of q]."""
     motion = amplitudes[:, None] * interface.Psi[:, mode - 1]
     turned = Rotation.from_rotvec(motion[:, 3:]).as_matrix() @ interface.triad
     return Triad(interface.position + motion[:, :3], turned, length, interface.name)
 
 
 def view_axes(nodes: Array) -> tuple[Array, Array]:
-    """Return the direction of view and the up direction, (3,) each, such that the two longest box sides are visible."""
+    """Return view direction and up direction, (3,) each, such that the two longest box sides are visible."""
     shortest, middle, longest = np.argsort(np.ptp(nodes, axis=0), kind="stable")
     axes = np.eye(3)
     towards = axes[shortest] * (1.0 if (longest, middle) in ((0, 1), (1, 2), (2, 0)) else -1.0)
@@ -105,5 +105,5 @@ def view_axes(nodes: Array) -> tuple[Array, Array]:
 
 
 def frequency_words(frequency: float) -> str:
-    """Return a frequency [Hz] with its unit; a massless shape has none."""
+    """Return a frequency [Hz] with its unit; a massless shape has no frequency."""
     return f"{frequency:.5g} Hz" if np.isfinite(frequency) else "static"

@@ -1,4 +1,4 @@
-"""Buckling of a reduced body under its unit loads: where K + amplitude K_geo loses its stiffness (theory.md §7)."""
+"""Buckling of a reduced body: amplitudes of unit loads at which K + amplitude K_geo is singular (theory.md §7)."""
 
 from dataclasses import dataclass
 
@@ -13,16 +13,16 @@ from fe_models.foundation.units import Units
 __all__ = ["CriticalLoad", "check_buckling", "critical_loads"]
 
 AXES = ("x", "y", "z")
-NEGLIGIBLE = 1e-10  #: eigenvalue over the largest of its load, below which a direction does not buckle
+NEGLIGIBLE = 1e-10  #: eigenvalue over the largest one for the same load, below which its direction does not buckle
 
 
 @dataclass(frozen=True)
 class CriticalLoad:
-    """The amplitudes at which one load makes the stiffness of the body singular; infinite if none does."""
+    """Amplitudes at which one load makes the stiffness of the body singular; infinite if it never does."""
 
     load: str  #: name of the load, such as "force x at big_end", along the axes of B
-    along: float  #: smallest positive amplitude, in `unit`
-    against: float  #: size of the smallest negative amplitude, in `unit`; infinite for angular velocities
+    along: float  #: smallest positive critical amplitude, in `unit`
+    against: float  #: size of the smallest negative critical amplitude, in `unit`; infinite for angular velocities
     unit: str
 
 
@@ -79,7 +79,7 @@ def critical_factors(reduced: ReducedBody, K_geo: Array) -> tuple[float, float]:
 
 
 def check_buckling(reduced: ReducedBody) -> QualityRecord:
-    """Critical amplitudes of the unit loads; the value is the largest of unit load over critical load."""
+    """Return the record of critical amplitudes; its value is the largest ratio of a unit load to its critical load."""
     if not reduced.n_q:
         return information("buckling", "the body has no modes")
     if reduced.geometric is None:
@@ -93,14 +93,14 @@ def check_buckling(reduced: ReducedBody) -> QualityRecord:
 
 
 def unit_factor(load: CriticalLoad, units: Units) -> float:
-    """Return how many unit loads buckle the body."""
+    """Return the critical amplitude in multiples of the unit load."""
     if load.unit == "rad/s":
         return (load.along * units.time) ** 2
     return min(load.along, load.against)
 
 
 def sentences(loads: tuple[CriticalLoad, ...]) -> list[str]:
-    """Describe the smallest angular velocity, acceleration, force and moment, with the sign of the load."""
+    """Describe the smallest critical angular velocity, acceleration, force and moment, with the sign of the load."""
     words = []
     for kind in ("angular velocity", "acceleration", "angular acceleration", "force", "moment"):
         of_kind = [load for load in loads if load.load.split(" at ")[0][:-2] == kind]

@@ -1,4 +1,4 @@
-"""Descriptions of a reduced body: labels, damping, units, cells, dropped columns, step sizes, unverifiable data."""
+"""Checks of descriptions in a reduced body: labels, damping, units, cells, dropped columns, step sizes, scope."""
 
 import numpy as np
 import scipy.linalg as la
@@ -22,11 +22,11 @@ __all__ = [
     "step_size",
 ]
 
-STEPS_PER_PERIOD = 20  #: that follow a vibration well
+STEPS_PER_PERIOD = 20  #: number of time steps per period for an accurate vibration
 
 
 def check_labels(reduced: ReducedBody) -> QualityRecord:
-    """Labels, sources and energy shares agree with the recorded columns."""
+    """Check that labels, sources and energy shares agree with the recorded columns."""
     columns = reduced.columns
     if columns is None:
         return information("labels", "the file holds no columns of its mode set")
@@ -43,7 +43,7 @@ def check_labels(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_damping_told(reduced: ReducedBody) -> QualityRecord:
-    """D is at least the damping in the provenance; dampers of the model add to it, and nothing reduces it.
+    """Check that D is at least the damping in the provenance; dampers of the model may add to it.
 
     The least eigenvalue of D less that damping, over modes of one frequency, over the largest entry of either.
     """
@@ -87,7 +87,7 @@ def check_scope(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_mesh_order(reduced: ReducedBody) -> QualityRecord:
-    """Excess of the lowest frequencies due to first-order cells, from the provenance of the file."""
+    """Report the error of the lowest frequencies due to first-order cells, from the provenance of the file."""
     counts = {kind: reduced.provenance.get(f"cells {kind}", "") for kind in FIRST_ORDER}
     cells = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
     told = reduced.provenance.get(PROVENANCE, "")
@@ -104,17 +104,17 @@ def check_mesh_order(reduced: ReducedBody) -> QualityRecord:
 
 
 def step_size(frequency: float, steps: int = STEPS_PER_PERIOD) -> float:
-    """Step that takes so many steps per period of a frequency [s]."""
+    """Return the time step for this number of steps per period of a frequency [s]."""
     return 1.0 / (steps * frequency)
 
 
 def check_step_size(reduced: ReducedBody) -> QualityRecord:
-    """Highest kept frequency over the lowest, the step that follows it and the largest an explicit scheme bears."""
+    """Report the ratio of highest to lowest frequency, the step for accuracy and the largest stable explicit step."""
     frequencies = reduced.frequencies[np.isfinite(reduced.frequencies)] / reduced.units.time
     if not len(frequencies) or not frequencies.min() > 0:
         return information("step-size", "the body has no mode with a frequency")
     highest, lowest = float(frequencies.max()), float(frequencies.min())
-    explicit = 1 / (np.pi * highest)  # central differences: h omega <= 2
+    explicit = 1 / (np.pi * highest)  # stability limit of central differences: h omega <= 2
     reason = (
         f"highest frequency {highest:.4g} Hz, lowest {lowest:.4g} Hz; {STEPS_PER_PERIOD} steps per period ask for "
         f"{step_size(highest):.2g} s to follow the highest, {step_size(lowest):.2g} s for the lowest; an explicit "
@@ -132,7 +132,7 @@ def check_step_size(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_damping(reduced: ReducedBody) -> QualityRecord:
-    """Damping ratios of the modes, D_kk / 2 omega_k, and the share of modes without any."""
+    """Report the damping ratios of the modes, D_kk / 2 omega_k, and the share of undamped modes."""
     omega = 2 * np.pi * reduced.frequencies
     is_dynamic = np.isfinite(omega) & (omega > 0)
     if not is_dynamic.any():
@@ -148,7 +148,7 @@ def check_damping(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_dropped_columns(reduced: ReducedBody) -> QualityRecord:
-    """Redundant columns dropped in the last step of the reduction, by label, from the provenance of the file."""
+    """Report the redundant columns, by label, that the reduction dropped, from the provenance of the file."""
     told = reduced.provenance.get("mode set redundant")
     if told is None:
         return information("dropped-columns", "the file does not say which columns were dropped")
@@ -158,7 +158,7 @@ def check_dropped_columns(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_units(reduced: ReducedBody) -> QualityRecord:
-    """Count implausible values: size of the kept nodes, mass divided by their hull, 2 f L of the first frequency."""
+    """Count implausible values: size of the kept nodes, mass over the volume of their hull, 2 f L of the first mode."""
     texts = [text for _, text in unit_findings(reduced)]
     reason = "; ".join(texts) or f"size, density and first frequency are plausible in {reduced.units.name}"
     return judge("units", float(len(texts)), reason)

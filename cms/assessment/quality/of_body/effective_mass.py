@@ -1,4 +1,4 @@
-"""Effective modal mass of a body driven at one interface, and the part missing in its modes."""
+"""Effective modal mass of a body that is driven at one interface, and the share of mass missing in its modes."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -21,12 +21,12 @@ DIRECTIONS = ("ux", "uy", "uz", "rx", "ry", "rz")
 
 @dataclass(frozen=True, eq=False)
 class EffectiveMass:
-    """Modes of the reduced body with one interface held, and the mass each puts into motion of that interface."""
+    """Modes of the reduced body with one interface fixed, and their effective masses for motion of that interface."""
 
-    at: str  #: name of the held interface
-    frequencies: Array  #: with the interface held, ascending, (n,) [Hz]
+    at: str  #: name of the fixed interface
+    frequencies: Array  #: frequencies with the interface fixed, ascending, (n,) [Hz]
     mass: Array  #: effective mass and inertia about the interface by direction, (n, 6) [kg, kg m²], axes of B
-    total: Array  #: those of the rigid body, (6,) [kg, kg m²]
+    total: Array  #: mass and inertia of the rigid body about the interface, (6,)
 
     def __post_init__(self) -> None:
         for name in ("frequencies", "mass", "total"):
@@ -34,17 +34,17 @@ class EffectiveMass:
 
     @property
     def share(self) -> Array:
-        """Effective over total mass, (n, 6)."""
+        """Ratio of effective to total mass, (n, 6)."""
         return self.mass / np.where(self.total > 0, self.total, 1.0)
 
     @property
     def cumulative(self) -> Array:
-        """Sum of the shares of all modes up to each, (n, 6)."""
+        """Cumulative sum of the shares over the modes, (n, 6)."""
         return np.asarray(np.cumsum(self.share, axis=0))
 
     @property
     def remainder(self) -> Array:
-        """Share of the mass that no mode represents, by direction, (6,); 0 if nothing can move."""
+        """Share of the mass in none of the modes, by direction, (6,); 0 if the body has no mass there."""
         return np.where(self.total > 0, 1.0 - self.share.sum(axis=0), 0.0)
 
 
@@ -63,7 +63,7 @@ def mass_record(found: EffectiveMass) -> dict[str, Any]:
 
 
 def effective_mass_at(reduced: ReducedBody, at: str) -> EffectiveMass:
-    """Return `effective_mass` of an interface that can be held, of a body that has modes and inertia.
+    """Return the `effective_mass` at an interface that can be fixed, of a body with modes and inertia.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def effective_mass_at(reduced: ReducedBody, at: str) -> EffectiveMass:
 
 
 def effective_mass(reduced: ReducedBody, at: str) -> EffectiveMass:
-    """Effective modal mass for base motion of an interface, from a modal file alone, whatever its frame.
+    """Return effective modal masses for base motion of an interface, from a modal file in any frame.
 
     (1) x = T q with the interface held: rigid motion takes back Psi q, x_r = -G⁻¹ Psi q, G the port's rigid part. A
         held body is driven by the ground instead: x_r = 0, and the interface only says about which point
@@ -108,12 +108,12 @@ def effective_mass(reduced: ReducedBody, at: str) -> EffectiveMass:
 
 
 def total_scale(total: Array) -> Array:
-    """Scale of masses and of inertias, (6,)."""
+    """Return the scale of masses and of moments of inertia, (6,)."""
     return np.repeat([total[:3].max(), total[3:].max()], 3)
 
 
 def check_driven_mass(reduced: ReducedBody) -> QualityRecord:
-    """Largest share of translational mass in no mode, over the interfaces that can be held.
+    """Report the largest share of translational mass in none of the modes, over the interfaces that can be fixed.
 
     It holds the mass that rides on the interface in the full model too, and what higher modes would carry; the full
     model tells them apart ("effective-mass").
@@ -125,7 +125,7 @@ def check_driven_mass(reduced: ReducedBody) -> QualityRecord:
         return information("driven-mass", "the body has no interface that could be driven")
     try:
         found = [effective_mass(reduced, name) for name in held]
-    except np.linalg.LinAlgError as error:  # impossible moments: other records report them
+    except np.linalg.LinAlgError as error:  # other records report impossible moments
         return information("driven-mass", f"the moments of the file give no modes with an interface held: {error}")
     largest = max(found, key=lambda one: one.remainder[:3].max())
     remainder = largest.remainder
@@ -143,7 +143,7 @@ def check_driven_mass(reduced: ReducedBody) -> QualityRecord:
 
 
 def can_be_held(reduced: ReducedBody, at: str) -> bool:
-    """Whether holding this interface stops all rigid motion; nodes on one line do not."""
+    """Return whether fixing this interface prevents all rigid motion; collinear nodes do not."""
     interface = reduced.interface(at)
     points = reduced.nodes[interface.members]
     if interface.kind != "nodes" or interface.Psi[3:].any():

@@ -31,7 +31,7 @@ __all__ = [
 
 
 def check_symmetry(reduced: ReducedBody) -> QualityRecord:
-    """M, K, D, the second moment R and the moments S_ab,kl = S_ba,lk are symmetric: largest defect over |A|."""
+    """Check that M, K, D, R and the moments S_ab,kl = S_ba,lk are symmetric: largest asymmetry over |A|."""
     matrices = {
         "M": reduced.M,
         "K": reduced.K,
@@ -46,7 +46,7 @@ def check_symmetry(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_definiteness(reduced: ReducedBody) -> QualityRecord:
-    """M and D have no negative eigenvalue, K only positive ones: smallest eigenvalue divided by the largest, scaled."""
+    """Check that M and D have no negative eigenvalue, and K only positive ones: smallest over largest, scaled."""
     values = {name: negativity(getattr(reduced, name)) for name in ("M", "K", "D")}
     stiffness = np.diag(reduced.K)
     if reduced.n_q and (stiffness <= 0).any():
@@ -60,7 +60,7 @@ def check_definiteness(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_kinetic_energy(reduced: ReducedBody) -> QualityRecord:
-    """The mass matrix of rigid and elastic motion together has no negative eigenvalue (scaled to a unit diagonal)."""
+    """Check that the mass matrix of rigid and elastic motion has no negative eigenvalue (scaled to a unit diagonal)."""
     M = whole_pencil(reduced).M
     value = negativity(M)
     reason = (
@@ -72,15 +72,15 @@ def check_kinetic_energy(reduced: ReducedBody) -> QualityRecord:
 
 
 def asymmetry(A: Array) -> float:
-    """Largest |A - Aᵀ| over the largest |A|; 0 for a zero matrix."""
+    """Return the largest entry of |A - Aᵀ| over that of |A|; 0 for a zero matrix."""
     size = np.abs(A).max(initial=0.0)
     return float(np.abs(A - A.T).max(initial=0.0) / size) if size > 0 else 0.0
 
 
 def negativity(A: Array) -> float:
-    """Return the smallest eigenvalue of A, scaled to a unit diagonal, divided by the largest, if negative.
+    """Return the smallest eigenvalue over the largest, if negative, of A scaled to a unit diagonal; else 0.
 
-    Rounding is 0.
+    Values within rounding count as 0.
     """
     if not A.size or not A.any():
         return 0.0
@@ -90,14 +90,14 @@ def negativity(A: Array) -> float:
 
 
 def scaled(A: Array) -> Array:
-    """Return the symmetric part of A with rows and columns divided by the root of |diagonal| (1 where that is zero)."""
+    """Return the symmetric part of A with rows and columns divided by sqrt(|diagonal|), or by 1 where it is zero."""
     diagonal = np.abs(np.diag(A))
     size = np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
     return (A + A.T) / 2 / np.outer(size, size)
 
 
 def check_modal_mass(reduced: ReducedBody) -> QualityRecord:
-    """M* = Σ_a S_aa,kl of the moments equals the modal mass M; both are the same integral where moments are exact."""
+    """Check that M* = Σ_a S_aa,kl of the moments equals the modal mass M: both are the same integral."""
     if reduced.n_q == 0:
         return information("modal-mass", "the body has no modes")
     defect = np.abs(reduced.moments.M - reduced.M) / np.abs(reduced.M).max()
@@ -118,7 +118,7 @@ def check_inertia_terms(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_frame_condition(reduced: ReducedBody) -> QualityRecord:
-    """Tisserand: 1C = 2C = 0 about the centre of mass; nodal at an interface: that interface does not move.
+    """Check the frame condition: Tisserand: 1C = 2C = 0 about the centre of mass; nodal: the interface does not move.
 
     |1C_k| / sqrt(m) and |2C_k| / sqrt(tr J) are at most one for a mode of unit modal mass, so they are without unit.
     """
@@ -146,9 +146,9 @@ def check_frame_condition(reduced: ReducedBody) -> QualityRecord:
 
 
 def held_motion(reduced: ReducedBody) -> tuple[Array, str]:
-    """Motions due to q that a nodal frame holds at zero, if the file has them, (n, n_q) [m], and their names.
+    """Return the motions that a nodal frame keeps at zero, as far as the file has them, (n, n_q) [m], and their names.
 
-    The six of an interface with a reference point, rotations times the body length, or held translations of kept nodes.
+    These are six motions of a reference point (rotations times body length) or translations of fixed kept nodes.
     """
     frame = reduced.frame
     if frame.at and reduced.interface(frame.at).kind != "nodes":
@@ -164,9 +164,9 @@ def held_motion(reduced: ReducedBody) -> tuple[Array, str]:
 
 
 def check_free_frequencies(reduced: ReducedBody) -> QualityRecord:
-    """Free-free frequencies stored in the file against those of its own moments and stiffness.
+    """Compare the stored free-free frequencies with those computed from the moments and stiffness of the file.
 
-    They couple 1C, 2C, S, R and m with K and M, so a wrong sign in one of them shows.
+    They couple 1C, 2C, S, R and m with K and M, so that a wrong sign in one of them is found.
     """
     stored = np.asarray(reduced.free_frequencies)
     if not reduced.is_held and not has_inertia(reduced):
@@ -189,7 +189,7 @@ def check_free_frequencies(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_inertia_tensor(reduced: ReducedBody) -> QualityRecord:
-    """Positive mass, and a second moment about the centre of mass without a negative eigenvalue.
+    """Check for positive mass, and for a second moment about the centre of mass without negative eigenvalues.
 
     This is the triangle inequality of the principal moments: none exceeds the sum of the other two.
     """
@@ -208,7 +208,7 @@ def check_inertia_tensor(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_energy_shares(reduced: ReducedBody) -> QualityRecord:
-    """The shares of the sources in the energy of each mode sum to one."""
+    """Check that the energy shares of the sources of each mode sum to one."""
     if not reduced.energy_shares.size:
         return information("energy-shares", "the file holds no energy shares")
     defect = np.abs(reduced.energy_shares.sum(axis=1) - 1)
@@ -217,7 +217,7 @@ def check_energy_shares(reduced: ReducedBody) -> QualityRecord:
 
 
 def momenta(reduced: ReducedBody) -> tuple[Array, Array]:
-    """Linear and angular momentum of each mode, relative to the largest possible for its modal mass, (n_q,) each."""
+    """Return linear and angular momentum of each mode over the largest possible for its modal mass, (n_q,) each."""
     moments = reduced.moments
     mass = np.sqrt(np.where(np.diag(reduced.M) > 0, np.diag(reduced.M), 1.0))
     center = moments.center_of_mass
@@ -228,7 +228,7 @@ def momenta(reduced: ReducedBody) -> tuple[Array, Array]:
 
 
 def mode_size(reduced: ReducedBody) -> Array:
-    """Largest displacement of each mode in the file, at least that of a rigid body with its mass, (n_q,).
+    """Return the largest stored displacement of each mode, but at least that of a rigid body of the same mass, (n_q,).
 
     A mode of unit modal mass moves by 1 / sqrt(m) in the mean, though it may leave all kept nodes at rest.
     """
@@ -238,7 +238,7 @@ def mode_size(reduced: ReducedBody) -> Array:
 
 
 def body_length(reduced: ReducedBody) -> float:
-    """Diagonal of the bounding box of kept nodes and interfaces, or the radius of gyration where that is zero [m]."""
+    """Return the box diagonal of kept nodes and interfaces, or the radius of gyration if the diagonal is zero [m]."""
     points = [reduced.nodes, *(interface.position[None] for interface in reduced.interfaces)]
     length = float(np.linalg.norm(np.ptp(np.concatenate(points), axis=0))) if sum(map(len, points)) else 0.0
     return length or float(np.sqrt(np.trace(reduced.moments.J0) / reduced.moments.m)) or 1.0

@@ -1,4 +1,4 @@
-"""What the interfaces of a reduced body can do: rigid members, and motions that no mode provides."""
+"""Checks of the interfaces of a reduced body: rigid motion of their members, and motions that no mode provides."""
 
 import numpy as np
 
@@ -11,11 +11,11 @@ from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
 
 __all__ = ["check_interface_motions", "check_interface_places", "check_rigid_interfaces", "missing_motions"]
 
-MISSING = 1e-7  #: singular value of the scaled interface motions over the largest, below which one is missing
+MISSING = 1e-7  #: singular value of the scaled interface motions over the largest, below which a motion is missing
 
 
 def check_rigid_interfaces(reduced: ReducedBody) -> QualityRecord:
-    """Members of a rigid interface follow its reference point: Phi_m = Psi_t + Psi_r × (c_m - c)."""
+    """Check that members of a rigid interface follow its reference point: Phi_m = Psi_t + Psi_r × (c_m - c)."""
     defects = {
         interface.name: rigid_defect(reduced, interface)
         for interface in reduced.interfaces
@@ -29,7 +29,7 @@ def check_rigid_interfaces(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_interface_places(reduced: ReducedBody) -> QualityRecord:
-    """The reference point of a rigid or distributing interface is a kept node, and moves as that node does.
+    """Check that the reference point of a rigid or distributing interface is a kept node and moves as this node.
 
     Largest distance over the body length, or of the translations over a mode's largest displacement. Other writers may
     leave reference nodes out; then nothing is judged.
@@ -54,9 +54,9 @@ def check_interface_places(reduced: ReducedBody) -> QualityRecord:
 
 
 def rigid_defect(reduced: ReducedBody, interface: ReducedInterface) -> float:
-    """Largest departure of the members from rigid motion, over the largest displacement of the mode.
+    """Return the largest deviation of the members from rigid motion, over the largest displacement of the mode.
 
-    Rotations of members that are on record, times the body length, are those of the reference point.
+    Stored rotations of members, times the body length, are compared with those of the reference point.
     """
     motion = rigid_motion_of_points(reduced.nodes[interface.members], interface.position) @ interface.Psi
     size = mode_size(reduced)
@@ -66,14 +66,14 @@ def rigid_defect(reduced: ReducedBody, interface: ReducedInterface) -> float:
         turn = reduced.kept.of_node(row)
         if turn is None:
             continue
-        # half the curl of a solid is that of its elements, which bend beside the rigid face
+        # half the curl of a solid is the rotation of its elements, which deform next to the rigid face
         if reduced.kept.source[int(np.flatnonzero(reduced.kept.nodes == row)[0])] == "dofs":
             largest = max(largest, float((np.abs(turn - interface.Psi[3:]) * body_length(reduced) / size).max()))
     return largest
 
 
 def check_interface_motions(reduced: ReducedBody) -> QualityRecord:
-    """Every interface can move in all six directions, independently of the others, by rigid motion and modes."""
+    """Check that rigid motion and modes can move every interface in six directions, independently of the others."""
     if not reduced.interfaces:
         return information("interface-motions", "the body has no interfaces")
     missing = missing_motions(reduced)
@@ -88,7 +88,7 @@ def check_interface_motions(reduced: ReducedBody) -> QualityRecord:
 
 
 def missing_motions(reduced: ReducedBody) -> Array:
-    """Combinations of interface motions that neither rigid motion nor a mode provides, (n_missing, 6 n_interfaces).
+    """Return combinations of interface motions missing in rigid motion and modes, (n_missing, 6 n_interfaces).
 
     Left null space of the motions of all reference points with x, rotations times the body length, modes times
     omega_1 / omega_k, so that a stiff static shape counts as much as its compliance.
@@ -114,11 +114,11 @@ def missing_motions(reduced: ReducedBody) -> Array:
 
 
 def provided_rows(interface: ReducedInterface) -> Array:
-    """Which of the six motions an interface has: one of nodes on one line has no rotation, (6,) bool."""
+    """Return which of the six motions an interface has, (6,) bool; an interface of collinear nodes has no rotation."""
     has_rotation = bool(interface.Psi[3:].any()) or interface.kind != "nodes"
     return np.array([True] * 3 + [has_rotation] * 3)
 
 
 def motion_labels(reduced: ReducedBody) -> tuple[str, ...]:
-    """Return one label per motion: 'big_end ux' to 'small_end rz'."""
+    """Return a label for each interface motion: 'big_end ux' to 'small_end rz'."""
     return tuple(f"{interface.name} {component}" for interface in reduced.interfaces for component in MOTION_COMPONENTS)

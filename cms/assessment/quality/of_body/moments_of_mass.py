@@ -1,4 +1,4 @@
-"""The moments of a file against each other and against its shapes at the kept nodes.
+"""Consistency of the moments in a file with each other and with the shapes at the kept nodes.
 
 The moments are integrals over the mass of products of a = [1, c, phi_x, phi_y, phi_z], so their Gram matrix has no
 negative eigenvalue. The file does not hold the distribution of the mass. But masses at the kept nodes with the right
@@ -15,16 +15,17 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["check_gram", "check_moments_of_shapes"]
 
-ROUNDING = 1e3 * np.finfo(float).eps  #: of the Gram matrix about the origin of B, relative
-ALIKE = 10.0  #: negativity of a body in another frame, or of some of its shapes, relative to that of the model
+ROUNDING = 1e3 * np.finfo(float).eps  #: relative rounding error of the Gram matrix about the origin of B
+ALIKE = 10.0  #: largest ratio of the negativity in another frame, or for some of the shapes, to that of the model
 LEAST_NODES = 60  #: smallest number of nodes that can represent the mass of a body
-EVEN = 0.3  #: weight of equal masses beside the second moment
-FAR_OFF = 4.0  #: ratio of moments by masses at the kept nodes and of the file above which these are not its mass
-CLEAR = 0.1  #: smallest moment whose direction is judged, relative to the largest that the mass could have
+EVEN = 0.3  #: weight of equal masses relative to the second moment in the fit
+#: ratio between moments of nodal masses and of the file, above which the kept nodes do not represent its mass
+FAR_OFF = 4.0
+CLEAR = 0.1  #: moment over the largest possible one, above which its direction is checked
 
 
 def check_gram(reduced: ReducedBody) -> QualityRecord:
-    """The Gram matrix of the moments, about the centre of mass, has no negative eigenvalue (unit diagonal)."""
+    """Check that the Gram matrix of the moments about the centre of mass has no negative eigenvalue (unit diagonal)."""
     moments = reduced.moments
     if moments.missing or not moments.is_exact:
         return information("gram", "the moments are not all known, or approximate")
@@ -48,7 +49,7 @@ def check_gram(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_moments_of_shapes(reduced: ReducedBody) -> QualityRecord:
-    """Moments are parallel to those of masses at the kept nodes, with the shapes there.
+    """Check that the moments are parallel to those of masses at the kept nodes, with the shapes there.
 
     (1) find masses near to equal masses with the sum, the centre and about the second moment of the file
     (2) compute P of each mode, and S_kl without its trace, of these masses
@@ -91,7 +92,7 @@ def check_moments_of_shapes(reduced: ReducedBody) -> QualityRecord:
 
 
 def masses_at_nodes(reduced: ReducedBody) -> Array | None:
-    """Return the masses near to equal masses with the sum and centre of the file, (n,); None if one is negative.
+    """Return nearly equal nodal masses with the mass and centre of the file, (n,); None if one is negative.
 
     Nodes of the surface lie farther out than the mass, so equal masses have a second moment that is up to twice too
     large. The masses w minimise |R(w) - R|² + `EVEN` n |w - 1/n|² with the correct sum and centre; total mass and
@@ -116,7 +117,7 @@ def masses_at_nodes(reduced: ReducedBody) -> Array | None:
 
 
 def cosines(a: Array, b: Array) -> Array:
-    """Return the cosine between columns of the same index, (k,); NaN if one of both is shorter than `CLEAR`."""
+    """Return the cosine between columns of equal index, (k,); NaN if one of the two is shorter than `CLEAR`."""
     one, other = np.linalg.norm(a, axis=0), np.linalg.norm(b, axis=0)
     is_clear = (one > CLEAR) & (other > CLEAR)
     product = np.einsum("nk,nk->k", a, b)

@@ -1,4 +1,4 @@
-"""Recovery rows of a reduced body in rigid motions, and compared with rows that follow from the rest of the file."""
+"""Checks of recovery rows in rigid motions, and of rows that follow from other data of the file."""
 
 import numpy as np
 
@@ -20,7 +20,7 @@ NO_TABLE = "the body has no recovery tables"
 
 
 def check_recovery_forces(reduced: ReducedBody) -> QualityRecord:
-    """Rows of stress, strain and element forces are zero in the six rigid motions.
+    """Check that rows of stress, strain and element force are zero in the six rigid motions.
 
     Over the largest entry of their kind for a mode of the same largest displacement; rotations by the size of the body.
     """
@@ -39,7 +39,7 @@ def check_recovery_forces(reduced: ReducedBody) -> QualityRecord:
                 own = rows[(table.dimensions[rows] == dimensions).all(axis=1)]
                 rigid = np.abs(table.dynamic[0][own, :N_RIGID] * lengths).max()
                 elastic = (np.abs(table.dynamic[0][own, N_RIGID:]) / np.where(shape > 0, shape, 1.0)).max(initial=0.0)
-                if quantity == "stress" and reduced.stress is not None:  # a place in a rigid part has no stress
+                if quantity == "stress" and reduced.stress is not None:  # points in a rigid part have no stress
                     whole = np.abs(reduced.stress).max(axis=(0, 1), initial=0.0)
                     elastic = max(elastic, (whole / np.where(shape > 0, shape, 1.0)).max(initial=0.0))
                 if quantity == "stress" and size > 0:
@@ -57,7 +57,7 @@ def check_recovery_forces(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_recovery_motions(reduced: ReducedBody) -> QualityRecord:
-    """Rows of motions are correct for a rigid body: unit translations along the mesh axes, rotations about a point.
+    """Check that motion rows are correct in rigid motion: unit translations along mesh axes, rotations about a point.
 
     The translations of a place are the axes of B and minus its skew matrix; of a kept node or an interface the place is
     its own.
@@ -76,7 +76,7 @@ def check_recovery_motions(reduced: ReducedBody) -> QualityRecord:
 
 
 def places_of(table: RecoveryTable) -> dict[str, dict[str, int]]:
-    """Return the rows of each place and quantity by component, if all three translations exist."""
+    """Return the rows of each place and quantity, by component, if all three translations exist."""
     found: dict[str, dict[str, int]] = {}
     for k, (label, quantity, component) in enumerate(
         zip(table.labels, table.quantities, table.components, strict=True)
@@ -87,7 +87,7 @@ def places_of(table: RecoveryTable) -> dict[str, dict[str, int]]:
 
 
 def motion_defect(reduced: ReducedBody, table: RecoveryTable, place: str, rows: dict[str, int]) -> float:
-    """Return the largest defect of the rows of one place, lengths over the size of the body."""
+    """Return the largest error of the rows at one place, with lengths divided by the body size."""
     A = reduced.frame.axes
     size = float(np.linalg.norm(np.ptp(reduced.nodes, axis=0))) if len(reduced.nodes) else 1.0
     order = MOTIONS.index(table.quantities[rows["ux"]])
@@ -105,7 +105,7 @@ def motion_defect(reduced: ReducedBody, table: RecoveryTable, place: str, rows: 
 
 
 def known_place(reduced: ReducedBody, place: str) -> Array | None:
-    """Return where a place is in B; None if the body does not keep it."""
+    """Return the position of a place in B; None if the body does not store it."""
     entity, _, rest = place.partition(" ")
     name = rest.rpartition(" ")[0]
     if entity == "interface":
@@ -115,7 +115,7 @@ def known_place(reduced: ReducedBody, place: str) -> Array | None:
 
 
 def check_recovery_shapes(reduced: ReducedBody) -> QualityRecord:
-    """Rows of kept nodes, stress points and interfaces follow from the modes, stress and matrices of the file.
+    """Check that rows of kept nodes, stress points and interfaces follow from modes, stress and matrices of the file.
 
     Differences are divided by the largest entry of the quantity, over modes of unit strain energy. Rows that only the
     model can give are left out.
@@ -133,7 +133,7 @@ def check_recovery_shapes(reduced: ReducedBody) -> QualityRecord:
             if not len(own):
                 continue
             a, b = ((x[..., N_RIGID:] * by_energy) for x in (table.dynamic[:, own], made))
-            if quantity == "stress":  # the part missing in the modes is known to the model only
+            if quantity == "stress":  # only the model provides the static stress outside the modes
                 a, b = a[:1], b[:1]
             elif quantity in MOTIONS:
                 order = MOTIONS.index(quantity)
@@ -141,7 +141,7 @@ def check_recovery_shapes(reduced: ReducedBody) -> QualityRecord:
             if quantity in MOTIONS:  # rotations are multiplied by the size of the body
                 lengths = np.where(table.dimensions[own, 1] == 0, body_length(reduced), 1.0)
                 a, b = a * lengths[:, None], b * lengths[:, None]
-            # places held by the frame do not move, so the size of other places is used
+            # places that the frame fixes do not move, so the size at other places is used
             at_least = 1e-3 * float((mode_size(reduced) * by_energy).max()) if quantity in MOTIONS else 0.0
             size = np.maximum(np.abs(b).max(axis=(-2, -1), keepdims=True, initial=0.0), at_least)
             size = np.maximum(size, 1e-9 * size.max(initial=0.0))
@@ -155,7 +155,7 @@ def check_recovery_shapes(reduced: ReducedBody) -> QualityRecord:
 
 
 def rows_by_label(reduced: ReducedBody, table: RecoveryTable, quantity: str) -> tuple[IntArray, Array]:
-    """Return the rows of a quantity that follow from the rest of the file, (n,), and their values, (3, n, 6 + n_q)."""
+    """Return rows of a quantity that follow from other data of the file, (n,), and their values, (3, n, 6 + n_q)."""
     loads, forces = loads_of_body(reduced)
     made: dict[str, Array] = {}
     rows = [k for k, each in enumerate(table.quantities) if each == quantity]
@@ -178,7 +178,7 @@ def rows_by_label(reduced: ReducedBody, table: RecoveryTable, quantity: str) -> 
 
 
 def place_of(table: RecoveryTable, row: int) -> str | int:
-    """Return the node, point or interface of a row, as a request names it."""
+    """Return the node, point or interface of a row, in the form used by requests."""
     words = table.labels[row].removeprefix(f"{table.entities[row]} ")
     place = words.removesuffix(f" {table.components[row]}").removesuffix(f" {table.quantities[row]}")
     node = place.partition(" skin ")[0]

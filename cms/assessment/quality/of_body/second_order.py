@@ -1,4 +1,4 @@
-"""The geometric stiffness of a file against its own moments, interfaces and quadratic modes.
+"""Consistency of the geometric stiffness of a file with its moments, interfaces and quadratic modes.
 
 A rotation theta of the whole body also rotates the stress of a load f, and the load that balances it. Between a
 rotation and a mode, the geometric stiffness is therefore (theta × f)·phi_k, which follows from f alone (docs/theory.md
@@ -20,12 +20,13 @@ from fe_models.meshes.mesh import SOLID_TYPES
 
 __all__ = ["check_second_order", "check_turned_loads", "turned_loads"]
 
-ROUNDING = 100 * np.finfo(float).eps  #: relative, of moments; times the square of distance over size of the body
-NEGLIGIBLE = 1e-3  #: smallest size that a difference is divided by, relative to the size that the field could have
+#: relative rounding error of moments, to be multiplied by (distance / size of the body)²
+ROUNDING = 100 * np.finfo(float).eps
+NEGLIGIBLE = 1e-3  #: smallest scale of a difference, relative to the largest possible size of the field
 
 
 def check_second_order(reduced: ReducedBody) -> QualityRecord:
-    """Force matrices of interfaces are minus the quadratic modes of their nodes, over modes of unit strain energy."""
+    """Check that force matrices of interfaces equal minus the quadratic modes of their nodes, at unit strain energy."""
     geometric = reduced.geometric
     if geometric is None or reduced.quadratic is None or not (np.diag(reduced.K) > 0).all():
         return information("second-order", "the file has no quadratic modes, or modes without stiffness")
@@ -38,7 +39,7 @@ def check_second_order(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_turned_loads(reduced: ReducedBody) -> QualityRecord:
-    """Turned loads follow from the moments: the difference over the sum of both, over modes of unit strain energy.
+    """Check that rotated loads follow from the moments: difference over their sum, for modes of unit strain energy.
 
     This is exact for solids. Beams and shells are not judged: their nodes also take couples, which count by half when
     they are turned, and their turned loads in bending are as small as that.
@@ -59,7 +60,7 @@ def check_turned_loads(reduced: ReducedBody) -> QualityRecord:
 
 
 def turned_defects(reduced: ReducedBody, geometric: GeometricStiffness) -> Iterator[tuple[str, float]]:
-    """Yield the differences of the rotated loads, each kind divided by the sum of both."""
+    """Yield the differences of the rotated loads, each kind divided by the sum of both terms."""
     turned = geometric.turned
     wanted = turned_loads(reduced, geometric)
     if turned is None or wanted is None:
@@ -68,12 +69,12 @@ def turned_defects(reduced: ReducedBody, geometric: GeometricStiffness) -> Itera
     shape = float((mode_size(reduced) * by_energy).max())
     m, L = reduced.moments.m, reach(reduced)
     force = {"translation": m, "rotation": m * L, "spin": m * L, "interfaces": 1.0}
-    far = float(np.linalg.norm(reduced.frame.origin)) / L  # moments about the mesh origin have lost digits
+    far = float(np.linalg.norm(reduced.frame.origin)) / L  # moments about the mesh origin have lost these digits
     rounding = ROUNDING * (1 + far**2)
     parts = np.split(wanted, [3, 6, 12])
     for name, made in zip(UNIT_LOADS, parts, strict=True):
         own = np.asarray(getattr(turned, name)).reshape(-1, 3, n)
-        if name == "interfaces":  # a mean of nodes has its own second-order part
+        if name == "interfaces":  # a mean motion of nodes has an additional second-order part
             is_point = [reduced.interfaces[k].kind != "nodes" for k in geometric.loaded]
             own, made = own[np.repeat(is_point, 6)], made[np.repeat(is_point, 6)]
         if not len(own):
@@ -86,7 +87,7 @@ def turned_defects(reduced: ReducedBody, geometric: GeometricStiffness) -> Itera
 
 
 def quadratic_defects(reduced: ReducedBody, geometric: GeometricStiffness) -> Iterator[tuple[str, float]]:
-    """Yield the largest difference of the force matrix of each interface from minus its quadratic modes."""
+    """Yield the largest difference between the force matrix of each interface and minus its quadratic modes."""
     if reduced.quadratic is None:
         return
     by_energy = 1 / np.sqrt(np.diag(reduced.K))
@@ -100,7 +101,7 @@ def quadratic_defects(reduced: ReducedBody, geometric: GeometricStiffness) -> It
             continue  # the file does not keep this node
         own = np.flatnonzero(distance <= 1e-9 * length)
         second = np.asarray(reduced.quadratic)[own] + geometric.of_interface(k)[:3]
-        apart = (np.abs(second) * weights).max(axis=(1, 2, 3)).min()  # the best of several nodes at this place
+        apart = (np.abs(second) * weights).max(axis=(1, 2, 3)).min()  # best match among several nodes at this position
         yield f"quadratic modes at {interface.name!r}", float(apart / (largest or 1.0))
 
 
@@ -146,12 +147,12 @@ def turned_loads(reduced: ReducedBody, geometric: GeometricStiffness) -> Array |
 
 
 def is_solid(reduced: ReducedBody) -> bool:
-    """Return whether the provenance says that all cells are solid ones."""
+    """Return whether the provenance says that all cells are solid."""
     kinds = [key.split()[1] for key in reduced.provenance if key.startswith("cells ")]
     others = [key for key in reduced.provenance if key.startswith(("section", "shell", "line", "matrices"))]
     return bool(kinds) and all(kind in SOLID_TYPES for kind in kinds) and not others
 
 
 def reach(reduced: ReducedBody) -> float:
-    """Return the larger of the size of the body and the largest distance of a node from the origin of B [m]."""
+    """Return the body size or the largest distance of a node from the origin of B, whichever is larger [m]."""
     return max(body_length(reduced), float(np.linalg.norm(reduced.nodes, axis=1).max(initial=0.0)))

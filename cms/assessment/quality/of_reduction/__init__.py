@@ -1,1 +1,1 @@
-"""How a mode set compares with its full model."""
+"""Comparison of a mode set with its full model."""

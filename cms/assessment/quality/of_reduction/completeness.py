@@ -1,4 +1,4 @@
-"""Static completeness: whether a mode set answers loads on the interfaces and rigid-body accelerations exactly."""
+"""Static completeness: whether responses to interface loads and rigid-body accelerations are exact in a mode set."""
 
 from dataclasses import dataclass, field
 
@@ -16,21 +16,22 @@ __all__ = [
     "StaticCompleteness", "completeness_records", "energy_error", "load_case_responses", "static_completeness",
 ]  # fmt: skip
 
-NO_LOAD = 1e-10  #: part of a load that is not in balance with rigid acceleration, below which it is rounding
-NO_ENERGY = 1e-24  #: strain energy of a response relative to the largest of its kind, below which it is zero
+NO_LOAD = 1e-10  #: unbalanced part of a load over the load, below which it is rounding
+NO_ENERGY = 1e-24  #: strain energy of a response over the largest of its kind, below which it is zero
 ACCELERATIONS = ("ax", "ay", "az", "alpha x", "alpha y", "alpha z")
 
 
 @dataclass(frozen=True, eq=False)
 class StaticCompleteness:
-    """Relative errors in energy norm, sqrt(eᵀ K e / uᵀ K u), of static responses in the span of a mode set."""
+    """Relative errors, sqrt(eᵀ K e / uᵀ K u), of static responses approximated in the span of a mode set."""
 
-    interface_loads: tuple[str, ...]  #: one per excess boundary dof E: 'load big_end ux'
-    interface: Array  #: body held at the determinate dofs R under that unit load, (n_e,); NaN: no deformation
+    interface_loads: tuple[str, ...]  #: name of each unit load, one for each excess boundary dof E: 'load big_end ux'
+    interface: Array  #: error under each unit load, with the body fixed at R, (n_e,); NaN: no deformation
     inertia_loads: tuple[str, ...]
-    inertia: Array  #: interfaces held, under that rigid-body acceleration, (n_r,); NaN: no deformation
-    load_cases: tuple[str, ...] = ()  #: those of the body
-    load_case: Array = field(default_factory=lambda: np.zeros(0))  #: free body under it, (n_load_cases,); NaN: as above
+    inertia: Array  #: error under each rigid-body acceleration, with the interfaces fixed, (n_r,); NaN: no deformation
+    load_cases: tuple[str, ...] = ()  #: names of the load cases of the body
+    #: error of the free body under each load case, (n_load_cases,); NaN: no deformation
+    load_case: Array = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "interface", frozen(self.interface))
@@ -39,7 +40,7 @@ class StaticCompleteness:
 
 
 def energy_error(body: FEBody, basis: FreeBasis, U: Array) -> Array:
-    """Relative energy error of the best approximation of columns U by rigid motion and modes, (k,); NaN: no energy.
+    """Return the relative energy error of columns U approximated by rigid motion and modes, (k,); NaN: no energy.
 
     c = Phiᵀ K u / omega², e = u - Phi c; the error is formed, not the difference of two energies. Rigid motion is taken
     off first: it has no energy, but its rounding has.
@@ -55,7 +56,7 @@ def energy_error(body: FEBody, basis: FreeBasis, U: Array) -> Array:
 
 
 def static_completeness(reference: FullReference, basis: FreeBasis) -> StaticCompleteness:
-    """Find the error of every unit interface load and every unit rigid-body acceleration.
+    """Return the error for each unit interface load and each unit rigid-body acceleration.
 
     Interface loads are in balance with the reactions at R (attachment modes Psi_A: with R any balanced combination of
     interface forces); accelerations act with all interfaces held (inertia-relief modes Psi_H).
@@ -74,7 +75,7 @@ def static_completeness(reference: FullReference, basis: FreeBasis) -> StaticCom
 
 
 def load_case_error(reference: FullReference, basis: FreeBasis) -> Array:
-    """Relative energy error of the free body under each load case, in balance with its acceleration, (n_load_cases,).
+    """Return the relative energy error of the accelerating free body under each load case, (n_load_cases,).
 
     A load that only accelerates the body, such as gravity, gives NaN.
     """
@@ -88,7 +89,7 @@ def load_case_error(reference: FullReference, basis: FreeBasis) -> Array:
 def load_case_responses(families: Families) -> Array:
     """Return the static response of the free body to each of its load cases, (n_dof, n_load_cases).
 
-    Zero of a load that only accelerates the body.
+    The response is zero if a load only accelerates the body.
     """
     body = families.body
     F = load_columns(body.load_cases, body.n_dof)
@@ -101,12 +102,12 @@ def load_case_responses(families: Families) -> Array:
 
 
 def acceleration_labels(n_r: int) -> tuple[str, ...]:
-    """Return names of the rigid-body accelerations; numbers where the body knows fewer than six."""
+    """Return the names of the rigid-body accelerations; numbers if the body has fewer than six."""
     return ACCELERATIONS if n_r == 6 else tuple(f"acceleration {k + 1}" for k in range(n_r))
 
 
 def completeness_records(statics: StaticCompleteness) -> tuple[QualityRecord, ...]:
-    """Records "static-interface", "static-inertia" and, where the body has load cases, "static-load-cases"."""
+    """Return the records "static-interface", "static-inertia" and, if there are load cases, "static-load-cases"."""
     records = []
     for name, labels, errors in (
         ("static-interface", statics.interface_loads, statics.interface),

@@ -1,4 +1,4 @@
-"""Condition of a mode set's columns before the finishing step."""
+"""Condition number of the columns of a mode set before the finishing step."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ __all__ = ["column_condition", "conditioning_record", "dropped_record"]
 
 
 def column_condition(body: FEBody, modes: ModeSet, omega2: float) -> tuple[float, tuple[str, ...]]:
-    """Condition number of the independent columns at unit length in the norm of W = K + omega² M, and the dropped ones.
+    """Return the condition number of the independent columns at unit length in the W-norm, and the dropped columns.
 
     With W-orthonormal Q the columns are V = Q (Qᵀ W V): it is that of the small matrix Qᵀ W V, which a Gram matrix
     of V would show only up to its root.
@@ -27,14 +27,14 @@ def column_condition(body: FEBody, modes: ModeSet, omega2: float) -> tuple[float
 
 
 def conditioning_record(condition: float, n_columns: int) -> QualityRecord:
-    """Record "conditioning"."""
+    """Return the record "conditioning"."""
     digits = max(0.0, np.log10(condition)) if condition > 0 else np.inf
     reason = f"condition number {condition:.2e}: about {digits:.0f} of 16 digits are lost among the kept columns"
     return judge("conditioning", condition, reason, {"n_columns": n_columns})
 
 
 def dropped_record(basis: FreeBasis, n_columns: int) -> QualityRecord:
-    """Record "dropped-columns" of a mode set, column by column."""
+    """Return the record "dropped-columns" of a mode set, which lists the dropped columns."""
     labels = basis.dropped
     reason = f"{len(labels)} of {n_columns} columns: {'; '.join(labels)}" if labels else "every column is independent"
     return judge("dropped-columns", float(len(labels)), reason, {"labels": labels})

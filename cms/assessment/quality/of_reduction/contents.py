@@ -1,4 +1,4 @@
-"""Compare every field of a modal file with its model, in the file's own modes.
+"""Comparison of every field of a modal file with its model, in the modes of the file.
 
 (1) find the modes of the file over all dofs of the model, Phi, from their values at the kept nodes (`full_shapes`)
 (2) compute each field from the model and Phi, by the functions that `reduce` uses
@@ -48,37 +48,38 @@ from fe_models.foundation.tall.columns import in_memory
 
 __all__ = ["CONTENTS", "ReductionOptions", "contents_records"]
 
-FEW = 24  #: largest number of modes that are compared one by one
-PROBES = 12  #: number of combinations if there are more modes
-FEW_NODES = 20  #: largest number of nodes whose quadratic modes are compared one by one
-NODE_PROBES = 8  #: number of combinations if there are more nodes
-NEGLIGIBLE = 1e-3  #: smallest size that a difference is divided by, relative to the size that the field could have
-STRESS = (1.0, -1.0, -2.0)  #: exponents of mass, length and time
-CONVERTED = "frame converted from"  #: provenance of a file that was converted to another frame
+FEW = 24  #: largest number of modes that are compared individually
+PROBES = 12  #: number of random combinations of modes, if there are more modes
+FEW_NODES = 20  #: largest number of nodes whose quadratic modes are compared individually
+NODE_PROBES = 8  #: number of random combinations of nodes, if there are more nodes
+NEGLIGIBLE = 1e-3  #: smallest scale of a difference, relative to the largest possible size of the field
+STRESS = (1.0, -1.0, -2.0)  #: dimensions of stress: exponents of mass, length and time
+CONVERTED = "frame converted from"  #: provenance entry of a file that was converted to another frame
 #: provenance that must agree with the model and its mode set; paths, versions and solvers may differ
 OF_ORIGIN = ("full dofs", "mode set", "mode set columns", "mode set n_modes", "mesh sha256", "deck sha256")
 
 
 @dataclass(frozen=True)
 class ReductionOptions:
-    """The options of `reduce` in the job of a file, which say what the file should hold."""
+    """Options of `reduce` in the job of a file, which determine the expected content of the file."""
 
     damping: Damping | StrainDamping | None = None
     frame: Frame | HeldFrame | None = None
     stress: bool = True
-    geometric: bool | tuple[str, ...] = False  #: whether there is geometric stiffness, or the loaded interfaces
+    #: whether geometric stiffness is expected, or the interfaces whose loads it includes
+    geometric: bool | tuple[str, ...] = False
     quadratic: bool = False
     recovery: tuple[RecoveryRequest, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A file, its model, and its modes over all dofs."""
+    """A modal file, its model, and its modes over all dofs."""
 
     body: FEBody
     modes: ModeSet
     reduced: ReducedBody
-    Phi: Array  #: the file's modes over all dofs, mesh axes, (n_dof, n_q)
+    Phi: Array  #: modes of the file over all dofs, mesh axes, (n_dof, n_q)
     families: Families
     basis: FreeBasis
     options: ReductionOptions | None
@@ -105,7 +106,7 @@ class Case:
 
     @cached_property
     def by_energy(self) -> Array:
-        """`combined` over modes of unit strain energy, (n_q, k)."""
+        """Coefficients `combined`, with modes scaled to unit strain energy, (n_q, k)."""
         stiffness = np.diag(self.reduced.K)
         return self.combined / np.sqrt(np.where(stiffness > 0, stiffness, 1.0))[:, None]
 
@@ -116,24 +117,24 @@ class Case:
 
     @cached_property
     def condition(self) -> FrameCondition:
-        """The frame that the file names, evaluated for the model."""
+        """Frame condition of the frame that the file names, evaluated for the model."""
         return frame_condition(self.body, named_frame(self.reduced.frame))
 
     @cached_property
     def keeping(self) -> FEBody:
-        """The model, which also keeps the nodes whose rotations the file holds."""
+        """Model with a request to keep the nodes whose rotations are in the file."""
         kept = self.reduced.kept
         own = np.zeros(0, np.int64) if kept is None else self.reduced.node_ids[kept.nodes]
         return replace(self.body, kept=np.union1d(self.body.kept, own).astype(np.int64))
 
     @cached_property
     def node_ids(self) -> IntArray:
-        """Nodes that the file must keep, and nodes that it keeps."""
+        """Node ids that the file must contain, and node ids that it contains."""
         return np.union1d(self.reduced.node_ids, kept_nodes(self.keeping)).astype(np.int64)
 
     @cached_property
     def finished(self) -> FinishedBasis:
-        """The modes over all dofs with the matrices and columns of the file."""
+        """Modes of the file over all dofs, with the matrices and columns of the file."""
         n = self.reduced.n_q
         return FinishedBasis(
             self.Phi, self.reduced.M, self.reduced.K,
@@ -143,7 +144,7 @@ class Case:
 
     @cached_property
     def expected(self) -> ReducedBody:
-        """The fields that follow from model and modes with little work; moments and columns are those of the file."""
+        """Expected fields that are cheap to compute from model and modes; moments and columns are those of the file."""
         none = np.zeros((self.body.n_dof, 0))
         condition = FrameCondition(self.reduced.frame, lambda columns: none, none, none, none, np.zeros(3))
         made = assembled(
@@ -162,7 +163,7 @@ def contents_records(
     basis: FreeBasis,
     options: ReductionOptions | None = None,
 ) -> tuple[QualityRecord, ...]:
-    """Return a record for each of `CONTENTS`, which compares the file with its model.
+    """Return the records that compare the file with its model, one for each of `CONTENTS`.
 
     Parameters
     ----------
@@ -188,7 +189,7 @@ def record_of(name: str, case: Case, compare: Callable[[Case], Iterator[Compared
         )
     if not found:
         return information(name, "the file holds none, and none was asked for")
-    worst = found[int(np.argmax([each.defect for each in found]))]  # not a number counts as the largest
+    worst = found[int(np.argmax([each.defect for each in found]))]  # NaN counts as the largest defect
     data: dict[str, float] = {}
     for each in found:
         data[each.field] = float(np.maximum(data.get(each.field, 0.0), each.defect))
@@ -200,7 +201,7 @@ def record_of(name: str, case: Case, compare: Callable[[Case], Iterator[Compared
 
 
 def missing(field: str, where: str = "") -> Compared:
-    """Return the result for a field that the file should hold but lacks."""
+    """Return the comparison result for a missing field that the file should contain."""
     return Compared(field, np.inf, where, "the file does not hold it")
 
 
@@ -208,7 +209,7 @@ def missing(field: str, where: str = "") -> Compared:
 
 
 def compare_points(case: Case) -> Iterator[Compared]:
-    """Nodes, their numbers and sets, and the surface."""
+    """Compare nodes, their numbers and sets, and the surface."""
     file, expected = case.reduced, case.expected
     yield same("node_ids", file.node_ids, case.node_ids)
     if len(file.node_ids) != len(case.node_ids):
@@ -236,7 +237,7 @@ def compare_points(case: Case) -> Iterator[Compared]:
 
 
 def compare_frame(case: Case) -> Iterator[Compared]:
-    """The modes in the condition of the frame that the file names."""
+    """Compare the frame: evaluate the condition of the frame that the file names for its modes."""
     frame, made = case.reduced.frame, case.condition.frame
     C = case.condition.rigid_part(case.Phi)
     scale = np.repeat([1.0, case.length], 3)[: len(C)]
@@ -253,7 +254,7 @@ def compare_frame(case: Case) -> Iterator[Compared]:
 
 
 def compare_interfaces(case: Case) -> Iterator[Compared]:
-    """Names, kinds, places, axes, members and motions of the interfaces."""
+    """Compare names, kinds, positions, axes, members and motions of the interfaces."""
     file, expected = case.reduced.interfaces, case.expected.interfaces
     yield same("interfaces.name", tuple(each.name for each in file), tuple(each.name for each in expected))
     size = mode_size(case.reduced)
@@ -267,7 +268,7 @@ def compare_interfaces(case: Case) -> Iterator[Compared]:
 
 
 def compare_rotations(case: Case) -> Iterator[Compared]:
-    """Rotations of the kept points, and where they come from."""
+    """Compare rotations of the kept points, and the origins of the rotations."""
     file, expected = case.reduced.kept, case.expected.kept
     if expected is None:
         return
@@ -281,7 +282,7 @@ def compare_rotations(case: Case) -> Iterator[Compared]:
 
 
 def compare_sums(case: Case) -> Iterator[Compared]:
-    """Weighted sums over the nodes."""
+    """Compare the weighted sums over the nodes."""
     file, expected = case.reduced.nodal_sums, case.expected.nodal_sums
     if file is None or expected is None:
         if expected is not None:
@@ -300,7 +301,7 @@ def compare_sums(case: Case) -> Iterator[Compared]:
 
 
 def compare_moments(case: Case) -> Iterator[Compared]:
-    """All moments of the modes, relative to the largest that a mode of unit mass could have; 1C to 5C follow from them.
+    """Compare the moments, over the largest possible ones of a mode of unit mass; 1C to 5C follow from them.
 
     1C and 2C are also computed from the full mass matrix, which gives them exactly for any body.
     """
@@ -325,7 +326,7 @@ def compare_moments(case: Case) -> Iterator[Compared]:
 
 
 def compare_damping(case: Case) -> Iterator[Compared]:
-    """The damping matrix, scaled by frequency: damping of the model plus that of the job or the provenance."""
+    """Compare the damping matrix, scaled by frequency, with damping of the model plus that of the job or provenance."""
     D, words = wanted_damping(case)
     if D is None:
         return
@@ -338,7 +339,7 @@ def compare_damping(case: Case) -> Iterator[Compared]:
 
 
 def wanted_damping(case: Case) -> tuple[Array | None, str]:
-    """Return the damping matrix that the file should have, and a description of its origin; None if it is unknown."""
+    """Return the expected damping matrix and its description; None if it is unknown."""
     reduced, options = case.reduced, case.options
     told = reduced.provenance.get("damping", "none")
     damping: Damping | StrainDamping | None = damping_of_words(told)
@@ -349,7 +350,7 @@ def wanted_damping(case: Case) -> tuple[Array | None, str]:
         asked = str(options.damping) if options.damping else "none"
         if asked == told:
             return carried_damping(case, options.damping, options.frame), f"the job: {asked}, carried to this frame"
-        # the conversion replaced all damping by that of the new modes
+        # the conversion replaced all damping by damping ratios of the new modes
         return None if damping is None or isinstance(damping, StrainDamping) else modal_damping(
             damping, reduced.M, reduced.K, second=reduced.units.time
         ), words
@@ -361,7 +362,7 @@ def wanted_damping(case: Case) -> tuple[Array | None, str]:
 
 
 def carried_damping(case: Case, damping: Damping | StrainDamping | None, frame: Frame | HeldFrame | None) -> Array:
-    """Return Tᵀ D T, D over the modes in the frame of the job; Phi_job T = Phi up to rigid motion."""
+    """Return Tᵀ D T, where D is the damping in the frame of the job, and Phi_job T = Phi up to rigid motion."""
     old = frame or named_frame(replace(case.reduced.frame, kind="tisserand", at=""))
     finished = finished_in(case.body, case.basis, old)
     Phi = in_memory(finished.Phi)
@@ -373,7 +374,7 @@ def carried_damping(case: Case, damping: Damping | StrainDamping | None, frame: 
 
 
 def compare_load_cases(case: Case) -> Iterator[Compared]:
-    """Resultants and modal forces over the sum of the nodal forces.
+    """Compare resultants and modal forces of load cases, relative to the sum of the nodal forces.
 
     A load on dofs that the frame holds works on no mode: its modal forces are rounding errors of the shapes there.
     """
@@ -391,7 +392,7 @@ def compare_load_cases(case: Case) -> Iterator[Compared]:
 
 
 def compare_sources(case: Case) -> Iterator[Compared]:
-    """Labels and shares by the columns of the file; the columns by the mode set, up to a scale for each column.
+    """Compare labels and energy shares, and the columns of the file with those of the mode set up to a scale.
 
     The forces of the modes on the columns V are F = VᵀK Phi. The coordinates A satisfy V A = Phi up to rigid motion, so
     that AᵀF = PhiᵀK Phi. Both are compared: where columns nearly repeat each other, the rounding of the first is much
@@ -421,7 +422,7 @@ def compare_sources(case: Case) -> Iterator[Compared]:
     yield apart("columns.F", scale[:, None] * F, G, size[:, None], axes=f"column {case.axes_words}")
     back = np.divide(A, scale[:, None], out=np.zeros_like(A), where=scale[:, None] != 0)
     E = V @ back - Phi
-    terms = rounding_of_energy(case.body, np.abs(V) @ np.abs(back))  # of the terms of V A
+    terms = rounding_of_energy(case.body, np.abs(V) @ np.abs(back))  # rounding of the terms of V A
     defect = np.maximum(np.einsum("nk,nk->k", E, case.body.K @ E) - SUSPECT_ENERGY * terms, 0.0)
     work = Phi.T @ K_Phi
     size = np.sqrt(np.maximum(np.diag(work), 0.0))
@@ -433,7 +434,7 @@ def compare_sources(case: Case) -> Iterator[Compared]:
 
 
 def compare_stress(case: Case) -> Iterator[Compared]:
-    """Stress of modes of unit strain energy, over the largest stress."""
+    """Compare stress of modes of unit strain energy, relative to the largest stress."""
     file, Z, frame, word = case.reduced, case.by_energy, case.reduced.frame, case.axes_words
     is_asked = case.options is not None and case.options.stress
     if file.stress is not None or is_asked:
@@ -464,7 +465,7 @@ def compare_stress(case: Case) -> Iterator[Compared]:
 
 
 def compare_recovery(case: Case) -> Iterator[Compared]:
-    """Recovery tables: names, and numbers relative to those of their quantity."""
+    """Compare recovery tables: their names, and their numbers relative to the size of the quantity."""
     if case.options is None:
         return
     file, requests = case.reduced, case.options.recovery
@@ -481,7 +482,7 @@ def compare_recovery(case: Case) -> Iterator[Compared]:
 
 
 def compare_table(case: Case, own: RecoveryTable, made: RecoveryTable) -> Iterator[Compared]:
-    """Rows of one table with the same quantity and dimension.
+    """Compare rows with the same quantity and dimension in one table.
 
     A file that was converted to another frame keeps the static part of its first frame, with the reaction there. Only
     its positions, velocities and accelerations are compared.
@@ -513,7 +514,7 @@ def compare_table(case: Case, own: RecoveryTable, made: RecoveryTable) -> Iterat
             rows = of_quantity[(own.dimensions[of_quantity] == dimensions).all(axis=1)]
             where, axes = f"{name}: {quantity}", f"row {case.axes_words}"
             a, b = own.dynamic[:, rows] @ X, made.dynamic[:, rows] * scaled
-            anywhere = typical.get((quantity, float(dimensions[1])), 0.0)  # places that are held do not move
+            anywhere = typical.get((quantity, float(dimensions[1])), 0.0)  # fixed places do not move
             first = max(np.abs(b[0]).max(initial=0.0), 0.0 if quantity in OF_MOTION else anywhere)
             for order in range(3):
                 if is_carried and order and quantity not in OF_MOTION:
@@ -551,7 +552,7 @@ def typical_sizes(case: Case) -> dict[tuple[str, float], float]:
 
 
 def force_of_load(case: Case, load: str) -> float:
-    """Return the size of a load of amplitude one as a force [N]."""
+    """Return the size of a load of unit amplitude as a force [N]."""
     m, L = case.reduced.moments.m, case.length
     for each in case.body.load_cases:
         if load == f"load case {each.name}":
@@ -565,7 +566,7 @@ def force_of_load(case: Case, load: str) -> float:
 
 
 def compare_geometric(case: Case) -> Iterator[Compared]:
-    """Geometric stiffness over modes of unit strain energy (an inverse buckling load), for each kind of load."""
+    """Compare geometric stiffness of each kind of load over modes of unit strain energy (inverse buckling load)."""
     file = case.reduced.geometric
     asked = False if case.options is None else case.options.geometric
     if file is None:
@@ -585,7 +586,7 @@ def compare_geometric(case: Case) -> Iterator[Compared]:
     made, own = stiffness_of_states(case.body, case.Phi @ Z, states), file.transformed(Z)
     m, L = case.reduced.moments.m, case.reach
     shape = np.abs(case.body.translations(case.Phi @ Z)).max(initial=0.0)
-    unit = np.abs(np.asarray(made.interfaces)[:, :3]).max(initial=0.0)  # of a unit force
+    unit = np.abs(np.asarray(made.interfaces)[:, :3]).max(initial=0.0)  # matrix of a unit force
     force = {"translation": m, "rotation": m * L, "spin": m * L, "interfaces": 1.0}
     by_axis = np.array([1.0, 1, 1, L, L, L])[:, None, None]
     for name in UNIT_LOADS:
@@ -607,7 +608,7 @@ def compare_geometric(case: Case) -> Iterator[Compared]:
 
 
 def compare_quadratic(case: Case) -> Iterator[Compared]:
-    """Second-order displacement over modes of unit strain energy, for each node or for combinations of nodes."""
+    """Compare second-order displacement over modes of unit strain energy, for each node or combination of nodes."""
     file = case.reduced.quadratic
     if file is None:
         if case.options is not None and case.options.quadratic and CONVERTED not in case.reduced.provenance:
@@ -625,7 +626,7 @@ def compare_quadratic(case: Case) -> Iterator[Compared]:
 
 
 def compare_origin(case: Case) -> Iterator[Compared]:
-    """Name, mode set and digests of the input of the file."""
+    """Compare name, mode set and input digests of the file."""
     yield same("name", case.reduced.name, case.body.name)
     own, made = case.reduced.provenance, case.expected.provenance
     yield Compared("provenance", 0.0)
@@ -634,7 +635,7 @@ def compare_origin(case: Case) -> Iterator[Compared]:
             yield same("provenance", own[key], made[key], key)
 
 
-#: the function that compares the fields of each record, in the order of the verdicts
+#: function that computes the comparison of each record, in the order of the verdicts
 CONTENTS: dict[str, Callable[[Case], Iterator[Compared]]] = {
     "points": compare_points,
     "frame": compare_frame,

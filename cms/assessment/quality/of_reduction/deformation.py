@@ -31,16 +31,16 @@ __all__ = [
 ]
 
 NORMS = ("M", "K", "nodal")
-NO_DEFORMATION = 1e-10  #: M-length of a motion without its rigid part over that with it, below which it is rounding
+NO_DEFORMATION = 1e-10  #: M-norm of the deformation over that of the whole motion, below which it is rounding
 
 
 @dataclass(frozen=True, eq=False)
 class DeformationError:
-    """Part of a reference deformation outside a mode set, over time, in several norms."""
+    """Part of a reference deformation outside the span of a mode set, over time, in several norms."""
 
-    t: Array  #: (n_t,) [time unit of the body]
-    error: Mapping[str, Array]  #: eps(t) by norm, (n_t,) each, 0 to 1
-    size: Mapping[str, Array]  #: |u_ref(t)| without rigid motion over its maximum by norm, (n_t,) each
+    t: Array  #: times, (n_t,) [time unit of the body]
+    error: Mapping[str, Array]  #: eps(t) in each norm, (n_t,), from 0 to 1
+    size: Mapping[str, Array]  #: deformation |u_ref(t)| in each norm over its maximum, (n_t,)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "t", frozen(self.t))
@@ -48,12 +48,12 @@ class DeformationError:
         object.__setattr__(self, "size", MappingProxyType({k: frozen(v) for k, v in self.size.items()}))
 
     def largest(self, norm: str) -> float:
-        """Return max_t eps(t) in that norm."""
+        """Return max_t eps(t) in this norm."""
         return float(self.error[norm].max())
 
 
 def deformation_error(body: FEBody, basis: FreeBasis, snapshots: Snapshots) -> DeformationError:
-    """Find eps(t) of a mode set in all norms of `NORMS`.
+    """Compute eps(t) of a mode set in all norms of `NORMS`.
 
     Snapshots may carry any rigid-body motion of first order. Their few columns are projected once, whatever the number
     of times.
@@ -89,7 +89,7 @@ def deformation_error(body: FEBody, basis: FreeBasis, snapshots: Snapshots) -> D
 
 
 def nodal_deformation_error(reduced: ReducedBody, u: Array, t: Array) -> DeformationError:
-    """Find eps(t) in the nodal norm for displacements of a file's kept nodes, from the file alone.
+    """Compute eps(t) in the nodal norm, from a modal file and displacements of its kept nodes.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def nodal_deformation_error(reduced: ReducedBody, u: Array, t: Array) -> Deforma
 
 
 def recovered_displacements(source: ReducedBody, q: Array, into: ReducedBody) -> Array:
-    """Displacements of the kept nodes in a motion of one reduced body, in the axes of another of the same part.
+    """Return displacements of the kept nodes in a motion of one reduced body, in axes of another one of the same part.
 
     Parameters
     ----------
@@ -149,31 +149,31 @@ def recovered_displacements(source: ReducedBody, q: Array, into: ReducedBody) ->
 
 
 def nodal_lengths(rows: Array, rigid: Array, shapes: Array, a: Array) -> tuple[Array, Array]:
-    """Return lengths of displacements outside rigid motion and shapes, and outside rigid motion alone, (n_t,) each."""
+    """Return norms of displacements outside rigid motion and shapes, and outside rigid motion only, (n_t,) each."""
     outside_rigid = outside(rows, rigid)
     outside_all = outside(outside_rigid, np.hstack([rigid, shapes]))
     return lengths(outside_all, outside_all, a), lengths(outside_rigid, outside_rigid, a)
 
 
 def outside(rows: Array, X: Array) -> Array:
-    """Return the part of columns orthogonal to the span of X, whose rank may be less than its columns."""
+    """Return the part of columns orthogonal to the span of X, which may be rank-deficient."""
     size = np.linalg.norm(X, axis=0)
     U, singular, _ = np.linalg.svd(X / np.where(size > 0, size, 1.0), full_matrices=False)
     Q = U[:, singular > 1e-10 * singular.max(initial=0.0)]
-    for _ in range(2):  # twice is enough
+    for _ in range(2):  # two passes suffice
         rows = rows - Q @ (Q.T @ rows)
     return rows
 
 
 def lengths(U: Array, W_U: Array, a: Array) -> Array:
-    """Length of U a(t) in the norm of W at all times, (n_t,)."""
+    """Return the W-norm of U a(t) for all times, (n_t,)."""
     G = U.T @ W_U
     squared = np.einsum("kt,kt->t", a, ((G + G.T) / 2) @ a)
     return np.asarray(np.sqrt(np.maximum(squared, 0.0)))
 
 
 def relative(t: Array, error: Mapping[str, Array], size: Mapping[str, Array]) -> DeformationError:
-    """Divide errors and sizes by the largest size of each norm."""
+    """Divide errors and sizes by the largest size in each norm."""
     largest = {norm: float(values.max()) for norm, values in size.items()}
     for norm, value in largest.items():
         if not value > 0:
@@ -186,7 +186,7 @@ def relative(t: Array, error: Mapping[str, Array], size: Mapping[str, Array]) ->
 
 
 def deformation_record(deformation: DeformationError) -> QualityRecord:
-    """Record "deformation-error": the largest eps(t) in the energy norm, or in the available norm."""
+    """Return the record "deformation-error": the largest eps(t) in the energy norm, or in the available norm."""
     norm = "K" if "K" in deformation.error else next(iter(deformation.error))
     k = int(np.argmax(deformation.error[norm]))
     parts = ", ".join(f"{name} {100 * deformation.largest(name):.3g} %" for name in deformation.error)

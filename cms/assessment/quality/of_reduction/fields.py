@@ -1,4 +1,4 @@
-"""The fields of a modal file, and the verdict that compares each with the model.
+"""Fields of a modal file, and the verdict that compares each field with the model.
 
 `FIELDS` names for every field of `ReducedBody`, and of the records in it, the record that judges it. A new field
 without a record fails a test (tests/cms/assessment/quality/of_reduction/test_contents.py).
@@ -18,7 +18,7 @@ __all__ = ["FIELDS", "Compared", "apart", "leaves", "same"]
 #: "mass-properties"
 FIELDS: Mapping[str, str] = {
     "name": "origin",
-    "units": "same-body",  # other units are refused before anything is compared
+    "units": "same-body",  # a difference of units is an error before the comparison
     "frame.kind": "frame",
     "frame.origin": "points",
     "frame.axes": "points",
@@ -114,16 +114,16 @@ FIELDS: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class Compared:
-    """The comparison of a field of a file with that of the model."""
+    """Comparison of one field of a file with the same field of the model."""
 
-    field: str  #: as in `FIELDS`
-    defect: float  #: largest difference relative to the size of the field; infinite for words and counts that differ
+    field: str  #: field name, as in `FIELDS`
+    defect: float  #: largest difference over the size of the field; infinite for differing texts and counts
     where: str = ""  #: description of the place of the largest difference
-    doubt: str = ""  #: description of the difference, if it is not one of numbers
+    doubt: str = ""  #: description of a difference that is not numerical
 
 
 def leaves(value: Any, path: str = "") -> dict[str, list[Any]]:
-    """Return the values of all fields of a record and of the records in it, by the path of the field.
+    """Return the values of all fields of a record and of nested records, by field path.
 
     Records in a tuple or mapping share their paths; a missing record has no fields.
     """
@@ -149,7 +149,7 @@ def leaves(value: Any, path: str = "") -> dict[str, list[Any]]:
 
 
 def same(field: str, got: Any, wanted: Any, where: str = "") -> Compared:
-    """Compare words, counts and indices, which must be equal."""
+    """Compare texts, counts and indices for equality."""
     if isinstance(got, np.ndarray) or isinstance(wanted, np.ndarray):
         is_same = np.array_equal(np.asarray(got), np.asarray(wanted))
     else:
@@ -163,7 +163,7 @@ def same(field: str, got: Any, wanted: Any, where: str = "") -> Compared:
 
 
 def apart(field: str, got: Array, wanted: Array, size: Array | float, where: str = "", axes: str = "") -> Compared:
-    """Compare numbers: the largest difference divided by a size that broadcasts with them.
+    """Compare numbers: return the largest ratio of difference to size; the size broadcasts.
 
     Parameters
     ----------

@@ -12,23 +12,24 @@ from fe_models.foundation.arrays import Array, IntArray, frozen
 
 __all__ = ["FrequencyComparison", "compare_frequencies", "compare_shapes", "frequency_records", "mac"]
 
-CLUSTER = 1e-3  #: relative gap between two frequencies below which only the plane of their shapes is compared
+CLUSTER = 1e-3  #: relative gap between two frequencies below which their shapes are compared as a common subspace
 
 
 @dataclass(frozen=True, eq=False)
 class FrequencyComparison:
-    """Elastic free-free modes in the band: full model against reduced body."""
+    """Elastic free-free modes in the band: full model compared with reduced body."""
 
-    full: Array  #: (n_full,) [Hz]
-    reduced: Array  #: all of the reduced body, ascending, (n_reduced,) [Hz]
+    full: Array  #: frequencies of the full model, (n_full,) [Hz]
+    reduced: Array  #: all frequencies of the reduced body, ascending, (n_reduced,) [Hz]
     #: reduced frequency divided by full frequency, in order, minus 1, (n_full,); NaN if the reduced body has none
     error: Array
-    mac: Array  #: mass-weighted, (n_full, n_reduced)
-    mac_nodal: Array  #: of the translations of all nodes, (n_full, n_reduced)
-    partner: IntArray  #: reduced mode that matches each full one, by the mass-weighted MAC; -1: none, (n_full,)
-    partner_error: Array  #: its frequency over the full one - 1, (n_full,)
-    recovered: Array  #: part of each full shape in the partners of its cluster, mass-weighted, 0 to 1, (n_full,)
-    recovered_nodal: Array  #: the same, nodal; the MAC with the partner for a single mode, (n_full,)
+    mac: Array  #: MAC weighted by mass, (n_full, n_reduced)
+    mac_nodal: Array  #: MAC of the translations of all nodes, (n_full, n_reduced)
+    partner: IntArray  #: reduced mode with the largest mass-weighted MAC for each full mode, (n_full,); -1: none
+    partner_error: Array  #: frequency of the partner over that of the full mode, minus 1, (n_full,)
+    #: part of each full shape in the span of the partners of its cluster, mass-weighted, 0 to 1, (n_full,)
+    recovered: Array
+    recovered_nodal: Array  #: the same in nodal translations; for a single mode, its MAC with the partner, (n_full,)
 
     def __post_init__(self) -> None:
         for name in ("full", "reduced", "error", "mac", "mac_nodal", "partner_error", "recovered", "recovered_nodal"):
@@ -37,7 +38,7 @@ class FrequencyComparison:
 
 
 def mac(A: Array, B: Array, M_B: Array | None = None) -> Array:
-    """Modal assurance criterion (a·b)² / (a·a b·b) of all pairs of columns, (n_a, n_b).
+    """Return the modal assurance criterion (a·b)² / (a·a b·b) for all pairs of columns, (n_a, n_b).
 
     Parameters
     ----------
@@ -98,13 +99,13 @@ def compare_shapes(full: Array, reduced: Array, massed: Array, a: Array, b: Arra
 
 
 def clusters(frequencies: Array) -> list[IntArray]:
-    """Return the indices of frequencies that lie within `CLUSTER` of their neighbours."""
+    """Return groups of indices of frequencies with relative gaps below `CLUSTER`."""
     is_apart = np.diff(frequencies) > CLUSTER * frequencies[1:]
     return np.split(np.arange(len(frequencies)), np.flatnonzero(is_apart) + 1)
 
 
 def span_share(A: Array, B: Array) -> Array:
-    """Squared part of each column of A in the span of B, (n_a,)."""
+    """Return the squared part of each column of A in the span of B, (n_a,)."""
     if not B.shape[1]:
         return np.zeros(A.shape[1])
     Q, _ = np.linalg.qr(B)
@@ -113,7 +114,7 @@ def span_share(A: Array, B: Array) -> Array:
 
 
 def frequency_records(comparison: FrequencyComparison, band: float) -> tuple[QualityRecord, ...]:
-    """Records "frequency-error", "mac" and "mac-nodal" of the modes in the band [Hz]."""
+    """Return the records "frequency-error", "mac" and "mac-nodal" for the modes in the band [Hz]."""
     c = comparison
     size = np.where(np.isnan(c.error), np.inf, np.abs(c.error))
     k = int(np.argmax(size))

@@ -1,4 +1,4 @@
-"""Error of a frequency response at the interfaces over a band."""
+"""Error of the frequency response at the interfaces over a band."""
 
 from dataclasses import dataclass
 
@@ -22,29 +22,30 @@ __all__ = [
     "response_record",
 ]
 
-DAMPING = 0.01  #: ratio of every mode in the full and the reduced response that are compared
-MOST_POINTS = 1_000_000  #: frequencies of a response
+DAMPING = 0.01  #: damping ratio of every mode in the compared responses of full and reduced model
+MOST_POINTS = 1_000_000  #: largest number of frequencies of a response
 POINTS = 400
-AROUND = np.array([0.0, 0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0, 8.0, 12.0])  #: half widths from a resonance
-UNDAMPED = 1e-4  #: frequency ratio of points around a resonance without damping, whose peak is infinite
-LOWEST = 0.05  #: lower end of the band over the first elastic frequency: below it the body moves rigidly
+#: distances of added points from a resonance, in half bandwidths
+AROUND = np.array([0.0, 0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0, 8.0, 12.0])
+UNDAMPED = 1e-4  #: relative frequency distance of points around an undamped resonance, whose peak is infinite
+LOWEST = 0.05  #: lower end of the band over the first elastic frequency; below it the body moves rigidly
 
 
 @dataclass(frozen=True, eq=False)
 class ResponseComparison:
-    """Response of the full model and of the reduced body, the same damping in both."""
+    """Responses of full model and reduced body with the same damping, compared."""
 
     full: FrequencyResponse
     reduced: FrequencyResponse
     error: Array  #: |H_reduced - H_full| / |H_full| at every frequency, Frobenius norm, (n_f,)
-    reference_error: float  #: of the full response itself, estimated
+    reference_error: float  #: estimated relative error of the full response
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "error", frozen(self.error))
 
     @property
     def mean_error(self) -> float:
-        """Root of the mean square of the error over the logarithm of frequency."""
+        """Root mean square of the error over logarithmic frequency."""
         f = np.log(self.full.frequencies)
         if len(f) == 1:
             return float(self.error[0])
@@ -52,7 +53,7 @@ class ResponseComparison:
 
 
 def frequency_grid(lowest: float, highest: float, points: int = POINTS) -> Array:
-    """Return frequencies evenly spaced by their logarithm, (points,) [Hz].
+    """Return frequencies that are evenly spaced on a logarithmic scale, (points,) [Hz].
 
     Raises
     ------
@@ -67,7 +68,7 @@ def frequency_grid(lowest: float, highest: float, points: int = POINTS) -> Array
 
 
 def resonance_grid(grid: Array, resonances: Array, ratios: Array) -> Array:
-    """Return a grid with points around resonances, so that peaks have their height at any damping, (n_f,) [Hz].
+    """Add points around resonances to a grid, so that peaks have their full height at any damping, (n_f,) [Hz].
 
     A peak is at f_k sqrt(1 - 2 zeta²) and half as wide as 2 zeta f_k: points at multiples of the half width from there,
     half of them within it. Of a resonance without damping the point itself is left out.
@@ -93,13 +94,13 @@ def resonance_grid(grid: Array, resonances: Array, ratios: Array) -> Array:
 
 
 def basis_ports(reference: FullReference, basis: FreeBasis) -> PortModel:
-    """Return a mode set's free modes at the ports."""
+    """Return the free modes of a mode set at the ports."""
     A = reference.ports.A
     return PortModel(reference.ports.names, basis.omega2, basis.is_massive, A @ basis.Phi, A @ basis.N)
 
 
 def compare_responses(full: FrequencyResponse, reduced: FrequencyResponse, length: float) -> Array:
-    """Relative error at every frequency, (n_f,): Frobenius norm, rotations times and moments over the length."""
+    """Return the relative error at each frequency, (n_f,), in the Frobenius norm; the length scales rotations."""
     out, into = (
         np.array([length if label.rsplit(" ", 1)[1].startswith("r") else 1.0 for label in labels])
         for labels in (full.outputs, full.inputs)
@@ -112,7 +113,7 @@ def compare_responses(full: FrequencyResponse, reduced: FrequencyResponse, lengt
 def response_comparison(
     reference: FullReference, model: PortModel, *, frequencies: Array | None = None, damping: float = DAMPING
 ) -> ResponseComparison:
-    """Compare the response at all interfaces, from well below the first elastic mode to the top of the band.
+    """Compare responses at all interfaces, from well below the first elastic mode to the top of the band.
 
     Parameters
     ----------
@@ -147,7 +148,7 @@ def response_comparison(
 
 
 def peaks(frequencies: Array, magnitude: Array) -> list[tuple[float, float]]:
-    """Return (frequency, magnitude) of the local maxima of a response, the most prominent first."""
+    """Return (frequency, magnitude) of the local maxima of a response, most prominent first."""
     from scipy.signal import find_peaks
 
     at, found = find_peaks(np.log(np.maximum(magnitude, np.finfo(float).tiny)), prominence=0.05)
@@ -156,7 +157,7 @@ def peaks(frequencies: Array, magnitude: Array) -> list[tuple[float, float]]:
 
 
 def response_record(comparison: ResponseComparison) -> QualityRecord:
-    """Record "frequency-response"; its value is the mean over the band, the largest error is named."""
+    """Return the record "frequency-response"; its value is the mean over the band, its text names the largest error."""
     f, error = comparison.full.frequencies, comparison.error
     k = int(np.argmax(error))
     good = np.flatnonzero(error > 0.05)

@@ -26,20 +26,21 @@ from fe_models.foundation.arrays import Array, frozen
 
 __all__ = ["FullShapes", "full_shapes", "same_body_record"]
 
-WELL_DETERMINED = 1e-7  #: smallest over largest singular value of the nodal rows, below which x is not determined
-ONE_FREQUENCY = 1e-6  #: relative difference of two stiffnesses, below which their modes may be combined
+WELL_DETERMINED = 1e-7  #: smallest over largest singular value of the nodal rows, below which x is undetermined
+#: relative difference of two modal stiffnesses below which their modes may be rotated into each other
+ONE_FREQUENCY = 1e-6
 
 
-KNOWN_MASS = 1e-6  #: rounding of the modal mass above which the record says so
-ROUNDING_MARGIN = 10.0  #: factor on the rounding of the columns of a set that a comparison with it allows
+KNOWN_MASS = 1e-6  #: rounding error of the modal mass above which the record mentions it
+ROUNDING_MARGIN = 10.0  #: factor on the rounding of columns of a mode set that a comparison tolerates
 
 
 @dataclass(frozen=True, eq=False)
 class FullShapes:
-    """Modes of a file over all dofs, mesh axes."""
+    """Modes of a file over all dofs, in mesh axes."""
 
-    Phi: Array  #: (n_dof, n_q)
-    Z: Array  #: their coordinates in the elastic shapes of the mode set, (n, n_q)
+    Phi: Array  #: modes over the dofs, (n_dof, n_q)
+    Z: Array  #: coordinates of the modes in the elastic shapes of the mode set, (n, n_q)
     #: largest distance at the kept nodes and interfaces beyond rounding of the set, over a mode's largest displacement
     misfit: float
 
@@ -49,7 +50,7 @@ class FullShapes:
 
 
 def full_shapes(body: FEBody, basis: FreeBasis, reduced: ReducedBody) -> FullShapes | None:
-    """Find the file's modes over all dofs of a mode set's body; None where they cannot be known."""
+    """Compute the modes of a file over all dofs of the body of a mode set; None if they are undetermined."""
     if len(reduced.node_ids) and reduced.node_ids.max() >= len(body.nodes):
         return None
     X = np.hstack([basis.N, basis.Phi])
@@ -79,7 +80,7 @@ def full_shapes(body: FEBody, basis: FreeBasis, reduced: ReducedBody) -> FullSha
 
 
 def determined(rows: Array, wanted: Array) -> Array | None:
-    """Return the x nearest to rows x = wanted; None where the rows do not determine it."""
+    """Return the least-squares solution x of rows x = wanted; None if the rows do not determine it."""
     size = np.linalg.norm(rows, axis=0)
     size = np.where(size > 0, size, 1.0)
     x, _, rank, singular = np.linalg.lstsq(rows / size, wanted, rcond=None)
@@ -89,7 +90,7 @@ def determined(rows: Array, wanted: Array) -> Array | None:
 
 
 def rounding_of(basis: FreeBasis, Z: Array) -> ShapeRounding:
-    """Return the rounding that a comparison allows of shapes with coordinates Z in those of a mode set."""
+    """Return the rounding error that a comparison tolerates for shapes with coordinates Z in a mode set."""
     if basis.rounding is None:
         none = np.zeros(Z.shape[1])
         return ShapeRounding(none, none, none)
@@ -97,7 +98,7 @@ def rounding_of(basis: FreeBasis, Z: Array) -> ShapeRounding:
 
 
 def kept_turns(body: FEBody, reduced: ReducedBody, X: Array) -> Array:
-    """Return the rotations of the kept points with columns X, axes of B, (n, k)."""
+    """Return the rotations of the kept points in the columns X, axes of B, (n, k)."""
     assert reduced.kept is not None
     row_of = np.full(len(body.nodes), -1, np.int64)
     row_of[reduced.node_ids] = np.arange(len(reduced.node_ids))
@@ -120,7 +121,7 @@ def turned_onto(found: Array, wanted: Array, stiffness: Array) -> Array:
 
 
 def kept_motion(body: FEBody, reduced: ReducedBody, X: Array) -> Array:
-    """Motion of the kept nodes and reference points with columns X, axes of B, rotations times the length, (n, k)."""
+    """Return motions of kept nodes and reference points in the columns X, axes of B, rotations times length, (n, k)."""
     axes = reduced.frame.axes
     at_nodes = body.translations(X)[reduced.node_ids]
     rows = [np.einsum("ba,nbk->nak", axes, at_nodes).reshape(-1, X.shape[1])]
@@ -130,39 +131,39 @@ def kept_motion(body: FEBody, reduced: ReducedBody, X: Array) -> Array:
 
 
 def known_interfaces(body: FEBody, reduced: ReducedBody) -> list[ReducedInterface]:
-    """Return the interfaces of the file that the model has too."""
+    """Return the interfaces of the file that also exist in the model."""
     names = [interface.name for interface in body.interfaces]
     return [interface for interface in reduced.interfaces if interface.name in names]
 
 
 def motion_scale(body: FEBody, reduced: ReducedBody) -> Array:
-    """1 for translations, the body length for rotations, one per kept motion, (n,)."""
+    """Return the scale of each kept motion, (n,): 1 for translations, the body length for rotations."""
     length = body.length
     ports = [np.repeat([1.0, length], 3)] * len(known_interfaces(body, reduced))
     return np.concatenate([np.ones(3 * len(reduced.nodes)), *ports])
 
 
 def misfit(found: Array, wanted: Array, rounding: ShapeRounding) -> float:
-    """Return the largest distance beyond rounding, over the largest motion of each mode."""
+    """Return the largest difference beyond rounding, over the largest motion of each mode."""
     largest = np.abs(wanted).max(axis=0, initial=0.0)
     distance = beyond(np.abs(found - wanted).max(axis=0, initial=0.0), rounding.motion)
     return float((distance / np.where(largest > 0, largest, 1.0)).max(initial=0.0))
 
 
 def beyond(difference: Array, rounding: Array) -> Array:
-    """Return the part of differences that rounding does not explain."""
+    """Return the part of differences that exceeds rounding."""
     return np.maximum(np.abs(difference) - rounding, 0.0)
 
 
 def finished_in(body: FEBody, basis: FreeBasis, frame: Frame | HeldFrame) -> FinishedBasis:
-    """Finish the span of the mode set in a frame."""
+    """Apply the finishing step to the span of a mode set in a frame."""
     n = basis.Phi.shape[1]
     modes = ModeSet("again", basis.Phi, tuple(f"shape {k + 1}" for k in range(n)), np.full(n, np.nan))
     return finish(body, modes, frame_condition(body, frame))
 
 
 def named_frame(frame: BodyFrame) -> Frame | HeldFrame:
-    """Return the frame that a file names."""
+    """Return the frame whose name is in the file."""
     x, y, z = frame.origin.tolist()
     axes = cast(Axes, tuple(tuple(float(v) for v in axis) for axis in frame.axes.T))
     if frame.kind == "nodal":
@@ -176,7 +177,7 @@ def named_frame(frame: BodyFrame) -> Frame | HeldFrame:
 
 
 def same_body_record(body: FEBody, basis: FreeBasis, reduced: ReducedBody, shapes: FullShapes | None) -> QualityRecord:
-    """Record "same-body": free-free frequencies of the file are those of the set, its modes lie in the set's span.
+    """Return the record "same-body": the file has the free-free frequencies of the set, and modes in its span.
 
     Only the part of a difference counts that rounding of the columns of the set does not explain. A change e of a shape
     changes Phiᵀ M Phi by Phiᵀ M e + eᵀ M Phi + eᵀ M e, and Phiᵀ K Phi likewise. Modes of light nodes are combinations

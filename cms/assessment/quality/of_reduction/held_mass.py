@@ -1,4 +1,4 @@
-"""Effective mass of a mode set with all interfaces held, against that of the full model."""
+"""Effective mass of a mode set with all interfaces fixed, compared with that of the full model."""
 
 from dataclasses import dataclass, replace
 
@@ -15,18 +15,18 @@ from fe_models.foundation.arrays import Array, frozen
 __all__ = ["HeldMass", "answered_statically", "held_mass", "held_mass_record"]
 
 DIRECTIONS = ("ux", "uy", "uz", "rx", "ry", "rz")
-HELD = 1e-8  #: singular value of the interface motions over the largest, below which a combination holds them
+HELD = 1e-8  #: singular value of the interface motions over the largest, below which a combination keeps them fixed
 MASS_TOLERANCE = 1e-10  #: relative residual of the solutions with M_II
-NO_MASS = 1e-9  #: held mass relative to the mass of the body, below which a direction has none
+NO_MASS = 1e-9  #: moving mass over the body mass, below which a direction has no moving mass
 
 
 @dataclass(frozen=True, eq=False)
 class HeldMass:
-    """Effective masses about the centre of the nodes, mesh axes, by direction."""
+    """Effective masses with fixed interfaces, about the mean of the nodes, in mesh axes, by direction."""
 
-    frequencies: Array  #: of the mode set's modes with all interfaces held, (n,) [Hz]
-    mass: Array  #: effective mass and inertia of each, (n, 6) [kg, kg m²]
-    total: Array  #: sum over all modes of the full model, (6,)
+    frequencies: Array  #: frequencies of the mode set with all interfaces fixed, (n,) [Hz]
+    mass: Array  #: effective mass and inertia of each mode, (n, 6) [kg, kg m²]
+    total: Array  #: sum of effective masses over all modes of the full model, (6,)
     rigid: Array  #: mass and inertia of the whole body, (6,)
 
     def __post_init__(self) -> None:
@@ -35,13 +35,13 @@ class HeldMass:
 
     @property
     def remainder(self) -> Array:
-        """Share of the held mass that no mode of the set carries, (6,); 0 where nothing is held."""
+        """Share of the moving mass in none of the modes of the set, (6,); 0 if no mass moves."""
         has_mass = self.total > NO_MASS * self.rigid
         return np.where(has_mass, 1 - self.mass.sum(axis=0) / np.where(has_mass, self.total, 1.0), 0.0)
 
 
 def held_mass(reference: FullReference, basis: FreeBasis) -> HeldMass:
-    """Find the effective masses of a mode set with all interfaces held.
+    """Compute the effective masses of a mode set with all interfaces fixed.
 
     (1) combinations of [N Phi] that do not move the held dofs: null space of their rows, rotations times the length
     (2) their modes z; participation L = zᵀ M d of unit rigid-body motions d, effective mass L²
@@ -75,7 +75,7 @@ def held_mass(reference: FullReference, basis: FreeBasis) -> HeldMass:
 
 
 def full_held_mass(reference: FullReference, b: Array) -> Array:
-    """Return b_Iᵀ M_II⁻¹ b_I over the interior dofs that have mass, (6,)."""
+    """Return b_Iᵀ M_II⁻¹ b_I over the interior dofs with mass, (6,)."""
     fixed = reference.families.fixed
     M_ii = fixed.M_ii
     diagonal = M_ii.diagonal()
@@ -91,7 +91,7 @@ def full_held_mass(reference: FullReference, b: Array) -> Array:
 
 
 def held_mass_record(held: HeldMass, *, is_static_complete: bool = False) -> QualityRecord:
-    """Record "effective-mass": the translation whose held mass is represented worst by the modes.
+    """Return the record "effective-mass" for the translation with the largest share of mass in no mode.
 
     Where the mode set answers rigid-body accelerations statically, what its modes leave out is not lost: nothing is
     judged.
@@ -115,7 +115,7 @@ def held_mass_record(held: HeldMass, *, is_static_complete: bool = False) -> Qua
 
 
 def answered_statically(record: QualityRecord) -> QualityRecord:
-    """Return the record of a mode set with exact static response to rigid accelerations: its deficit is no fault."""
+    """Return the record of a mode set that is exact for rigid accelerations: missing mass is not an error."""
     if record.verdict == "pass":
         return record
     return replace(record, verdict="info", reason=f"{record.reason}; the rest answers statically", action="")

@@ -1,4 +1,4 @@
-"""How much stiffer rigid interfaces (RBE2) make a body than distributing ones (RBE3)."""
+"""Increase of stiffness due to rigid interfaces (RBE2), compared with distributing interfaces (RBE3)."""
 
 from dataclasses import dataclass, replace
 
@@ -20,12 +20,12 @@ MODES = 6
 
 @dataclass(frozen=True, eq=False)
 class InterfaceStiffening:
-    """Free body with all its interfaces rigid, and with all distributing."""
+    """Free body with all its interfaces rigid, compared with all of them distributing."""
 
     rigid: Array  #: elastic free-free frequencies with rigid interfaces, (n,) [Hz]
-    distributing: Array  #: the same with distributing ones, (n,) [Hz]
-    labels: tuple[str, ...]  #: of the motions of the interfaces: 'big_end ux'
-    compliance_rigid: Array  #: elastic displacement for a unit force along each of them, (6 n_ports,) [m/N, 1/(N m)]
+    distributing: Array  #: elastic free-free frequencies with distributing interfaces, (n,) [Hz]
+    labels: tuple[str, ...]  #: label of each interface motion: 'big_end ux'
+    compliance_rigid: Array  #: elastic displacement per unit force along each motion, (6 n_ports,) [m/N, 1/(N m)]
     compliance_distributing: Array
 
     def __post_init__(self) -> None:
@@ -34,7 +34,7 @@ class InterfaceStiffening:
 
     @property
     def frequency_change(self) -> Array:
-        """Rigid over distributing frequency - 1, (n,); not negative but for rounding."""
+        """Frequency ratio of rigid to distributing interfaces, minus 1, (n,); nonnegative up to rounding."""
         return self.rigid / self.distributing - 1
 
     @property
@@ -47,19 +47,19 @@ class InterfaceStiffening:
 
 
 def can_be_both(body: FEBody, interface: Interface) -> bool:
-    """Whether an interface can be rigid as well as distributing: three nodes or more, not on one line."""
+    """Return whether an interface can be rigid or distributing: it needs three nodes that are not collinear."""
     return interface.kind != "nodes" and interface.dofs is None and are_spread(body.nodes[interface.nodes])
 
 
 def has_both_kinds(body: FEBody) -> bool:
-    """Whether the body has an interface that can be rigid as well as distributing."""
+    """Return whether the body has an interface that can be rigid or distributing."""
     return any(can_be_both(body, interface) for interface in body.interfaces)
 
 
 def with_kind(body: FEBody, kind: str) -> FEBody:
-    """Return an uncoupled body with every interface that can be of both kinds made of this kind.
+    """Return an uncoupled body in which every interface that can be rigid or distributing has the given kind.
 
-    That is none of kind "nodes", and of beams none on a single node or line.
+    Interfaces of kind "nodes" do not change, nor do interfaces of beams at one node or on a line.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def with_kind(body: FEBody, kind: str) -> FEBody:
 
 
 def interface_stiffening(body: FEBody, *, n_modes: int = MODES) -> InterfaceStiffening:
-    """Couple a body both ways, and compare frequencies and the compliance of its interfaces.
+    """Couple a body in both ways, and compare frequencies and interface compliances.
 
     A rigid interface adds constraints that a distributing one lacks, so its frequencies are not lower and its
     compliances not higher.
@@ -98,7 +98,7 @@ def interface_stiffening(body: FEBody, *, n_modes: int = MODES) -> InterfaceStif
 
 
 def stiffening_record(stiffening: InterfaceStiffening) -> QualityRecord:
-    """Record "interface-stiffening"."""
+    """Return the record "interface-stiffening"."""
     change, ratio = stiffening.frequency_change, stiffening.compliance_ratio
     k, j = int(np.argmax(change)), int(np.nanargmax(ratio))
     reason = (

@@ -1,4 +1,4 @@
-"""Mass properties by two routes: mass matrix of the full model against the file's moments."""
+"""Mass properties from the mass matrix of the full model, compared with the moments in the file."""
 
 import numpy as np
 
@@ -12,11 +12,12 @@ from fe_models.foundation.ranks.spread_matrix import largest_entry
 
 __all__ = ["check_grounding", "check_mass_properties", "rigid_mass_matrix"]
 
-ROUNDING = 30 * np.finfo(float).eps  #: of moments of a body, relative, where its distance is its size
+#: relative rounding error of moments if the distance from the origin equals the body size
+ROUNDING = 30 * np.finfo(float).eps
 
 
 def rigid_mass_matrix(reduced: ReducedBody) -> Array:
-    """Mass matrix of the file's rigid body about the mesh origin, mesh axes, (6, 6) [kg, kg m, kg m²]."""
+    """Return the rigid-body mass matrix of the file about the mesh origin, mesh axes, (6, 6) [kg, kg m, kg m²]."""
     moments, frame = reduced.moments, reduced.frame
     # second moment about the mesh origin: c_mesh = o + A c
     o, A = frame.origin, frame.axes
@@ -28,15 +29,15 @@ def rigid_mass_matrix(reduced: ReducedBody) -> Array:
 
 
 def mass_matrix(m: float, S: Array, J: Array) -> Array:
-    """[m 1, -S~; S~, J], (6, 6)."""
+    """Return [m 1, -S~; S~, J], (6, 6)."""
     S_tilde = np.array([[0.0, -S[2], S[1]], [S[2], 0.0, -S[0]], [-S[1], S[0], 0.0]])
     return np.block([[m * np.eye(3), -S_tilde], [S_tilde, J]])
 
 
 def check_mass_properties(body: FEBody, reduced: ReducedBody) -> QualityRecord:
-    """Psi_Rᵀ M Psi_R of the full mass matrix against mass, first moment and inertia of the file.
+    """Compare Psi_Rᵀ M Psi_R of the full model with mass, first moment and inertia in the file.
 
-    First moments over m L, inertia over m L², both about the centre of the nodes, L the length of the body.
+    First moments are divided by m L, inertia by m L², about the mean of the nodes; L is the body length.
     """
     center, length = body.nodes.mean(axis=0), body.length
     Psi_R = geometric_rigid_modes(body, origin=center)
@@ -45,7 +46,7 @@ def check_mass_properties(body: FEBody, reduced: ReducedBody) -> QualityRecord:
     own = shift.T @ rigid_mass_matrix(reduced) @ shift
     mass = max(abs(full[0, 0]), np.finfo(float).tiny)
     size = np.repeat([1.0, length], 3)
-    # moments about an origin far away have lost these digits already
+    # moments about a distant origin have already lost these digits
     far = np.linalg.norm(center) / length + np.linalg.norm(center - reduced.frame.origin) / length
     rounding = ROUNDING * (1 + far**2)
     defect = np.maximum(np.abs(own - full) / np.outer(size, size) / mass - rounding, 0.0)
@@ -63,7 +64,7 @@ def check_mass_properties(body: FEBody, reduced: ReducedBody) -> QualityRecord:
 
 
 def geometric_shift(center: Array) -> Array:
-    """Rigid motion about the mesh origin of a unit rigid motion about another point, (6, 6)."""
+    """Return the rigid motions about the mesh origin for unit rigid motions about another point, (6, 6)."""
     shift = np.eye(6)
     x, y, z = center
     shift[:3, 3:] = -np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
@@ -71,9 +72,9 @@ def geometric_shift(center: Array) -> Array:
 
 
 def check_grounding(body: FEBody) -> QualityRecord:
-    """K times rigid-body modes: the largest force over |K| |Psi_R|, largest entries, rotations over the body length.
+    """Check that rigid-body modes cause no force: largest |K Psi_R| over |K| |Psi_R|, rotations over the body length.
 
-    A body that is held, as declared, is not judged.
+    A body that is declared as fixed to the ground is not checked.
 
     Row by row would be sharper, but the rows of a rigid interface are sums that cancel, and keep their rounding.
     """

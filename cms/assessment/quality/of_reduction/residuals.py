@@ -1,4 +1,4 @@
-"""How far a reduced eigenpair is from a true one at most, from its residual alone.
+"""Error bounds of reduced eigenpairs, computed from their residuals alone.
 
 For phi with phiᵀ M phi = 1, theta = phiᵀ K phi and Psi_Rᵀ M phi = 0 expand phi = sum c_j phi_j in the true elastic
 modes. The residual r = K phi - theta M phi has |r|²_G = sum (lambda_j - theta)² c_j² / lambda_j, G the flexibility of
@@ -26,11 +26,11 @@ __all__ = ["ResidualBounds", "residual_bounds", "residual_record"]
 
 @dataclass(frozen=True, eq=False)
 class ResidualBounds:
-    """Bounds of the errors of reduced free-free frequencies, without knowing the true ones."""
+    """Error bounds of reduced free-free frequencies, which need no exact frequencies."""
 
-    frequencies: Array  #: reduced, (n,) [Hz]
-    bound: Array  #: b of this module: |(f_reduced / f)² - 1| <= b for some true f, (n,)
-    estimate: Array  #: b² / gap of the reduced frequencies, at most b, (n,)
+    frequencies: Array  #: reduced frequencies, (n,) [Hz]
+    bound: Array  #: bound b of each frequency: |(f_reduced / f)² - 1| <= b for some exact f, (n,)
+    estimate: Array  #: estimate b² / gap between reduced frequencies, at most b, (n,)
 
     def __post_init__(self) -> None:
         for name in ("frequencies", "bound", "estimate"):
@@ -38,12 +38,12 @@ class ResidualBounds:
 
     @property
     def frequency_distance(self) -> Array:
-        """Largest f_reduced / f - 1 allowed by the bound, (n,); a Ritz frequency lies above."""
+        """Largest f_reduced / f - 1 within the bound, (n,); Ritz frequencies are upper bounds."""
         return np.sqrt(1 + self.bound) - 1
 
 
 def residual_bounds(reference: FullReference, basis: FreeBasis) -> ResidualBounds:
-    """Bound the reduced frequencies in the band (at least the first): one solve per mode."""
+    """Compute the bounds of the reduced frequencies in the band (at least of the first): one solve per mode."""
     body = reference.body
     frequencies = basis.frequencies(body.units.time)
     n = max(1, int((frequencies <= reference.band).sum()))
@@ -57,7 +57,7 @@ def residual_bounds(reference: FullReference, basis: FreeBasis) -> ResidualBound
 
 
 def residual_record(bounds: ResidualBounds) -> QualityRecord:
-    """Record "residual-bound"."""
+    """Return the record "residual-bound"."""
     if not len(bounds.bound):
         return information("residual-bound", "the reduced body has no elastic mode")
     distance = bounds.frequency_distance

@@ -1,1 +1,1 @@
-"""The full model as the reference: its modes, responses and motions, computed once."""
+"""Full model as the reference: its modes, responses and motions, computed once."""

@@ -1,4 +1,4 @@
-"""A mode set as modes of the free reduced body, over all dofs: where comparisons with the full model start."""
+"""Free-free modes in the span of a mode set, over all dofs: the basis of comparisons with the full model."""
 
 from dataclasses import dataclass
 
@@ -17,32 +17,32 @@ from fe_models.foundation.tall.columns import combine, dots, inner, of_this_proc
 
 __all__ = ["FreeBasis", "ShapeRounding", "free_basis", "ritz_basis", "shape_rounding"]
 
-MASSLESS = 1e-12  #: modal mass times omega_1² of a shape of unit W-length, below which it is static
+MASSLESS = 1e-12  #: modal mass times omega_1² of a shape of unit W-norm, below which the shape is static
 
 
 @dataclass(frozen=True, eq=False)
 class ShapeRounding:
-    """Size of the change of shapes by rounding in the columns of their mode set, in three norms.
+    """Rounding errors of shapes due to rounding of the columns of their mode set, in three norms.
 
     A shape phi = sum_k a_k v_k is known to sum_k |a_k| eps |v_k|. Nearly dependent columns have large coefficients a_k,
     and the span of such a set is known less well.
     """
 
-    motion: Array  #: norm of the displacement, rotations times the length of the body, (n,)
-    mass: Array  #: norm by the diagonal of M, (n,)
-    stiffness: Array  #: norm by the diagonal of K, (n,)
+    motion: Array  #: error in the norm of the displacement, rotations times body length, (n,)
+    mass: Array  #: error in the norm of the diagonal of M, (n,)
+    stiffness: Array  #: error in the norm of the diagonal of K, (n,)
 
     def __post_init__(self) -> None:
         for name in ("motion", "mass", "stiffness"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
     def of_combinations(self, Z: Array) -> "ShapeRounding":
-        """Return the rounding of the shapes Phi Z."""
+        """Return the rounding errors of the shapes Phi Z."""
         return ShapeRounding(*(np.abs(Z).T @ each for each in (self.motion, self.mass, self.stiffness)))
 
 
 def shape_rounding(body: FEBody, V: Array, A: Array) -> ShapeRounding:
-    """Return the rounding of the shapes V A."""
+    """Return the rounding errors of the shapes V A."""
     motion = np.where(body.dofs[:, 1] < 3, 1.0, body.length**2)
     diagonals = (motion, np.abs(body.M.diagonal()), np.abs(body.K.diagonal()))
     of_columns = ShapeRounding(*(np.finfo(float).eps * np.sqrt(dots(V, V, each)) for each in diagonals))
@@ -54,28 +54,28 @@ class FreeBasis:
     """The span of [Psi_R, mode set] with M- and K-orthogonal columns: rigid motions N and elastic shapes Phi."""
 
     Phi: Array  #: elastic shapes, (n_dof, n), ascending omega2, massless ones last; Nᵀ M Phi = 0
-    omega2: Array  #: Phiᵀ K Phi, (n,): squared frequencies for shapes with mass [1/s²]
-    is_massive: np.ndarray  #: Phiᵀ M Phi = 1 there, 0 elsewhere, (n,) bool
+    omega2: Array  #: Phiᵀ K Phi, (n,): squared frequencies of shapes with mass [1/s²]
+    is_massive: np.ndarray  #: True where Phiᵀ M Phi = 1, False where it is 0, (n,) bool
     N: Array  #: M-orthonormal rigid-body motions, (n_dof, n_r)
     dropped: tuple[str, ...] = ()  #: labels of redundant columns
-    rounding: ShapeRounding | None = None  #: of Phi, if the columns are known
+    rounding: ShapeRounding | None = None  #: rounding errors of Phi, if the columns are known
 
     def __post_init__(self) -> None:
         for name in ("Phi", "omega2", "N"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
     def frequencies(self, time: float = 1.0) -> Array:
-        """Elastic free-free frequencies of the reduced body, ascending [Hz], time: [s] of the body's time unit."""
+        """Return the elastic free-free frequencies of the reduced body, ascending [Hz]; `time` is its time unit [s]."""
         return np.sqrt(np.maximum(self.omega2[self.is_massive], 0.0)) / (2 * np.pi) / time
 
     @property
     def vibrating(self) -> Array:
-        """The shapes with mass, (n_dof, n_massive)."""
+        """Shapes with mass, (n_dof, n_massive)."""
         return self.Phi[:, self.is_massive]
 
 
 def free_basis(body: FEBody, modes: ModeSet, families: Families) -> FreeBasis:
-    """Finish a mode set in mean axes: the free-free modes of the reduced body, whatever frame its file has.
+    """Return the free-free modes in the span of a mode set, in mean axes, whatever the frame of the file.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def free_basis(body: FEBody, modes: ModeSet, families: Families) -> FreeBasis:
 
 
 def ritz_basis(body: FEBody, X: Array, N: Array) -> FreeBasis:
-    """Rayleigh-Ritz in the span of columns without rigid-body motion.
+    """Apply the Rayleigh-Ritz method to the span of columns, without rigid-body motion.
 
     (1) W-orthonormal columns Q, W = K + omega_1² M, redundant ones dropped; what rounding has made of rigid-body
         motion in the small remainders of nearly redundant columns is taken off

@@ -1,4 +1,4 @@
-"""The free reduced body as one small pencil over rigid motion and modal coordinates, from a modal file alone."""
+"""Matrices of the free reduced body over rigid motion and modal coordinates, from a modal file alone."""
 
 from dataclasses import dataclass
 
@@ -16,19 +16,19 @@ __all__ = [
 
 #: smallest eigenvalue of the scaled rigid mass matrix, below which there is no inertia about an axis
 NO_INERTIA = 1e-12
-KNOWN_RATIO = 1e9  #: ratio of squared frequencies, up to which rounding of the modal mass stays far below all limits
+KNOWN_RATIO = 1e9  #: ratio of squared frequencies up to which rounding of the modal mass is far below all limits
 
 
 @dataclass(frozen=True, eq=False)
 class FreePencil:
     """M x'' + D x' + K x = f for x = (translation of B, rotation of B, q), small motion, components in B.
 
-    Of a held body x = q alone: its frame does not move.
+    For a body fixed to the ground, x = q: its frame does not move.
     """
 
-    M: Array  #: (n_r + n_q, n_r + n_q), n_r = 6, of a held body 0
-    K: Array  #: (n_r + n_q, n_r + n_q)
-    D: Array  #: (n_r + n_q, n_r + n_q)
+    M: Array  #: mass, (n_r + n_q, n_r + n_q); n_r = 6, or 0 for a body fixed to the ground
+    K: Array  #: stiffness, (n_r + n_q, n_r + n_q)
+    D: Array  #: damping, (n_r + n_q, n_r + n_q)
 
     def __post_init__(self) -> None:
         for name in ("M", "K", "D"):
@@ -36,12 +36,12 @@ class FreePencil:
 
 
 def free_pencil(reduced: ReducedBody) -> FreePencil:
-    """Return the pencil of a free body; for a held body that of its modes alone."""
+    """Return the matrices of a free body, or over the modes alone for a body fixed to the ground."""
     return FreePencil(reduced.M, reduced.K, reduced.D) if reduced.is_held else whole_pencil(reduced)
 
 
 def whole_pencil(reduced: ReducedBody) -> FreePencil:
-    """Return the pencil of docs/theory.md §6 at rest.
+    """Return the matrices of docs/theory.md §6 at rest.
 
     M = [m 1, -S~, 1C; S~, J(0), 2C; 1Cᵀ, 2Cᵀ, M*], K = diag(0, K*), D = diag(0, D*).
     """
@@ -60,7 +60,7 @@ def whole_pencil(reduced: ReducedBody) -> FreePencil:
 
 
 def free_elastic_modes(reduced: ReducedBody) -> tuple[Array, Array, np.ndarray]:
-    """Elastic modes of the free reduced body, ascending, then its massless shapes.
+    """Return the elastic modes of the free reduced body, ascending, then its massless shapes.
 
     Rigid motion is condensed by M_rr x_r + M_rq q = 0.
 
@@ -90,7 +90,7 @@ def free_elastic_modes(reduced: ReducedBody) -> tuple[Array, Array, np.ndarray]:
 
 
 def frequency_distance(own: Array, stored: Array) -> Array:
-    """Return relative differences of frequencies from stored ones, if known; both ascending.
+    """Return the relative differences between frequencies and stored ones, if known; both ascending.
 
     The mass of a mode is omega_1² / omega² of its energy in units of the first mode, and rounding leaves it an error of
     eps: a frequency is known to eps omega² / omega_1². Light frames with point masses have modes of 1e6 times the first
@@ -111,28 +111,28 @@ def frequency_distance(own: Array, stored: Array) -> Array:
 
 
 def has_inertia(reduced: ReducedBody) -> bool:
-    """Whether the rigid body has mass and a moment of inertia about every axis, by its scaled mass matrix."""
+    """Return whether the rigid body has mass and inertia about every axis, from its scaled mass matrix."""
     M_rr = whole_pencil(reduced).M[:6, :6]
     size = np.sqrt(np.maximum(np.diag(M_rr), 0.0))
     return bool((size > 0).all() and np.linalg.eigvalsh(M_rr / np.outer(size, size))[0] > NO_INERTIA)
 
 
 def stiffness_scale(reduced: ReducedBody) -> float:
-    """Smallest positive K_kk / M_kk of the modes [1/s²]; 1 if there is none."""
+    """Return the smallest positive K_kk / M_kk of the modes [1/s²]; 1 if there is none."""
     mass, stiffness = np.diag(reduced.M), np.diag(reduced.K)
     has_both = (mass > 0) & (stiffness > 0)
     return float((stiffness[has_both] / mass[has_both]).min()) if has_both.any() else 1.0
 
 
 def port_rows(reduced: ReducedBody, name: str) -> Array:
-    """Motion of an interface's reference point with x, components in B, (6, n_r + n_q)."""
+    """Return the motion of the reference point of an interface due to x, in axes of B, (6, n_r + n_q)."""
     if reduced.is_held:
         return np.asarray(reduced.interface(name).Psi)
     return whole_port_rows(reduced, name)
 
 
 def whole_port_rows(reduced: ReducedBody, name: str) -> Array:
-    """Motion of an interface's reference point with rigid motion and modes, components in B, (6, 6 + n_q)."""
+    """Return the motion of the reference point due to rigid motion and modes, in axes of B, (6, 6 + n_q)."""
     interface = reduced.interface(name)
     rows = np.zeros((6, 6 + reduced.n_q))
     rows[:3, :6] = rigid_motion_of_points(interface.position[None], np.zeros(3))[0]

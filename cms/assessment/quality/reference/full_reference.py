@@ -1,4 +1,4 @@
-"""The full model as the reference of the quality checks; results are shared by all mode sets of the body."""
+"""Full model as the reference of quality checks; all mode sets of the body share its results."""
 
 from contextlib import ExitStack
 from functools import cached_property
@@ -18,8 +18,8 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["FullReference", "usable_band"]
 
-CUTOFF_MARGIN = 1.5  #: highest kept vibration frequency over the highest frequency of interest, by custom
-MODES_BEYOND = 1.5  #: full modes are found up to this multiple of the band
+CUTOFF_MARGIN = 1.5  #: customary ratio of the highest retained frequency to the highest frequency of interest
+MODES_BEYOND = 1.5  #: upper frequency of the full modes over that of the band
 
 
 class FullReference:
@@ -58,18 +58,18 @@ class FullReference:
         self.close()
 
     def close(self) -> None:
-        """Free the factorisation if it was made here."""
+        """Free the factorisation if this object created it."""
         self._stack.close()
 
     @cached_property
     def modes(self) -> EigenResult:
-        """Elastic free modes up to somewhat beyond the band, at least one."""
+        """Elastic free modes up to 1.5 times the band, at least one."""
         found = self.families.free_modes(ModeCount(cutoff=MODES_BEYOND * self.band * self.body.units.time))
         return found if len(found.omega2) else self.families.free_modes(n_modes=1)
 
     @property
     def frequencies(self) -> Array:
-        """Their frequencies, ascending [Hz]."""
+        """Elastic free frequencies, ascending [Hz]."""
         return self.modes.frequencies / self.body.units.time
 
     @property
@@ -79,19 +79,19 @@ class FullReference:
 
     @cached_property
     def ports(self) -> Ports:
-        """The reference points of all interfaces."""
+        """Reference points of all interfaces."""
         return Ports.of_body(self.body)
 
     @cached_property
     def response(self) -> ReferenceResponse:
-        """Modes of the full model for the response at the interfaces up to the band."""
+        """Modes of the full model for the interface response up to the band."""
         return reference_response(self.families, self.ports, self.band * self.body.units.time)
 
 
 def usable_band(modes: ModeSet, reduced: ReducedBody) -> float:
-    """Highest frequency a mode set may be trusted to by custom [Hz]: its highest vibration mode over 1.5.
+    """Return the highest frequency for which a mode set is customarily used [Hz]: highest vibration mode over 1.5.
 
-    A set without vibration modes, or with one only, is asked for its first free-free frequency.
+    For a set with at most one vibration mode, it is the first free-free frequency.
     """
     time = reduced.units.time
     first = reduced.free_frequencies[0] / time if len(reduced.free_frequencies) else 0.0

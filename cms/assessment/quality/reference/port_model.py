@@ -1,4 +1,4 @@
-"""A body as the motion of its modes at ports, and its frequency response."""
+"""Modes of a body at its ports, and its frequency response."""
 
 from dataclasses import dataclass
 
@@ -14,18 +14,18 @@ __all__ = [
     "FrequencyResponse", "PortModel", "file_resonances", "file_response", "modal_response", "port_model", "resonances",
 ]  # fmt: skip
 
-CHUNK = 2**22  #: complex entries of the systems solved at once
+CHUNK = 2**22  #: number of complex entries of the equation systems that are solved together
 
 
 @dataclass(frozen=True, eq=False)
 class PortModel:
     """Rigid and elastic free modes of a body at its ports, mesh axes."""
 
-    names: tuple[str, ...]  #: of the ports
-    omega2: Array  #: squared elastic frequencies, stiffness of massless shapes, (n,) [1/time²]
-    is_massive: np.ndarray  #: (n,) bool
-    modes: Array  #: motion of the ports with the modes, (6 n_ports, n)
-    rigid: Array  #: and with the M-orthonormal rigid-body motions, (6 n_ports, n_r)
+    names: tuple[str, ...]  #: names of the ports
+    omega2: Array  #: squared elastic frequencies, or stiffness of massless shapes, (n,) [1/time²]
+    is_massive: np.ndarray  #: whether each mode has mass, (n,) bool
+    modes: Array  #: motion of the ports in the modes, (6 n_ports, n)
+    rigid: Array  #: motion of the ports in the M-orthonormal rigid-body motions, (6 n_ports, n_r)
 
     def __post_init__(self) -> None:
         for name in ("omega2", "modes", "rigid"):
@@ -34,14 +34,14 @@ class PortModel:
 
 @dataclass(frozen=True, eq=False)
 class FrequencyResponse:
-    """Receptance between ports: H = displacement / force, rotation / moment; units and axes of the body's mesh."""
+    """Receptance between ports: displacement / force, rotation / moment, in units and axes of the mesh of the body."""
 
-    frequencies: Array  #: (n_f,) [Hz]
-    H: np.ndarray  #: complex, (n_f, n_outputs, n_inputs) [m/N, 1/N, 1/(N m)]
-    outputs: tuple[str, ...]  #: such as "small_end ux"
-    inputs: tuple[str, ...]  #: such as "big_end ux"
-    damping: str  #: in words
-    time: float = 1.0  #: [s] of the body's time unit
+    frequencies: Array  #: frequencies, (n_f,) [Hz]
+    H: np.ndarray  #: complex receptance, (n_f, n_outputs, n_inputs) [m/N, 1/N, 1/(N m)]
+    outputs: tuple[str, ...]  #: names of the motions, such as "small_end ux"
+    inputs: tuple[str, ...]  #: names of the forces, such as "big_end ux"
+    damping: str  #: description of the damping
+    time: float = 1.0  #: time unit of the body [s]
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "frequencies", frozen(self.frequencies))
@@ -63,7 +63,7 @@ class FrequencyResponse:
         return 1j * self.omega[:, None, None] * self.H
 
     def between(self, excited: str, answering: str) -> "FrequencyResponse":
-        """Return the 6 x 6 part from the forces on one interface to the motion of another."""
+        """Return the 6 x 6 block from forces on one interface to motions of another."""
         rows = [k for k, label in enumerate(self.outputs) if label.rsplit(" ", 1)[0] == answering]
         columns = [k for k, label in enumerate(self.inputs) if label.rsplit(" ", 1)[0] == excited]
         for name, found, labels in ((answering, rows, self.outputs), (excited, columns, self.inputs)):
@@ -81,7 +81,7 @@ class FrequencyResponse:
 
 
 def port_model(reduced: ReducedBody) -> PortModel:
-    """Return the free modes of a reduced body at its interfaces, from its file alone."""
+    """Return the free modes of a reduced body at its interfaces, from its modal file alone."""
     omega2, X, is_massive = free_elastic_modes(reduced)
     rows = mesh_port_rows(reduced)
     N = np.zeros((0, 0))
@@ -92,7 +92,7 @@ def port_model(reduced: ReducedBody) -> PortModel:
 
 
 def mesh_port_rows(reduced: ReducedBody) -> Array:
-    """Motion of all reference points with x, components in mesh axes, (6 n_ports, n_r + n_q)."""
+    """Return the motions of all reference points due to x, in mesh axes, (6 n_ports, n_r + n_q)."""
     if not reduced.interfaces:
         raise QualityError(f"body {reduced.name!r}: has no interface; forces and motions need a place")
     turn = np.kron(np.eye(2), reduced.frame.axes)
@@ -132,16 +132,16 @@ def modal_response(
 
 
 def resonances(model: PortModel, *, damping: float, time: float = 1.0) -> tuple[Array, Array]:
-    """Return frequencies and ratios of the elastic modes with mass, (n_massive,) [Hz] and [-]; parameters as there."""
+    """Return frequencies and damping ratios of the elastic modes with mass, (n_massive,) [Hz] and [-]."""
     omega2 = model.omega2[model.is_massive]
     frequencies = np.sqrt(np.maximum(omega2, 0.0)) / (2 * np.pi) / time
     return frequencies, np.full(len(frequencies), damping)
 
 
 def file_resonances(reduced: ReducedBody, *, damping: float | None = None) -> tuple[Array, Array]:
-    """Return frequencies and damping ratios of the modes without joints, (n_massive,) [Hz] and [-].
+    """Return frequencies and damping ratios of the free body without joints, (n_massive,) [Hz] and [-].
 
-    With the D of the file the ratio is that of its diagonal in these modes, xᵀ D x / 2 omega: light damping.
+    With D of the file, each ratio follows from its diagonal in these modes, xᵀ D x / 2 omega (light damping).
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def file_resonances(reduced: ReducedBody, *, damping: float | None = None) -> tu
 
 
 def file_response(reduced: ReducedBody, frequencies: Array, *, damping: float | None = None) -> FrequencyResponse:
-    """Response of the free reduced body between all its interfaces, from the file alone.
+    """Return the response of the free reduced body between all its interfaces, from its modal file alone.
 
     Parameters
     ----------
@@ -187,13 +187,13 @@ def file_response(reduced: ReducedBody, frequencies: Array, *, damping: float | 
 
 
 def require_damping(damping: float) -> None:
-    """Refuse a damping ratio that is negative or no number."""
+    """Raise an error for a damping ratio that is negative or not finite."""
     if not 0 <= damping < np.inf:
         raise QualityError(f"frequency response: damping = {damping}; expected a ratio of 0 or more (0.01 is 1 %)")
 
 
 def require_frequencies(frequencies: Array) -> None:
-    """Refuse frequencies that are not above 0: a free body has no response there."""
+    """Raise an error for nonpositive frequencies: the response of a free body is infinite at 0."""
     values = np.asarray(frequencies)
     if values.ndim != 1 or not len(values) or not (np.isfinite(values) & (values > 0)).all():
         raise QualityError("frequency response: expected frequencies above 0 [Hz]; a free body has none at 0")

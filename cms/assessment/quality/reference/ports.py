@@ -1,4 +1,4 @@
-"""Ports: the reference points of the interfaces, through which forces go in and motions come out."""
+"""Ports: the reference points of the interfaces, where forces act and motions are observed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,19 +14,19 @@ from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
 
 __all__ = ["Ports"]
 
-COLLINEAR = 1e-6  #: spread of nodes across their line over that along it, below which they carry no rotation
+COLLINEAR = 1e-6  #: spread of nodes across their line over that along it, below which they define no rotation
 
 
 @dataclass(frozen=True, eq=False)
 class Ports:
-    """Six motions per interface in mesh axes: u_port = A u; forces and moments on them act as Aᵀ f."""
+    """Six motions per interface in mesh axes, u_port = A u; forces and moments at the ports act as Aᵀ f."""
 
-    names: tuple[str, ...]  #: interfaces
-    A: sp.csr_array  #: (6 n_ports, n_dof)
+    names: tuple[str, ...]  #: names of the interfaces
+    A: sp.csr_array  #: motions of the ports over the dofs, (6 n_ports, n_dof)
 
     @classmethod
     def of_body(cls, body: FEBody, names: Sequence[str] | None = None) -> "Ports":
-        """Return the ports of these interfaces of a coupled body, all by default.
+        """Return the ports of the named interfaces of a coupled body, by default of all.
 
         Raises
         ------
@@ -42,7 +42,7 @@ class Ports:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """One per motion: 'big_end ux' to 'small_end rz'."""
+        """Label of each motion: 'big_end ux' to 'small_end rz'."""
         return tuple(f"{name} {component}" for name in self.names for component in MOTION_COMPONENTS)
 
     def loads(self) -> Array:
@@ -50,15 +50,15 @@ class Ports:
         return self.A.T.toarray()
 
     def row(self, name: str) -> slice:
-        """Rows of the port of that name."""
+        """Return the rows of the port with this name."""
         k = self.names.index(name)
         return slice(6 * k, 6 * k + 6)
 
 
 def port_matrix(body: FEBody, interface: Interface) -> sp.csr_array:
-    """Motion of the reference point with u, (6, n_dof): of its node, of a node that moves it, or the mean motion.
+    """Return the motion of a reference point, (6, n_dof): of its node, of a node that moves it, or the mean motion.
 
-    Nodes on one line have a mean translation only; their rotation rows are zero.
+    Collinear nodes have only a mean translation; their rotation rows are zero.
     """
     dofs = np.asarray(interface.dofs)
     if len(dofs) == 6 and len(np.unique(body.dofs[dofs, 0])) == 1:

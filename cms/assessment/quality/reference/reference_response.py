@@ -1,4 +1,4 @@
-"""The full model's response at its ports: a rich basis whose error is measured by its residual.
+"""Response of the full model at its ports, in a rich basis whose error the residual measures.
 
 (1) free modes up to twice the band
 (2) the static response to the port loads (exact at frequency 0) and its first inertia correction G M G f
@@ -23,24 +23,24 @@ from fe_models.foundation.sparse.sparse_product import SymmetricProduct
 
 __all__ = ["RESPONSE_TOLERANCE", "ReferenceResponse", "reference_response"]
 
-MODES_BEYOND = 2.0  #: free modes are found up to this multiple of the band
-RESPONSE_TOLERANCE = 1e-5  #: error of the reference at the top of the band, over its response
+MODES_BEYOND = 2.0  #: upper frequency of the free modes over that of the band
+RESPONSE_TOLERANCE = 1e-5  #: largest relative error of the reference response at the top of the band
 UNSEEN_GAIN = 4 / 3  #: largest lambda / (lambda - omega²) of modes above twice the band
 MOST_ROUNDS = 5
 
 
 @dataclass(frozen=True, eq=False)
 class ReferenceResponse:
-    """The full model at its ports, and the accuracy of its response."""
+    """Response of the full model at its ports, and its accuracy."""
 
     model: PortModel
     basis: FreeBasis
-    error: float  #: estimated error of the response at `checked_at`, over its size
-    checked_at: float  #: [cycles per time unit]
+    error: float  #: estimated relative error of the response at `checked_at`
+    checked_at: float  #: frequency at which the error is estimated [cycles per time unit]
 
 
 def reference_response(families: Families, ports: Ports, band: float) -> ReferenceResponse:
-    """Find the response of the full model up to a band: steps (1) to (5) of this module.
+    """Compute the response of the full model up to a band: steps (1) to (5) of this module.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def reference_response(families: Families, ports: Ports, band: float) -> Referen
 
 
 def between_modes(basis: FreeBasis, omega2: float) -> float:
-    """Return omega² in the middle of the gap between two modes that omega² lies in."""
+    """Return the middle of the gap between the two modes adjacent to omega², as a squared frequency."""
     levels = np.concatenate([[0.0], basis.omega2[basis.is_massive]])
     above = int(np.searchsorted(levels, omega2))
     return float(omega2 if above >= len(levels) else (levels[above - 1] + levels[above]) / 2)

@@ -26,16 +26,16 @@ from fe_models.foundation.arrays import Array, frozen
 __all__ = ["LoadHistory", "Snapshots", "interface_forces", "support_acceleration", "transient", "transient_in"]
 
 
-NO_LOAD = 1e-10  #: part of a load that is not in balance with rigid acceleration, below which it is rounding
+NO_LOAD = 1e-10  #: unbalanced part of a load over the load, below which it is rounding
 
 
 @dataclass(frozen=True, eq=False)
 class LoadHistory:
-    """Loads f(t) = F p(t), p linear between the times."""
+    """Loads f(t) = F p(t); p is piecewise linear between the times."""
 
     F: Array  #: load columns over the dofs, (n_dof, n_loads) [N]
-    t: Array  #: ascending, evenly spaced, (n_t,) [time unit of the body]
-    p: Array  #: amplitudes, (n_loads, n_t)
+    t: Array  #: ascending, evenly spaced times, (n_t,) [time unit of the body]
+    p: Array  #: load amplitudes, (n_loads, n_t)
 
     def __post_init__(self) -> None:
         for name in ("F", "t", "p"):
@@ -50,7 +50,7 @@ class LoadHistory:
             )
 
     def __add__(self, other: "LoadHistory") -> "LoadHistory":
-        """Return both loads together; their times must agree."""
+        """Return the sum of both load histories; their times must agree."""
         if not np.array_equal(self.t, other.t):
             raise QualityError("load history: the loads that are added have different times")
         return LoadHistory(np.hstack([self.F, other.F]), self.t, np.vstack([self.p, other.p]))
@@ -60,9 +60,9 @@ class LoadHistory:
 class Snapshots:
     """Displacements u(t) = columns @ amplitudes over the dofs of the full model."""
 
-    columns: Array  #: (n_dof, k)
-    amplitudes: Array  #: (k, n_t)
-    t: Array  #: (n_t,) [time unit of the body]
+    columns: Array  #: displacement columns, (n_dof, k)
+    amplitudes: Array  #: amplitudes of the columns, (k, n_t)
+    t: Array  #: times, (n_t,) [time unit of the body]
 
     def __post_init__(self) -> None:
         for name in ("columns", "amplitudes", "t"):
@@ -75,23 +75,23 @@ class Snapshots:
 
     @classmethod
     def of_displacements(cls, u: Array, t: Array) -> "Snapshots":
-        """Return snapshots of displacements given one column per time, (n_dof, n_t)."""
+        """Return snapshots of displacements that are given as one column for each time, (n_dof, n_t)."""
         return cls(u, np.eye(u.shape[1]), t)
 
     @property
     def u(self) -> Array:
-        """All displacements, (n_dof, n_t)."""
+        """Displacements at all times, (n_dof, n_t)."""
         return self.columns @ self.amplitudes
 
 
 def interface_forces(body: FEBody, histories: Mapping[str, Array], t: Array) -> LoadHistory:
-    """Return forces and moments on interfaces, mesh axes: name -> (6, n_t) [N, N m]."""
+    """Return the load history of forces and moments on interfaces, mesh axes: name -> (6, n_t) [N, N m]."""
     ports = Ports.of_body(body, tuple(histories))
     return LoadHistory(ports.loads(), t, np.vstack([np.asarray(history) for history in histories.values()]))
 
 
 def support_acceleration(body: FEBody, acceleration: Array, t: Array, *, origin: Array | None = None) -> LoadHistory:
-    """Return the inertia load -M Psi_R a(t) of a body whose frame accelerates: motion relative to it, first order.
+    """Return the inertia load -M Psi_R a(t) in an accelerating frame, for the motion relative to this frame.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def transient_in(basis: FreeBasis, load: LoadHistory, *, damping: float = 0.0, i
 
 
 def transient_basis(families: Families, F: Array, cutoff: float, held: Sequence[str]) -> FreeBasis:
-    """Return modes and static corrections of the body as held: steps (1) and (2); cut-off in body units."""
+    """Return modes and static corrections under the given support: steps (1) and (2); cut-off in body units."""
     body = families.body
     flexibility: Flexibility
     if held:
@@ -192,9 +192,9 @@ def transient_basis(families: Families, F: Array, cutoff: float, held: Sequence[
 
 
 def modal_motion(basis: FreeBasis, p: Array, h: float, damping: float, *, is_preloaded: bool = False) -> Array:
-    """Modal coordinates under modal forces p linear over steps h, (n, n_t): step (3).
+    """Step (3): integrate modal coordinates under modal forces p that are linear over steps h, (n, n_t).
 
-    Massless shapes follow statically.
+    Massless shapes respond statically.
     """
     q = p / basis.omega2[:, None]
     moving = np.flatnonzero(basis.is_massive)
@@ -205,7 +205,7 @@ def modal_motion(basis: FreeBasis, p: Array, h: float, damping: float, *, is_pre
     )
     if steps is None:
         return q
-    P = q[moving].copy()  # static answers p / omega²
+    P = q[moving].copy()  # static response p / omega²
     dP = np.diff(P, axis=1)
     now, rate = (P[:, 0].copy() if is_preloaded else np.zeros(len(moving))), np.zeros(len(moving))
     q[moving, 0] = now
@@ -217,7 +217,7 @@ def modal_motion(basis: FreeBasis, p: Array, h: float, damping: float, *, is_pre
 
 
 def oscillator_step(omega: float, damping: float, h: float) -> Array:
-    """Map (q, q'/omega, P, dP) to (q, q'/omega) one step later, (2, 4); P = p / omega² grows by dP over the step."""
+    """Return the (2, 4) map from (q, q'/omega, P, dP) to (q, q'/omega) after a step; P = p / omega² grows by dP."""
     A = np.zeros((4, 4))
     A[0, 1] = omega
     A[1, :3] = -omega, -2 * damping * omega, omega
