@@ -91,7 +91,7 @@ def test_a_tape_of_another_expression_has_another_value():
 
 @pytest.mark.parametrize("family", [name for name in FAMILIES if name not in ("kills", "motions")])
 def test_the_first_cases_of_every_family_pass(tmp_path, family):
-    for seed in range(3, 7):
+    for seed in (3, 4):
         (tmp_path / str(seed)).mkdir()
         verdict = case_of(family)(seed, tmp_path / str(seed))
         assert verdict.kind in (REFUSED, ACCEPTED), verdict.words

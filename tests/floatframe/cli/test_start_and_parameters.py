@@ -132,7 +132,7 @@ def test_a_sweep_begins_each_run_in_its_equilibrium(folder):
         '[outputs.low]\nof = "up.distance value"\ntake = "least"\n'
         '[outputs.high]\nof = "up.distance value"\ntake = "greatest"\n'
     )
-    run("sweep", folder / "sweep.toml", "-o", folder / "sweep.csv")
+    run("sweep", folder / "sweep.toml", "-j", "1", "-o", folder / "sweep.csv")
     rows = np.loadtxt(folder / "sweep.csv", delimiter=",", skiprows=1, usecols=(0, 1, 2))
     for column in (1, 2):
         assert_allclose(rows[:, column], -2.0 * 9.81 / rows[:, 0], rtol=0, atol=1e-9)

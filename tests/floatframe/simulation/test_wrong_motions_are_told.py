@@ -1,6 +1,7 @@
 """Motions that runs once got wrong in silence: each is right to 5 % of its exact value, or says that it is not."""
 
 import logging
+from itertools import product
 
 import numpy as np
 import pytest
@@ -253,7 +254,24 @@ CASES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", CASES)
+def odd(words, *values):
+    """Yield the names of combinations with an odd sum of indices; in the other half all pairs of values meet."""
+    for indices in product(*(range(len(each)) for each in values)):
+        if sum(indices) % 2:
+            yield words.format(*(each[k] for each, k in zip(values, indices, strict=True)))
+
+
+FORMS = ("absolute", "relative")
+LONG = {
+    *odd("stiff slide, {}, rho {}, h {}, {}", FORMS, (0.8, 0.5), (1e-3, 5e-3), ("events", "jumps")),
+    *odd("falling rod, {} frame, damper {}, rho {}, h {}", ("mean", "held"), (0.0, 0.5),
+         ("0.8, absolute", "0.0, relative"), (1e-3, 1e-2)),
+    *odd("restarts every {} steps, rho {}, {}", (1, 10), (0.8, 1.0), FORMS),
+}  # fmt: skip
+assert LONG <= CASES.keys()
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.long) if n in LONG else n for n in CASES])
 def test_a_motion_that_is_wrong_says_so(name, caplog):
     with caplog.at_level(logging.WARNING):
         try:

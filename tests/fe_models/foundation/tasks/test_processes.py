@@ -22,7 +22,7 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("n", [2, 3])
+@pytest.mark.parametrize("n", [2, pytest.param(3, marks=pytest.mark.long)])
 def test_one_bad_value_never_loses_the_others(n):
     values, seen = [1, "killed", 2, *BAD, 3, "segfault", 4, 5], []
     with tasks_of(n) as tasks:
