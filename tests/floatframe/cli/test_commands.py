@@ -102,7 +102,9 @@ def test_info_shows_the_run(results):
     assert record["drift"]["pin"]["distance"] < 1e-9
 
 
-@pytest.mark.parametrize(("suffix", "magic"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
+@pytest.mark.parametrize(
+    ("suffix", "magic"), [("png", b"\x89PNG"), ("svg", b"<?xml"), pytest.param("pdf", b"%PDF", marks=pytest.mark.long)]
+)
 def test_plot_draws_a_picture(results, tmp_path, suffix, magic):
     result = run("plot", results, "-o", tmp_path / f"swing.{suffix}")
     assert result.exit_code == 0, result.output
@@ -236,8 +238,9 @@ def test_an_interrupted_run_can_be_read_and_leaves_the_old_results(folder, resul
     """`results` comes first, so that the kernels are compiled and the run gets to its steps at once."""
     (folder / "swing.h5").write_bytes(b"the old results")
     (folder / "swing.toml").write_text(RIGID.replace("t_end = 0.5", "t_end = 1e5"))
+    often = "import floatframe.simulation.integrate as i; i.SEGMENT_SECONDS = 0.5; "
     with subprocess.Popen(
-        [*PROGRAM, "run", "swing.toml", "--watch", "off"],
+        [*PROGRAM[:2], often + PROGRAM[2], "run", "swing.toml", "--watch", "off"],
         cwd=folder,
         env=ENVIRONMENT,
         preexec_fn=heed_signals,

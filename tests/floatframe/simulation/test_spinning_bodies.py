@@ -1,6 +1,7 @@
 """Bodies that turn by 0.1 to 3 rad in a step: right to 5 %, refused, or told."""
 
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
@@ -41,10 +42,15 @@ def skew(w):
     return np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
 
 
-@pytest.mark.parametrize("turn", [0.1, 0.3, 1.0, 3.0])
-@pytest.mark.parametrize("axis", [0, 1, 2])
-@pytest.mark.parametrize("arm", [0.0, ARM])
-@pytest.mark.parametrize(("method", "formulation"), METHODS)
+def spins():
+    """Yield all combinations; those with an odd sum of indices are long: in the other half all pairs of values meet."""
+    ways = [0.1, 0.3, 1.0, 3.0], [0, 1, 2], [0.0, ARM], METHODS
+    for i, j, k, n in product(*(range(len(each)) for each in ways)):
+        turn, axis, arm, of = (each[index] for each, index in zip(ways, (i, j, k, n), strict=True))
+        yield pytest.param(turn, axis, arm, *of, marks=pytest.mark.long if (i + j + k + n) % 2 else ())
+
+
+@pytest.mark.parametrize(("turn", "axis", "arm", "method", "formulation"), list(spins()))
 def test_an_asymmetric_body_that_spins_is_right_or_told(method, formulation, arm, axis, turn):
     """About each of its axes, free and as a heavy top; about the middle one it tumbles."""
     omega = turn / H * np.roll([1.0, TILT[0], TILT[1]], axis)

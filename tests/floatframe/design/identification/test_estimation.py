@@ -45,12 +45,12 @@ def noisy(truth, rng):
 
 @pytest.mark.parametrize("source", ["torques", "both"])
 def test_bias_and_deviation_over_many_noises_are_those_predicted(robot, truth, source):
-    """Means within 4 standard errors, scatter within what chi-squared allows; 200 noises of torques."""
+    """Means within 4 standard errors, scatter within what chi-squared allows."""
     form, samples, phi = robot
     base = base_parameters(form, source=source, by="samples")
     rng = np.random.default_rng(11)
     found, predicted = [], []
-    n = 200 if source == "torques" else 60
+    n = 60
     for _ in range(n):
         tau, wrench = noisy(truth, rng)
         made = estimate(form, Measured(samples, tau, wrench if source == "both" else None), base=base)

@@ -136,6 +136,7 @@ def test_a_scaled_link_is_the_one_of_other_density_and_modulus():
             assert_allclose(np.abs(scaled[name]), np.abs(expected), rtol=0, atol=1e-9 * size, err_msg=name)
 
 
+@pytest.mark.long  # the scaled link is tested above, the fit with a spring
 def test_a_flexible_link_is_identified_with_its_inertia():
     """Hub, payload, mass, stiffness and damping of the link from torque, tip and base, from 1 % beside."""
     t, n_p = np.arange(101) * 0.01, len(TRUTH)

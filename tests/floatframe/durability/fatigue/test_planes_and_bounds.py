@@ -49,8 +49,7 @@ def largest(name, matrices, q, frame, *, n_planes=180, k=0.3):
     return float(found.largest[0])
 
 
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("name", ["normal", "shear", "findley"])
+@pytest.mark.parametrize(("name", "seed"), [("normal", 0), ("shear", 1), ("findley", 2)])
 def test_tension_and_torsion_out_of_phase(name, seed):
     """sigma cos wt and tau sin wt in the plane of the surface, by brute force over planes, any axes."""
     R = rotation(seed)  # columns: e1, e2, m
@@ -151,7 +150,7 @@ def histories(seed, n_t=400, n_q=4):
     ][seed % 4]
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(k, marks=pytest.mark.long) for k in (2, 3))])
 @pytest.mark.parametrize("name", CRITERIA)
 def test_no_node_exceeds_its_bound(name, seed):
     """Each kind of history by every criterion."""
