@@ -18,7 +18,6 @@ from cms.modes.families.cost import (
     require_room_for_stiffness,
 )
 from cms.modes.families.families import Families, body_of
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.damping import Damping, modal_damping
 from cms.reduction.basis.finishing import FinishedBasis, finish
@@ -309,7 +308,7 @@ def reduced_nodal_sums(body: FEBody, Phi: Array, frame: BodyFrame) -> NodalSums 
 
 def reduced_load_case(body: FEBody, case: LoadCase, Phi: Array, frame: BodyFrame) -> ReducedLoadCase:
     """Return the modal forces of a load case, and its resultant wrench about the origin of B."""
-    wrench = geometric_rigid_modes(body, origin=frame.origin).T @ case.f
+    wrench = rigid_motion_of_dofs(body.nodes, body.dofs, frame.origin).T @ case.f
     R = frame.axes.T
     h = inner(Phi, case.f[:, None])[:, 0]
     return ReducedLoadCase(case.name, case.kind, force=R @ wrench[:3], torque=R @ wrench[3:], h=h)

@@ -6,27 +6,28 @@ Weight and d'Alembert loads of rigid motion are linear in position (theory.md §
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["MassLoads", "rigid_motion_of_dofs", "rigid_motion_of_points", "rotation_work"]
 
 
-def rigid_motion_of_points(points: Array, origin: Array) -> Array:
+def rigid_motion_of_points(points: Array, origin: ArrayLike) -> Array:
     """Return the translations of points under the six unit rigid-body motions about the origin, (n_points, 3, 6).
 
     u = d + theta × (c - origin), with columns d_x d_y d_z theta_x theta_y theta_z.
     """
     motion = np.zeros((len(points), 3, 6))
     motion[:, :, :3] = np.eye(3)
-    x, y, z = (np.asarray(points) - origin).T
+    x, y, z = (np.asarray(points) - np.asarray(origin)).T
     motion[:, 1, 3], motion[:, 2, 3] = -z, y
     motion[:, 0, 4], motion[:, 2, 4] = z, -x
     motion[:, 0, 5], motion[:, 1, 5] = -y, x
     return motion
 
 
-def rigid_motion_of_dofs(nodes: Array, dofs: IntArray, origin: Array) -> Array:
+def rigid_motion_of_dofs(nodes: Array, dofs: IntArray, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
     """Return the values of dofs under the six unit rigid-body motions about the origin, (n_dof, 6).
 
     The columns are d_x d_y d_z [-] and theta_x theta_y theta_z [m]. Rotational dofs take the rotation; multipliers are
@@ -38,6 +39,8 @@ def rigid_motion_of_dofs(nodes: Array, dofs: IntArray, origin: Array) -> Array:
         (n_nodes, 3) [m].
     dofs
         (node, component) of every dof, (n_dof, 2); component 0-2 translation, 3-5 rotation, negative: multiplier.
+    origin
+        Reference point of the rotations, (3,) [m]; default: the origin of the mesh.
     """
     motion = rigid_motion_of_points(nodes, origin)
     node, component = dofs.T

@@ -19,8 +19,8 @@ from cms.assessment.quality.reference.transient import Snapshots, transient
 from cms.errors import CompareError
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.modes.families.families import Families
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from fe_models.body.fe_body import FEBody
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.paths import replace_file
 from fe_models.foundation.ranks.spread_matrix import whole_matrix
@@ -188,7 +188,7 @@ def deformation(families: Families, u: Array) -> Array:
 
 def centered_directions(body: FEBody) -> Array:
     """Return the geometric rigid-body modes about the centre of mass, (n_dof, 6), mesh axes."""
-    moved = geometric_rigid_modes(body)
+    moved = rigid_motion_of_dofs(body.nodes, body.dofs)
     M_moved = body.M @ moved
     mass = moved[:, 0] @ M_moved[:, 0]
     if mass <= 0:
@@ -196,7 +196,7 @@ def centered_directions(body: FEBody) -> Array:
     # S = int c from the products of translations and rotations: d_x · theta_y gives S_z, d_y · theta_z S_x, …
     products = moved[:, :3].T @ M_moved[:, 3:]
     center = np.array([products[1, 2], products[2, 0], products[0, 1]]) / mass
-    return geometric_rigid_modes(body, origin=center)
+    return rigid_motion_of_dofs(body.nodes, body.dofs, center)
 
 
 def held_mass(families: Families, directions: Array) -> Array:

@@ -13,7 +13,6 @@ from cms.body.reduced_body import BodyFrame, ReducedBody
 from cms.errors import ForeignBodyError
 from cms.exchange.importers.inertia import Inertia, completed, moments_of_masses
 from cms.exchange.importers.superelement import RecoveryRows, Superelement, listed
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.damping import Damping
 from cms.reduction.basis.finishing import finish
@@ -113,7 +112,7 @@ def tables_of(element: Superelement, body: FEBody, Phi: Array, reduced: ReducedB
     if not element.tables:
         return tables
     frame = reduced.frame
-    Psi_B = geometric_rigid_modes(body, origin=frame.origin) @ np.kron(np.eye(2), frame.axes)
+    Psi_B = rigid_motion_of_dofs(body.nodes, body.dofs, frame.origin) @ np.kron(np.eye(2), frame.axes)
     motion = static_part(element, f"superelement {element.name!r}") @ np.hstack([Psi_B, Phi])
     none = LoadColumns((), np.zeros((0, 3)), np.zeros(0, dtype=bool))
     for name, rows in element.tables.items():
@@ -277,7 +276,7 @@ def require_rigid_recovery(body: FEBody, element: Superelement) -> None:
     center = body.nodes.mean(axis=0)
     length = body.length
     scale = np.array([1.0, 1, 1, 1 / length, 1 / length, 1 / length])
-    found = body.recovery.matrix @ (geometric_rigid_modes(body, origin=center) * scale)
+    found = body.recovery.matrix @ (rigid_motion_of_dofs(body.nodes, body.dofs, center) * scale)
     expected = rigid_motion_of_dofs(body.nodes, body.recovery.dofs, center) * scale
     rotations = body.recovery.dofs[:, 1] >= 3
     defect = np.abs(found - expected) * np.where(rotations, length, 1.0)[:, None]
@@ -294,7 +293,7 @@ def require_rigid_recovery(body: FEBody, element: Superelement) -> None:
 def known_moments(body: FEBody, Phi: Array, M: Array, frame: BodyFrame) -> Moments:
     """Return the moments that follow from a reduced mass matrix: m, S, R, 1C, 2C and M*, in the frame B."""
     axes = np.kron(np.eye(2), frame.axes)
-    Psi_R = geometric_rigid_modes(body, origin=frame.origin) @ axes
+    Psi_R = rigid_motion_of_dofs(body.nodes, body.dofs, frame.origin) @ axes
     M_Psi_R = body.M @ Psi_R
     rigid_mass = Psi_R.T @ M_Psi_R
     J, lower = rigid_mass[3:, 3:], rigid_mass[:3, 3:]  # lower: -S~

@@ -1,7 +1,4 @@
-"""Motions without strain energy: rigid-body modes (docs/theory.md §2), and motions of mechanisms.
-
-Rigid-body modes are computed in three ways that must give the same space.
-"""
+"""Motions without strain energy: rigid-body modes (docs/theory.md §2), and motions of mechanisms."""
 
 import numpy as np
 import scipy.linalg as la
@@ -10,69 +7,23 @@ from cms.errors import BodyError
 from fe_models.body.fe_body import FEBody
 from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.sparse.submatrix import principal_block
 from fe_models.foundation.tall.columns import combine, dots, of_this_process
 from fe_models.foundation.words import node_list
 
 __all__ = [
     "WITHIN_ROUNDING",
-    "determinate_dofs",
     "determinate_partition",
     "free_motions",
-    "geometric_rigid_modes",
     "independent_rigid_modes",
     "mechanism_words",
     "moving_nodes",
-    "null_space_rigid_modes",
     "rounding_of_energy",
-    "static_rigid_modes",
     "without_energy",
 ]
 
 HOLDS = 1e-4  #: pivot above which fixing a dof prevents a motion well enough for a factorisation
 #: tolerance for rigid-body modes restricted to some dofs, with rotations scaled by the body length
 RANK_TOLERANCE = 1e-8
-
-
-def geometric_rigid_modes(body: FEBody, *, origin: Array | None = None) -> Array:
-    """Return rigid-body modes from node positions: u = d + theta × c; rotations are theta, multipliers are 0.
-
-    Parameters
-    ----------
-    origin
-        Reference point of the rotations, (3,) [m]; default: origin of the mesh.
-
-    Returns
-    -------
-    Array
-        (n_dof, 6); columns d_x d_y d_z [-] and theta_x theta_y theta_z [m].
-    """
-    return rigid_motion_of_dofs(body.nodes, body.dofs, np.zeros(3) if origin is None else origin)
-
-
-def determinate_dofs(body: FEBody, candidates: IntArray) -> IntArray:
-    """Choose six candidate dofs that exactly prevent rigid-body motion (the set R of docs/theory.md §1).
-
-    The choice uses pivoted QR of the rigid-body modes restricted to the candidates, rotations scaled by the body
-    length.
-
-    Raises
-    ------
-    BodyError
-        If the candidates leave a rigid-body motion free.
-    """
-    Psi_R = geometric_rigid_modes(body, origin=body.nodes.mean(axis=0))[candidates]
-    Psi_R[:, 3:] /= body.length  # theta of one per body length, comparable to a unit translation
-    Psi_R[body.dofs[candidates, 1] >= 3] *= body.length  # a rotational dof counts as the translation at that length
-    _, R, pivots = la.qr(Psi_R.T, mode="economic", pivoting=True)
-    pivot_sizes = np.abs(np.diag(R))
-    rank = int((pivot_sizes > RANK_TOLERANCE * max(pivot_sizes.max(initial=0.0), 1.0)).sum())
-    if rank < 6:
-        raise BodyError(
-            f"body {body.name!r}: {len(candidates)} dofs hold only {rank} of the 6 rigid-body motions; "
-            "take an interface with six dofs, or more nodes that are not on one line"
-        )
-    return np.sort(candidates[pivots[:6]])
 
 
 def independent_rigid_modes(body: FEBody) -> tuple[Array, IntArray]:
@@ -92,7 +43,7 @@ def independent_rigid_modes(body: FEBody) -> tuple[Array, IntArray]:
     """
     if body.is_held:
         return np.zeros((body.n_dof, 0)), np.zeros(0, np.int64)
-    Psi_R = geometric_rigid_modes(body, origin=body.nodes.mean(axis=0))
+    Psi_R = rigid_motion_of_dofs(body.nodes, body.dofs, body.nodes.mean(axis=0))
     scaled = _in_lengths(body, Psi_R)
     scaled[:, 3:] /= body.length
     _, R, pivots = la.qr(scaled, mode="economic", pivoting=True)
@@ -144,29 +95,6 @@ def _in_lengths(body: FEBody, Psi_R: Array) -> Array:
     scaled = Psi_R.copy()
     scaled[body.dofs[:, 1] >= 3] *= body.length
     return scaled
-
-
-def static_rigid_modes(body: FEBody, r: IntArray) -> Array:
-    """Return rigid-body modes as static solutions for unit displacements of the determinate dofs r, (n_dof, 6).
-
-    The interior part is -K_ff⁻¹ K_fr, where f are all dofs except r. This uses only the stiffness matrix.
-    """
-    from cms.linear_algebra.solvers.factorization import factorize
-
-    f = np.setdiff1d(np.arange(body.n_dof), r)
-    columns = body.K[:, r].toarray()
-    Psi_R = np.zeros((body.n_dof, len(r)))
-    Psi_R[r, np.arange(len(r))] = 1.0
-    with factorize(principal_block(body.K, f), definite=not (body.dofs[:, 1] < 0).any()) as factorization:
-        Psi_R[f] = -factorization.solve(columns[f])
-    return Psi_R
-
-
-def null_space_rigid_modes(body: FEBody) -> Array:
-    """Return rigid-body modes as zero-frequency vibration modes of the free body, (n_dof, 6), M-orthonormal."""
-    from cms.linear_algebra.solvers.eigen import eigenmodes
-
-    return eigenmodes(body.K, body.M, n_modes=6).Phi
 
 
 # motions without strain energy: which they are, how many, and where they are largest ---------------------------------

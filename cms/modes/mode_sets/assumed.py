@@ -6,11 +6,11 @@ import numpy as np
 
 from cms.errors import ModeSetError
 from cms.modes.families.families import Families, body_of
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets.axis_functions import AXIS_FUNCTIONS, AxisFunctions, axis_functions
 from cms.modes.mode_sets.mesh_field import coupled_field
 from fe_models.body.fe_body import FEBody
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
 from fe_models.foundation.words import nearest, quoted
 
@@ -82,7 +82,7 @@ def assumed_modes(
     if poisson is not None and not -1 < poisson <= 0.5:
         raise ModeSetError(f"assumed_modes: poisson = {poisson}; expected a number between -1 and 0.5")
     counts = _counts(n_modes, n_axial, n_bending, n_torsion)
-    Psi_R = geometric_rigid_modes(body)
+    Psi_R = rigid_motion_of_dofs(body.nodes, body.dofs)
     p, t, e_1, e_2 = section_axes(body, Psi_R, axis, point)
     mesh_dofs = body.dofs if body.recovery is None else body.recovery.dofs
     node, component = mesh_dofs.T

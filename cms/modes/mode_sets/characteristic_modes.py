@@ -9,9 +9,9 @@ import scipy.sparse as sp
 from cms.errors import ModeSetError
 from cms.linear_algebra.independent import gram_in_blocks
 from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.modes.mode_set import ModeSet
 from fe_models.body.fe_body import FEBody, Interface
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.sparse.sparse_product import SymmetricProduct
 from fe_models.foundation.tall.columns import combine, in_memory, of_this_process
@@ -62,7 +62,7 @@ def with_characteristic_modes(
     .. [1] The reduction is a projection within the span of the constraint modes: docs/theory.md.
     """
     wanted = mode_count(n_modes)
-    Psi_R = geometric_rigid_modes(body, origin=body.nodes.mean(axis=0))
+    Psi_R = rigid_motion_of_dofs(body.nodes, body.dofs, body.nodes.mean(axis=0))
     parts = [
         _Part(
             (interface.name,),

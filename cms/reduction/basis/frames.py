@@ -14,9 +14,9 @@ import scipy.sparse as sp
 from cms.body.reduced_body import BodyFrame
 from cms.errors import BodyError
 from cms.linear_algebra.lu_factors import solve_factored
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.node_motion import node_weights, weighted_rigid_modes
 from fe_models.body.fe_body import FEBody
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, IntArray
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.records import checked_fields
@@ -143,14 +143,14 @@ def frame_condition(body: FEBody, frame: Frame | HeldFrame) -> FrameCondition:
         none = np.zeros((body.n_dof, 0))
         at = placed("held", frame, np.zeros(3))
         return FrameCondition(at, lambda columns: np.zeros((0, columns.shape[1])), none, none, none, np.zeros(3))
-    Psi_0 = geometric_rigid_modes(body)
+    Psi_0 = rigid_motion_of_dofs(body.nodes, body.dofs)
     rigid_mass = Psi_0.T @ (body.M @ Psi_0)
     mass = rigid_mass[0, 0]
     if not mass > 0:
         raise BodyError(f"body {body.name!r}: its mass is {mass:g}; expected a positive mass")
     # first moment from the coupling of translation and rotation: ∫ u·(theta × c) = theta·(c × u)
     center = np.array([rigid_mass[1, 5], rigid_mass[2, 3], rigid_mass[0, 4]]) / mass
-    Psi_R = geometric_rigid_modes(body, origin=center)
+    Psi_R = rigid_motion_of_dofs(body.nodes, body.dofs, center)
     M_Psi_R = body.M @ Psi_R
     factor = cholesky_of_inertia(body.name, Psi_R.T @ M_Psi_R)
     if isinstance(frame, TisserandFrame):

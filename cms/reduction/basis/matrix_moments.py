@@ -9,8 +9,8 @@ are those of the same deformations: reducing in a frame and converting to it giv
 
 import numpy as np
 
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from fe_models.body.fe_body import FEBody
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.tall.columns import in_memory
 
@@ -42,7 +42,7 @@ def gram_from_matrices(body: FEBody, Phi: Array, origin: Array | None = None) ->
     """
     at = np.zeros(3) if origin is None else origin
     C = rigid_parts(body, in_memory(Phi), at)  # step (0)
-    Psi_R = geometric_rigid_modes(body, origin=at)
+    Psi_R = rigid_motion_of_dofs(body.nodes, body.dofs, at)
     Phi = in_memory(Phi) - Psi_R @ C
     n = Phi.shape[1]
     node, component = body.dofs.T
@@ -98,7 +98,7 @@ def rigid_parts(body: FEBody, Phi: Array, origin: Array) -> Array:
     They are zero if the mass matrix does not describe rigid motion, as for a body with fixed dofs.
     """
     middle = body.nodes.mean(axis=0)  # with a point far away, the rotations would lose digits
-    Psi_R = geometric_rigid_modes(body, origin=middle)
+    Psi_R = rigid_motion_of_dofs(body.nodes, body.dofs, middle)
     M_R = Psi_R.T @ (body.M @ Psi_R)
     m = np.trace(M_R[:3, :3]) / 3
     scale = np.repeat([1.0, np.sqrt(np.trace(M_R[3:, 3:]) / m) or 1.0], 3)

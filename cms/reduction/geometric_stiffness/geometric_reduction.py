@@ -14,13 +14,12 @@ import scipy.sparse as sp
 
 from cms.body.geometric_stiffness import GeometricStiffness, stiffness_of_loads
 from cms.modes.families.families import Families, body_of
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.frames import FrameCondition
 from cms.reduction.basis.node_motion import reference_motion, translation_rows
 from cms.reduction.geometric_stiffness.unit_states import UnitStates, turned_rigid_work, unit_states
 from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.fe_body import FEBody, Interface
-from fe_models.body.rigid_motion import MassLoads, rotation_work
+from fe_models.body.rigid_motion import MassLoads, rigid_motion_of_dofs, rotation_work
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.tall.columns import beside, rows_times
 
@@ -117,7 +116,7 @@ def stiffness_of_states(body: FEBody, Phi: Array, states: UnitStates) -> Geometr
     The matrices are computed over shapes and rotations about the axes of B; the mixed part becomes `RotatedLoads`.
     """
     frame = states.condition.frame
-    rotations = geometric_rigid_modes(body, origin=frame.origin)[:, 3:] @ frame.axes
+    rotations = rigid_motion_of_dofs(body.nodes, body.dofs, frame.origin)[:, 3:] @ frame.axes
     columns = beside(rotations, Phi)
     K = np.zeros((states.mass.k, columns.shape[1], columns.shape[1]))
     for first in range(0, len(states.loaded), LOADS_AT_ONCE):

@@ -18,11 +18,10 @@ from cms.body.reduced_body import BodyFrame
 from cms.errors import BodyError
 from cms.modes.families.families import Families, body_of, families_of
 from cms.modes.families.fixed_interface import held_factor
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.frames import Frame, FrameCondition, HeldFrame, TisserandFrame, frame_condition
 from cms.reduction.basis.node_motion import node_weights, reference_motion, weighted_rigid_modes
 from fe_models.body.fe_body import FEBody, Interface
-from fe_models.body.rigid_motion import MassLoads
+from fe_models.body.rigid_motion import MassLoads, rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.tall.columns import combine, of_this_process
 
@@ -115,7 +114,7 @@ def turned_rigid_work(body: FEBody, forces: Array, frame: BodyFrame) -> Array:
     by_node = np.zeros((len(body.nodes), 2, 3, forces.shape[1]))
     by_node[node[own], component[own] // 3, component[own] % 3] = forces[own]
     by_node[:, 1] /= 2
-    rotations = geometric_rigid_modes(body, origin=frame.origin)[own, 3:] @ frame.axes
+    rotations = rigid_motion_of_dofs(body.nodes, body.dofs, frame.origin)[own, 3:] @ frame.axes
     work = np.empty((forces.shape[1], 3, 3))
     for x, axis in enumerate(frame.axes.T):
         turned = np.cross(axis[:, None], by_node, axisa=0, axisb=2, axisc=2)

@@ -14,7 +14,6 @@ from cms.body.geometric_stiffness import SPIN_PAIRS
 from cms.body.recovery_table import N_RIGID
 from cms.body.reduced_body import BodyFrame, ReducedBody
 from cms.errors import RecoveryError
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.node_motion import reference_motion
 from cms.reduction.frame_conversion import rigid_mass, six_motions
 from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffness, unit_mass_loads
@@ -23,7 +22,7 @@ from cms.reduction.recovery.model_rows import node_rows
 from cms.reduction.recovery.places import Places
 from cms.reduction.recovery.request import RecoveryRequest
 from fe_models.body.fe_body import FEBody
-from fe_models.body.rigid_motion import MassLoads
+from fe_models.body.rigid_motion import MassLoads, rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = [
@@ -158,7 +157,7 @@ def loads_of_model(body: FEBody, frame: BodyFrame, request: RecoveryRequest) -> 
     columns, forces = _Columns(), []
     turn = np.kron(np.eye(2), frame.axes)
     columns.add(GRAVITY, (ACCELERATION,) * 3)
-    forces.append(np.asarray(body.M @ (geometric_rigid_modes(body)[:, :3] @ frame.axes)))
+    forces.append(np.asarray(body.M @ (rigid_motion_of_dofs(body.nodes, body.dofs)[:, :3] @ frame.axes)))
     if has_geometric_stiffness(body):
         assert body.element_model is not None
         mass = unit_mass_loads(frame)

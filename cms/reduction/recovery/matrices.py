@@ -18,7 +18,6 @@ from cms.body.recovery_table import N_RIGID, RecoveryTable, spin_accelerations
 from cms.body.reduced_body import ReducedBody
 from cms.errors import RecoveryError
 from cms.modes.families.families import Families, body_of, families_of
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.frames import FrameCondition
 from cms.reduction.recovery.blocks import Block, RowName
 from cms.reduction.recovery.interface_rows import PartOfTable, interface_part
@@ -27,6 +26,7 @@ from cms.reduction.recovery.load_columns import SPIN, LoadColumns, loads_of_body
 from cms.reduction.recovery.model_rows import model_block
 from cms.reduction.recovery.request import OF_INTERFACES, RecoveryRequest
 from fe_models.body.fe_body import FEBody
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array
 
 __all__ = ["recovery_matrices", "recovery_of_model"]
@@ -155,7 +155,7 @@ def recovery_of_model(
     frame = condition.frame
     Psi_B = np.zeros((body.n_dof, N_RIGID))
     if not body.is_held:
-        Psi_B = geometric_rigid_modes(body, origin=frame.origin) @ np.kron(np.eye(2), frame.axes)
+        Psi_B = rigid_motion_of_dofs(body.nodes, body.dofs, frame.origin) @ np.kron(np.eye(2), frame.axes)
     motion = np.hstack([Psi_B, Phi if over is None else Phi @ over])
     with families_of(source) as families:
         for request in wanted:

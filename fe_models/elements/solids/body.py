@@ -386,15 +386,6 @@ def provenance(
     return {key: value for key, value in record.items() if value}
 
 
-def _rule_words(integration: str, mass: str) -> dict[str, str]:
-    """Describe deviations from full integration and consistent mass; raise `BodyError` for unknown rules."""
-    for what, value, choices in (("integration", integration, INTEGRATIONS), ("mass", mass, MASSES)):
-        if value not in choices:
-            raise BodyError(f"solid_body: {what}: unknown {quoted(value)}{nearest(value, choices)}")
-    words = {"integration of the stiffness": integration} if integration != "full" else {}
-    return words | ({"mass of the cells": mass} if mass != "consistent" else {})
-
-
 def require_rows(where: str, u: Array, n_rows: int) -> None:
     """Raise `BodyError` unless u has that many rows and is two-dimensional."""
     if u.ndim != 2 or u.shape[0] != n_rows:

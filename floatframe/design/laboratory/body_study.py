@@ -14,13 +14,13 @@ import scipy.sparse as sp
 
 from cms.errors import CmsError
 from cms.modes.families.families import Families
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.damping import RayleighDamping
 from cms.reduction.basis.finishing import finish
 from cms.reduction.basis.frames import TisserandFrame, frame_condition
 from cms.reduction.reduction import reduce
 from fe_models.body.fe_body import FEBody
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.elements.shells.shell_points import ShellPoints
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ReportedError
@@ -130,7 +130,7 @@ def largest_difference(histories: Mapping[str, Array], full: Mapping[str, Array]
 
 def without_rigid(body: FEBody, u: Array) -> Array:
     """Return columns in mean axes, u - N Nᵀ M u with M-orthonormal rigid motions N, (n_dof, k)."""
-    Psi = geometric_rigid_modes(body)
+    Psi = rigid_motion_of_dofs(body.nodes, body.dofs)
     M_Psi = body.M @ Psi
     return np.asarray(u - Psi @ la.solve(Psi.T @ M_Psi, M_Psi.T @ u, assume_a="pos"))
 

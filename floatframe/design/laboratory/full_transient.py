@@ -26,11 +26,10 @@ from cms.body.geometric_stiffness import SPIN_PAIRS
 from cms.body.reduced_body import BodyFrame
 from cms.errors import FactorizationError
 from cms.linear_algebra.solvers.factorization import Factorization, factorize
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.damping import RayleighDamping
 from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffness, unit_mass_loads
 from fe_models.body.fe_body import MULTIPLIER, FEBody
-from fe_models.body.rigid_motion import MassLoads
+from fe_models.body.rigid_motion import MassLoads, rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
@@ -307,7 +306,9 @@ def load_columns(
         for key in ("acceleration", "omega", "alpha"):
             if np.shape(getattr(frame, key)) != (len(t), 3):
                 raise ModelError(f"{where}: frame: {key}: expected {(len(t), 3)}, got {np.shape(getattr(frame, key))}")
-        columns.append(-np.asarray(body.M @ geometric_rigid_modes(body, origin=np.asarray(frame.origin, float))))
+        columns.append(
+            -np.asarray(body.M @ rigid_motion_of_dofs(body.nodes, body.dofs, np.asarray(frame.origin, float)))
+        )
         amplitudes.append(np.hstack([frame.acceleration, frame.alpha]))
         columns.append(spin_columns(body, np.asarray(frame.origin, dtype=float)))
         omega = np.asarray(frame.omega, dtype=float)

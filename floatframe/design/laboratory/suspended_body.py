@@ -20,10 +20,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from cms.body.geometric_stiffness import SPIN_PAIRS
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.damping import RayleighDamping
 from fe_models.body.fe_body import FEBody
 from fe_models.body.load_cases import LoadCase
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.design.laboratory.full_transient import full_transient, spin_columns
 from floatframe.design.laboratory.substitution import with_body
@@ -230,7 +230,7 @@ def _loads(
     R = rotation_matrix(motion.p) @ frame.axes.T  # from mesh axes to the ground
     acceleration = np.einsum("tab,ta->tb", R, motion.v_dot)
     omega, alpha = motion.omega_B @ frame.axes.T, motion.omega_B_dot @ frame.axes.T
-    Psi = geometric_rigid_modes(body, origin=frame.origin)
+    Psi = rigid_motion_of_dofs(body.nodes, body.dofs, frame.origin)
     columns = [-np.asarray(body.M @ Psi), spin_columns(body, frame.origin)]
     pairs = [(1 if a == b else 2) * omega[:, a] * omega[:, b] for a, b in SPIN_PAIRS]
     amplitudes = [np.hstack([acceleration, alpha]), np.stack(pairs, axis=1)]

@@ -9,11 +9,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 import cms
 from cms import Address, BuckensFrame, NodalFrame, craig_bampton, reduce
 from cms.errors import BodyError
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.node_motion import kept_points
 from cms.reduction.frame_conversion import convert_frame, six_motions
 from fe_models.body.couplings.couplings import couple
 from fe_models.body.fe_body import Interface
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.elements.beams.attachments import PointMass
 from fe_models.elements.beams.beam_property import BeamProperty
 from fe_models.elements.beams.body import beam_body
@@ -91,8 +91,8 @@ def test_a_node_inside_a_solid_turns_as_a_distributing_interface_round_it():
 
 def test_a_rigid_motion_turns_every_kept_node_of_a_coupled_solid_by_itself():
     mesh, body = solid_bar(kind="tetra10", nx=4)
-    points = kept_points(replace(body, kept=np.arange(len(mesh.nodes))), geometric_rigid_modes(body), np.eye(3),
-                         np.arange(len(body.nodes)))  # fmt: skip
+    rigid = rigid_motion_of_dofs(body.nodes, body.dofs)
+    points = kept_points(replace(body, kept=np.arange(len(mesh.nodes))), rigid, np.eye(3), np.arange(len(body.nodes)))
     expected = np.hstack([np.zeros((3, 3)), np.eye(3)])
     assert_allclose(points.rotation, np.tile(expected, (len(mesh.nodes), 1, 1)), rtol=0, atol=1e-9)
 

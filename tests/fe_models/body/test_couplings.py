@@ -3,10 +3,9 @@ import pytest
 import scipy.sparse.linalg as spla
 from numpy.testing import assert_allclose, assert_array_equal
 
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from fe_models.body.couplings.couplings import couple, mean_motion
 from fe_models.body.fe_body import MULTIPLIER, Interface
-from fe_models.body.rigid_motion import rigid_motion_of_points
+from fe_models.body.rigid_motion import rigid_motion_of_dofs, rigid_motion_of_points
 from fe_models.errors import InterfaceError
 from tests.bodies import bar, box_mesh, with_interfaces
 
@@ -28,12 +27,12 @@ def end_faces(kinds, weights=None):
 def test_rigid_modes_of_a_coupled_body_are_its_uncoupled_ones(kinds):
     body = end_faces(kinds)
     coupled = couple(body)
-    Psi = geometric_rigid_modes(coupled)
-    assert_allclose(coupled.mesh_displacement(Psi), geometric_rigid_modes(body), rtol=0, atol=ROUNDOFF)
+    Psi = rigid_motion_of_dofs(coupled.nodes, coupled.dofs)
+    assert_allclose(coupled.mesh_displacement(Psi), rigid_motion_of_dofs(body.nodes, body.dofs), rtol=0, atol=ROUNDOFF)
     assert_allclose(coupled.K @ Psi, 0, rtol=0, atol=ROUNDOFF * abs(coupled.K).max())
     assert_allclose(
         Psi.T @ (coupled.M @ Psi),
-        geometric_rigid_modes(body).T @ (body.M @ geometric_rigid_modes(body)),
+        rigid_motion_of_dofs(body.nodes, body.dofs).T @ (body.M @ rigid_motion_of_dofs(body.nodes, body.dofs)),
         rtol=0,
         atol=ROUNDOFF * body.M.sum(),
     )

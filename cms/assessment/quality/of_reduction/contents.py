@@ -27,7 +27,7 @@ from cms.body.reduced_body import ReducedBody
 from cms.body.source_columns import SourceColumns
 from cms.errors import CmsError
 from cms.modes.families.families import Families
-from cms.modes.families.rigid_modes import geometric_rigid_modes, rounding_of_energy
+from cms.modes.families.rigid_modes import rounding_of_energy
 from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.damping import Damping, damping_of_words, modal_damping
 from cms.reduction.basis.finishing import SUSPECT_ENERGY, FinishedBasis
@@ -42,6 +42,7 @@ from cms.reduction.recovery.matrices import recovery_of_model
 from cms.reduction.recovery.request import OF_INTERFACES, OF_MOTION, RecoveryRequest
 from cms.reduction.reduction import assembled, kept_nodes, reduced_damping, reduced_moments
 from fe_models.body.fe_body import FEBody
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.errors import FeModelsError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.tall.columns import in_memory
@@ -307,7 +308,7 @@ def compare_moments(case: Case) -> Iterator[Compared]:
     """
     file, R = case.reduced.moments, case.combined
     frame = case.reduced.frame
-    L = geometric_rigid_modes(case.body, origin=frame.origin).T @ (case.body.M @ case.Phi)
+    L = rigid_motion_of_dofs(case.body.nodes, case.body.dofs, frame.origin).T @ (case.body.M @ case.Phi)
     size = np.sqrt(file.m)
     yield apart("moments.C1", file.C1, frame.axes.T @ L[:3], size, "by the mass matrix", "component mode")
     yield apart(

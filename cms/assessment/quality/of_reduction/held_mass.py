@@ -9,7 +9,7 @@ from cms.assessment.quality.record import QualityRecord, information, judge
 from cms.assessment.quality.reference.free_basis import FreeBasis
 from cms.assessment.quality.reference.full_reference import FullReference
 from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
-from cms.modes.families.rigid_modes import geometric_rigid_modes
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array, frozen
 
 __all__ = ["HeldMass", "answered_statically", "held_mass", "held_mass_record"]
@@ -49,7 +49,7 @@ def held_mass(reference: FullReference, basis: FreeBasis) -> HeldMass:
         it (a mean motion each) is not taken off
     """
     body, families = reference.body, reference.families
-    d = geometric_rigid_modes(body, origin=body.nodes.mean(axis=0))
+    d = rigid_motion_of_dofs(body.nodes, body.dofs, body.nodes.mean(axis=0))
     b = body.M @ d
     X = np.hstack([basis.N, basis.Phi])
     rows = X[families.h] * np.where(body.dofs[families.h, 1] < 3, 1.0, body.length)[:, None]

@@ -5,8 +5,8 @@ import numpy as np
 from cms.assessment.quality.limits import LIMITS
 from cms.assessment.quality.record import QualityRecord, information, judge
 from cms.body.reduced_body import ReducedBody
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from fe_models.body.fe_body import FEBody
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.ranks.spread_matrix import largest_entry
 
@@ -40,7 +40,7 @@ def check_mass_properties(body: FEBody, reduced: ReducedBody) -> QualityRecord:
     First moments are divided by m L, inertia by m L², about the mean of the nodes; L is the body length.
     """
     center, length = body.nodes.mean(axis=0), body.length
-    Psi_R = geometric_rigid_modes(body, origin=center)
+    Psi_R = rigid_motion_of_dofs(body.nodes, body.dofs, center)
     full = Psi_R.T @ (body.M @ Psi_R)
     shift = geometric_shift(center)
     own = shift.T @ rigid_mass_matrix(reduced) @ shift
@@ -78,7 +78,7 @@ def check_grounding(body: FEBody) -> QualityRecord:
 
     Row by row would be sharper, but the rows of a rigid interface are sums that cancel, and keep their rounding.
     """
-    Psi_R = geometric_rigid_modes(body, origin=body.nodes.mean(axis=0))
+    Psi_R = rigid_motion_of_dofs(body.nodes, body.dofs, body.nodes.mean(axis=0))
     Psi_R[:, 3:] /= body.length
     size = np.abs(Psi_R).max(axis=0)
     stiffest = largest_entry(body.K) or 1.0

@@ -19,8 +19,8 @@ from cms.assessment.quality.reference.ports import Ports
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.modes.families.families import Families
 from cms.modes.families.flexibility import BoundaryConditions, Flexibility
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from fe_models.body.fe_body import FEBody
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array, frozen
 
 __all__ = ["LoadHistory", "Snapshots", "interface_forces", "support_acceleration", "transient", "transient_in"]
@@ -100,7 +100,7 @@ def support_acceleration(body: FEBody, acceleration: Array, t: Array, *, origin:
     origin
         Point the angular acceleration is about, (3,) [m]; mesh origin by default.
     """
-    Psi_R = geometric_rigid_modes(body, origin=np.zeros(3) if origin is None else origin)
+    Psi_R = rigid_motion_of_dofs(body.nodes, body.dofs, np.zeros(3) if origin is None else origin)
     return LoadHistory(-(body.M @ Psi_R), t, np.asarray(acceleration))
 
 

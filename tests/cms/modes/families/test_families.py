@@ -13,10 +13,10 @@ from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.modes.families.families import Families
 from cms.modes.families.flexibility import BoundaryConditions
 from cms.modes.families.interface_loads import InterfaceLoad, point_load
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.modes.mode_sets import MODE_SETS, benfield_hruda
 from fe_models.body.couplings.couplings import couple
 from fe_models.body.fe_body import Interface
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from tests.bodies import bar, chain, with_interfaces
 from tests.cms.modes.families.examples import BODIES, constrained_spectrum, three_interface_solid
 
@@ -232,7 +232,7 @@ def test_an_interface_that_leaves_rotations_free_borrows_interior_dofs(n_compone
     with Families(body) as f:
         assert len(f.r) == 6
         assert len(f.e) == 0
-        assert np.linalg.matrix_rank(geometric_rigid_modes(body)[f.r]) == 6
+        assert np.linalg.matrix_rank(rigid_motion_of_dofs(body.nodes, body.dofs)[f.r]) == 6
         assert_allclose(f.free_modes(n_modes=3).omega2, constrained_spectrum(body, np.zeros(0, int))[6:9], rtol=1e-8)
         held = constrained_spectrum(body, body.b)
         n_free = 6 - n_components
@@ -333,7 +333,8 @@ def test_a_load_across_the_hinge_holds_the_mechanism(stiffness):
     body = couple(hinged_bricks())
     arm = body.interface("right").reference - HINGE
     loads = springs_of_hinged_bricks(stiffness, np.cross([0.0, 0.0, 1.0], arm))
-    rigid, about_hinge = geometric_rigid_modes(body), geometric_rigid_modes(body, origin=HINGE)[:, 5]
+    rigid = rigid_motion_of_dofs(body.nodes, body.dofs)
+    about_hinge = rigid_motion_of_dofs(body.nodes, body.dofs, HINGE)[:, 5]
     is_right = body.nodes[body.dofs[:, 0]][:, :2].sum(axis=1) > 2.0 + 1e-9
     Psi = np.column_stack([rigid, np.where(is_right, about_hinge, 0.0)])
     K_load = la.block_diag(*[load.K for load in loads])  # both triads are the mesh axes

@@ -8,13 +8,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from cms.errors import ModeSetError
 from cms.linear_algebra.solvers.mode_count import ModeCount
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.modes.mode_sets import craig_bampton, craig_bampton_ir, guyan, rubin
 from cms.modes.mode_sets.characteristic_modes import with_characteristic_modes
 from cms.reduction.basis.finishing import finish
 from cms.reduction.basis.frames import TisserandFrame, frame_condition
 from cms.reduction.reduction import reduce
 from fe_models.body.couplings.couplings import couple
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from tests.bodies import bar
 
 ROUNDOFF = 1e-12
@@ -54,7 +54,7 @@ def test_rigid_motion_of_every_interface_stays_in_the_span(kinds, together):
     few = with_characteristic_modes(whole, body, n_modes=0, together=together)
     for interface in body.interfaces:
         motion = np.zeros((body.n_dof, 6))  # this interface moves, the others are held
-        motion[interface.dofs] = geometric_rigid_modes(body)[interface.dofs]
+        motion[interface.dofs] = rigid_motion_of_dofs(body.nodes, body.dofs)[interface.dofs]
         expected = whole.columns @ motion[body.b]
         V = few.columns / np.linalg.norm(few.columns, axis=0)
         rest = expected - V @ np.linalg.lstsq(V, expected, rcond=None)[0]
@@ -69,7 +69,7 @@ def test_modes_of_one_interface_are_the_lowest_of_its_constrained_pencil(body, m
     columns = np.flatnonzero([group == "constraint left" for group in modes.groups])
     Psi_C = modes.columns[:, columns]
     K_c, M_c = Psi_C.T @ (body.K @ Psi_C), Psi_C.T @ (body.M @ Psi_C)
-    R = geometric_rigid_modes(body)[interface.dofs]
+    R = rigid_motion_of_dofs(body.nodes, body.dofs)[interface.dofs]
     free_of_R = la.null_space(R.T @ M_c)
     omega2 = la.eigvals(la.solve(free_of_R.T @ M_c @ free_of_R, free_of_R.T @ K_c @ free_of_R)).real
     exact = np.sqrt(np.sort(omega2)[:4]) / (2 * np.pi)
@@ -130,7 +130,7 @@ def test_sets_and_bodies_without_such_modes_are_refused(body):
 
 def free_body_load(body, f):
     """The load with the rigid-body acceleration it causes: what a free body answers by deformation alone."""
-    R = geometric_rigid_modes(body)
+    R = rigid_motion_of_dofs(body.nodes, body.dofs)
     return f - body.M @ (R @ np.linalg.solve(R.T @ (body.M @ R), R.T @ f))
 
 
@@ -145,7 +145,7 @@ def test_static_answers_are_exact_to_loads_whose_motion_is_kept_and_improve_for_
     found = finish(body, few, frame_condition(body, TisserandFrame()))
     answer = found.Phi @ (found.Phi.T @ f / np.diag(found.K))
     rest = u - answer
-    R = geometric_rigid_modes(body)
+    R = rigid_motion_of_dofs(body.nodes, body.dofs)
     rest -= R @ np.linalg.lstsq(R, rest, rcond=None)[0]
     assert_allclose(rest, 0, rtol=0, atol=1e-8 * np.abs(answer).max())
 

@@ -14,13 +14,13 @@ from cms.assessment.quality.reference.free_pencil import free_elastic_modes
 from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
 from cms.linear_algebra.independent import independent_columns
 from cms.modes.families.families import Families
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets import craig_bampton_ir
 from cms.reduction.basis.finishing import elastic_directions, orthonormal_motions
 from cms.reduction.basis.frames import NodalFrame, TisserandFrame
 from cms.reduction.reduction import reduce
 from fe_models.body.couplings.couplings import couple
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from tests.bodies import beam, chain
 
 ROUNDOFF = 1e-12
@@ -70,7 +70,7 @@ def test_the_span_of_rigid_motion_and_shapes_loses_the_rigid_motion_alone():
     K, M = body.K.toarray(), body.M.toarray()
     values, V = la.eigh(K, M)
     omega2 = values[6]
-    R = geometric_rigid_modes(body, origin=body.nodes.mean(axis=0))
+    R = rigid_motion_of_dofs(body.nodes, body.dofs, body.nodes.mean(axis=0))
     mix = np.random.default_rng(1).normal(size=(10, 10))
     X = np.hstack([R[:, :4], V[:, 6:12]]) @ mix
     Q, _ = independent_columns(X, body, omega2)

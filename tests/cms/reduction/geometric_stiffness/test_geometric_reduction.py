@@ -9,14 +9,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import cms
 from cms.errors import BodyError, ModeSetError
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.frames import BuckensFrame, NodalFrame, TisserandFrame, frame_condition
 from cms.reduction.basis.node_motion import reference_motion
 from cms.reduction.geometric_stiffness.geometric_reduction import reduced_geometric_stiffness
 from cms.reduction.geometric_stiffness.unit_states import balanced, unit_loads, unit_states
 from fe_models.assembly.planar import planar
 from fe_models.body.material import Material
-from fe_models.body.rigid_motion import MassLoads
+from fe_models.body.rigid_motion import MassLoads, rigid_motion_of_dofs
 from fe_models.elements.beams.attachments import PointMass
 from fe_models.elements.beams.beam_property import BeamProperty
 from fe_models.elements.beams.body import beam_body
@@ -38,7 +37,7 @@ def test_a_rigid_rotation_turns_the_loads(name, frame):
     with cms.Families(body) as families:
         phi = families.flexibility(phi)  # smooth shapes
         phi /= np.abs(phi).max()
-        columns = np.hstack([geometric_rigid_modes(body), phi])
+        columns = np.hstack([rigid_motion_of_dofs(body.nodes, body.dofs), phi])
         found = reduced_geometric_stiffness(families, columns, condition)
     own = found.interfaces.reshape(-1, *found.spin.shape[1:])
     K = np.concatenate([found.translation, found.rotation, found.spin, own, found.spread.K])

@@ -8,11 +8,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import cms
 from cms.errors import BodyError
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.frames import BuckensFrame, NodalFrame, TisserandFrame, frame_condition
 from cms.reduction.frame_conversion import convert_frame
 from cms.reduction.geometric_stiffness.quadratic_modes import quadratic_modes
 from cms.reduction.reduction import kept_nodes
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from tests.bodies import STEEL, bar
 from tests.cms.reduction.geometric_stiffness.examples import bar_of_beams, some_bodies
 
@@ -37,7 +37,7 @@ def test_a_deformed_body_that_turns_is_a_deformed_body_that_is_turned(name, fram
     with cms.Families(body) as families:
         phi = families.flexibility(phi)
         phi /= np.abs(phi).max()
-        turns = geometric_rigid_modes(body)[:, 3:]
+        turns = rigid_motion_of_dofs(body.nodes, body.dofs)[:, 3:]
         g = quadratic_modes(families, np.hstack([turns, phi]), condition, nodes)
     axes, points = condition.frame.axes, body.nodes[nodes]
     on_mesh = np.einsum("ab,nbkl->nakl", axes, g)

@@ -9,13 +9,12 @@ from numpy.testing import assert_allclose
 import cms
 from cms.errors import RecoveryError
 from cms.modes.families.families import Families
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.frames import frame_condition
 from cms.reduction.frame_conversion import rigid_mass
 from cms.reduction.recovery.load_columns import loads_of_body, loads_of_model, on_coordinates
 from cms.reduction.recovery.matrices import recovery_of_model, residual_response
 from fe_models.body.fe_body import FEBody
-from fe_models.body.rigid_motion import MassLoads
+from fe_models.body.rigid_motion import MassLoads, rigid_motion_of_dofs
 from tests.bodies import STEEL
 from tests.cms.reduction.recovery.examples import HEIGHT, LENGTH, NODES, POINT, ROWS, WIDTH, full, reduced
 
@@ -94,7 +93,7 @@ def test_a_body_that_accelerates_steadily_has_the_stress_of_inertia_relief(modes
     force = np.array([30.0, 400.0, -250.0])
     F = np.zeros((full().n_dof, 1))
     F[full().interface("right").dofs[:3], 0] = force
-    Psi = geometric_rigid_modes(full())
+    Psi = rigid_motion_of_dofs(full().nodes, full().dofs)
     rigid = np.linalg.solve(Psi.T @ (full().M @ Psi), Psi.T @ F)
     balanced = F - full().M @ (Psi @ rigid)
     p = np.zeros(len(table.loads))
@@ -114,7 +113,7 @@ def test_the_residual_response_is_static_in_mean_axes_without_the_modes():
         modes = families.free_modes(8)
         condition = frame_condition(body, cms.TisserandFrame())
         found = residual_response(families, condition, modes.Phi, np.diag(modes.omega2), F)
-    M_Psi = body.M @ geometric_rigid_modes(body)
+    M_Psi = body.M @ rigid_motion_of_dofs(body.nodes, body.dofs)
     scale = np.abs(body.K).max() / np.abs(M_Psi).max()
     both = sp.block_array([[body.K, sp.csc_array(scale * M_Psi)], [sp.csc_array(scale * M_Psi.T), None]], format="csc")
     exact = spla.splu(both).solve(np.vstack([F, np.zeros((6, 2))]))[: body.n_dof]
@@ -148,7 +147,7 @@ def test_a_steady_spin_has_the_stress_of_its_centrifugal_load(frame):
     tensor = np.outer(omega, omega) - omega @ omega * np.eye(3)
     assert_allclose(field, -(c @ tensor.T), atol=1e-9)
     F = full().recovery.matrix.T @ full().element_model.mass_forces(MassLoads(-tensor[None], (tensor @ origin)[None]))
-    Psi = geometric_rigid_modes(full())
+    Psi = rigid_motion_of_dofs(full().nodes, full().dofs)
     rigid = np.linalg.solve(Psi.T @ (full().M @ Psi), Psi.T @ F)
     exact = stress_rows(full(), supported(full(), F - full().M @ (Psi @ rigid)))[:, 0]
     p = np.zeros(len(table.loads))
@@ -163,7 +162,7 @@ def motion_of(body: cms.ReducedBody, modes, seed=3):
     """Return random z, z', z'' and the motions of the full model that they are, (n_dof,) each."""
     condition = frame_condition(full(), cms.NodalFrame("left"))
     Phi = cms.reduction.basis.finishing.finish(full(), modes, condition).Phi
-    Psi = geometric_rigid_modes(full(), origin=body.frame.origin)
+    Psi = rigid_motion_of_dofs(full().nodes, full().dofs, body.frame.origin)
     rng = np.random.default_rng(seed)
     z = rng.standard_normal((3, 6 + body.n_q)) * np.concatenate([np.ones(6), np.full(body.n_q, 1e-3)])
     z[:2, :6] = 0.0  # rigid motions of order one against strains: their rounding is that of the stiffness
@@ -187,7 +186,7 @@ def test_net_forces_are_the_rates_of_momentum_and_the_sum_of_the_interfaces():
     body = reduced("craig-bampton", "nodal")
     table = body.recovery["all"]
     z, u = motion_of(body, cms.craig_bampton(full(), n_modes=4))
-    about = geometric_rigid_modes(full(), origin=np.array(POINT))
+    about = rigid_motion_of_dofs(full().nodes, full().dofs, np.array(POINT))
     expected = about.T @ (full().M @ u[2])
     y = table.values(z[0], z[1], z[2])
     rows = table.rows("net force")
@@ -262,7 +261,7 @@ def test_loads_of_the_body_are_those_of_the_model(frame):
         frame, cms.TisserandFrame(origin=tuple(body.frame.origin), axes=tuple(map(tuple, body.frame.axes.T)))
     )
     Phi = cms.reduction.basis.finishing.finish(full(), modes, frame_condition(full(), chosen)).Phi
-    Psi = geometric_rigid_modes(full(), origin=body.frame.origin) @ np.kron(np.eye(2), body.frame.axes)
+    Psi = rigid_motion_of_dofs(full().nodes, full().dofs, body.frame.origin) @ np.kron(np.eye(2), body.frame.axes)
     expected = np.hstack([Psi, Phi]).T @ F
     scale = np.abs(expected).max(axis=0) + 1e-300
     assert_allclose(forces / scale, expected / scale, rtol=0, atol=1e-9)

@@ -12,7 +12,7 @@ import fe_models as fm
 from cms.body.invariants import moments_from_gram
 from cms.errors import BodyError
 from cms.linear_algebra.solvers.eigen import eigenmodes
-from cms.modes.families.rigid_modes import geometric_rigid_modes
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.errors import BeamError, SectionError
 from tests import bodies
 from tests.fe_models.small_frames import RECTANGLE, SI, STEEL, space_frame, straight, supported_frequencies
@@ -25,7 +25,7 @@ ROUNDOFF = 1e-12
 
 def test_rigid_motion_costs_nothing_and_makes_no_stress():
     body = space_frame()
-    Psi_R = geometric_rigid_modes(body)
+    Psi_R = rigid_motion_of_dofs(body.nodes, body.dofs)
     assert_allclose(body.K @ Psi_R, 0, rtol=0, atol=ROUNDOFF * np.abs(body.K.data).max())
     assert_allclose(body.D @ Psi_R, 0, rtol=0, atol=ROUNDOFF * np.abs(body.D.data).max())
     assert np.linalg.eigvalsh(body.K.toarray())[6] > 1e-6 * np.abs(body.K.data).max() * 1e-6
@@ -35,7 +35,7 @@ def test_rigid_motion_costs_nothing_and_makes_no_stress():
 
 def test_skin_moves_rigidly_with_the_body():
     body = space_frame()
-    moved = body.translations(geometric_rigid_modes(body))
+    moved = body.translations(rigid_motion_of_dofs(body.nodes, body.dofs))
     theta = np.array([0.3, -0.2, 0.5])
     expected = np.cross(theta, body.nodes)
     has_dofs = np.r_[np.arange(6), np.arange(6, len(body.nodes))]
@@ -62,7 +62,7 @@ def test_rigid_moments_are_those_of_the_mass_matrix_on_rigid_motion():
     """Second road: m, first and second moments from Psi_Rᵀ M Psi_R."""
     body = space_frame()
     moments = moments_from_gram(gram_of(body, np.zeros((body.n_dof, 1))))
-    Psi_R = geometric_rigid_modes(body)
+    Psi_R = rigid_motion_of_dofs(body.nodes, body.dofs)
     rigid = Psi_R.T @ (body.M @ Psi_R)
     assert_allclose(rigid[3:, 3:], moments.J0, rtol=0, atol=1e-11 * np.abs(moments.J0).max())
     assert_allclose(rigid[0, 0], moments.m, rtol=1e-12)
@@ -74,7 +74,7 @@ def test_moments_of_modes_are_those_of_the_mass_matrix():
     body = space_frame()
     u = np.random.default_rng(2).normal(size=(body.n_dof, 3))
     moments = moments_from_gram(gram_of(body, u))
-    momentum = geometric_rigid_modes(body).T @ (body.M @ u)
+    momentum = rigid_motion_of_dofs(body.nodes, body.dofs).T @ (body.M @ u)
     scale = np.abs(momentum).max()
     assert_allclose(moments.C1, momentum[:3], rtol=0, atol=1e-11 * scale)
     assert_allclose(moments.C2, momentum[3:], rtol=0, atol=1e-11 * scale)

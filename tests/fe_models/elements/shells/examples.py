@@ -3,8 +3,7 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from cms.modes.families.rigid_modes import geometric_rigid_modes
-from fe_models.body.rigid_motion import MassLoads
+from fe_models.body.rigid_motion import MassLoads, rigid_motion_of_dofs
 from tests.fe_models.small_shells import of_nodes, solved
 
 
@@ -24,7 +23,7 @@ def balanced_state(body, seed=1):
     rng = np.random.default_rng(seed)
     loads = MassLoads(1e3 * rng.normal(size=(1, 3, 3)), 1e3 * rng.normal(size=(1, 3)))
     of_mass = on_dofs(body, body.element_model.mass_forces(loads))[:, 0]
-    Psi = geometric_rigid_modes(body)
+    Psi = rigid_motion_of_dofs(body.nodes, body.dofs)
     nodal = np.zeros(body.n_dof)
     some = rng.choice(6 * n_shell_nodes(body), 40, replace=False)
     nodal[some] = -np.linalg.lstsq(Psi[some].T, Psi.T @ of_mass, rcond=None)[0]

@@ -9,8 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import cms
 import fe_models as fm
-from cms.modes.families.rigid_modes import geometric_rigid_modes
-from fe_models.body.rigid_motion import MassLoads
+from fe_models.body.rigid_motion import MassLoads, rigid_motion_of_dofs
 from fe_models.elements.shells.elements import DRILLING_SHARE
 from tests.fe_models.elements.shells.examples import balanced_state, n_shell_nodes, on_dofs, shell_fields, turned_loads
 from tests.fe_models.small_shells import KINDS, SI, STEEL, of_nodes, solved
@@ -41,7 +40,7 @@ def test_a_rigid_rotation_turns_the_forces_of_a_body_in_equilibrium(kind, stiffe
     model = body.element_model
     loads, nodal, u = balanced_state(body)
     n = n_shell_nodes(body)
-    Psi = geometric_rigid_modes(body)
+    Psi = rigid_motion_of_dofs(body.nodes, body.dofs)
     K = model.geometric_stiffness(body.mesh_displacement(u[:, None]), loads, body.mesh_displacement(Psi))[0]
     f = nodal[: 6 * n].reshape(n, 6)
     expected = np.zeros((6, 6))
@@ -65,7 +64,7 @@ def test_a_rigid_rotation_turns_sections_that_turn_by_themselves_without_a_force
     loads, _, u = balanced_state(body)
     own = np.arange(6 * n_shell_nodes(body), body.n_dof)
     assert len(own) == 7 + 5  # about the normal, and about the lever where the bar goes on
-    columns = np.hstack([geometric_rigid_modes(body), np.eye(body.n_dof)[:, own]])
+    columns = np.hstack([rigid_motion_of_dofs(body.nodes, body.dofs), np.eye(body.n_dof)[:, own]])
     K = model.geometric_stiffness(body.mesh_displacement(u[:, None]), loads, body.mesh_displacement(columns))[0]
     size = np.abs(model.frame.internal_forces(body.mesh_displacement(u[:, None])[model.shell.n_mesh_dof :])).max()
     for a in range(3):
@@ -78,7 +77,7 @@ def test_mass_forces_and_internal_forces_are_those_of_the_matrices():
         body = bent_strip(kind, stiffened=True)
         model, n = body.element_model, body.n_dof
         loads = MassLoads.none(6).plus_rigid(np.eye(6), np.array([0.1, -0.2, 0.3]))
-        expected = body.M @ geometric_rigid_modes(body, origin=np.array([0.1, -0.2, 0.3]))
+        expected = body.M @ rigid_motion_of_dofs(body.nodes, body.dofs, np.array([0.1, -0.2, 0.3]))
         forces = on_dofs(body, model.mass_forces(loads))
         assert_allclose(forces, expected, rtol=0, atol=ROUNDOFF * np.abs(expected).max())
         u = np.random.default_rng(0).normal(size=(n, 2))

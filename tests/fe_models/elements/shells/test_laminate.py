@@ -8,8 +8,7 @@ import scipy.sparse.linalg as spl
 from numpy.testing import assert_allclose
 
 import fe_models as fm
-from cms.modes.families.rigid_modes import geometric_rigid_modes
-from fe_models.body.rigid_motion import MassLoads
+from fe_models.body.rigid_motion import MassLoads, rigid_motion_of_dofs
 from fe_models.elements.recovery.strain import nodal_strain
 from fe_models.elements.shells.geometric import stress_second_moments
 from fe_models.elements.shells.laminate import shell_law
@@ -373,7 +372,7 @@ def test_mass_is_exact_through_layers_of_several_densities(kind):
         expected += m * np.outer(place, place) + m * np.diag([0, a**2, b**2, t**2]) / 12
     expected[2, 2], expected[1, 1] = (sum(m for m, _, _ in boxes) * size**2 / 3 for size in (b, a))
     assert_allclose(gram, expected, rtol=1e-10, atol=1e-12)
-    Psi = geometric_rigid_modes(body)
+    Psi = rigid_motion_of_dofs(body.nodes, body.dofs)
     E = expected[1:, 1:]
     assert_allclose((Psi.T @ body.M @ Psi)[3:, 3:], np.trace(E) * np.eye(3) - E, rtol=1e-10, atol=1e-12)
 
@@ -382,7 +381,7 @@ def test_mass_is_exact_through_layers_of_several_densities(kind):
 def test_a_rigid_rotation_turns_the_forces_of_a_shell_of_layers(kind):
     body = shell(curved(kind), laminate(*(replace(layer, thickness=8 * layer.thickness) for layer in ODD), offset=0.04))
     loads, nodal, u = balanced_state(body)
-    Psi = geometric_rigid_modes(body)
+    Psi = rigid_motion_of_dofs(body.nodes, body.dofs)
     columns = (body.mesh_displacement(item) for item in (u[:, None], Psi))
     K = body.element_model.geometric_stiffness(next(columns), loads, next(columns))[0]
     f = nodal.reshape(-1, 6)

@@ -164,12 +164,12 @@ def test_internal_forces_of_a_frame_are_those_of_its_stiffness():
 @pytest.mark.parametrize("body", ["solid", "frame"])
 def test_mass_forces_are_the_mass_times_rigid_accelerations(body):
     body = solid("tetra10", 0.1) if body == "solid" else frame()
-    from cms.modes.families.rigid_modes import geometric_rigid_modes
+    from fe_models.body.rigid_motion import rigid_motion_of_dofs
 
     origin = np.array([0.1, -0.2, 0.3])
     loads = MassLoads.none(6).plus_rigid(np.eye(6), origin)
     forces = body.element_model.mass_forces(loads)[: body.n_dof]
-    expected = body.M @ geometric_rigid_modes(body, origin=origin)
+    expected = body.M @ rigid_motion_of_dofs(body.nodes, body.dofs, origin)
     assert_allclose(forces, expected, rtol=0, atol=ROUNDOFF * np.abs(expected).max())
 
 

@@ -24,12 +24,12 @@ from cms.assessment.quality.reference.transient import (
     transient_in,
 )
 from cms.modes.families.families import Families
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets import MODE_SETS, craig_bampton, guyan
 from cms.reduction.basis.frames import NodalFrame, TisserandFrame
 from cms.reduction.reduction import reduce
 from fe_models.body.couplings.couplings import couple
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from tests.bodies import bar, chain
 
 
@@ -123,7 +123,11 @@ def test_all_interfaces_can_be_held_under_an_acceleration(body, families):
     t = np.linspace(0, 10.0, 21)
     load = support_acceleration(body, np.outer([0, 0, 9.81, 0, 0, 0], t / 10), t)
     found = transient(families, load, cutoff=5000.0, held=["left", "right"], damping=0.05).u[:, -1]
-    wanted = -9.81 * families.Psi_H @ np.linalg.lstsq(families.Psi_R, geometric_rigid_modes(body)[:, 2], rcond=None)[0]
+    wanted = (
+        -9.81
+        * families.Psi_H
+        @ np.linalg.lstsq(families.Psi_R, rigid_motion_of_dofs(body.nodes, body.dofs)[:, 2], rcond=None)[0]
+    )
     assert_allclose(found, wanted, rtol=0, atol=1e-4 * np.abs(wanted).max())
 
 
@@ -176,7 +180,7 @@ def test_the_error_does_not_depend_on_the_frame_of_the_snapshots(body, families,
     basis = free_basis(body, craig_bampton(body, n_modes=3), families)
     plain = deformation_error(body, basis, snapshots)
     rng = np.random.default_rng(4)
-    Psi_R = geometric_rigid_modes(body)
+    Psi_R = rigid_motion_of_dofs(body.nodes, body.dofs)
     size = np.abs(snapshots.amplitudes).max()
     moved = Snapshots(
         np.hstack([snapshots.columns, Psi_R]),
@@ -203,7 +207,7 @@ def test_the_error_is_the_distance_of_a_dense_least_squares(body, families, snap
     few = Snapshots(snapshots.columns, snapshots.amplitudes[:, 100::200], snapshots.t[100::200])
     found = deformation_error(body, basis, few)
     for norm, W, rigid in (
-        ("M", body.M.toarray(), geometric_rigid_modes(body)),
+        ("M", body.M.toarray(), rigid_motion_of_dofs(body.nodes, body.dofs)),
         ("K", body.K.toarray(), np.zeros((body.n_dof, 0))),
     ):
         values, vectors = la.eigh(W)
@@ -263,7 +267,9 @@ def test_the_record_tells_the_largest_error_and_keeps_the_history(body, families
         ),
         (
             lambda b, f: deformation_error(
-                b, free_basis(b, guyan(b), f), Snapshots(geometric_rigid_modes(b), np.ones((6, 2)), np.arange(2.0))
+                b,
+                free_basis(b, guyan(b), f),
+                Snapshots(rigid_motion_of_dofs(b.nodes, b.dofs), np.ones((6, 2)), np.arange(2.0)),
             ),
             "does not deform body",
         ),

@@ -19,13 +19,13 @@ from cms.assessment.quality.of_reduction.residuals import residual_bounds
 from cms.assessment.quality.reduction_check import check_reduction
 from cms.assessment.quality.reference.free_basis import FreeBasis, free_basis, ritz_basis
 from cms.assessment.quality.reference.full_reference import FullReference, usable_band
-from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets import MODE_SETS, craig_bampton, guyan
 from cms.reduction.basis.frames import BuckensFrame, NodalFrame, TisserandFrame
 from cms.reduction.reduction import reduce
 from fe_models.body.couplings.couplings import couple
 from fe_models.body.load_cases import LoadCase
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.units import unit_system
 from tests.bodies import bar, beam, chain
 
@@ -166,7 +166,7 @@ def test_load_cases_are_answered_by_their_residual_vectors_only(body):
     """Pressure in the middle of the bar is no interface load; gravity does not deform a free body."""
     middle = int(np.flatnonzero((body.dofs[:, 1] == 2) & (np.abs(body.nodes[body.dofs[:, 0], 0] - 0.5) < 0.01))[0])
     push = LoadCase("push", "force", np.eye(body.n_dof)[middle])
-    gravity = LoadCase("gravity", "gravity", body.M @ geometric_rigid_modes(body)[:, 2])
+    gravity = LoadCase("gravity", "gravity", body.M @ rigid_motion_of_dofs(body.nodes, body.dofs)[:, 2])
     loaded = body.with_load_cases(push, gravity)
     with FullReference(loaded, band=BAND) as reference:
         poor = craig_bampton(loaded, n_modes=1)
@@ -229,7 +229,7 @@ def test_true_modes_have_no_residual(reference):
 @pytest.mark.parametrize("frame", [TisserandFrame(), NodalFrame("right")], ids=str)
 def test_the_rigid_mass_of_a_file_is_that_of_the_mass_matrix_about_the_mesh_origin(body, frame):
     reduced = reduce(body, guyan(body), frame=frame)
-    Psi_R = geometric_rigid_modes(body)
+    Psi_R = rigid_motion_of_dofs(body.nodes, body.dofs)
     wanted = Psi_R.T @ (body.M @ Psi_R)
     assert_allclose(rigid_mass_matrix(reduced), wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
 
@@ -238,7 +238,7 @@ def test_effective_masses_with_the_interfaces_held_are_those_of_the_fixed_modes(
     """L_k² of a dense solution with the interfaces held; over all modes they sum to the held mass of the full model."""
     i = body.i
     lam, Phi = la.eigh(body.K.toarray()[np.ix_(i, i)], body.M.toarray()[np.ix_(i, i)])
-    d = geometric_rigid_modes(body, origin=body.nodes.mean(axis=0))
+    d = rigid_motion_of_dofs(body.nodes, body.dofs, body.nodes.mean(axis=0))
     wanted = (Phi.T @ (body.M @ d)[i]) ** 2
     found = held_mass(reference, basis_of(reference, craig_bampton(body, n_modes=7)))
     assert_allclose(found.frequencies, np.sqrt(lam[:7]) / (2 * np.pi), rtol=1e-7)
