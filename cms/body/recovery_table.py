@@ -11,16 +11,16 @@ lack. Together they are the mode acceleration method (docs/theory.md §11).
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from cms.body.geometric_stiffness import SPIN_PAIRS
 from cms.errors import BodyError
-from fe_models.foundation.arrays import Array, IntArray, frozen, require_finite, require_shape
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.records import checked_fields, frozen_copies
+from fe_models.foundation.records import ArrayShape, checked_fields, frozen_copies
 from fe_models.foundation.units import Dimensions, Units, unit_words
 from fe_models.foundation.words import nearest, quoted
 
@@ -74,39 +74,23 @@ class RecoveryTable:
     """
 
     name: str
-    labels: tuple[str, ...]
-    quantities: tuple[str, ...]
-    entities: tuple[str, ...]
-    numbers: IntArray
-    components: tuple[str, ...]
-    dimensions: Array
-    dynamic: Array
-    loads: tuple[str, ...]
-    load_dimensions: Array
-    static: Array
+    labels: Annotated[tuple[str, ...], ArrayShape(("n_rows",))]
+    quantities: Annotated[tuple[str, ...], ArrayShape(("n_rows",))]
+    entities: Annotated[tuple[str, ...], ArrayShape(("n_rows",))]
+    numbers: Annotated[IntArray, ArrayShape(("n_rows",))]
+    components: Annotated[tuple[str, ...], ArrayShape(("n_rows",))]
+    dimensions: Annotated[Array, ArrayShape(("n_rows", 3))]
+    dynamic: Annotated[Array, ArrayShape((3, "n_rows", None))]
+    loads: Annotated[tuple[str, ...], ArrayShape(("n_loads",))]
+    load_dimensions: Annotated[Array, ArrayShape(("n_loads", 3))]
+    static: Annotated[Array, ArrayShape(("n_rows", "n_loads"))]
     system: Units
     truncated: str = ""
 
     def __post_init__(self) -> None:
         where = f"recovery {self.name!r}"
-        n, n_loads = len(self.labels), len(self.loads)
-        put = object.__setattr__
-        for name in (*TEXTS, "loads"):
-            put(self, name, tuple(getattr(self, name)))
-        put(self, "numbers", frozen(self.numbers, np.int64))
-        for name in ("dimensions", "dynamic", "load_dimensions", "static"):
-            put(self, name, frozen(getattr(self, name)))
-            require_finite(f"{where}: {name}", getattr(self, name))
-        for name in TEXTS[1:]:
-            if len(getattr(self, name)) != n:
-                raise BodyError(f"{where}: {n} labels, but {len(getattr(self, name))} {name}")
-        if self.numbers.shape != (n,):
-            raise BodyError(f"{where}: numbers: expected ({n},), got {self.numbers.shape}")
-        require_shape(f"{where}: dimensions", self.dimensions, (n, 3))
-        require_shape(f"{where}: load_dimensions", self.load_dimensions, (n_loads, 3))
-        require_shape(f"{where}: static", self.static, (n, n_loads))
-        if self.dynamic.ndim != 3 or self.dynamic.shape[:2] != (3, n) or self.dynamic.shape[2] < N_RIGID:
-            raise BodyError(f"{where}: dynamic: expected (3, {n}, 6 + n_q), got {self.dynamic.shape}")
+        if self.n_q < 0:
+            raise BodyError(f"{where}: dynamic: expected (3, {self.n_rows}, 6 + n_q), got {self.dynamic.shape}")
         for what, words in (("label", self.labels), ("load", self.loads)):
             if len(set(words)) != len(words):
                 twice = next(word for k, word in enumerate(words) if word in words[:k])

@@ -2,13 +2,14 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
+from fe_models.foundation.arrays import Array, require_shape
 from fe_models.foundation.errors import ArgumentError, BodyError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.records import checked_fields, frozen_copies
+from fe_models.foundation.records import ArrayShape, checked_fields, frozen_copies
 
 __all__ = ["LOAD_CASE_KINDS", "LoadCase", "ReducedLoadCase", "check_load_cases", "load_columns"]
 
@@ -36,15 +37,11 @@ class LoadCase:
 
     name: str
     kind: str
-    f: Array
+    f: Annotated[Array, ArrayShape(("n_dof",))]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "f", frozen(self.f))
         if not self.name:
             raise BodyError("load case: expected a name, got none")
-        if self.f.ndim != 1:
-            raise BodyError(f"load case {self.name!r}: f: expected one number per dof, got shape {self.f.shape}")
-        require_finite(f"load case {self.name!r}: f", self.f)
 
 
 @presented
@@ -70,19 +67,9 @@ class ReducedLoadCase:
 
     name: str
     kind: str
-    force: Array
-    torque: Array
-    h: Array
-
-    def __post_init__(self) -> None:
-        where = f"load case {self.name!r}"
-        for name in ("force", "torque", "h"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
-            require_finite(f"{where}: {name}", getattr(self, name))
-        require_shape(f"{where}: force", self.force, (3,))
-        require_shape(f"{where}: torque", self.torque, (3,))
-        if self.h.ndim != 1:
-            raise BodyError(f"{where}: h: expected one number per mode, got shape {self.h.shape}")
+    force: Annotated[Array, ArrayShape((3,))]
+    torque: Annotated[Array, ArrayShape((3,))]
+    h: Annotated[Array, ArrayShape(("n_q",))]
 
 
 def check_load_cases(where: str, load_cases: tuple[LoadCase, ...], n_dof: int) -> None:

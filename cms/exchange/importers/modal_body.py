@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -22,7 +23,8 @@ from cms.reduction.frame_conversion import convert_frame
 from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.load_cases import ReducedLoadCase
 from fe_models.foundation.arrays import Array, IntArray, frozen
-from fe_models.foundation.records import FrozenMapping, frozen_copies
+from fe_models.foundation.errors import ArgumentError
+from fe_models.foundation.records import ArrayShape, FrozenMapping, checked_fields, frozen_copies
 from fe_models.meshes.numbering import Numbering
 
 __all__ = ["ForeignInterface", "ModalBody", "body_of_modes"]
@@ -48,6 +50,7 @@ class ForeignInterface:
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError, misfit=ForeignBodyError)
 class ModalBody:
     """Matrices and integrals over the modes of a foreign body in its own frame B, numbers as its file has them.
 
@@ -58,16 +61,19 @@ class ModalBody:
     """
 
     name: str
-    M: Array  #: modal mass, (n_q, n_q)
-    K: Array  #: modal stiffness, (n_q, n_q)
-    D: Array | None  #: modal damping, (n_q, n_q)
+    M: Annotated[Array, ArrayShape(("n_q", "n_q"))]  #: modal mass
+    K: Annotated[Array, ArrayShape(("n_q", "n_q"))]  #: modal stiffness
+    D: Annotated[Array | None, ArrayShape(("n_q", "n_q"))]  #: modal damping
     moments: Moments  #: in B
-    node_numbers: IntArray  #: (n_nodes,)
-    nodes: Array  #: undeformed places in B, (n_nodes, 3)
-    Phi: Array  #: translations of the nodes for each mode, (n_nodes, 3, n_q)
-    rotations: Array | None = None  #: of the nodes for each mode, (n_nodes, 3, n_q); None: unknown
-    stress: Array | None = None  #: xx yy zz yz xz xy at the nodes for each mode, (n_nodes, 6, n_q)
-    surface: IntArray = field(default_factory=lambda: np.zeros((0, 3), np.int64))  #: triangles of rows of `nodes`
+    node_numbers: Annotated[IntArray, ArrayShape(("n_nodes",))]
+    nodes: Annotated[Array, ArrayShape(("n_nodes", 3))]  #: undeformed places in B
+    Phi: Annotated[Array, ArrayShape(("n_nodes", 3, "n_q"))]  #: translations of the nodes for each mode
+    #: rotations of the nodes for each mode; None: unknown
+    rotations: Annotated[Array | None, ArrayShape(("n_nodes", 3, "n_q"))] = None
+    #: xx yy zz yz xz xy at the nodes for each mode
+    stress: Annotated[Array | None, ArrayShape(("n_nodes", 6, "n_q"))] = None
+    #: triangles of rows of `nodes`
+    surface: Annotated[IntArray, ArrayShape((None, 3))] = field(default_factory=lambda: np.zeros((0, 3), np.int64))
     interfaces: tuple[ForeignInterface, ...] = ()  #: those named in the file
     load_cases: tuple[ReducedLoadCase, ...] = ()
     geometric: GeometricStiffness | None = None  #: in mean axes; its interfaces are the nodes, in their order
@@ -76,25 +82,8 @@ class ModalBody:
 
     def __post_init__(self) -> None:
         where = f"body {self.name!r}"
-        put = object.__setattr__
-        n, n_nodes = np.asarray(self.K).shape[0], len(self.node_numbers)
-        shapes = {
-            "M": (n, n), "K": (n, n), "D": (n, n), "nodes": (n_nodes, 3), "Phi": (n_nodes, 3, n),
-            "rotations": (n_nodes, 3, n), "stress": (n_nodes, 6, n),
-        }  # fmt: skip
-        for name, shape in shapes.items():
-            value = getattr(self, name)
-            if value is None:
-                continue
-            array = frozen(value)
-            if array.shape != shape:
-                raise ForeignBodyError(f"{where}: {name}: expected shape {shape}, got {array.shape}")
-            if not np.isfinite(array).all():
-                raise ForeignBodyError(f"{where}: {name}: expected finite numbers")
-            put(self, name, array)
-        put(self, "node_numbers", frozen(self.node_numbers, np.int64))
-        put(self, "surface", frozen(self.surface, np.int64))
-        put(self, "provenance", FrozenMapping(dict(self.provenance)))
+        n, n_nodes = len(self.K), len(self.node_numbers)
+        object.__setattr__(self, "provenance", FrozenMapping(dict(self.provenance)))
         if not n:
             raise ForeignBodyError(f"{where}: expected at least one mode, got none; a rigid body needs no file")
         if len(np.unique(self.node_numbers)) != n_nodes:
@@ -114,7 +103,7 @@ class ModalBody:
                     raise ForeignBodyError(
                         f"{where}: {name}: expected a symmetric matrix, |A - Aᵀ| is {defect / size:.1e} of |A|"
                     )
-                put(self, name, frozen((matrix + matrix.T) / 2))
+                object.__setattr__(self, name, frozen((matrix + matrix.T) / 2))
 
     @property
     def n_q(self) -> int:

@@ -9,6 +9,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import scipy.linalg as la
@@ -21,7 +22,9 @@ from cms.modes.families.families import Families
 from cms.modes.families.flexibility import BoundaryConditions, Flexibility
 from fe_models.body.fe_body import FEBody
 from fe_models.body.rigid_motion import rigid_motion_of_dofs
-from fe_models.foundation.arrays import Array, frozen
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.errors import ArgumentError
+from fe_models.foundation.records import ArrayShape, checked_fields
 
 __all__ = ["LoadHistory", "Snapshots", "interface_forces", "support_acceleration", "transient", "transient_in"]
 
@@ -30,24 +33,18 @@ NO_LOAD = 1e-10  #: unbalanced part of a load over the load, below which it is r
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError, misfit=QualityError)
 class LoadHistory:
     """Loads f(t) = F p(t); p is piecewise linear between the times."""
 
-    F: Array  #: load columns over the dofs, (n_dof, n_loads) [N]
-    t: Array  #: ascending, evenly spaced times, (n_t,) [time unit of the body]
-    p: Array  #: load amplitudes, (n_loads, n_t)
+    F: Annotated[Array, ArrayShape(("n_dof", "n_loads"))]  #: load columns over the dofs [N]
+    t: Annotated[Array, ArrayShape(("n_t",))]  #: ascending, evenly spaced times [time unit of the body]
+    p: Annotated[Array, ArrayShape(("n_loads", "n_t"))]  #: load amplitudes
 
     def __post_init__(self) -> None:
-        for name in ("F", "t", "p"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
         step = np.diff(self.t)
-        if self.t.ndim != 1 or len(self.t) < 2 or not (step > 0).all() or np.ptp(step) > 1e-6 * step.max():
+        if len(self.t) < 2 or not (step > 0).all() or np.ptp(step) > 1e-6 * step.max():
             raise QualityError("load history: expected two or more times, ascending and evenly spaced")
-        if self.p.shape != (self.F.shape[1], len(self.t)):
-            raise QualityError(
-                f"load history: {self.F.shape[1]} loads at {len(self.t)} times need amplitudes "
-                f"({self.F.shape[1]}, {len(self.t)}), got {self.p.shape}"
-            )
 
     def __add__(self, other: "LoadHistory") -> "LoadHistory":
         """Return the sum of both load histories; their times must agree."""
@@ -57,21 +54,13 @@ class LoadHistory:
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError, misfit=QualityError)
 class Snapshots:
     """Displacements u(t) = columns @ amplitudes over the dofs of the full model."""
 
-    columns: Array  #: displacement columns, (n_dof, k)
-    amplitudes: Array  #: amplitudes of the columns, (k, n_t)
-    t: Array  #: times, (n_t,) [time unit of the body]
-
-    def __post_init__(self) -> None:
-        for name in ("columns", "amplitudes", "t"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
-        if self.amplitudes.shape != (self.columns.shape[1], len(self.t)):
-            raise QualityError(
-                f"snapshots: {self.columns.shape[1]} columns at {len(self.t)} times need amplitudes "
-                f"({self.columns.shape[1]}, {len(self.t)}), got {self.amplitudes.shape}"
-            )
+    columns: Annotated[Array, ArrayShape(("n_dof", "k"))]  #: displacement columns
+    amplitudes: Annotated[Array, ArrayShape(("k", "n_t"))]  #: amplitudes of the columns
+    t: Annotated[Array, ArrayShape(("n_t",))]  #: times [time unit of the body]
 
     @classmethod
     def of_displacements(cls, u: Array, t: Array) -> "Snapshots":
