@@ -21,7 +21,7 @@ from fe_models.foundation.sparse.sparse_product import SymmetricProduct
 from fe_models.foundation.tall.columns import beside, combine, dots, inner
 
 __all__ = [
-    "Basis", "DisplacementColumns", "Products", "gram", "gram_in_blocks", "independent_basis", "independent_columns",
+    "Basis", "DisplacementColumns", "Products", "gram_in_blocks", "independent_basis", "independent_columns",
     "orthonormal_basis", "within",
 ]  # fmt: skip
 
@@ -54,12 +54,6 @@ class DisplacementColumns:
     def inner(self, other: "DisplacementColumns", omega2: float) -> Array:
         """Return selfᵀ (K + omega² M) other."""
         return inner(self.X, other.KX) + omega2 * inner(self.X, other.MX)
-
-
-def gram(X: Array, AX: Array) -> Array:
-    """Return Xᵀ A X for symmetric A, averaging the rounding errors of its two halves."""
-    G = inner(X, AX)
-    return (G + G.T) / 2
 
 
 @dataclass(frozen=True, eq=False)

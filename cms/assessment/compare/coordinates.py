@@ -11,10 +11,10 @@ import numpy as np
 import scipy.linalg as la
 
 from cms.assessment.quality.reference.ports import Ports
-from cms.linear_algebra.independent import DisplacementColumns, Products, gram, independent_columns
+from cms.linear_algebra.independent import DisplacementColumns, Products, independent_columns
 from cms.modes.families.families import Families
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.tall.columns import inner, subtract
+from fe_models.foundation.tall.columns import gram, inner, subtract
 
 __all__ = ["Coordinates", "ReferenceBasis"]
 

@@ -18,7 +18,7 @@ from cms.linear_algebra.solvers.shift_inverted import (
     refined_modes,
 )
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.tall.columns import combine, combine_in_place, combined, inner, put, subtract
+from fe_models.foundation.tall.columns import combine, combine_in_place, combined, gram, inner, put, subtract
 
 __all__ = ["BlockLanczos", "DenseSearch", "KrylovSearch", "RitzPairs"]
 
@@ -164,16 +164,16 @@ class BlockLanczos:
         M_W = self.M @ W
         for k_pass in range(MAX_PASSES):
             C = inner(V, M_W)
-            gram = _symmetric(inner(W, M_W))
-            longest = np.sqrt(max(np.diag(gram).max(initial=0.0), 0.0))
+            G = gram(W, M_W)
+            longest = np.sqrt(max(np.diag(G).max(initial=0.0), 0.0))
             subtract(W, V, C)
             C_sum += C @ R_sum
-            gram -= C.T @ C  # Gram matrix of W - V C, accurate as long as cancellation is small
+            G -= C.T @ C  # Gram matrix of W - V C, accurate as long as cancellation is small
             taken = np.abs(C).max(initial=0.0)
-            if not taken**2 <= SETTLED**2 * la.eigvalsh(gram)[0]:
+            if not taken**2 <= SETTLED**2 * la.eigvalsh(G)[0]:
                 M_W = self.M @ W
-                gram = _symmetric(inner(W, M_W))
-            length2, U = la.eigh(gram)
+                G = gram(W, M_W)
+            length2, U = la.eigh(G)
             floor = DEPENDENT * max(length, longest) if k_pass == 0 else 0.1
             kept = length2 > floor**2
             scaled = U[:, kept] / np.sqrt(length2[kept])
@@ -182,19 +182,15 @@ class BlockLanczos:
             if not kept.any():
                 break
             if length2[kept][0] > (TAME * longest) ** 2:
-                defect = _symmetric(inner(W, M_W))
-                if np.abs(defect - np.eye(len(defect))).max() > ROUNDOFF:
-                    U = la.cholesky(defect)
+                G = gram(W, M_W)
+                if np.abs(G - np.eye(len(G))).max() > ROUNDOFF:
+                    U = la.cholesky(G)
                     W, M_W = (combined(X, la.solve_triangular(U, np.eye(len(U)))) for X in (W, M_W))
                     R_sum = U @ R_sum
                 break
             M_W = self.M @ W
         put(W, self._columns[:, self.m : self.m + W.shape[1]])
         return C_sum, R_sum, M_W
-
-
-def _symmetric(G: Array) -> Array:
-    return (G + G.T) / 2
 
 
 # mode search ----------------------------------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from cms.linear_algebra.solvers.factorization import Matrix
 from cms.linear_algebra.solvers.inverse import Inverse
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.sparse.sparse_product import SymmetricProduct
-from fe_models.foundation.tall.columns import combine, inner, subtract
+from fe_models.foundation.tall.columns import combine, gram, inner, subtract
 
 __all__ = [
     "ArraySpace", "Modes", "ShiftInverted", "TallProduct", "TallSpace", "measured_residual",
@@ -134,8 +134,7 @@ def refined_modes(operator: ShiftInverted, X: Any, theta: Array, n_wanted: int) 
     subtract(X, Y, np.eye(len(theta)))
     residuals = np.sqrt(np.maximum(np.diag(inner(X, M @ X)), 0.0))[:n_wanted]
     del X
-    G = inner(Y, M @ Y)
-    mu, Z = la.eigh((H + H.T) / 2, (G + G.T) / 2)
+    mu, Z = la.eigh((H + H.T) / 2, gram(Y, M @ Y))
     return Modes(mu + operator.shift, n_wanted, residuals, Y, Z)
 
 

@@ -9,7 +9,7 @@ import scipy.linalg as la
 
 from cms.errors import EigenError, ModeSetError
 from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
-from cms.linear_algebra.independent import gram, independent_columns
+from cms.linear_algebra.independent import independent_columns
 from cms.linear_algebra.solvers.eigen import EigenResult
 from cms.modes.families.families import Families, body_of, families_of
 from cms.modes.families.receptance import boundary_scale
@@ -17,7 +17,7 @@ from cms.modes.families.static_modes import boundary_names
 from cms.modes.mode_set import Block, ModeSet, mode_set, require_interfaces, rigid_block
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray, frozen
-from fe_models.foundation.tall.columns import combine
+from fe_models.foundation.tall.columns import combine, gram
 from fe_models.foundation.words import nearest
 
 __all__ = ["BalancedSystem", "balance", "balanced_truncation"]

@@ -9,7 +9,7 @@ import scipy.linalg as la
 from scipy.linalg.lapack import dpstrf
 
 from cms.errors import FactorizationError, ModeSetError
-from cms.linear_algebra.independent import DisplacementColumns, gram
+from cms.linear_algebra.independent import DisplacementColumns
 from cms.linear_algebra.solvers.factorization import factorize, shifted_matrix
 from cms.modes.centrifugal import CENTRIFUGAL
 from cms.modes.families.families import Families, body_of, families_of
@@ -19,6 +19,7 @@ from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.sparse.sparse_product import SymmetricProduct
 from fe_models.foundation.sparse.submatrix import PrincipalBlock
+from fe_models.foundation.tall.columns import gram
 
 __all__ = ["krylov"]
 

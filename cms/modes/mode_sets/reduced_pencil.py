@@ -7,7 +7,6 @@ import numpy as np
 import scipy.linalg as la
 
 from cms.errors import ModeSetError
-from cms.linear_algebra.independent import gram
 from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
 from cms.modes.families.families import Families, families_of
 from cms.modes.families.static_modes import boundary_names
@@ -17,7 +16,7 @@ from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.records import ArrayShape, checked_fields
-from fe_models.foundation.tall.columns import in_memory
+from fe_models.foundation.tall.columns import gram, in_memory
 
 __all__ = [
     "ReducedPencil",

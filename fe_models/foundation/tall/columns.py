@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
 
 __all__ = [
-    "Columns", "are_finite", "beside", "combine", "combine_in_place", "combined", "copied", "dots", "elsewhere",
+    "Columns", "are_finite", "beside", "combine", "combine_in_place", "combined", "copied", "dots", "elsewhere", "gram",
     "in_memory", "inner", "of_this_process", "ordered", "put", "rows_times", "subtract",
 ]  # fmt: skip
 
@@ -82,6 +82,12 @@ def inner(X: Any, Y: Any) -> Array:
     if (far := elsewhere(X, Y)) is not None:
         return np.asarray(sum(far.on_rows(inner, far.like(X), far.like(Y))))
     return np.sum(_by_rows(lambda some: X[some].T @ Y[some], X, Y, is_sum=True), axis=0)
+
+
+def gram(X: Any, AX: Any) -> Array:
+    """Return Xᵀ A X for symmetric A, averaging the rounding errors of its two halves."""
+    G = inner(X, AX)
+    return (G + G.T) / 2
 
 
 def dots(X: Any, Y: Any, d: Array | None = None) -> Array:

@@ -6,14 +6,14 @@ import numpy as np
 import scipy.linalg as la
 
 from cms.body.reduced_body import BodyFrame
-from cms.linear_algebra.independent import Products, gram, gram_in_blocks, independent_basis
+from cms.linear_algebra.independent import Products, gram_in_blocks, independent_basis
 from cms.modes.families.families import Families
 from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.finishing import finish
 from cms.reduction.basis.frames import FrameCondition
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, frozen
-from fe_models.foundation.tall.columns import combine, dots, inner, of_this_process
+from fe_models.foundation.tall.columns import combine, dots, gram, inner, of_this_process
 
 __all__ = ["FreeBasis", "ShapeRounding", "free_basis", "ritz_basis", "shape_rounding"]
 
