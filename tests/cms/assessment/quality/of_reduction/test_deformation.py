@@ -255,8 +255,14 @@ def test_the_record_tells_the_largest_error_and_keeps_the_history(body, families
     ("call", "words"),
     [
         (lambda b, f: LoadHistory(np.ones((3, 1)), np.array([0.0, 1.0, 3.0]), np.ones((1, 3))), "evenly spaced"),
-        (lambda b, f: LoadHistory(np.ones((3, 2)), np.array([0.0, 1.0]), np.ones((1, 2))), "need amplitudes"),
-        (lambda b, f: Snapshots(np.ones((3, 2)), np.ones((1, 2)), np.arange(2.0)), "need amplitudes"),
+        (
+            lambda b, f: LoadHistory(np.ones((3, 2)), np.array([0.0, 1.0]), np.ones((1, 2))),
+            r"p: expected shape \(2, 2\)",
+        ),
+        (
+            lambda b, f: Snapshots(np.ones((3, 2)), np.ones((1, 2)), np.arange(2.0)),
+            r"amplitudes: expected shape \(2, n_t\)",
+        ),
         (
             lambda b, f: transient(f, LoadHistory(np.ones((3, 1)), np.arange(2.0), np.ones((1, 2))), cutoff=1.0),
             "over 3 dofs",
