@@ -131,6 +131,14 @@ def test_an_interrupted_run_is_resumed_bit_for_bit(tmp_path):
     assert_array_equal(read.controller("pid").motor, whole.controller("pid").motor)
 
 
+def test_a_run_goes_on_from_the_last_state_of_another_with_the_memory_of_its_controller(motion):
+    first = integrate(rotor(pid()), GeneralizedAlpha(), 0.5, 1e-3)
+    memory = first.controller("pid")["state 1"][-1:]
+    second = integrate(rotor(pid(state=memory)), GeneralizedAlpha(), 1.0, 1e-3, t_start=0.5, state=first.state(-1))
+    assert_allclose(second.joint("pin").angle, motion.joint("pin").angle[500:], rtol=0, atol=1e-12)
+    assert_allclose(second.controller("pid").motor, motion.controller("pid").motor[50:], rtol=0, atol=1e-10)
+
+
 def test_a_run_of_another_controller_is_not_resumed(tmp_path):
     path = tmp_path / "rotor.h5"
 
