@@ -1,4 +1,4 @@
-"""Types of bodies as flat arrays: instances of one reduced body share one."""
+"""Types of bodies as flat arrays; bodies made from the same reduced body share one type."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,12 +20,12 @@ SYMMETRIC = 0.02  #: relative difference of two moments of inertia below which a
 
 
 def integers(values: list[int]) -> IntArray:
-    """Return an integer array, empty ones included."""
+    """Return values as an integer array, also if there are none."""
     return np.array(values, dtype=np.int64)
 
 
 def offsets(sizes: IntArray) -> IntArray:
-    """Return where each of consecutive parts begins, and the end, (n + 1,)."""
+    """Return the first index of each of consecutive parts, followed by the total length, (n + 1,)."""
     return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
 
 
@@ -54,7 +54,7 @@ def body_types(bodies: Sequence[Body]) -> tuple[list[RigidBody | ReducedBody], I
 
 
 def axis_of_symmetry(mass: float, S: Array, J0: Array) -> Array:
-    """Return the axis about which the inertia at the centre of mass is symmetric, (3,); zero if there is none."""
+    """Return the symmetry axis of the inertia about the centre of mass, (3,); zero if the body is not axisymmetric."""
     s = S / mass if mass > 0 else np.zeros(3)
     return axis_of_inertia(J0 - point_inertia(mass, s))
 
@@ -65,7 +65,7 @@ def point_inertia(mass: float, r: Array) -> Array:
 
 
 def axis_of_inertia(J: Array, within: float = SYMMETRIC) -> Array:
-    """Return the axis about which an inertia is symmetric, (3,); zero if there is none, or if every axis is one.
+    """Return the symmetry axis of an inertia tensor, (3,); zero if there is none, or if all three moments are equal.
 
     within: difference of the moments across the axis, by the largest one.
     """
@@ -77,7 +77,7 @@ def axis_of_inertia(J: Array, within: float = SYMMETRIC) -> Array:
 
 
 def type_arrays(types: list[RigidBody | ReducedBody]) -> BodyTypes:
-    """Return the data of the types of bodies."""
+    """Return the data of the types of bodies as the record of the kernels."""
     blocks: list[Array] = []
     block0 = np.zeros((len(types), N_BLOCKS), np.int64)
     is_diagonal = np.ones((len(types), 3), np.int64)

@@ -1,4 +1,4 @@
-"""Connections in the order of their compilation: their ends, wrenches and rows."""
+"""Connections in the order in which they are compiled, with their ends, wrenches and rows."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -22,17 +22,17 @@ __all__ = ["Connections", "End", "add_joint", "add_spring"]
 
 @dataclass(frozen=True, eq=False)
 class End:
-    """A marker of a connection, and the index of its part of the wrench."""
+    """One end of a connection: its marker, and the index of the wrench that acts there."""
 
     marker: MarkerData
-    sign: float  #: +1 at A, -1 at B
-    force: int = FORCE  #: -1: none
+    sign: float  #: sign of the wrench: +1 at marker A, -1 at marker B
+    force: int = FORCE  #: index of the force in the wrench of the connection, -1 for none
     moment: int = NO_MOMENT
 
 
 @dataclass
 class Connections:
-    """Lists over connections, their markers and rows."""
+    """Connections, with one list entry for each connection, marker or row."""
 
     placed: State
     n_q: IntArray
@@ -46,13 +46,14 @@ class Connections:
     b_of: list[int] = field(default_factory=list)
     law: list[int] = field(default_factory=list)
     item: list[int] = field(default_factory=list)
-    accelerated: list[int] = field(default_factory=list)  #: markers whose acceleration is an input of a law
-    rates: list[int] = field(default_factory=list)  #: whether the rows depend on velocities
+    #: numbers of the markers whose acceleration is an input of a law
+    accelerated: list[int] = field(default_factory=list)
+    rates: list[int] = field(default_factory=list)  #: for each connection, whether its rows depend on velocities
     rows: list[Row] = field(default_factory=list)
-    owner: list[str] = field(default_factory=list)  #: of each row
+    owner: list[str] = field(default_factory=list)  #: name of the connection to which each row belongs
 
     def add_marker(self, marker: MarkerData) -> int:
-        """Add a marker that is no end of a connection, and return its number."""
+        """Add a marker that is not an end of a connection, and return its number."""
         self.markers.append(marker)
         self.connection_of.append(-1)
         self.sign.append(0.0)
@@ -107,7 +108,7 @@ def add_spring(system: System, made: Connections, spring: SpringDamper) -> float
 def spring_length(
     where: str, spring: SpringDamper, a: MarkerData, b: MarkerData, placed: State, n_q: IntArray
 ) -> float:
-    """Return the free length of a spring; `ModelError` if it has no direction as placed."""
+    """Return the free length of a spring; `ModelError` if the two markers coincide, so that it has no direction."""
     distance = float(np.linalg.norm(marker_pose(b, placed, n_q)[0] - marker_pose(a, placed, n_q)[0]))
     free_length = distance if spring.free_length is None else spring.free_length
     if distance == 0 and (free_length > 0 or spring.preload != 0 or spring.damping != 0 or spring.characteristic):

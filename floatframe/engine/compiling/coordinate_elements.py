@@ -1,4 +1,4 @@
-"""Couplers and user forces in the arrays of the kernels: coordinates between markers, and their couplings."""
+"""Couplers and user forces in the arrays of the kernels: coordinates between markers, and their coupling terms."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -47,7 +47,7 @@ __all__ = [
 ]
 
 
-LEAST_SIZE = 1e-3  #: size of a state if no other is known
+LEAST_SIZE = 1e-3  #: size of a state whose typical size is unknown
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,13 +66,13 @@ class PlacedCoordinate:
 
     @property
     def has_arm(self) -> bool:
-        """Whether a force along the coordinate has a moment about the point of A that loads a body."""
+        """Whether a force along the coordinate also applies a moment to the body of marker A."""
         return self.coordinate.kind == PUSH and self.a.body >= 0
 
 
 @dataclass
 class CoordinateElements:
-    """Lists over coordinates and connections."""
+    """Couplers and user forces, with one list entry for each coordinate or connection."""
 
     names: tuple[str, ...] = ()
     coordinate0: list[int] = field(default_factory=lambda: [0])
@@ -84,10 +84,11 @@ class CoordinateElements:
     tapes: list[Tape] = field(default_factory=list)
     callbacks: list[Callback] = field(default_factory=list)
     placed: list[PlacedCoordinate] = field(default_factory=list)
-    lengths: list[float | None] = field(default_factory=list)  #: declared by the forces, for each coordinate
+    #: for each coordinate, the length that its force declares, or None
+    lengths: list[float | None] = field(default_factory=list)
 
     def give_lengths(self, radii: Array, length: float, units: Units) -> None:
-        """Set the ranges of coordinates and rates over which a law changes, from radii of gyration of bodies, (n_b,).
+        """Set the ranges of coordinates and rates over which laws change, from radii of gyration of bodies, (n_b,).
 
         A distance by the length that a force says, or the size of the smaller body, in a second, 1 m/s at most; angles
         by 1 rad.
@@ -99,7 +100,7 @@ class CoordinateElements:
             record["size"], record["speed"] = size, min(size / second, most)
 
     def records(self) -> dict[str, Any]:
-        """Return the arrays of the model."""
+        """Return these data as arrays of the model."""
         tapes = self.tapes
         return {
             "elements": filled(model.Elements(), coordinate0=self.coordinate0, core=self.core),
@@ -129,7 +130,7 @@ def add_coordinate_elements(system: System, made: Connections, functions: Functi
 
 
 def add_coupler(system: System, made: Connections, elements: CoordinateElements, coupler: CoordinateCoupler) -> None:
-    """Add a coupler: the rows of its coordinates, then that of its multiplier."""
+    """Add a coupler: one row for each coordinate, then the row of its multiplier."""
     where = f"coupler {coupler.name!r}"
     coordinates = [find_coordinate(system, f"{where}: term {k + 1}", c, made) for k, (c, _) in enumerate(coupler.terms)]
     factors = [factor for _, factor in coupler.terms]
@@ -145,7 +146,7 @@ def add_coupler(system: System, made: Connections, elements: CoordinateElements,
 def add_user_force(
     system: System, made: Connections, elements: CoordinateElements, functions: Functions, force: UserForce
 ) -> None:
-    """Add a user force: the rows of its coordinates, then of its forces, then of its states."""
+    """Add a user force: the rows of its coordinates, then those of its forces, then those of its states."""
     where = f"force {force.name!r}"
     names, acting = list(force.coordinates), list(force.forces)
     coordinates = [find_coordinate(system, f"{where}: coordinates: {k}", c, made) for k, c in force.coordinates.items()]
@@ -195,7 +196,7 @@ def add_coordinates(
     core: list[Row],
     length: float | None = None,
 ) -> int:
-    """Add a connection, with rows of its coordinates, then of its core; return the number of the first core row."""
+    """Add a connection with rows of its coordinates, then its core rows; return the number of the first core row."""
     rows: list[Row] = []
     ends: list[End] = []
     starts: list[tuple[int, int, int]] = []  # for each coordinate in the connection: value, force, arm
@@ -235,7 +236,7 @@ def add_coordinates(
 
 
 def find_coordinate(system: System, where: str, coordinate: Coordinate, made: Connections) -> PlacedCoordinate:
-    """Return a coordinate in the assembled position; `ModelError` with the closest name if it does not exist."""
+    """Return a coordinate in the assembled position; `ModelError` suggests the closest name if it does not exist."""
     if isinstance(coordinate, JointCoordinate):
         return coordinate_of_joint(system, where, coordinate, made)
     a = find_marker(system, f"{where}: marker_a", coordinate.marker_a)

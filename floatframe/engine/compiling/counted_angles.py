@@ -1,4 +1,4 @@
-"""Angles whose turns a run counts: of joints, of sensors that request it, and of bushings that twist."""
+"""Angles counted through full turns: of joints, of sensors that request it, and of bushings that can twist far."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -33,18 +33,19 @@ SAME = 1e-9  #: difference of two directions below which they count as equal
 
 @dataclass(frozen=True)
 class CountedAngle:
-    """An angle between two bodies, from directions in their frames; see kernels/turns.py."""
+    """An angle between two bodies, given by directions in their frames; see kernels/turns.py."""
 
-    holder: int  #: body with the axis x × z, -1 for the ground
+    holder: int  #: body that carries the axis x × z, -1 for the ground
     other: int
     x: Direction
     z: Direction
-    y: Direction  #: direction of the other body, which turns from z towards -x
+    y: Direction  #: direction fixed in the other body; a positive angle rotates it from z towards -x
     sign: float = 1.0
-    part: int = -1  #: 0, 1, 2: component of the rotation vector of a bushing; its three components are consecutive
+    #: component 0, 1 or 2 of the rotation vector of a bushing (its components are consecutive), -1 for a plain angle
+    part: int = -1
 
     def is_same(self, angle: "CountedAngle") -> bool:
-        """Whether another angle measures the same."""
+        """Whether two descriptions measure the same angle."""
         own, others = ((a.holder, a.other, a.sign, a.part) for a in (self, angle))
         directions = ((*a.x, *a.y, *a.z) for a in (self, angle))
         return own == others and all(abs(p - q) <= SAME for p, q in zip(*directions, strict=True))
@@ -55,11 +56,11 @@ class AngleOfSensor(Protocol):
     """A sensor that measures an angle through full turns."""
 
     def counted_angle(self, system: System) -> CountedAngle:
-        """Return the angle; `ModelError` if a marker names what does not exist."""
+        """Return the angle that the sensor measures; `ModelError` if one of its markers does not exist."""
 
 
 def angle_of(coordinate: RowCoordinate, a: MarkerData, b: MarkerData) -> CountedAngle:
-    """Return the angle of a coordinate between two markers."""
+    """Return the angle coordinate between two markers as a counted angle."""
     holder, other = (b, a) if coordinate.kind == TWIST_B else (a, b)
     x, z = (holder.shape.triad @ each for each in (coordinate.x, coordinate.z))
     y = other.shape.triad @ coordinate.y
@@ -73,7 +74,7 @@ def direction(x: Sequence[float] | Array) -> Direction:
 
 
 def counted_angles(system: System, placed: State) -> list[tuple[CountedAngle, TimeFunction | None]]:
-    """Return the angles of a system without duplicates, each with the motion that prescribes it or None."""
+    """Return the angles of a system without duplicates, each with the function that prescribes it, or None."""
     found: list[tuple[CountedAngle, TimeFunction | None]] = []
     between: dict[tuple[int, int, float], list[CountedAngle]] = {}  # the same two bodies
     n_q = n_q_of(system)
@@ -111,7 +112,7 @@ def rotation_of(a: MarkerData, b: MarkerData) -> list[CountedAngle]:
 
 
 def first_angles(system: System, n_angles: int) -> list[int]:
-    """Return for each bushing the index of its rotation vector among the angles, -1 for those that count no turns."""
+    """Return, for each bushing, the index of its first counted angle, or -1 if its turns are not counted."""
     counting = [force.counts_turns for force in system.forces if isinstance(force, Bushing)]
     first = n_angles - 3 * sum(counting)  # they are the last
     return [first + 3 * sum(counting[:k]) if counts else -1 for k, counts in enumerate(counting)]

@@ -1,4 +1,4 @@
-"""Order and fill of the block elimination of connections that share bodies; done once per system."""
+"""Elimination order and fill of the block factorisation of connections that share bodies; computed once per system."""
 
 from heapq import heapify, heappop, heappush
 

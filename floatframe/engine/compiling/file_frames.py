@@ -1,4 +1,4 @@
-"""Conversion of states, results and small motions between the frames of the engine and those of the files.
+"""Conversion of states, results and small motions between body frames of the engine and body frames of the files.
 
 Kernels, start, integrators and analyses work in the frames of the engine, where stiffened bodies move in mean axes
 (`floatframe.model.bodies.mean_axes`). What a user gives and gets, states, results and shapes, speaks of the frames of
@@ -23,27 +23,27 @@ Way = Literal["to_file", "to_mean"]
 
 
 def state_of_file(compiled: CompiledSystem, state: State) -> State:
-    """Return a state of the engine, converted to the frames of the files."""
+    """Return a state of the engine converted to the body frames of the files."""
     return motion_of_file(compiled, state, np.zeros_like(state.u))[0]
 
 
 def state_of_engine(compiled: CompiledSystem, state: State) -> State:
-    """Return a state in the frames of the files, converted to those of the engine."""
+    """Return a state given in the body frames of the files, converted to those of the engine."""
     return motion_of_engine(compiled, state, np.zeros_like(state.u))[0]
 
 
 def motion_of_file(compiled: CompiledSystem, state: State, u_dot: Array) -> tuple[State, Array]:
-    """Return a state and accelerations (n_u,) of the engine, converted to the frames of the files."""
+    """Return a state and accelerations (n_u,) of the engine converted to the body frames of the files."""
     return changed_state(compiled, state, u_dot, "to_file")
 
 
 def motion_of_engine(compiled: CompiledSystem, state: State, u_dot: Array) -> tuple[State, Array]:
-    """Return a state and accelerations (n_u,) in the frames of the files, converted to those of the engine."""
+    """Return a state and accelerations (n_u,) in the body frames of the files, converted to those of the engine."""
     return changed_state(compiled, state, u_dot, "to_mean")
 
 
 def rows_of_file(compiled: CompiledSystem, rows: Rows) -> Rows:
-    """Return rows of results of the engine, converted to the frames of the files."""
+    """Return result rows of the engine converted to the body frames of the files."""
     if not any(compiled.mean_axes):
         return rows
     r, p, q, u, u_dot = changed(compiled, (rows.r, rows.p, rows.q, rows.u, rows.u_dot), "to_file")
@@ -51,7 +51,7 @@ def rows_of_file(compiled: CompiledSystem, rows: Rows) -> Rows:
 
 
 def small_motions_of_file(compiled: CompiledSystem, q: Array) -> tuple[Array, ...]:
-    """Return small motions of each body in its file's frame (body axes) from those in the engine, at its q (n_q,)."""
+    """Return for each body the matrix from small motions in the engine to those in the file frame, at q, (n_q,)."""
     bodies = compiled.model.bodies
     return tuple(
         np.eye(6 + int(bodies.n_q[i])) if axes is None else axes.small_motions(q[bodies.q0[i] : bodies.q0[i + 1]])
@@ -60,7 +60,7 @@ def small_motions_of_file(compiled: CompiledSystem, q: Array) -> tuple[Array, ..
 
 
 def changed_state(compiled: CompiledSystem, state: State, u_dot: Array, way: Way) -> tuple[State, Array]:
-    """Return a state and accelerations in the other frames."""
+    """Return a state and accelerations converted to the other set of body frames."""
     if not any(compiled.mean_axes):
         return state, u_dot
     r, p, q, u, u_dot = changed(compiled, (state.r, state.p, state.q, state.u, u_dot), way)
@@ -68,7 +68,7 @@ def changed_state(compiled: CompiledSystem, state: State, u_dot: Array, way: Way
 
 
 def changed(compiled: CompiledSystem, arrays: tuple[Array, ...], way: Way) -> tuple[Array, ...]:
-    """Return r (..., n_b, 3), p (..., n_b, 4), q (..., n_q), u and u_dot (..., n_u) in the other frames."""
+    """Return r (..., n_b, 3), p (..., n_b, 4), q (..., n_q), u and u_dot (..., n_u) in the other set of body frames."""
     r, p, q, u, u_dot = (np.array(array) for array in arrays)
     with np.errstate(over="ignore", invalid="ignore"):  # NaN of a motion that diverges
         for i, axes in enumerate(compiled.mean_axes):

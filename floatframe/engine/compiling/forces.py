@@ -1,4 +1,4 @@
-"""Forces as flat arrays, and the functions of time and of coordinates that forces and drives share."""
+"""Forces as flat arrays, and the functions of time or of coordinates that forces and prescribed motions share."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -27,19 +27,19 @@ __all__ = ["Functions", "body_loads", "joint_forces", "with_forces"]
 
 @dataclass
 class Functions:
-    """Functions in the order of their compilation."""
+    """Functions of time and of coordinates in the order in which they are compiled."""
 
     known: list[TimeFunction] = field(default_factory=list)
 
     def index(self, function: TimeFunction | None) -> int:
-        """Return the number of a function, -1 for no function."""
+        """Return the number of a function, -1 for None."""
         if function is None:
             return -1
         self.known.append(function)
         return len(self.known) - 1
 
     def record(self) -> FunctionPieces:
-        """Return the pieces of all functions, one function after another."""
+        """Return the pieces of all functions as one record, one function after another."""
         return filled(
             FunctionPieces(),
             piece0=offsets(integers([len(function.begins) for function in self.known])),
@@ -49,7 +49,7 @@ class Functions:
 
 
 def with_forces(joint: Joint, rows: Sequence[Row], forces: Sequence[JointForce]) -> list[Row]:
-    """Return the rows of a joint, those of coordinates with forces replaced; `ModelError` if that is impossible."""
+    """Return the rows of a joint with force rows for loaded coordinates; `ModelError` if a force cannot act there."""
     result = list(rows)
     for force in forces:
         where = f"force {force.name!r}"
@@ -70,7 +70,7 @@ def with_forces(joint: Joint, rows: Sequence[Row], forces: Sequence[JointForce])
 def joint_forces(
     system: System, rows: Sequence[Row], owner: Sequence[str], functions: Functions
 ) -> tuple[JointForces, list[int]]:
-    """Return the forces along coordinates, sorted by row, and the index of the first force of each row, and the end.
+    """Return the forces along joint coordinates sorted by row, and each row's first index, followed by their number.
 
     owner: name of the joint of each row.
     """

@@ -1,4 +1,4 @@
-"""The loads on the interfaces of a flexible body: ends of connections, and point forces."""
+"""The loads on the interfaces of a flexible body: wrenches of connections and point forces."""
 
 from dataclasses import dataclass
 
@@ -15,12 +15,12 @@ __all__ = ["Load", "Wrench", "amplitudes", "in_body", "interface_number", "loads
 
 @dataclass(frozen=True, eq=False)
 class Wrench:
-    """Indices of the wrench of a connection on an interface."""
+    """Indices of the wrench that a connection applies to an interface."""
 
     interface: int
     sign: float
-    force: int  #: first column of the force in w, -1 for none
-    moment: int  #: first column of the moment in w, -1 for none
+    force: int  #: first column of the force in the wrench array w, -1 for none
+    moment: int  #: first column of the moment in the wrench array w, -1 for none
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,12 +29,12 @@ class Load:
 
     interface: int
     force: PointForce
-    triad: Array  #: undeformed axes of the marker in the body frame, (3, 3)
-    number: int = -1  #: number among the point forces of the system
+    triad: Array  #: axes of the marker in the undeformed body, body frame, (3, 3)
+    number: int = -1  #: index among the point forces of the system
 
 
 def loads_on_interfaces(system: System, body: int) -> tuple[list[Wrench], list[Load]]:
-    """Return the indices of the wrenches on the interfaces of a flexible body, and the point forces on them."""
+    """Return the wrench indices of connections on the interfaces of a flexible body, and the point forces on them."""
     model, reduced = compiled_system(system).model, system.bodies[body].moved  # type: ignore[union-attr]
     n = reduced.n_q
     forces = [force for force in system.forces if isinstance(force, PointForce)]
@@ -58,13 +58,13 @@ def loads_on_interfaces(system: System, body: int) -> tuple[list[Wrench], list[L
 
 
 def interface_number(reduced: ReducedBody, psi: Array, position: Array) -> int:
-    """Return the number of the interface with this motion and position, -1 for none."""
+    """Return the number of the interface with these shapes and this position, -1 if there is none."""
     same = [np.array_equal(each.Psi, psi) and np.array_equal(each.position, position) for each in reduced.interfaces]
     return same.index(True) if any(same) else -1
 
 
 def amplitudes(load: Load, t: Array, R: Array) -> Array:
-    """Return force and moment of a point force in body axes, (n_t, 6); a follower turns with the undeformed marker."""
+    """Return force and moment of a point force over time in body axes, (n_t, 6); a follower rotates with its marker."""
     force = load.force
     factor = np.ones(len(t)) if force.amplitude is None else np.array([force.amplitude(x) for x in t])
     six = []
@@ -77,5 +77,5 @@ def amplitudes(load: Load, t: Array, R: Array) -> Array:
 
 
 def in_body(R: Array, vectors: Array) -> Array:
-    """Return vectors in body axes, (n_t, 3)."""
+    """Return vectors given in ground axes in body axes, (n_t, 3)."""
     return np.asarray(np.einsum("tba,tb->ta", R, vectors))

@@ -1,4 +1,4 @@
-"""Markers with their bodies, and their positions at the start."""
+"""Markers as positions on their bodies, and their poses at the start."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -34,20 +34,20 @@ __all__ = [
 ]
 
 GROUND_INDEX = -1
-#: distance of a node from a reference point, relative to the size of the body, below which they coincide
+#: distance between a node and a reference point, relative to the size of the body, below which they coincide
 SAME_PLACE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class MarkerData:
-    """A marker with its body."""
+    """A marker resolved to a body index and a position."""
 
     body: int  #: index of the body, -1 for the ground
     shape: MarkerShape
 
 
 def least_size(markers: Sequence[MarkerData], radii: Array) -> float:
-    """Return the smallest size of the bodies of markers: the radius of gyration, or the arm of a marker."""
+    """Return the smallest size of the bodies that carry the markers: radius of gyration, or arm of a marker."""
     arms: dict[int, float] = {}
     for marker in markers:
         if marker.body >= 0:
@@ -57,12 +57,12 @@ def least_size(markers: Sequence[MarkerData], radii: Array) -> float:
 
 
 def n_q_of(system: System) -> IntArray:
-    """Return the numbers of modes of the bodies, (n_b,)."""
+    """Return the number of modes of each body, (n_b,)."""
     return integers([body_n_q(body) for body in system.bodies])
 
 
 def find_body(system: System, where: str, name: str) -> int:
-    """Return the index of a body, -1 for the ground; `ModelError` with the nearest name if there is none."""
+    """Return the index of a body, -1 for the ground; `ModelError` suggests the closest name if it does not exist."""
     if name == GROUND.name:
         return GROUND_INDEX
     index = system.derived(index_of_bodies)
@@ -115,7 +115,7 @@ def find_marker(system: System, where: str, marker: Marker) -> MarkerData:
 
 
 def interface_at_node(body: FlexibleBody, where: str, node: int | str) -> str:
-    """Return the interface for a node of the user's mesh: with this only member, or with it at the reference point.
+    """Return the interface at a node: the node is its only member, or lies at the reference point as its member.
 
     Raises
     ------
@@ -145,7 +145,7 @@ def interface_at_node(body: FlexibleBody, where: str, node: int | str) -> str:
 
 
 def joint_markers(system: System, joint: Joint, placed: State) -> tuple[MarkerData, MarkerData]:
-    """Return both markers of a joint; a body without a marker gets one at the position of the other marker."""
+    """Return both markers of a joint; a body for which none is given gets one at the position of the other marker."""
     where = f"joint {joint.name!r}"
     given_a, given_b = joint.marker_a, joint.marker_b
     if isinstance(given_a, Marker):
@@ -166,14 +166,14 @@ def joint_markers(system: System, joint: Joint, placed: State) -> tuple[MarkerDa
 
 
 def marker_as_placed(system: System, where: str, name: str, other: MarkerData, placed: State) -> MarkerData:
-    """Return the marker of a body at the place of another marker, with the axes of the body."""
+    """Return a marker on a body at the position of another marker, with the axes of the body."""
     r_P, _ = marker_pose(other, placed, n_q_of(system))
     marker = marker_with_pose(system, where, name, (r_P, np.eye(3)), placed)
     return replace(marker, shape=replace(marker.shape, triad=np.eye(3)))
 
 
 def marker_with_pose(system: System, where: str, name: str, pose: tuple[Array, Array], placed: State) -> MarkerData:
-    """Return the marker of a body at an assembled position with axes, both in ground axes."""
+    """Return a marker on a body with an assembled position and axes, both given in ground axes."""
     index = find_body(system, where, name)
     r_P, A_P = pose
     if index < 0:
@@ -200,7 +200,7 @@ def marker_pose(marker: MarkerData, state: State, n_q: IntArray) -> tuple[Array,
 
 
 def marker_shapes(markers: list[MarkerShape]) -> tuple[list[int], Array]:
-    """Return the index of the shapes of each marker (-1 for none), and the shapes, flat."""
+    """Return all mode shapes of the markers as one flat array, and the index of each marker's shapes (-1 for none)."""
     start: list[int] = []
     parts: list[Array] = []
     n = 0
@@ -213,7 +213,7 @@ def marker_shapes(markers: list[MarkerShape]) -> tuple[list[int], Array]:
 
 
 def marker_bending(markers: list[MarkerShape]) -> tuple[list[int], Array]:
-    """Return the index of K_P [l, 6, k] of each marker (-1 for none), and all of them, flat; one for each interface."""
+    """Return the matrices K_P [l, 6, k] of all interfaces as a flat array, and the index for each marker (-1: none)."""
     start: list[int] = []
     known: dict = {}
     parts: list[Array] = []

@@ -20,7 +20,7 @@ __all__ = ["Pairs", "add_pair_laws", "bushing_markers"]
 
 @dataclass
 class Pairs:
-    """Bushings and contacts, with their names."""
+    """Bushings and contacts in the order in which they are compiled, with their names."""
 
     names: tuple[str, ...] = ()
     bushings: Bushings = field(default_factory=Bushings)
@@ -58,7 +58,7 @@ def add_pair_laws(system: System, made: Connections, functions: Functions) -> Pa
 
 
 def ends_of(a: MarkerData, b: MarkerData) -> tuple[End, End]:
-    """Return the ends of a wrench with force, moment on A and moment on B."""
+    """Return the ends of a wrench that has a force, a moment on A and a moment on B."""
     return End(a, 1.0, moment=MOMENT), End(b, -1.0, moment=MOMENT_B)
 
 
@@ -69,7 +69,7 @@ def require_two_bodies(where: str, a: MarkerData, b: MarkerData) -> None:
 
 
 def bushing_markers(system: System, bushing: Bushing, placed: State) -> tuple[MarkerData, MarkerData]:
-    """Return both markers; a body without a marker gets one at the position and with the axes of the other marker."""
+    """Return both markers of a bushing; a body for which none is given gets one with the pose of the other marker."""
     where = f"force {bushing.name!r}"
     given = (bushing.marker_a, bushing.marker_b)
     found = [

@@ -1,4 +1,4 @@
-"""Bodies without a position, placed by their joints.
+"""Placement by their joints of bodies for which no position is given.
 
 A body without a position begins where its mesh is drawn. Its joints then move it to the nearest pose that they ask for:
 
@@ -37,40 +37,40 @@ from floatframe.model.system import Body, System
 
 __all__ = ["held_directions", "placed_bodies", "placed_state"]
 
-AT_JOINT = 1e-9  #: gap of a joint relative to the size of the system, up to which a body stays as drawn
+AT_JOINT = 1e-9  #: gap of a joint, relative to the size of the system, up to which a body keeps its position
 PARALLEL = 1e-9  #: sine of an angle up to which axes count as parallel
 
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """A joint between two given markers, seen from one of its bodies."""
+    """A joint between two given markers, from the point of view of one of its bodies."""
 
     joint: Joint
-    own: MarkerData  #: on this body
+    own: MarkerData  #: marker on this body
     other: MarkerData
-    is_b: bool  #: whether the own marker is marker B
+    is_b: bool  #: whether the marker on this body is marker B
 
 
 @dataclass(frozen=True, eq=False)
 class PlacedBodies:
-    """The bodies of a system with their positions, and in how many directions joints hold those that give none."""
+    """The placed bodies of a system, and how many directions joints fix for bodies without a given position."""
 
     bodies: tuple[Body, ...]
-    n_held: Mapping[str, int]  #: by the name of a body without a position, 0 to 3
+    n_held: Mapping[str, int]  #: number of fixed directions, 0 to 3, by the name of a body without a given position
 
 
 def placed_bodies(system: System) -> tuple[Body, ...]:
-    """Return the bodies of a system, those without a position placed by their joints; made once for a system."""
+    """Return the bodies of a system after joints have placed those without a position; computed once for a system."""
     return system.derived(place_bodies).bodies
 
 
 def held_directions(system: System) -> Mapping[str, int]:
-    """Return in how many directions joints hold each body without a position, 0 to 3, by its name."""
+    """Return the number of directions (0 to 3) that joints fix for each body without a given position, by name."""
     return system.derived(place_bodies).n_held
 
 
 def place_bodies(system: System) -> PlacedBodies:
-    """Return the bodies of a system, those without a position placed by their joints."""
+    """Return the bodies of a system after joints have placed those without a position."""
     bodies = [body if body.position is not None else replace(body, position=np.zeros(3)) for body in system.bodies]
     waiting = {i for i, body in enumerate(system.bodies) if body.position is None}
     names = [body.name for body in bodies]
@@ -94,19 +94,19 @@ def place_bodies(system: System) -> PlacedBodies:
 
 
 def on_ground(system: System) -> set[int]:
-    """Return the bodies with a joint to the ground as a whole."""
+    """Return the bodies that a joint connects to the ground itself, without a marker of the ground."""
     ends = [(joint.marker_a, joint.marker_b) for joint in system.joints]
     held = {body_name(b.body) for pair in ends for a, b in (pair, pair[::-1]) if is_ground(a) and isinstance(b, Marker)}
     return {i for i, body in enumerate(system.bodies) if body.name in held}
 
 
 def is_ground(end: Place) -> bool:
-    """Whether the end of a joint is the ground without a marker."""
+    """Whether the end of a joint is the ground, without a marker."""
     return not isinstance(end, Marker) and body_name(end) == GROUND.name
 
 
 def links_of(system: System) -> list[list[Link]]:
-    """Return the joints of each body that may ask for its pose."""
+    """Return, for each body, its joints between two given markers."""
     links: list[list[Link]] = [[] for _ in system.bodies]
     for joint in system.joints:
         if isinstance(joint, SlidingJoint) or not all(isinstance(m, Marker) for m in (joint.marker_a, joint.marker_b)):
@@ -127,13 +127,13 @@ def length_of(bodies: list[Body], links: list[list[Link]]) -> float:
 
 
 def rank_of(bodies: list[Body], links: list[Link], done: set[int]) -> int:
-    """Return the number of directions in which placed bodies hold a body."""
+    """Return the number of independent directions in which placed bodies fix a body."""
     rows = [n for link in links if link.other.body in done for n in held(bodies, link)]
     return int(np.linalg.matrix_rank(np.array(rows), tol=1e-6)) if rows else 0
 
 
 def rows_of(bodies: list[Body], link: Link) -> tuple[Row, ...]:
-    """Return the rows of a joint as its bodies stand; none where it is not defined, such as a rod without length."""
+    """Return the rows of a joint at the present poses; none if they are undefined, as for a rod of zero length."""
     own, other = pose(bodies, link.own), pose(bodies, link.other)
     (r_a, A_a), (r_b, A_b) = (other, own) if link.is_b else (own, other)
     try:
@@ -143,7 +143,7 @@ def rows_of(bodies: list[Body], link: Link) -> tuple[Row, ...]:
 
 
 def held(bodies: list[Body], link: Link) -> Array:
-    """Return the directions in which a joint holds the distance of its points, ground axes, (n, 3)."""
+    """Return the directions in which a joint fixes the distance of its points, ground axes, (n, 3)."""
     _, A = pose(bodies, link.other if link.is_b else link.own)
     rows = rows_of(bodies, link)
     found = [row.x for row in rows if row.kind == POINT]
@@ -163,7 +163,7 @@ def pose(bodies: list[Body], marker: MarkerData) -> tuple[Array, Array]:
 
 
 def placed(bodies: list[Body], i: int, links: list[Link], length: float) -> Body:
-    """Return body i, moved by its joints to placed bodies."""
+    """Return body i after its joints have moved it to the bodies placed before."""
     body = bodies[i]
     moving = list(bodies)
     is_turned = not np.array_equal(body.orientation, [1.0, 0.0, 0.0, 0.0])
@@ -185,7 +185,7 @@ def placed(bodies: list[Body], i: int, links: list[Link], length: float) -> Body
 
 
 def asked_rotation(bodies: list[Body], link: Link) -> Array | None:
-    """Return the smallest rotation, (3, 3), by which a body fulfils the axes that a joint holds; None: it does already.
+    """Return the smallest rotation, (3, 3), after which a body satisfies the axes of a joint; None if it already does.
 
     Two rows E · D = 0 with one axis E of A hold it along the normal of the two D of B. Three hold all axes: the k-th of
     A along D of the row before.
@@ -208,7 +208,7 @@ def asked_rotation(bodies: list[Body], link: Link) -> Array | None:
 
 
 def rotation_between(here: Array, there: Array) -> Array | None:
-    """Return the smallest rotation, (3, 3), that turns a unit vector to another; None if they are parallel."""
+    """Return the smallest rotation, (3, 3), from one unit vector to another; None if they are parallel."""
     normal, cosine = np.cross(here, there), float(here @ there)
     if np.linalg.norm(normal) <= PARALLEL:
         if cosine > 0:
@@ -220,7 +220,7 @@ def rotation_between(here: Array, there: Array) -> Array | None:
 
 
 def placed_state(system: System) -> State:
-    """Return the state of the bodies as placed, in the frames of the engine."""
+    """Return the state of the placed bodies, in the frames of the engine."""
     motions = [motion_at_start(body) for body in placed_bodies(system)]
     return State(
         r=np.array([motion.r for motion in motions]),
@@ -231,7 +231,7 @@ def placed_state(system: System) -> State:
 
 
 def motion_at_start(body: Body) -> FrameMotion:
-    """Return the motion of the frame in which a body is computed at the start, without accelerations."""
+    """Return the initial motion of the frame in which the engine computes a body, without accelerations."""
     zero = np.zeros(3)
     if not isinstance(body, FlexibleBody):
         none = np.zeros(0)

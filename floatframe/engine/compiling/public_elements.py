@@ -24,39 +24,39 @@ from floatframe.model.system import System
 
 __all__ = ["PlacedLaw", "PublicElements", "add_public_elements"]
 
-ANGLES = ("rad", "1", "")  #: units of held quantities that are not lengths
-WIDTH = 18  #: numbers of the motion of a marker
-ACCELERATED = 24  #: the same with its accelerations
+ANGLES = ("rad", "1", "")  #: units of constrained quantities that are not lengths
+WIDTH = 18  #: number of values in the motion of a marker
+ACCELERATED = 24  #: number of values in the motion of a marker with accelerations
 
 
 @dataclass(frozen=True, eq=False)
 class PlacedLaw:
-    """An element with its law, and the indices of its unknowns."""
+    """An element in the assembled system: its law, its markers, and the indices of its unknowns."""
 
     element: Element
     law: ElementLaw
     connection: int
-    states: tuple[int, ...]  #: rows of the values of its states
-    multipliers: tuple[int, ...]  #: rows of its multipliers
+    states: tuple[int, ...]  #: rows of the values of the states of the element
+    multipliers: tuple[int, ...]  #: rows of the multipliers of the element
     markers: tuple[MarkerData, ...]
-    head: tuple[int, ...]  #: sizes of its inputs, see `compiling.callbacks.law_templates`
-    value: Callback  #: its function
-    slopes: Callback  #: of derivatives
-    rest: tuple[Callback, Callback]  #: the same functions, for the equations in equilibrium
+    head: tuple[int, ...]  #: numbers of markers, states and other inputs, see `compiling.callbacks.law_templates`
+    value: Callback  #: C function of the values of the law
+    slopes: Callback  #: C function of the derivatives of the law
+    rest: tuple[Callback, Callback]  #: the same two functions for the equations in static equilibrium
     length: float = 0.0  #: length over which the law changes
-    speed: float = 0.0  #: speed of 1 m/s, in the units of the system
-    time: float = 0.0  #: of 1 s
-    own_time: float = 0.0  #: time over which the law changes by time alone; 0: unknown
+    speed: float = 0.0  #: value of 1 m/s in the units of the system
+    time: float = 0.0  #: value of 1 s in the units of the system
+    own_time: float = 0.0  #: time over which the law changes by explicit dependence on time; 0: unknown
 
     @property
     def digest(self) -> tuple[int | str | None, ...]:
-        """Key of its functions, independent of their addresses."""
+        """Key of the functions of the law, independent of their addresses."""
         functions = (self.law.function, self.law.tangent, self.law.rest)
         return tuple(digest_of(each) or words_of(each) if callable(each) else each for each in functions)
 
     @property
     def sizes(self) -> list[float]:
-        """Sizes of its inputs, see `compiling.callbacks.law_templates`.
+        """Typical sizes of the inputs of the law, see `compiling.callbacks.law_templates`.
 
         Without a time of its own velocities are measured by 1 m/s, or by its length in a second where that is less.
         """
@@ -70,23 +70,23 @@ class PlacedLaw:
 
     @property
     def columns_of_marker(self) -> int:
-        """Number of the variations of a marker in derivatives: 12, or 18 with accelerations."""
+        """Number of derivative columns for each marker: 12, or 18 with accelerations."""
         return self.head[1] - 6
 
     @property
     def n_out(self) -> int:
-        """Number of wrench components, rates of states and held equations."""
+        """Number of wrench components, rates of states and constraint equations."""
         return 6 * len(self.markers) + len(self.law.states) + len(self.law.multipliers)
 
 
 def words_of(function: Callable[..., None]) -> str:
-    """Return the name of a function without a digest."""
+    """Return the name of a function for which no digest exists."""
     return f"{getattr(function, '__module__', '')}.{getattr(function, '__qualname__', '')}"
 
 
 @dataclass
 class PublicElements:
-    """Lists over elements."""
+    """Public elements in the order in which they are compiled."""
 
     placed: list[PlacedLaw] = field(default_factory=list)
     callbacks: list[Callback] = field(default_factory=list)
@@ -102,7 +102,7 @@ class PublicElements:
         return tuple(each.element.name for each in self.placed)
 
     def give_lengths(self, radii: Array, length: float) -> None:
-        """Set the lengths of change that laws do not declare, from the radii of gyration of bodies, (n_b,)."""
+        """Set the length over which each law changes, if not declared, from radii of gyration of bodies, (n_b,)."""
         for k, each in enumerate(self.placed):
             own = each.law.length or least_size(each.markers, radii) or length
             self.placed[k] = replace(each, length=own)
@@ -145,7 +145,7 @@ class PublicElements:
 
 
 def add_public_elements(system: System, made: Connections, first_state: int) -> PublicElements:
-    """Add the elements of a system; their states follow the existing ones."""
+    """Add the public elements of a system; their states follow those already added."""
     elements = PublicElements(state0=[first_state])
     for element in system.elements:
         add_element(system, made, elements, element)
@@ -196,7 +196,7 @@ def add_element(system: System, made: Connections, elements: PublicElements, ele
 
 
 def law_of(element: Element, placed: Placed) -> ElementLaw:
-    """Return the law of an element; any error of its method becomes a `ModelError` with the name of the element."""
+    """Return the law of an element; any error in its method becomes a `ModelError` with the element's name."""
     where = f"element {element.name!r}"
     try:
         law = element.law(placed)
@@ -221,7 +221,7 @@ def law_of(element: Element, placed: Placed) -> ElementLaw:
 
 
 def acting_ends(where: str, markers: list[MarkerData], law: ElementLaw) -> tuple[list[End], list[tuple[int, float]]]:
-    """Return the ends, and the source index and factor of each row of their wrenches."""
+    """Return the loaded ends, and the source index and sign of each of their wrench rows."""
     ends: list[End] = []
     sources: list[tuple[int, float]] = []
     is_shared = law.is_opposite and all(marker.body >= 0 for marker in markers)
@@ -242,12 +242,12 @@ def acting_ends(where: str, markers: list[MarkerData], law: ElementLaw) -> tuple
 
 
 def held(law: ElementLaw) -> Sequence[tuple[int, str]]:
-    """Return the held quantity of each multiplier, with its unit."""
+    """Return the constrained quantity of each multiplier, with its unit."""
     return list(zip(law.holds, law.held_units, strict=True))
 
 
 def held_row(holds: int, unit: str) -> Row:
-    """Return the row of a multiplier."""
+    """Return the row of a multiplier that constrains a quantity with this unit."""
     if holds == NOTHING:
         return Row(PART)
     if holds == VELOCITY:

@@ -34,7 +34,7 @@ def spin_tensor(geometric: GeometricStiffness) -> Array:
 
 
 def stiffened_shape_moments(S_kl: Array, geometric: GeometricStiffness) -> Array:
-    """Return S_ab,kl including the matrices of spin and angular acceleration, (3, 3, n_q, n_q)."""
+    """Return S_ab,kl plus the stiffness matrices of spin and angular acceleration, (3, 3, n_q, n_q)."""
     K_ab, K_r = spin_tensor(geometric), np.asarray(geometric.rotation)
     S = S_kl + K_ab
     trace = np.einsum("cckl->kl", K_ab)

@@ -68,7 +68,7 @@ __all__ = ["CompiledSystem", "Lines", "add_sliding", "compiled_system", "gap_rec
 
 @dataclass
 class Lines:
-    """Lists over the lines, and over their stations."""
+    """Deformed lines and their stations in the order in which they are compiled."""
 
     marker: list[int] = field(default_factory=list)
     row: list[int] = field(default_factory=list)
@@ -92,14 +92,14 @@ class Lines:
         }
 
     def of_markers(self, n_markers: int) -> IntArray:
-        """Return the line along which each marker slides, -1 for none."""
+        """Return the line along which each marker slides, -1 for markers that do not slide."""
         line = np.full(n_markers, -1, np.int64)
         line[self.marker] = np.arange(len(self.marker))
         return line
 
 
 def add_sliding(system: System, made: ConnectionLists, lines: Lines, joint: SlidingJoint) -> None:
-    """Add a sliding joint, the markers of its stations and its line."""
+    """Add a sliding joint with its line and the markers of the stations of the line."""
     where = f"joint {joint.name!r}"
     first, b = joint_markers(system, joint, made.placed)
     name = body_name(joint.marker_a.body)
@@ -129,11 +129,11 @@ def add_sliding(system: System, made: ConnectionLists, lines: Lines, joint: Slid
 # Bodies are eliminated one by one, each by its own matrix, so that none may be without inertia, joints or not.
 
 
-NO_INERTIA = 1e-13  #: ratio of the smallest principal moment to the largest below which it counts as zero
+NO_INERTIA = 1e-13  #: ratio of the smallest to the largest principal moment below which the smallest counts as zero
 
 
 def require_inertia(bodies: Sequence[RigidBody | FlexibleBody]) -> None:
-    """Raise `ModelError` with the name of a body that could move in some way without any force.
+    """Raise `ModelError` with the name of a body that has a motion without inertia.
 
     That is a rigid body, or a beam without thickness, that has no moment of inertia about an axis, and a mode that
     has neither mass nor stiffness.
@@ -152,7 +152,7 @@ def require_inertia(bodies: Sequence[RigidBody | FlexibleBody]) -> None:
 
 
 def require_moments(where: str, inertia: Array) -> None:
-    """Raise `ModelError` with the axis about which an inertia tensor about the centre of mass is zero."""
+    """Raise `ModelError` with the principal axis about which the inertia at the centre of mass is zero."""
     moments, axes = np.linalg.eigh(0.5 * (inertia + inertia.T))
     if moments[0] > NO_INERTIA * moments[-1]:
         return
@@ -197,35 +197,38 @@ def gap_record(made: ConnectionLists, contacts: Contacts, laws: Sequence[PlacedL
 # from the description of a system to the records of the kernels -------------------------------------------------------
 
 
-SOFT = 1e-9  #: compliance of redundant constraints, relative to the displacement of the mass in a step
+#: compliance of redundant constraints, relative to the displacement of a free mass by the same force in one step
+SOFT = 1e-9
 #: compliance relative to the mobility of bodies, with a margin for rounding in the elimination
 ROUNDING = 1e3 * np.finfo(float).eps
-MOST_SOFT = 1e-5  #: like SOFT, for angles of bodies with hardly any moment of inertia about an axis
+#: largest compliance for rotations, relative to 1/J, of bodies that have almost no moment of inertia about an axis
+MOST_SOFT = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
 class CompiledSystem:
-    """A system in the arrays of the kernels, with the names of its parts in order."""
+    """A system in the arrays of the kernels, with the names of its parts in the same order."""
 
     model: Model
     body_names: tuple[str, ...]
     joint_names: tuple[str, ...]
-    spring_names: tuple[str, ...]  #: of spring-dampers, then bushings and contacts
-    element_names: tuple[str, ...]  #: of couplers, then user forces, then public elements
-    laws: tuple[PlacedLaw, ...]  #: of public elements
-    callbacks: tuple[Callback, ...]  #: users' functions called by the kernels
-    owners: tuple[str, ...]  #: name of the connection of each row, (n_w,)
-    placed: State  #: the given state, before it is made consistent, in the frames of the engine
-    by_joints: NDArray[np.bool_]  #: whether a body has no position, so that its joints placed it, (n_b,)
-    mean_axes: tuple[MeanAxes | None, ...]  #: of bodies whose frame in the engine differs from that of their file
+    spring_names: tuple[str, ...]  #: names of the spring-dampers, then of bushings and contacts
+    element_names: tuple[str, ...]  #: names of the couplers, then of user forces and public elements
+    laws: tuple[PlacedLaw, ...]  #: laws of the public elements
+    callbacks: tuple[Callback, ...]  #: user functions that the kernels call
+    owners: tuple[str, ...]  #: name of the connection to which each row belongs, (n_w,)
+    placed: State  #: the given state before constraints are closed, in the frames of the files
+    by_joints: NDArray[np.bool_]  #: whether joints have placed the body because no position is given, (n_b,)
+    #: mean-axis frame of each body whose frame in the engine differs from that of its file, else None
+    mean_axes: tuple[MeanAxes | None, ...]
     coordinates: tuple[str, ...]  #: name of the joint coordinate to which each row belongs, "" for none, (n_w,)
-    length: float  #: size of the system as placed [m]; scales rotations against translations
-    angles: tuple[CountedAngle, ...]  #: angles between bodies whose turns are counted
-    angle_motions: tuple[TimeFunction | None, ...]  #: that prescribe them
+    length: float  #: size of the placed system [m], which relates rotations to translations
+    angles: tuple[CountedAngle, ...]  #: angles between bodies that are counted through full turns
+    angle_motions: tuple[TimeFunction | None, ...]  #: function that prescribes each counted angle, or None
 
     @property
     def gap_sizes(self) -> Array:
-        """The size by which the gap of each row is judged, (n_w,).
+        """Reference size for the gap of each row, (n_w,).
 
         The length of the system for a length, 1 for an angle, and for the sum of a coupler that of its terms.
         """
@@ -238,7 +241,7 @@ class CompiledSystem:
 
     @property
     def motion_lengths(self) -> Array:
-        """A length for a unit of each motion, (n_u,): the system size for rotations, 1/sqrt(mass) for modes."""
+        """Length that one unit of each motion represents, (n_u,): system size for rotations, 1/sqrt(mass) for modes."""
         bodies, lengths = self.model.bodies, np.ones(int(self.model.bodies.u0[-1]))
         for i, first in enumerate(map(int, bodies.u0[:-1])):
             lengths[first + 3 : first + 6] = self.length
@@ -247,7 +250,7 @@ class CompiledSystem:
 
     @property
     def resting_model(self) -> Model:
-        """The model in which the laws of elements are replaced by their equations in equilibrium."""
+        """The model in which elements use their laws for static equilibrium."""
         rest = [each.rest for each in self.laws]
         return self.model._replace(
             laws=self.model.laws._replace(
@@ -258,12 +261,12 @@ class CompiledSystem:
 
     @property
     def stop_words(self) -> tuple[str, ...]:
-        """Messages of outputs of elements that end a run, in the order of the model."""
+        """Messages of the element outputs that end a run, in the order of the model."""
         return tuple(f"element {each.element.name!r}: {text}" for each in self.laws for text in each.law.stops.values())
 
     @property
     def connection_names(self) -> tuple[str, ...]:
-        """Names of joints, springs, couplers and user forces: the order of connections in the model."""
+        """Names of joints, springs, couplers and user forces, in the order of the connections in the model."""
         return self.joint_names + self.spring_names + self.element_names
 
     def connection_words(self, c: int) -> str:
@@ -274,7 +277,7 @@ class CompiledSystem:
 
 
 def compiled_system(system: System) -> CompiledSystem:
-    """Return the flat arrays of a system, computed at the first call and stored in the system.
+    """Return a system in the arrays of the kernels; the first call computes them and stores them in the system.
 
     Raises
     ------
@@ -465,7 +468,7 @@ def marker_record(
 
 
 def row_softness(system: System, made: ConnectionLists, types: BodyTypes, kind_of_body: IntArray) -> Array:
-    """Return the compliance of constraint rows, relative to c_k, by which they share reactions; zero if not requested.
+    """Return the compliance, divided by c_k, of rows that share reactions, (n_w,); zero if sharing is not requested.
 
     A joint shares by how its two bodies give way: SOFT times the sum of their 1/m for distances, of their 1/J for
     angles, J the mean of the principal moments of inertia about the centre of mass. A body with a small moment about an
@@ -490,7 +493,7 @@ def row_softness(system: System, made: ConnectionLists, types: BodyTypes, kind_o
 
 
 def principal_moments(types: BodyTypes) -> Array:
-    """Return the principal moments of inertia of all types of bodies about their centres of mass, (n_types, 3)."""
+    """Return the principal moments of inertia about the centre of mass for all types of bodies, (n_types, 3)."""
     moments = []
     for m, S, J0 in zip(types.mass, types.S, types.J0, strict=True):
         moments.append(np.linalg.eigvalsh(J0 - (S @ S * np.eye(3) - np.outer(S, S)) / m))
@@ -498,7 +501,7 @@ def principal_moments(types: BodyTypes) -> Array:
 
 
 def body_sizes(made: ConnectionLists, places: list[Array], placed: State, radii: Array) -> Array:
-    """Return the size of the group of bodies connected to each body, without the ground, (n_b,).
+    """Return, for each body, the size of the group of bodies connected to it without the ground, (n_b,).
 
     The largest arm of a marker or radius of gyration (radii, (n_b,)), or the extent of their points and of those that
     hold them.
@@ -536,7 +539,7 @@ def body_sizes(made: ConnectionLists, places: list[Array], placed: State, radii:
 
 
 def extent(points: Array) -> float:
-    """Return the largest distance between two points, (n, 3); it does not depend on the direction of the axes."""
+    """Return the largest distance between two of the points, (n, 3), independent of the direction of the axes."""
     if len(points) < 2:
         return 0.0
     radii = np.linalg.norm(points - points.mean(axis=0), axis=1)
@@ -546,6 +549,6 @@ def extent(points: Array) -> float:
 
 
 def system_length(sizes: Array, places: list[Array], placed: State) -> float:
-    """Return the largest size of connected bodies, or the extent of the whole system; 1 if all are 0."""
+    """Return the size of the largest group of connected bodies, or of the whole system if larger; 1 if both are 0."""
     points = np.array([*places, *placed.r])
     return max(float(sizes.max()), extent(points)) or 1.0

@@ -17,12 +17,12 @@ __all__ = ["FunctionOfTime", "functions_in", "functions_of_time", "parts_of_time
 
 
 class FunctionOfTime(NamedTuple):
-    """A function of time of a system."""
+    """A function of time that acts in a system."""
 
-    where: str  #: such as "forces.push.amplitude"
+    where: str  #: path of the function in the system, such as "forces.push.amplitude"
     function: TimeFunction
     is_motion: bool  #: whether the function prescribes a motion
-    holder: Any  #: dataclass with the function as a field
+    holder: Any  #: dataclass that has the function as a field
     field: str
 
 
@@ -35,7 +35,7 @@ def functions_of_time(system: System) -> Iterator[FunctionOfTime]:
 
 
 def functions_in(value: Any, where: str, is_motion: bool, holder: Any, field: str) -> Iterator[FunctionOfTime]:
-    """Yield the functions of time in a value: the value itself, or functions in a container."""
+    """Yield the functions of time in a value, which is a function or a container of functions."""
     if isinstance(value, TimeFunction):
         yield FunctionOfTime(where, value, is_motion, holder, field)
     elif is_dataclass(value) and not isinstance(value, type):
@@ -54,7 +54,7 @@ def functions_in(value: Any, where: str, is_motion: bool, holder: Any, field: st
 
 
 def parts_of_time(system: System) -> Iterator[tuple[str, Any]]:
-    """Yield the forces and elements made of expressions, and their places in the system."""
+    """Yield the forces and elements made of expressions, with their paths in the system."""
     for group in ("forces", "elements"):
         for part in getattr(system, group):
             if hasattr(part, "parts_of_time"):
@@ -62,7 +62,7 @@ def parts_of_time(system: System) -> Iterator[tuple[str, Any]]:
 
 
 def rate_of_functions(functions: Iterable[FunctionOfTime]) -> float:
-    """Return the highest rate of functions of time: of their sines, or the inverse of the shortest piece [1/s]."""
+    """Return the highest rate of change [1/s]: angular frequency of a sine, or 1/duration of the shortest piece."""
     fastest = 0.0
     for each in functions:
         lengths = np.diff(each.function.begins)

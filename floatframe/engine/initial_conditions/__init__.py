@@ -1,1 +1,1 @@
-"""Computed once before a motion: consistent positions, velocities and accelerations, and diagnoses of constraints."""
+"""Computations before a motion: consistent positions, velocities and accelerations, and diagnosis of constraints."""

@@ -11,12 +11,12 @@ from floatframe.model.state import State
 
 __all__ = ["conflict_of_drives", "drive_name", "open_joints"]
 
-SPANNED = 1e-7  #: norm of the remainder of a unit row after projection on the others, below which they span it
-INVOLVED = 1e-4  #: component of a unit row in another row above which that row is named
+SPANNED = 1e-7  #: norm of a unit row after projection out of the other rows, below which it is a combination of them
+INVOLVED = 1e-4  #: coefficient of another row in this combination above which a message names the row
 
 
 def open_joints(compiled: CompiledSystem, error: Array) -> str:
-    """Return a message with the joints that are open most; `error`: the residuals of the rows, (n_w,)."""
+    """Return a message with the joints that have the largest gaps; `error`: residuals of the rows, (n_w,)."""
     model = compiled.model
     words = []
     for c, name in enumerate(compiled.connection_names):
@@ -32,14 +32,14 @@ def open_joints(compiled: CompiledSystem, error: Array) -> str:
 
 
 def drive_name(compiled: CompiledSystem, row: int) -> str:
-    """Return the name of the drive of a row, for messages."""
+    """Return the name of the prescribed motion of a row, for messages."""
     if not compiled.coordinates[row]:
         return f"the motion of coupler {compiled.owners[row]!r}"
     return f"the drive of {compiled.coordinates[row]!r} of joint {compiled.owners[row]!r}"
 
 
 def conflict_of_drives(compiled: CompiledSystem, work: Work, state: State) -> str:
-    """Return a message about drives that conflict with joints and other drives, "" if none do.
+    """Return a message about prescribed motions in conflict with joints or each other, "" if there is no conflict.
 
     A drive is taken back where its row is spanned by those of the joints and of the drives before it.
     """

@@ -20,34 +20,34 @@ from floatframe.model.state import State
 
 __all__ = ["Mobility", "constraint_mobility", "scaled_constraints"]
 
-DEPENDENT = 1e-7  #: norm of the remainder of a unit row after projection on earlier rows, below which it is redundant
+DEPENDENT = 1e-7  #: norm of a unit row after projection out of earlier rows, below which it is redundant
 
 
 @dataclass(frozen=True)
 class Mobility:
-    """Freedoms of a system at one state."""
+    """Numbers of freedoms and constraints of a system at one state."""
 
     n_bodies: int
     n_modes: int
-    n_constraints: int  #: held by joints
-    n_redundant: int  #: number of redundant constraints, taking modes into account
+    n_constraints: int  #: number of constraints of joints
+    n_redundant: int  #: number of redundant constraints if bodies deform in their modes
     n_redundant_rigid: int  #: number of redundant constraints if all bodies were rigid
-    redundant: Mapping[str, int]  #: number of constraints that repeat those of earlier joints, by joint
+    redundant: Mapping[str, int]  #: number of constraints, by joint, that depend on those of earlier joints
     redundant_rigid: Mapping[str, int]  #: the same if all bodies were rigid
 
     @property
     def gruebler(self) -> int:
-        """Count of Gruebler: six for each body minus all constraints."""
+        """Mobility by Gruebler's count: six for each body minus the number of constraints."""
         return 6 * self.n_bodies - self.n_constraints
 
     @property
     def mobility(self) -> int:
-        """Number of independent motions of the rigid bodies: six for each minus the rank of the constraints."""
+        """Number of independent rigid motions: six for each body minus the rank of the constraints."""
         return self.gruebler + self.n_redundant_rigid
 
     @property
     def n_freedoms(self) -> int:
-        """The same with their modes."""
+        """Number of independent motions including the modes of the bodies."""
         return self.gruebler + self.n_modes + self.n_redundant
 
 
@@ -75,7 +75,7 @@ def constraint_mobility(compiled: CompiledSystem, work: Work, state: State) -> M
 
 
 def scaled_constraints(model: Model, work: Work, state: State) -> tuple[Array, Array]:
-    """Return G L⁻ᵀ with M = L Lᵀ, rows of length one: with the modes and for rigid bodies, dense."""
+    """Return G L⁻ᵀ with M = L Lᵀ and rows of unit length, dense: once with the modes, once for rigid bodies."""
     set_iterate(work, state)
     parts = linearized(model, work, 1.0, 0.0, 0.0)
     G = parts.G.toarray()[is_held(model.rows.kind)]
@@ -89,13 +89,13 @@ def scaled_constraints(model: Model, work: Work, state: State) -> tuple[Array, A
 
 
 def unit_rows(A: Array) -> Array:
-    """Return rows divided by their length; rows of zeros are unchanged."""
+    """Return the rows divided by their lengths; zero rows are unchanged."""
     length = np.linalg.norm(A, axis=1, keepdims=True)
     return np.asarray(A / np.where(length > 0, length, 1.0))
 
 
 def dependent_rows(A: Array) -> Array:
-    """Return the rows that earlier rows span, (n_rows,) bool."""
+    """Return, for each row, whether it is a combination of earlier rows, (n_rows,) bool."""
     basis = np.zeros((0, A.shape[1]))
     result = np.zeros(len(A), dtype=bool)
     for k, row in enumerate(A):

@@ -1,4 +1,4 @@
-"""Gaps between bodies at one state, for use once per motion or step; the kernels have their own functions."""
+"""Gaps between bodies at one state, for computations once per motion or step; steps use functions in the kernels."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ def has_gaps(compiled: CompiledSystem) -> bool:
 
 
 def gaps_at(compiled: CompiledSystem, work: Work, t: float, state: State, w: Array) -> Array:
-    """Return all gaps of a state at time t, (n_gaps,), see kernels/connections/gap.py."""
+    """Return all gaps at a state and time t, (n_gaps,), see kernels/connections/gap.py."""
     from floatframe.engine.kernels.entry import rates_of_constraints
 
     model = compiled.model

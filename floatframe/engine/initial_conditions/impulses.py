@@ -1,4 +1,4 @@
-"""Velocities that jump: after an impact, and at the start where drives begin at once.
+"""Jumps of velocities after an impact, and at the start if prescribed motions begin with a velocity.
 
 In an impact constraints become active at an instant, or reverse the rate of a coordinate.
 
@@ -32,7 +32,7 @@ from floatframe.model.system import System
 
 __all__ = ["Impact", "impact", "words_of_begun_drives"]
 
-#: distance in a step, in radians or relative to the size of the system, that a drive may deviate from its bodies
+#: allowed deviation of a prescribed motion from the bodies in one step, in rad or relative to the size of the system
 FITS = 1e-9
 
 
@@ -40,16 +40,16 @@ FITS = 1e-9
 class Impact:
     """The result of an impact."""
 
-    state: State  #: with the velocities after it
-    rate: Array  #: rate of the held quantity of each row before the impact, (n_w,)
-    impulse: Array  #: impulse of the unknown of each row, (n_w,) [N s, N m s]
-    gap: Array  #: gap of the held quantity of each row, (n_w,) [m, rad; for held velocities m/s]
+    state: State  #: state with the velocities after the impact
+    rate: Array  #: rate of each row's constrained quantity before the impact, (n_w,)
+    impulse: Array  #: impulse of each row's constraint force, (n_w,) [N s, N m s]
+    gap: Array  #: residual gap of each row's constrained quantity, (n_w,) [m, rad; m/s for velocity constraints]
 
 
 def impact(
     compiled: CompiledSystem, state: State, *, t: float, known: Array, restitution: Mapping[int, float]
 ) -> Impact:
-    """Return the state (frames of the engine) after all constraints of a system become active at once.
+    """Return the state, in frames of the engine, after all constraints become active at once.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def impact(
 
 
 def words_of_begun_drives(system: System, t: float, state: State | None, h: float) -> str:
-    """Return a message about the drive whose rate at t differs most from that of its bodies, "" if none does.
+    """Return a message about the prescribed rate that differs most from the bodies at t, "" if all rates agree.
 
     A motion then begins with velocities that fit, the nearest ones by mass and modal stiffness. Rigid mechanisms move
     so; what is elastic, as bars of segments, takes it as a blow whose waves long steps h do not follow.

@@ -68,12 +68,12 @@ __all__ = [
 ]
 
 
-ASSEMBLED = 1e-12  #: largest |g| of an assembled system; for points relative to the size of the system
+ASSEMBLED = 1e-12  #: largest residual |g| of a closed joint; for points relative to the size of the system
 MOST_ITERATIONS = 30
-ENDLESS = 1e12  #: a correction (rad, or in units of length) that only a singular matrix gives
-OF_STEP = 0.1  #: fraction of a step for differences that give rates of accelerations
-NEAREST = 1e-6  #: the same fraction if a contact is near
-NEAR_BY = 1e-3  #: small displacement from a position: in rad, or relative to the size of the system
+ENDLESS = 1e12  #: size of a correction (rad, or relative length) above which the matrix counts as singular
+OF_STEP = 0.1  #: difference step for rates of accelerations, as a fraction of the time step
+NEAREST = 1e-6  #: the same fraction if a contact is close
+NEAR_BY = 1e-3  #: test displacement from a position, in rad or relative to the size of the system
 #: singular value of the constraints of rigid bodies, relative to the largest, below which a motion is free
 ALLOWED = 1e-10
 
@@ -120,7 +120,7 @@ class ConsistentState:
 def consistent_state(
     system: System, state: State | None = None, *, t: float = 0.0, known: Array | None = None
 ) -> ConsistentState:
-    """Return a consistent state near a given state or the assembled bodies, for prescribed motions at time t.
+    """Return a consistent state near a given state or near the assembled bodies, with prescribed motions at time t.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def consistent_motion(
     known: Array | None = None,
     angle: Array | None = None,
 ) -> ConsistentState:
-    """Return the same as `consistent_state`, in the frames of the engine; the given state is in those of the files.
+    """Return the result of `consistent_state` in the frames of the engine, for a state in the frames of the files.
 
     angle: counted angles of a motion before, (n_angles,), whose turned bushings go on; None: those of the state.
     """
@@ -172,7 +172,7 @@ def consistent_motion(
 
 
 def known_of(compiled: CompiledSystem, state: State | None) -> Array | None:
-    """Return the unknowns in a state if the system has states or angles that continue; otherwise None.
+    """Return the connection unknowns in a state if force states or counted angles continue from it; otherwise None.
 
     Raises
     ------
@@ -193,14 +193,14 @@ def known_of(compiled: CompiledSystem, state: State | None) -> Array | None:
 
 
 def counted_angles_of(compiled: CompiledSystem, state: State | None) -> Array | None:
-    """Return the counted angles that a state carries, if they are as many as those of the system; else None."""
+    """Return the counted angles stored in a state if their number matches the system; otherwise None."""
     if state is None or state.angle is None or state.angle.shape != (len(compiled.angles),):
         return None
     return state.angle
 
 
 def checked(compiled: CompiledSystem, state: State) -> State:
-    """Return a user's state in the frames of the engine; `ModelError` if it is not a state of this system."""
+    """Return a user's state in the frames of the engine; `ModelError` if its sizes do not match the system."""
     p = np.empty_like(compiled.placed.p)
     for name in ("r", "p", "q", "u"):
         value = array_of_shape(f"state: {name}", getattr(state, name), getattr(compiled.placed, name).shape)
@@ -211,7 +211,7 @@ def checked(compiled: CompiledSystem, state: State) -> State:
 
 
 def assembled(compiled: CompiledSystem, work: Work, state: State, known: Array | None = None) -> State:
-    """(1): return the state with all joints closed, and driven angles at their prescribed values."""
+    """(1): return the state with all joints closed and prescribed angles at their values."""
     model = compiled.model
     if not is_held_position(model.rows.kind).any():
         return state
@@ -236,7 +236,7 @@ def assembled(compiled: CompiledSystem, work: Work, state: State, known: Array |
 
 
 def closed(compiled: CompiledSystem, model: Model, work: Work, state: State, w: Array) -> tuple[State, Array]:
-    """Return the state with the joints of a model closed, and the remaining gaps of its rows: (n_w,), zero if none."""
+    """Return the state with the joints of a model closed, and the remaining residuals of the rows, (n_w,)."""
     holds = is_held_position(model.rows.kind)
     scale = compiled.gap_sizes
     for _ in range(MOST_ITERATIONS):
@@ -258,7 +258,7 @@ def closed(compiled: CompiledSystem, model: Model, work: Work, state: State, w: 
 
 
 def refuse_open_joints(compiled: CompiledSystem, work: Work, state: State, error: Array) -> None:
-    """Raise `ModelError` with the names of the joints that remain open, or of the conflicting drives."""
+    """Raise `ModelError` with the names of the joints that remain open, or of the prescribed motions in conflict."""
     conflict = conflict_of_drives(compiled, work, state)
     if conflict:
         raise ModelError(f"conflicting drives: {conflict}; remove one of them, or free the coordinate that opposes it")
@@ -274,7 +274,7 @@ def refuse_open_joints(compiled: CompiledSystem, work: Work, state: State, error
 
 
 def require_independent_constraints(compiled: CompiledSystem, work: Work, tree: Tree, state: State) -> None:
-    """Raise `ModelError` with the joints of redundant constraints, unless these are to share their load."""
+    """Raise `ModelError` with the joints of redundant constraints, unless the system lets them share reactions."""
     model = compiled.model
     holds = is_held(model.rows.kind)
     if not holds.any() or model.rows.soft.any():
@@ -309,7 +309,7 @@ def require_independent_constraints(compiled: CompiledSystem, work: Work, tree: 
 
 
 def is_singular_position(compiled: CompiledSystem, work: Work, tree: Tree, state: State, n_redundant: int) -> bool:
-    """Whether a displacement of 1e-3 rad along allowed motions reduces the number of redundant constraints."""
+    """Whether a test displacement of 1e-3 rad along allowed motions makes redundant constraints independent."""
     model = compiled.model
     holds = is_held(model.rows.kind)
     set_iterate(work, state)
@@ -334,7 +334,7 @@ def is_singular_position(compiled: CompiledSystem, work: Work, tree: Tree, state
 
 
 def with_compatible_velocities(compiled: CompiledSystem, work: Work, state: State, known: Array | None = None) -> State:
-    """(2): return the state with velocities that keep the joints closed."""
+    """(2): return the state with velocities that satisfy the constraints."""
     from floatframe.engine.kernels.entry import rates_of_constraints
 
     model = compiled.model
@@ -382,14 +382,14 @@ def solve_accelerations(
 
 
 def work_from(model: Model, known: Array | None) -> Work:
-    """Return working arrays in which the states of user forces are fixed at their known or initial values."""
+    """Return working arrays with the states of user forces fixed at their known or initial values."""
     work = new_work(model)
     work.states.base[:] = start_unknowns(model, known)[model.states.row]
     return work
 
 
 def require_numbers(compiled: CompiledSystem, work: Work) -> None:
-    """Raise `ModelError` with the name of an element or user force whose law is not finite at the iterate."""
+    """Raise `ModelError` with the name of an element or user force whose law is not finite at the present iterate."""
     no_number = int(work.counted.no_number)
     if no_number:
         raise ModelError(
@@ -399,7 +399,7 @@ def require_numbers(compiled: CompiledSystem, work: Work) -> None:
 
 
 def start_unknowns(model: Model, known: Array | None = None) -> Array:
-    """Return the initial unknowns of connections, (n_w,): zero, and states of user forces at their initial values.
+    """Return the initial connection unknowns, (n_w,): states of user forces at their initial values, the others zero.
 
     With unknowns that are known from before: these states, and the coordinates of couplers and user forces, whose
     angles are those next to them.
@@ -413,12 +413,12 @@ def start_unknowns(model: Model, known: Array | None = None) -> Array:
 
 
 def has_normal_friction(model: Model) -> bool:
-    """Whether some friction depends on the force in its joint."""
+    """Whether a friction law depends on the normal force in its joint."""
     return bool((model.joint_forces.coefficient > 0).any())
 
 
 def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t: float, h: float) -> Array:
-    """Return d(u_dot)/dt at a consistent state, (n_u,), by a difference along the motion over a tenth of a step h.
+    """Return d(u_dot)/dt at a consistent state, (n_u,), by a difference over a tenth of the time step h.
 
     Its error is of second order in h. The difference is central, but forward in time where something may depend on it,
     since that may begin or jump at t. It reaches over no contact that closes or opens, whose force the first step has
@@ -458,7 +458,7 @@ def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t:
 # a row whose axes E, Z are rotated by delta prescribes f - delta.
 
 
-FAR = np.pi / 4  #: deviation of a drive above which it is moved in steps, and the largest step
+FAR = np.pi / 4  #: deviation of a prescribed angle above which it is reached in increments, and the largest increment
 
 
 def driven_angles(model: Model) -> IntArray:
@@ -468,7 +468,7 @@ def driven_angles(model: Model) -> IntArray:
 
 
 def way_of_drives(model: Model, work: Work, state: State, w: Array, rows: IntArray) -> Array:
-    """Return f - th of driven angles at a state, at the time in `work`, between -pi and pi, (len(rows),) [rad]."""
+    """Return the deviation of prescribed angles from their values, between -pi and pi, (len(rows),) [rad]."""
     set_iterate(work, state, w=w)
     linearized(model, work, 1.0, 0.0, 0.0)
     sense = sense_of(model, rows)
@@ -479,7 +479,7 @@ def way_of_drives(model: Model, work: Work, state: State, w: Array, rows: IntArr
 
 
 def led_by(model: Model, rows: IntArray, delta: Array) -> Model:
-    """Return the model in which driven angles are prescribed as f - delta, delta (len(rows),) [rad]."""
+    """Return a model with the prescribed angles reduced by delta, (len(rows),)."""
     c, s = np.cos(delta)[:, None], (sense_of(model, rows) * np.sin(delta))[:, None]
     x, z = model.rows.x.copy(), model.rows.z.copy()
     x[rows] = c * model.rows.x[rows] - s * model.rows.z[rows]
@@ -488,12 +488,12 @@ def led_by(model: Model, rows: IntArray, delta: Array) -> Model:
 
 
 def sense_of(model: Model, rows: IntArray) -> Array:
-    """Return the sense of an angle in the marker of its axes: -1 about an axis of B."""
+    """Return the sign of an angle in the marker that has its axis: -1 for an axis of B."""
     return np.where(model.rows.kind[rows] == TURN_B, -1.0, 1.0)
 
 
 def stages(way: Array) -> list[Array]:
-    """Return the remaining deviations of drives after each step towards their angles, (n_drives,), without the last.
+    """Return the deviations of prescribed angles that remain after each increment but the last, (n_drives,) each.
 
     No step where all drives are near: they close by themselves.
     """
@@ -511,7 +511,7 @@ def stages(way: Array) -> list[Array]:
 
 
 def require_no_half_turns(compiled: CompiledSystem, work: Work, state: State) -> None:
-    """Raise `ModelError` with the name of a joint whose axes are closed antiparallel instead of parallel.
+    """Raise `ModelError` with the name of a joint that is closed with an axis antiparallel instead of parallel.
 
     Parameters
     ----------
@@ -563,16 +563,16 @@ def require_no_half_turns(compiled: CompiledSystem, work: Work, state: State) ->
 # is skipped, because N needs the kernels of relative coordinates, which are compiled at their first use.
 
 
-FEW = 200  #: number of rows up to which all are checked first: this takes milliseconds
-WELL = 1e-6  #: smallest eigenvalue of G M⁻¹ Gᵀ, for unit rows, above which no constraint is redundant
-SMALL = 1e-5  #: singular value relative to the largest, below which constraints may be redundant
-GAP = 1e-3  #: ratio to the next larger singular value, below which they are redundant
+FEW = 200  #: number of rows up to which the exact check comes first, because it takes milliseconds
+WELL = 1e-6  #: smallest eigenvalue of G M⁻¹ Gᵀ with unit rows above which no constraint is redundant
+SMALL = 1e-5  #: singular value, relative to the largest, below which constraints may be redundant
+GAP = 1e-3  #: ratio of a singular value to the next larger one below which the constraint is redundant
 #: singular value relative to the largest, or norm of a row relative to its part for bodies only, that counts as zero
 ROUNDING = 1e-11
 
 
 def repeated_constraints(compiled: CompiledSystem, work: Work, tree: Tree, state: State) -> int:
-    """Return the number of redundant rows of joints and elements at a state; arrays are overwritten."""
+    """Return the number of redundant rows of joints and elements at a state; the working arrays are overwritten."""
     model = compiled.model
     closing = is_held(model.rows.kind) & (tree.kept_row >= 0)
     if not closing.any():
@@ -596,7 +596,7 @@ def repeated_constraints(compiled: CompiledSystem, work: Work, tree: Tree, state
 
 
 def dependent_count(C: Array) -> int:
-    """Return the rank deficiency of unit rows."""
+    """Return the rank deficiency of a matrix with unit rows."""
     if not len(C):
         return 0
     values = np.linalg.svd(C, compute_uv=False)

@@ -1,4 +1,4 @@
-"""Whether the mass matrices of stiffened bodies are positive definite at a state.
+"""Check that the mass matrices of stiffened bodies are positive definite at a state.
 
 The kinetic energy of a stiffened body is cut off after the second order of the deformation (docs/theory.md §7), so that
 it can become negative where a linear one cannot: at far deflections. (In a frame held where the body is hinged, shapes
@@ -38,7 +38,7 @@ def indefinite_masses(system: System, state: State) -> tuple[str, ...]:
 
 
 def indefinite_mass_words(names: tuple[str, ...]) -> str:
-    """Return a message on the meaning and the remedy; an empty text for no body."""
+    """Return a message with the meaning and the remedy; empty if there are no names."""
     if not names:
         return ""
     told = ", ".join(repr(name) for name in names)

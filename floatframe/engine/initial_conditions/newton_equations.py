@@ -1,4 +1,4 @@
-"""The linearised equations at one iterate, and their solution, for all computations done once per motion."""
+"""The linearised equations at one iterate and their solution, for computations outside the time loop."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -37,28 +37,29 @@ __all__ = [
     "with_modal_weight",
 ]
 
-DENSE = 150  #: equations up to which a dense factorisation is faster than a sparse one
-STIFF = 1e3  #: the stiffness in W is scaled so that it exceeds the mass by this factor for the softest mode
-STIFF_START = 1e6  #: the same when closing a placement: stiff modes hardly vibrate afterwards
+DENSE = 150  #: number of equations up to which a dense factorisation is faster than a sparse one
+STIFF = 1e3  #: factor by which the scaled stiffness in W exceeds the mass for the softest mode
+STIFF_START = 1e6  #: the same factor for closing a placement, where stiff modes must hardly deform
 #: factor of velocities in the sum of K and D from which D is found: its terms are then far above the rounding of K
 FAST = 2.0**40
-MASSLESS = 10.0  #: frequency of a mode without mass, relative to the highest frequency, from its artificial mass
+MASSLESS = 10.0  #: frequency of the artificial mass of a massless mode, relative to the highest frequency
 
 
 @dataclass(frozen=True, eq=False)
 class Linearized:
     """Matrices of the system at an iterate, unknowns in body axes (dx, dtheta, dq)."""
 
-    H: tuple[Array, ...]  #: of each body, (6 + n, 6 + n)
-    J: sp.csr_array  #: wrenches to bodies: forces = J.T @ w, (n_w, n_u)
-    G: sp.csr_array  #: rows by unknowns, (n_w, n_u); of rows that feel accelerations with these
-    V: sp.csr_array  #: rows by wrenches, (n_w, n_w)
+    H: tuple[Array, ...]  #: tangent matrix of each body, (6 + n, 6 + n)
+    J: sp.csr_array  #: transposed map from wrenches to body forces: forces = J.T @ w, (n_w, n_u)
+    #: derivatives of rows by body unknowns, including accelerations if a row depends on them, (n_w, n_u)
+    G: sp.csr_array
+    V: sp.csr_array  #: derivatives of rows by wrenches, (n_w, n_w)
 
 
 def set_iterate(
     work: Work, state: State, u_dot: Array | None = None, w: Array | None = None, *, R: Array | None = None
 ) -> None:
-    """Write a state into the working arrays; accelerations and wrenches zero if not given, R of the state if known."""
+    """Write a state into the working arrays; missing accelerations and wrenches are zero; R is used if it is known."""
     work.state.r[:] = state.r
     work.state.R[:] = rotation_matrix(state.p) if R is None else R
     work.state.q[:] = state.q
@@ -106,7 +107,7 @@ def linearized(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> 
 
 
 def by_velocities(model: Model, work: Work, by_positions: Linearized) -> tuple[tuple[Array, ...], sp.csr_array]:
-    """Return the derivatives of forces (for each body, (6 + n, 6 + n)) and rows, (n_w, n_u), by velocities.
+    """Return the derivatives by velocities of body forces, (6 + n, 6 + n) each, and of rows, (n_w, n_u).
 
     by_positions: those by positions, at the same iterate.
     """
@@ -116,7 +117,7 @@ def by_velocities(model: Model, work: Work, by_positions: Linearized) -> tuple[t
 
 
 def summed(parts: list[tuple[Array, int, int]], shape: tuple[int, int]) -> sp.csr_array:
-    """Return the sparse sum of dense blocks, each with its first row and column."""
+    """Return the sparse sum of dense blocks, each given with its first row and column."""
     if not parts:
         return sp.csr_array(shape)
     if max(shape) > DENSE:
@@ -130,7 +131,7 @@ def summed(parts: list[tuple[Array, int, int]], shape: tuple[int, int]) -> sp.cs
 
 
 def entries(parts: list[tuple[Array, int, int]]) -> tuple[Array, IntArray, IntArray]:
-    """Return values, rows and columns of the entries of dense blocks, each with its first row and column."""
+    """Return values, rows and columns of the entries of dense blocks, each given with its first row and column."""
     rows = [np.repeat(np.arange(first, first + len(block)), block.shape[1]) for block, first, _ in parts]
     columns = [np.tile(np.arange(first, first + block.shape[1]), len(block)) for block, _, first in parts]
     values = [block.ravel() for block, _, _ in parts]
@@ -138,13 +139,13 @@ def entries(parts: list[tuple[Array, int, int]]) -> tuple[Array, IntArray, IntAr
 
 
 class NewtonFactors:
-    """Factors of the equations H y - Jᵀ w = forces, G y + V w = rows.
+    """Factors of the coupled equations H y - Jᵀ w = forces, G y + V w = rows.
 
     The equations are scaled by `balanced_scales`: otherwise units and the size of the system would choose the pivots.
     """
 
     def __init__(self, H: tuple[Array, ...], parts: Linearized) -> None:
-        """Factorise, as a dense matrix if it is small; RuntimeError if it is exactly singular.
+        """Factorise the matrix, as a dense one if it is small; RuntimeError if it is exactly singular.
 
         A pivot of zero in the dense matrix may be rounding of terms of very different size; the order of sparse
         elimination keeps such terms apart.
@@ -175,7 +176,7 @@ class NewtonFactors:
         self.sparse = splu(sp.csc_array((values, (row, column)), shape=(n, n)))
 
     def solve(self, forces: Array, rows: Array) -> tuple[Array, Array]:
-        """Return y, (n_u,), and w, (n_w,)."""
+        """Return the solution y, (n_u,), and w, (n_w,), for right sides `forces` and `rows`."""
         right = self.of_rows * np.concatenate([forces, rows])
         found = dgetrs(*self.dense, right)[0] if self.sparse is None else self.sparse.solve(right)
         solution = self.of_columns * found
@@ -188,7 +189,7 @@ def solve(H: tuple[Array, ...], parts: Linearized, forces: Array, rows: Array) -
 
 
 def balanced_scales(diagonal: Array, J: Any, G: Any, V: Any) -> tuple[Array, Array]:
-    """Return scales of the unknowns (y, w) and of the equations for which stiffnesses and rows have size one.
+    """Return scale factors of unknowns (y, w) and equations that bring stiffnesses and rows to size one.
 
     The stiffness of an unknown y is the size of its diagonal in H plus that of the springs, whose rows V w = -G y give
     J G/V, unless that is rounding. Without the springs, bodies that only springs hold would be scaled by the rounding
@@ -223,7 +224,7 @@ def modal_diagonals(model: Model, i: int, which: int) -> Array:
 
 
 def modal_matrix(model: Model, i: int, which: int) -> Array:
-    """Return M*, K* or D* of a body, (n_q, n_q)."""
+    """Return the modal matrix M*, K* or D* of a body, (n_q, n_q)."""
     n, t = int(model.bodies.n_q[i]), model.bodies.kind[i]
     if n == 0:
         return np.zeros((0, 0))
@@ -234,7 +235,7 @@ def modal_matrix(model: Model, i: int, which: int) -> Array:
 
 
 def highest_frequency(model: Model) -> float:
-    """Return the largest sqrt(K_kk/M_kk) of all modes with mass [rad/s]; 0 without modes."""
+    """Return the largest sqrt(K_kk/M_kk) of all modes with mass [rad/s]; 0 if there are no modes."""
     highest = 0.0
     for i in range(len(model.bodies.kind)):
         M, K = modal_diagonals(model, i, MASS), modal_diagonals(model, i, STIFFNESS)
@@ -245,7 +246,7 @@ def highest_frequency(model: Model) -> float:
 
 
 def modal_weight(model: Model, i: int, stiff: float = STIFF) -> float:
-    """Return the factor on the modal stiffness of a body for which its softest mode is `stiff` times its mass."""
+    """Return the factor by which modal stiffness is `stiff` times the modal mass for the softest mode of a body."""
     M, K = modal_diagonals(model, i, MASS), modal_diagonals(model, i, STIFFNESS)
     elastic = (M > 0) & (K > 0)
     softest = np.min(K[elastic] / M[elastic]) if elastic.any() else (K.max() if K.size and K.max() > 0 else 1.0)
@@ -253,7 +254,7 @@ def modal_weight(model: Model, i: int, stiff: float = STIFF) -> float:
 
 
 def with_modal_weight(model: Model, H: tuple[Array, ...], stiff: float = STIFF) -> tuple[Array, ...]:
-    """Return mass matrices plus modal stiffness scaled by `stiff`: W of `initial`."""
+    """Return mass matrices plus scaled modal stiffness, the weight matrix W of `initial`."""
     weighted = []
     for i, block in enumerate(H):
         block = block.copy()
@@ -263,7 +264,7 @@ def with_modal_weight(model: Model, H: tuple[Array, ...], stiff: float = STIFF) 
 
 
 def with_mass_for_all(model: Model, H: tuple[Array, ...]) -> tuple[Array, ...]:
-    """Return mass matrices with a small mass for modes without mass, so that they can be accelerated."""
+    """Return mass matrices in which massless modes get a small mass, so that accelerations exist."""
     omega = MASSLESS * highest_frequency(model)
     complete = []
     for i, block in enumerate(H):
@@ -276,7 +277,7 @@ def with_mass_for_all(model: Model, H: tuple[Array, ...]) -> tuple[Array, ...]:
 
 
 def displaced(model: Model, state: State, x: Array) -> State:
-    """Return the state displaced by x = (dr in ground axes, rotation vector in body axes, dq) per body, (n_u,)."""
+    """Return the state displaced by x = (dr in ground axes, rotation vector in body axes, dq) of each body, (n_u,)."""
     r, p, q = state.r.copy(), state.p.copy(), state.q.copy()
     for i in range(len(model.bodies.kind)):
         u0, u1 = model.bodies.u0[i], model.bodies.u0[i + 1]
@@ -288,7 +289,7 @@ def displaced(model: Model, state: State, x: Array) -> State:
 
 
 def in_ground_axes(model: Model, state: State, y: Array) -> Array:
-    """Return body unknowns with their translation rotated from body to ground axes, (n_u,)."""
+    """Return body unknowns with the translations rotated from body axes to ground axes, (n_u,)."""
     x = y.copy()
     for i, p in enumerate(state.p):
         u0 = model.bodies.u0[i]
@@ -297,7 +298,7 @@ def in_ground_axes(model: Model, state: State, y: Array) -> Array:
 
 
 def in_body_axes(model: Model, state: State, x: Array) -> Array:
-    """Return body unknowns with their translation rotated from ground to body axes, (n_u,)."""
+    """Return body unknowns with the translations rotated from ground axes to body axes, (n_u,)."""
     y = x.copy()
     for i, p in enumerate(state.p):
         u0 = model.bodies.u0[i]

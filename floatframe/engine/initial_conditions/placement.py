@@ -1,4 +1,4 @@
-"""Displacement of bodies from their given positions by the joints: reported if large, refused if implausible.
+"""Limits on how far joints may move bodies from their given positions: large moves are logged, huge ones rejected.
 
 Newton's method closes the joints from any place; from far away it can end in another configuration than the one that
 was meant (an elbow the other way round).
@@ -17,12 +17,12 @@ __all__ = ["require_placed_near"]
 
 log = logging.getLogger(__name__)
 
-REPORTED = 0.1  #: displacement relative to the size of a body, above which it is reported
-REFUSED = 3.0  #: displacement relative to the size of the largest body, above which it is refused
+REPORTED = 0.1  #: displacement, relative to the size of the body, above which it is logged
+REFUSED = 3.0  #: displacement, relative to the size of the largest body, above which it is rejected
 
 
 def require_placed_near(compiled: CompiledSystem, placed: State, closed: State) -> None:
-    """Log the body that the joints moved far, and raise `ModelError` if it was placed out of reach.
+    """Log the body that the joints moved far, and raise `ModelError` if a body was moved too far.
 
     Prescribed motions may move bodies far at their beginning: with them it is told, not refused. So may the joints of a
     loop that place bodies without a position.
@@ -63,7 +63,7 @@ def require_placed_near(compiled: CompiledSystem, placed: State, closed: State) 
 
 
 def body_sizes(compiled: CompiledSystem) -> Array:
-    """Return the largest arm of a marker or the radius of gyration of each body, (n_b,) [m]; 1 if all are 0."""
+    """Return the size of each body, (n_b,) [m]: largest marker arm or radius of gyration; 1 if all are 0."""
     model = compiled.model
     kind, types, markers = model.bodies.kind, model.body_types, model.markers
     size = np.sqrt(np.maximum(np.trace(types.J0, axis1=1, axis2=2), 0.0) / (2 * types.mass))[kind]

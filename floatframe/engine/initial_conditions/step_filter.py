@@ -1,4 +1,4 @@
-"""Accelerations at the start of a motion, without the parts that a step of the given size cannot resolve.
+"""Initial accelerations without the components that a step of the given size cannot resolve.
 
 A start knows the accelerations u_dot of the equations of motion alone. Where a mode, a spring or a damper is far
 faster than the step, they throw the body on which it acts. The matrix of a Newton step tells fast from slow:
@@ -54,20 +54,20 @@ __all__ = ["Beginning", "Spin", "StepFilter", "beginning_of", "closing_velocitie
 
 @dataclass(frozen=True, eq=False)
 class StepFilter:
-    """Z of the module docstring at a state, with the factors of its matrix."""
+    """The filter Z of the module docstring at one state, with the factors of its matrix."""
 
     compiled: CompiledSystem
     state: State
-    mass: tuple[Array, ...]  #: M, a block of each body
-    G: sp.csr_array  #: dependence of rows on accelerations, (n_w, n_u)
-    factors: NewtonFactors  #: of the matrix of (1)
+    mass: tuple[Array, ...]  #: mass matrix of each body
+    G: sp.csr_array  #: derivatives of rows by accelerations, (n_w, n_u)
+    factors: NewtonFactors  #: factors of the matrix in (1)
 
     def __call__(self, y: Array) -> Array:
-        """Return Z y, (n_u,), of accelerations or their rates, translations in ground axes."""
+        """Return Z y, (n_u,), for accelerations or their rates y, with translations in ground axes."""
         return self.solved(y)[0]
 
     def solved(self, y: Array) -> tuple[Array, Array]:
-        """Return Z y, and mu, (n_w,)."""
+        """Return Z y, and the multipliers mu, (n_w,)."""
         model = self.compiled.model
         own = in_body_axes(model, self.state, y)
         ends = zip(self.mass, model.bodies.u0[:-1], model.bodies.u0[1:], strict=True)
@@ -75,12 +75,12 @@ class StepFilter:
         return in_ground_axes(model, self.state, z), mu
 
     def twice(self, y: Array) -> Array:
-        """Return (2 Z - Z²) y."""
+        """Return (2 Z - Z²) y, which differs from y only to second order in h for motions that the step resolves."""
         z = self(y)
         return z + self(y - z)
 
     def closing(self, gap: Array) -> Array:
-        """Return du of (3), (n_u,), for g(after)/h, (n_w,), zero in all rows that are not closed in this way."""
+        """Return the velocity correction du of (3), (n_u,), for rates g(after)/h, (n_w,), zero in all other rows."""
         model = self.compiled.model
         return in_ground_axes(model, self.state, self.factors.solve(np.zeros(self.factors.n_u), -gap)[0])
 
@@ -95,7 +95,7 @@ def step_filter(
     spin: "Spin | None" = None,
     work: Work | None = None,
 ) -> StepFilter:
-    """Return the filter with the matrix M + c_d D + c_k K at a state with its accelerations and wrenches, at time t.
+    """Return the filter with matrix M + c_d D + c_k K at time t, at a state with its accelerations and wrenches.
 
     spin: of bodies whose D is that of axes which do not spin with them. work: made by `work_from`; overwritten.
     K holds what forces do as they turn with the bodies. Those of modes that the step does not follow are no part of it:
@@ -110,7 +110,7 @@ def step_filter(
     held = is_held(model.rows.kind)
 
     def by(u_dot: Array, w: Array) -> StepFilter:
-        """Return the filter with the matrix at other accelerations and wrenches."""
+        """Return the filter with its matrix evaluated at other accelerations and wrenches."""
         set_iterate(work, state, u_dot, np.where(is_wrench(model), w, consistent.w))
         if spin is not None:
             work.state.spins[:] = spin.bodies
@@ -126,14 +126,14 @@ def step_filter(
 
 
 def chosen(is_first: NDArray[np.bool_], first: sp.csr_array, second: sp.csr_array) -> sp.csr_array:
-    """Return some rows of one matrix, and the others of another."""
+    """Return a matrix with some rows from the first and the other rows from the second."""
     both = sp.csr_array(sp.vstack([first, second]))
     rows = np.arange(len(is_first))
     return both[np.where(is_first, rows, len(rows) + rows)]
 
 
 def is_wrench(model: Model) -> NDArray[np.bool_]:
-    """Return which unknowns of connections are forces, moments or multipliers, and not states, (n_w,)."""
+    """Return, for each connection unknown, whether it is a force, moment or multiplier rather than a state, (n_w,)."""
     result = np.ones(int(model.connections.w0[-1]), dtype=bool)
     for k in range(3):
         result[model.states.row + k] = False
@@ -146,8 +146,8 @@ def is_wrench(model: Model) -> NDArray[np.bool_]:
 class Spin:
     """Axisymmetric bodies whose spin is integrated separately, see `kernels.generalized_alpha`."""
 
-    bodies: NDArray[np.int64]  #: 1 for each of these bodies, (n_b,)
-    turn: Array  #: w omega × e, the part of u_dot that rotates their axes e with the spin w, (n_u,)
+    bodies: NDArray[np.int64]  #: 1 for each body whose spin is integrated separately, (n_b,)
+    turn: Array  #: part w omega × e of u_dot, due to the rotation of the symmetry axis e at spin rate w, (n_u,)
     #: difference between the rates of the remainder, in axes that do not spin, and those of u_dot, (n_u,)
     further: Array
 
@@ -172,10 +172,10 @@ def spin_of(compiled: CompiledSystem, consistent: ConsistentState, may: NDArray[
 
 @dataclass(frozen=True, eq=False)
 class Beginning:
-    """Accelerations with which a motion begins, and their rates, filtered with one s."""
+    """Initial accelerations and their rates, filtered with the same matrix."""
 
     u_dot: Array  #: (2 Z - Z²) u_dot, (n_u,)
-    rates: Array  #: Z d(u_dot)/dt along the motion; for bodies that spin in axes that do not spin, (n_u,)
+    rates: Array  #: Z d(u_dot)/dt along the motion, (n_u,); for spinning bodies in axes that do not spin
 
 
 def beginning_of(
@@ -187,7 +187,7 @@ def beginning_of(
     *,
     spin: Spin | None = None,
 ) -> Beginning:
-    """Return accelerations and rates at a state at time t for steps of size h; z None: from the equations of motion.
+    """Return initial accelerations and rates at t for step size h; z None: unfiltered, from the equations of motion.
 
     spin: of bodies whose accelerations are filtered without the turn of their axes.
     """
@@ -200,7 +200,7 @@ def beginning_of(
 
 
 def closing_velocities(z: StepFilter, after: State, w: Array, t: float, h: float, rows: NDArray[np.bool_]) -> Array:
-    """Return du of (3), (n_u,), for some rows, (n_w,), in a step of size h from t to `after`; z: with s = 1."""
+    """Return the velocity correction du of (3), (n_u,), for some rows, (n_w,), in a step of size h from t."""
     model = z.compiled.model
     work, unknowns = work_from(model, w), start_unknowns(model, w)
     if len(model.coordinates.row):  # angles of couplers and user forces are those nearest to the predicted ones

@@ -61,27 +61,27 @@ __all__ = [
 
 @view
 def block(types, t, which, size):
-    """Return a constant block of a type of bodies as a view of the flat store."""
+    """Return one constant matrix of a type of bodies as a view of the flat array of all matrices."""
     start = types.block0[t, which]
     return types.blocks[start : start + size]
 
 
 @view
 def newton_block(model, work, i):
-    """Return the Newton matrix of body i, (6 + n, 6 + n), as a view of the flat store."""
+    """Return the Newton matrix of body i, (6 + n, 6 + n), as a view of the flat array of all matrices."""
     n = 6 + model.bodies.n_q[i]
     return work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((n, n))
 
 
 @loops
 def column(A, n, k):
-    """Return column k of A [a, k], flat."""
+    """Return column k of a matrix A [a, k] that is stored flat."""
     return A[k], A[n + k], A[2 * n + k]
 
 
 @loops
 def tensor(A, n, k):
-    """Return matrix k of A [ab, k], flat."""
+    """Return matrix k of a tensor A [ab, k] that is stored flat."""
     return column(A, n, k), column(A[3 * n :], n, k), column(A[6 * n :], n, k)
 
 
@@ -102,32 +102,32 @@ def tensor_sum(A, n, x):
 
 @loops
 def trace_less(W):
-    """Return (tr W) 1 - W."""
+    """Return (tr W) 1 - W for a matrix W."""
     x, y, z = W[0][0], W[1][1], W[2][2]
     return (y + z, -W[0][1], -W[0][2]), (-W[1][0], x + z, -W[1][2]), (-W[2][0], -W[2][1], x + y)
 
 
 @loops
 def axial(W):
-    """Return (W_zy - W_yz, W_xz - W_zx, W_yx - W_xy)."""
+    """Return (W_zy - W_yz, W_xz - W_zx, W_yx - W_xy), twice the axial vector of W."""
     return W[2][1] - W[1][2], W[0][2] - W[2][0], W[1][0] - W[0][1]
 
 
 @loops
 def coupling(second, W, n, k):
-    """Return B_k, from the blocks of 2C and W."""
+    """Return B_k, the coupling of mode k with rotation, from the invariants 2C (`second`) and W."""
     return add(column(second, n, k), axial(tensor(W, n, k)))
 
 
 @loops
 def inertia_rate(third, W, n, k):
-    """Return D_k, from the blocks of 3C and W; dJ/dq_k = D_k + D_kᵀ."""
+    """Return D_k, where dJ/dq_k = D_k + D_kᵀ, from the invariants 3C (`third`) and W."""
     return matrix_sum(tensor(third, n, k), trace_less(tensor(W, n, k)))
 
 
 @loops
 def moved_inertia(m, s, J, p):
-    """Return first moment and inertia about a point from which p leads to the one before."""
+    """Shift first moment s and inertia J of a mass m by p, the vector from the new to the old reference point."""
     y = add(s, scaled(0.5 * m, p))
     d = 2.0 * dot(p, y)
     rows = (
@@ -140,7 +140,7 @@ def moved_inertia(m, s, J, p):
 
 @loops
 def modal_term(types, t, n, which, x, out):
-    """Add M x, K x or D x of a type of bodies to `out`, (n_q,)."""
+    """Add the product of a modal matrix M, K or D with x to `out`, (n_q,)."""
     if types.is_diagonal[t, which - MASS]:
         diagonal = block(types, t, which, n)
         for k in range(n):
@@ -156,7 +156,7 @@ def modal_term(types, t, n, which, x, out):
 
 @loops
 def first_moments(model, work, i):
-    """Write s(q) and 1C(q) = ds/dq, and K_t q_dot, K_r q_dot of a stiffened body, into work.bodies."""
+    """Write s(q), 1C(q) = ds/dq, and for a stiffened body K_t q_dot and K_r q_dot, into work.bodies."""
     types, bodies = model.body_types, work.bodies
     t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
     put(bodies.s[i], 0, types.S[t])
@@ -181,7 +181,7 @@ def first_moments(model, work, i):
 
 @loops
 def products(types, t, n, q, q_dot, W, Y):
-    """Write W_ab = S_ab q and Y = 4C q_dot."""
+    """Write the products W_ab = S_ab q and Y = 4C q_dot of a type of bodies."""
     W[:] = 0.0
     Y[:] = 0.0
     add_products(block(types, t, S_AB, 9 * n * n), q, W)
@@ -190,7 +190,7 @@ def products(types, t, n, q, q_dot, W, Y):
 
 @loops
 def body_forces(model, work, i):
-    """Write the left sides of (1) to (3) of body i into the residual, and s, 1C, W, Y, J, D_q_dot."""
+    """Write inertia and elastic forces of body i, (1) to (3), into the residual, and s, 1C, W, Y, J, D_q_dot."""
     types, bodies, R = model.body_types, work.bodies, work.state.R[i]
     t, n, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.u0[i]
     u, u_dot = work.state.u[u0 : u0 + 6 + n], work.state.u_dot[u0 : u0 + 6 + n]
@@ -212,7 +212,7 @@ def body_forces(model, work, i):
 
 @loops
 def modal_forces(model, work, i, a):
-    """Write (3) of body i, and W, Y, J, D_q_dot; return the terms of q_dot and q_ddot in (1) and (2)."""
+    """Write the modal forces (3) of body i and W, Y, J, D_q_dot; return the modal terms of (1) and (2)."""
     types, bodies = model.body_types, work.bodies
     t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i] + 6
     q, q_dot, q_ddot = work.state.q[q0 : q0 + n], work.state.u[u0 : u0 + n], work.state.u_dot[u0 : u0 + n]
@@ -248,7 +248,7 @@ def modal_forces(model, work, i, a):
 
 @loops
 def body_mass_product(model, work, i, v, out):
-    """Write generalised momenta M u of body i into out, (6 + n_q,), for v, (6 + n_q,), with v_GO in body axes.
+    """Write the generalised momenta M u of body i into out, (6 + n_q,); v: its velocities, v_GO in body axes.
 
     `body_forces` has been called for this configuration.
     """
@@ -269,14 +269,14 @@ def body_mass_product(model, work, i, v, out):
 
 @loops
 def gyroscopic(omega, J, D):
-    """Return the derivative of omega × J omega + 2 D omega by omega: omega~ J - (J omega)~ + 2 D."""
+    """Return the derivative of omega × J omega + 2 D omega by omega, which is omega~ J - (J omega)~ + 2 D."""
     turning = matrix_sum(product(tilde(omega), J), tilde(scaled(-1.0, turned(J, omega))))
     return matrix_sum(scaled_matrix(2.0, D), turning)
 
 
 @loops
 def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
-    """Write the derivative of (1) to (3) into H, (6 + n, 6 + n), with weights of mass, damping, stiffness parts.
+    """Write the derivative of (1) to (3) into H, (6 + n, 6 + n); c_m, c_d, c_k: weights of mass, damping, stiffness.
 
     Columns are (dx, dtheta, dq) with da = c_m dx, dalpha = c_m dtheta, dq_ddot = c_m dq, domega = c_d dtheta,
     dq_dot = c_d dq, dq: c_k dq. The derivative by the rotation of the body itself (da = a × dphi) goes
@@ -306,7 +306,7 @@ def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
 
 @loops
 def spin_columns(model, work, i, c_d, H):
-    """Add the contribution w dtheta × e of the rotation of the axis e of a spinning body to its angular acceleration.
+    """Add the derivative of w dtheta × e: rotation of a spinning body's axis e changes its angular acceleration.
 
     w: spin; see `kernels.generalized_alpha`. The columns of alpha in (1) to (3) are -tilde(s), J, Bᵀ.
     """
@@ -325,7 +325,7 @@ def spin_columns(model, work, i, c_d, H):
 
 @loops
 def modal_tangent(model, work, i, c_m, c_d, c_k, H, turn):
-    """Write the rows and columns of the modes; see `body_tangent`.
+    """Write the rows and columns of the modes into H; see `body_tangent`.
 
     With b = 1C_k: (1) by q, (2) by q but for the sums over modes in `modal_columns`, (3) by a, alpha, omega.
     """
@@ -355,7 +355,7 @@ def modal_tangent(model, work, i, c_m, c_d, c_k, H, turn):
 
 @loops
 def modal_columns(model, work, i, c_d, c_k, H):
-    """Add the terms with products over 4C and S_ab: the modal block, and the rest of the derivative of (2) by q.
+    """Add the terms with 4C and S_ab to H: the modal block, and the remaining derivatives of (2) by q.
 
     2 4C_kj·omega, B'_kj·alpha - omegaᵀ 5C_jk omega; Σ_k B'_kj q_ddot_k + 2 Σ_k q_dot_k 5C_jk omega, where B'_kj is the
     derivative of B_k by q_j: 4C_kj, and K_r,kj of a stiffened body; both are in S_ab. The second is Σ A_ab S_ab,kj with
@@ -380,7 +380,7 @@ def modal_columns(model, work, i, c_d, c_k, H):
 
 @loops
 def stiffened_columns(model, work, i, c_d, c_k, H):
-    """Add the contribution of K_t beyond s(q) and 1C(q), and the derivatives of q_dotᵀK_t q_dot and q_dotᵀK_r q_dot."""
+    """Add the terms of K_t beyond s(q) and 1C(q), and the derivatives of q_dotᵀ K_t q_dot and q_dotᵀ K_r q_dot."""
     n, q0, u0 = model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
     K_t = block(model.body_types, model.bodies.kind[i], K_TRANSLATION, 3 * n * n)
     first_dot = work.bodies.K_t_q_dot[3 * q0 : 3 * (q0 + n)]
@@ -400,7 +400,7 @@ def stiffened_columns(model, work, i, c_d, c_k, H):
 
 @loops
 def modal_block(types, t, n, which, factor, H):
-    """Add factor * M, K or D to the modal block of H."""
+    """Add a modal matrix M, K or D, multiplied by `factor`, to the modal block of H."""
     if types.is_diagonal[t, which - MASS]:
         diagonal = block(types, t, which, n)
         for k in range(n):

@@ -10,7 +10,7 @@ ENOUGH = 0.25  # ratio of a pivot to the largest number of its row at which the 
 
 @matrix_loops
 def add_products(A, x, out):
-    """Add Σ_k A[k, j] x_k to out_j, A flat with rows as long as out; four rows at once."""
+    """Add Σ_k A[k, j] x_k to out[j], with A stored flat in rows as long as out; four rows at once."""
     n, width = x.shape[0], out.shape[0]
     for k in range(0, n - 3, 4):
         o = k * width
@@ -27,7 +27,7 @@ def add_products(A, x, out):
 
 @matrix_loops
 def lu_factor(A, pivot):
-    """Overwrite A, (n, n), with its factors, the numbers on the diagonal of the upper one inverted.
+    """Overwrite A, (n, n), with its LU factors; the diagonal of U is stored inverted.
 
     The pivot is the first number that is at least `ENOUGH` of the largest one of its row, or the one with the largest
     ratio to it. Return False if a pivot is zero or not finite.
@@ -64,7 +64,7 @@ def lu_factor(A, pivot):
 
 @matrix_loops
 def lu_solve(A, pivot, b):
-    """Overwrite b, (n,), with A⁻¹ b by the factors of `lu_factor`.
+    """Overwrite b, (n,), with A⁻¹ b, from the factors of `lu_factor`.
 
     Four rows at once: their sums do not wait for each other.
     """
@@ -108,7 +108,7 @@ def lu_solve(A, pivot, b):
 
 @matrix_loops
 def lu_solve_columns(A, pivot, B):
-    """Overwrite B, (n, m), with A⁻¹ B by the factors of `lu_factor`; six columns at once, kept in registers."""
+    """Overwrite B, (n, m), with A⁻¹ B from the factors of `lu_factor`; six columns at once stay in registers."""
     n, m = B.shape
     for k in range(n):
         row = pivot[k]
@@ -146,7 +146,7 @@ def lu_solve_columns(A, pivot, B):
 
 @matrix_loops
 def six_columns(A, X, out):
-    """Write A X into out, (n_rows, 6), by the first n_rows rows of A, (., n), and X, (n, 6)."""
+    """Write A X into out, (n_rows, 6), for the first n_rows rows of A, (., n), and X, (n, 6)."""
     for r in range(out.shape[0]):
         x, y = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         for j in range(X.shape[0]):

@@ -1,4 +1,4 @@
-"""Energies, momenta and constraint drift of the iterate; all on the deformed bodies."""
+"""Energies, momenta and constraint drift of the iterate, all for the deformed bodies."""
 
 import math
 
@@ -35,7 +35,7 @@ __all__ = ["diagnose", "power"]
 
 @inner
 def quadratic(model, work, i, which, x):
-    """Return xᵀ M x, xᵀ K x or xᵀ D x of body i."""
+    """Return the quadratic form xᵀ M x, xᵀ K x or xᵀ D x of body i."""
     n = model.bodies.n_q[i]
     product = work.bodies.modal[:n]
     for k in range(n):
@@ -103,7 +103,7 @@ def diagnose(model, work, out, drift):
 
 @inner
 def drive_power(model, work, c):
-    """Return the power of the wrenches of a joint on its bodies if it prescribes a motion; otherwise zero."""
+    """Return the power that a joint supplies to its bodies if it prescribes a motion; otherwise zero."""
     w0, a, b = model.connections.w0[c], model.connections.a[c], model.connections.b[c]
     is_driven = False
     for k in range(w0, model.connections.w0[c + 1]):
@@ -127,7 +127,7 @@ def drive_power(model, work, c):
 
 @inner
 def loaded_power(model, work, c):
-    """Return the power supplied by forces along coordinates of joint c, the power dissipated by them, and the total."""
+    """Return supplied power, dissipated power and total power of the forces along coordinates of joint c."""
     rows, markers = model.rows, work.markers
     loads, dissipated, total = 0.0, 0.0, 0.0
     w0, a, b = model.connections.w0[c], model.connections.a[c], model.connections.b[c]
@@ -147,7 +147,7 @@ def loaded_power(model, work, c):
 
 @inner
 def body_load_power(model, work, d):
-    """Return the power of load case d on its body."""
+    """Return the power that load case d supplies to its body."""
     i, first = model.body_loads.body[d], model.body_loads.value0[d]
     u0, R, f = model.bodies.u0[i], work.state.R[i], model.body_loads.values
     factor, _, _ = time_function(model.functions, model.body_loads.factor[d], work.state.time)
@@ -159,7 +159,7 @@ def body_load_power(model, work, d):
 
 @inner
 def power(model, work):
-    """Return the power of point forces and drives, and the power dissipated by dampers and modal damping (positive)."""
+    """Return the power supplied by point forces and drives, and the power dissipated by dampers and modes."""
     loads, dissipated = 0.0, 0.0
     for k in range(model.loads.marker.shape[0]):
         m = model.loads.marker[k]

@@ -1,4 +1,4 @@
-"""The way into compiled code; that of absolute coordinates, and a plain function for each of its tasks.
+"""The entry into compiled code for absolute coordinates, with one plain function for each of its tasks.
 
 One entry, since numba compiles and links everything below an entry once more for each of them.
 """
@@ -53,35 +53,35 @@ LINEARIZE, RATES, CORRECT, OBSERVE, ADVANCE, COUNT = range(6)
 
 
 class Order(NamedTuple):
-    """A request to the entry."""
+    """A request to the entry: a task with its parameters."""
 
-    what: IntArray = integer()  #: LINEARIZE, RATES, CORRECT, OBSERVE, ADVANCE or COUNT
-    c_m: Array = real()  #: weights of the parts of mass, damping, stiffness
+    what: IntArray = integer()  #: task: LINEARIZE, RATES, CORRECT, OBSERVE, ADVANCE or COUNT
+    c_m: Array = real()  #: weights of mass, damping and stiffness in the Newton matrix
     c_d: Array = real(unit="s")
     c_k: Array = real(unit="s²")
     t0: Array = real(unit="s")  #: time of step 0, or of the observed state
     h: Array = real(unit="s")
     first: IntArray = integer()  #: number of the first step
     n_steps: IntArray = integer()
-    every: IntArray = integer()  #: results are written at this interval of steps
-    alpha_m: Array = real()  #: coefficients of the method
+    every: IntArray = integer()  #: number of steps between written results
+    alpha_m: Array = real()  #: coefficients of the generalized-alpha method
     alpha_f: Array = real()
     beta: Array = real()
     gamma: Array = real()
-    tolerance: Array = real()  #: of Newton's method
+    tolerance: Array = real()  #: tolerance of Newton's method
     max_iterations: IntArray = integer()
     length: Array = real(unit="m")  #: size of the system
-    most_error: Array = real()  #: allowed error of a step, 0 for no control
-    h_min: Array = real(unit="s")  #: smallest part of a divided step, 0 if it may not be divided
-    stabilized: IntArray = integer()  #: whether velocities are enforced too, and spins integrated separately
+    most_error: Array = real()  #: allowed error of a step, 0 for no error control
+    h_min: Array = real(unit="s")  #: smallest size of a divided step, 0 if steps may not be divided
+    stabilized: IntArray = integer()  #: whether velocity constraints are enforced and spins are integrated separately
 
 
 class Outcome(NamedTuple):
-    """The report of the entry."""
+    """The report of the entry about a request."""
 
     status: int  #: DONE, DIVERGED, SINGULAR_BODY, SINGULAR_CONNECTION or INACCURATE
-    n_steps: int  #: done
-    n_rows: int  #: written
+    n_steps: int  #: number of steps done
+    n_rows: int  #: number of rows written
     singular: int  #: number of the singular body or connection
     excess: float  #: size of the last correction relative to the allowed one
 
@@ -91,7 +91,7 @@ as_rows, as_order = converter(Rows()), converter(Order())
 
 
 def make_entry(digest):
-    """Return the cached entry; the digest of the sources enters its key, see the package docstring."""
+    """Return the cached entry; the digest of the sources is part of its key, see the package docstring."""
 
     def run(model_table, work_table, memory_table, rows_table, order_table):
         if digest == 0:
@@ -132,7 +132,7 @@ ORDER, NO_MEMORY, NO_ROWS = Order(), zeros(Memory(), NO_SIZES), zeros(Rows(), NO
 
 
 class CompiledEntry:
-    """A compiled function of records and a request, the only way from Python into a time loop.
+    """A compiled function of records and a request, the only way from Python into the time loop.
 
     Its arguments are the tables of the records of a formulation (model and working arrays first), of the memory, of
     the rows of results, and of the order.
@@ -154,7 +154,7 @@ class CompiledEntry:
         return sum(self.compiled.stats.cache_misses.values()) > before
 
     def __call__(self, *records: Any, memory: Any = NO_MEMORY, rows: Any = NO_ROWS, **order: float) -> Outcome:
-        """Carry out a request; unnamed fields of the order are zero, and all arrays live until it returns."""
+        """Carry out a request; fields that are not given are zero, and all arrays stay alive until it returns."""
         if not self.is_ready:
             began = time.perf_counter()
             if self.prepare():
@@ -167,7 +167,7 @@ class CompiledEntry:
         return Outcome(*outcome)
 
     def observe(self, *records: Any, memory: Memory, t: float) -> Rows:
-        """Return the results at the state in the memory, and store the power at this state in the memory."""
+        """Return the results at the state in the memory, and store their power in the memory."""
         rows = new_rows(records[0], 1)
         self(*records, memory=memory, rows=rows, what=OBSERVE, t0=t)
         return rows
@@ -175,7 +175,7 @@ class CompiledEntry:
     def advance(
         self, *records: Any, memory: Memory, h: float, first: int, n_steps: int, every: int, **order: float
     ) -> tuple[Rows, Outcome]:
-        """Advance the memory by n_steps of size h, and return the results after every `every`-th, and the report.
+        """Advance the memory by n_steps of size h; return the report and the results after every `every`-th step.
 
         order: time of step 0, and numbers of the method; see `kernels.generalized_alpha.time_loop`.
         """
@@ -194,12 +194,12 @@ def prepare() -> bool:
 
 
 def evaluate_and_linearize(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> None:
-    """Write residuals and derivatives for the iterate in `work`; rows of wrenches weighted by c_k if above 0."""
+    """Write residuals and derivatives at the iterate in `work`; c_k above 0 weights the rows of wrenches."""
     absolute_kernels(model, work, what=LINEARIZE, c_m=c_m, c_d=c_d, c_k=c_k)
 
 
 def rates_of_constraints(model: Model, work: Work) -> tuple[Array, Array]:
-    """Return for every row the rate of the held quantity, and its second rate at zero u_dot, both (n_w,)."""
+    """Return rate and second rate (at zero u_dot) of every row's constrained quantity, both (n_w,)."""
     absolute_kernels(model, work, what=RATES)
     return work.connections.rate.copy(), work.connections.bias.copy()
 
@@ -210,5 +210,5 @@ def newton_correction(model: Model, work: Work, c_m: float, c_d: float, c_k: flo
 
 
 def count_angles(model: Model, work: Work, memory: Memory, h: float) -> None:
-    """Store the angles of the state in the memory, a step of size h after the stored ones."""
+    """Store the counted angles of the state in the memory, a step of size h after the stored ones."""
     absolute_kernels(model, work, memory=memory, what=COUNT, h=h)

@@ -1,4 +1,4 @@
-"""Evaluation of the whole system at one iterate: residuals, and their derivatives body by body.
+"""Evaluation of the whole system at one iterate: residuals, and their derivatives for each body.
 
 Described in `floatframe.model.forces.loads`, `floatframe.integrators.ida`.
 """
@@ -23,7 +23,7 @@ __all__ = ["evaluate", "evaluate_bodies", "evaluate_markers", "linearize", "slid
 
 @inner
 def evaluate(model, work, c_k):
-    """Write the residuals of bodies and rows for the iterate in `work`; rows of wrenches weighted by c_k."""
+    """Write the residuals of bodies and rows for the iterate in `work`; c_k weights the rows of wrenches."""
     evaluate_markers(model, work)
     for c in range(model.connections.size.shape[0]):
         connection_rows(model, work, c, c_k)
@@ -32,7 +32,7 @@ def evaluate(model, work, c_k):
 
 @inner
 def evaluate_markers(model, work):
-    """Write the motion of all markers; their wrenches are zero."""
+    """Write the motion of all markers and set their wrenches to zero."""
     for m in range(model.markers.body.shape[0]):
         marker_motion(model, work, m)
     slide_markers(model, work)
@@ -40,7 +40,7 @@ def evaluate_markers(model, work):
 
 @inner
 def slide_markers(model, work):
-    """Move sliding markers to their current positions; wrenches of all markers are zero."""
+    """Move sliding markers to their current positions and set the wrenches of all markers to zero."""
     work.markers.wrench[:, :] = 0.0
     for k in range(model.lines.marker.shape[0]):
         slide_marker(model, work, k)
@@ -48,7 +48,7 @@ def slide_markers(model, work):
 
 @inner
 def evaluate_bodies(model, work):
-    """Write the residuals of bodies including loads and wrenches of connections on markers."""
+    """Write the residuals of bodies, including loads and the wrenches of connections."""
     for k in range(model.loads.marker.shape[0]):
         load_wrench(model, work, k)
     for i in range(model.bodies.kind.shape[0]):
@@ -85,7 +85,7 @@ def body_load(model, work, d):
 
 @inner
 def tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning):
-    """Write the tangent of body i into H, (6 + n, 6 + n), with its wrenches constant in space or in markers.
+    """Write the tangent of body i into H, (6 + n, 6 + n); each wrench is constant in ground axes or marker axes.
 
     turning, (3, 3): rotation of the body by its unknown dtheta, see `marker_columns`.
     """
@@ -102,7 +102,7 @@ def tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning):
 
 @inner
 def turning_by_unknown(model, work, i):
-    """Return the rotation of body i by its unknown dtheta, body axes.
+    """Return the rotation of body i for a change of its unknown dtheta, body axes.
 
     R exp(theta) turns by T(theta) dtheta. Where the spin is taken by itself, R exp(x) exp(xi e) with x across e and
     unknowns in the axes of the iterate, it turns by e along e, and across it by T(x) in these axes.
@@ -115,7 +115,7 @@ def turning_by_unknown(model, work, i):
 
 @inner
 def linearize(model, work, c_m, c_d, c_k):
-    """Write H of every body, J_row and J_column of every end, and P, V of every connection, without factorisation."""
+    """Write H of every body, J_row and J_column of every end, P and V of every connection, without factorisation."""
     rate = c_d / c_k if c_k > 0.0 else 0.0
     for i in range(model.bodies.kind.shape[0]):
         n = 6 + model.bodies.n_q[i]

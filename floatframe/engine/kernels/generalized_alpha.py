@@ -90,7 +90,7 @@ SINGULAR = 6  # status: the Newton matrix is singular, in a formulation with one
 UNRESOLVED = 7  # status: a step is too long for a contact
 TURNED = 8  # status: a body rotates too far in a step
 NO_ACCELERATION = 9  # status: a step has no accelerations at its end, of a scheme that needs none
-#: largest rotation in a step [rad] of a body with joints away from its axis; above 1.15 joints can add energy
+#: largest rotation [rad] in a step of a body with joints off its rotation axis; above 1.15 joints can add energy
 MOST_TURN = 1.0
 # distance of a joint from the axis of rotation, relative to the size of the system, above which it is away from it
 OFF_AXIS = 1e-3
@@ -113,7 +113,7 @@ SAME = 1e-12  # relative difference below which step sizes count as equal
 
 @inner
 def put_weights(model, work, c_k):
-    """Write the weights of the norm: mass, inertia, M + c_k K."""
+    """Write the weights of the norm of corrections: mass, inertia, and M + c_k K of the modes."""
     for i in range(model.bodies.kind.shape[0]):
         t, u0, n = model.bodies.kind[i], model.bodies.u0[i], model.bodies.n_q[i]
         for k in range(3):
@@ -138,7 +138,7 @@ def copy(source, target):
 
 @inner
 def load_state(state, memory):
-    """Copy the memory of the integrator into the iterate; rotation since the beginning of the step is zero."""
+    """Copy the memory of the integrator into the iterate, with zero rotation since the beginning of the step."""
     copy(memory.r.reshape(memory.r.size), state.r.reshape(memory.r.size))
     copy(memory.q, state.q)
     copy(memory.u, state.u)
@@ -155,7 +155,7 @@ def load_state(state, memory):
 
 @inner
 def turn_body(model, state, memory, i):
-    """Write R of body i: that of the beginning of the step, turned by theta, or by both parts of it if it spins."""
+    """Write R of body i: its value at the beginning of the step, rotated by theta; a spin is a separate rotation."""
     R_start, theta = matrix_of_euler_parameters(memory.p[i]), vector(state.theta[i])
     if state.spins[i] == 0:
         put_matrix(state.R[i], product(R_start, exp_matrix(theta)))
@@ -165,13 +165,13 @@ def turn_body(model, state, memory, i):
 
 @small
 def spin_axis(model, i):
-    """Return the axis about which the inertia of body i is symmetric, body axes; zero: none."""
+    """Return the symmetry axis of the inertia of body i, body axes; zero if there is none."""
     return vector(model.body_types.axis[model.bodies.kind[i]])
 
 
 @small
 def takes_spin(turn, alpha):
-    """Whether a step integrates a spin separately: alpha is not much smaller than without the rotation of the axis."""
+    """Whether a step integrates a spin separately: alpha is not much smaller without the rotation of the axis."""
     rest = sub(alpha, turn)
     return dot(turn, turn) > 0.0 and dot(alpha, alpha) >= STEADY * STEADY * dot(rest, rest)
 
@@ -194,7 +194,7 @@ def begin_spin(model, work, memory, i):
 
 @inner
 def take_to_body(model, state, i):
-    """Convert omega and alpha - w omega × e of body i from axes that do not spin to omega and alpha in its own axes.
+    """Convert omega and alpha of body i from axes that do not spin to its own axes, and add w omega × e to alpha.
 
     These axes are those of the beginning of the step turned by exp(across).
     """
@@ -207,7 +207,7 @@ def take_to_body(model, state, i):
 
 @inner
 def take_age(solver, n_iterations):
-    """Count a step with the present factors, and request new ones if it took longer than the mean of all steps.
+    """Count a step with the present factors, and request new ones if it needed more iterations than the mean.
 
     The mean counts what the factors cost: to go on would raise it, and new ones come back to it.
     """
@@ -219,7 +219,7 @@ def take_age(solver, n_iterations):
 
 @inner
 def predict(model, work, memory, h, order):
-    """(1): a_new = a. Return the squared size of the acceleration and of the increment, in the norm of `weight`."""
+    """(1): predict with a_new = a; return the squared norms of acceleration and increment."""
     begin_step(model, work, memory, h, order.alpha_f)
     size, size_x = 0.0, 0.0
     for i in range(model.bodies.kind.shape[0]):
@@ -251,7 +251,7 @@ def predict(model, work, memory, h, order):
 
 @inner
 def update(model, work, memory, by_rate, by_acceleration, c_k, is_held):
-    """Add the correction (y, mu) to the iterate, and y_rate to enforced velocities; return its squared norm."""
+    """Add the correction (y, mu) to the iterate, and y_rate to constrained velocities; return its squared norm."""
     total = 0.0
     for i in range(model.bodies.kind.shape[0]):
         n, u0, q0 = model.bodies.n_q[i], model.bodies.u0[i], model.bodies.q0[i]
@@ -274,7 +274,7 @@ def update(model, work, memory, by_rate, by_acceleration, c_k, is_held):
 
 @inner
 def change_rates(model, work, i, by_theta, by_rate, by_acceleration):
-    """Add y by_rate to the velocities of body i, y by_acceleration to its accelerations, and by_theta to theta.
+    """Add by_rate y to the velocities of body i, by_acceleration y to its accelerations, and by_theta to theta.
 
     A body that spins has them in the axes that do not spin with it: omega and alpha - w omega × e follow y there, which
     is that of theta or, where theta stays, of a velocity.
@@ -303,7 +303,7 @@ def change_rates(model, work, i, by_theta, by_rate, by_acceleration):
 
 @inner
 def turns_too_far(model, work, length):
-    """Return the first body that would rotate by more than `MOST_TURN` with a joint away from the axis, or -1.
+    """Return the first body, or -1, that rotates by more than `MOST_TURN` with a joint off its rotation axis.
 
     A spin that is taken by itself does not count. Where all joints lie on the axis through the frame, its origin does
     not move on a circle, and any turn is followed.
@@ -325,7 +325,7 @@ def turns_too_far(model, work, length):
 
 @inner
 def hold_velocities(model, work, c_k):
-    """Write the velocity correction y_rate for `update` that closes the gaps in mu; return its squared norm.
+    """Write the velocity correction y_rate for the gaps in mu, used by `update`; return its squared norm.
 
     Accelerations change with velocities, and reactions, which are changed here, with accelerations. Positions stay: so
     what the factors take of forces that follow positions (modal stiffness, forces that turn against the body) stays
@@ -357,7 +357,7 @@ def largest(x):
 
 @inner
 def expect_late_gaps(solver):
-    """Add to the gaps in mu what the first iteration is expected to leave open; return the largest of them.
+    """Add to the velocity gaps in mu the gaps that the first iteration will probably leave; return the largest.
 
     Rates of what is held change with the positions. The gap that is late changes as it did over the step before.
     """
@@ -372,7 +372,7 @@ def expect_late_gaps(solver):
 
 @inner
 def keep_late_gaps(solver):
-    """Remember what the first iteration has left open, what was expected and the gaps in mu; return the largest gap."""
+    """Store the velocity gaps that the first iteration left open and their change; return the largest gap in mu."""
     most = 0.0
     for k in range(solver.mu.shape[0]):
         most = max(most, abs(solver.mu[k]))
@@ -385,7 +385,7 @@ def keep_late_gaps(solver):
 
 @inner
 def are_aged(solver, second, first, of_rates):
-    """Whether the age of the factors H changes a step: its second correction by its first, H⁻¹ times the change of H.
+    """Whether outdated factors H change the result of a step, from the ratio of its second to its first correction.
 
     Velocities are corrected by H⁻¹ Gᵀ nu, `of_rates`, which no residual decides, so that they follow the factors: by as
     much of them as the second correction is of the first, less what it is with new factors.
@@ -399,7 +399,7 @@ def are_aged(solver, second, first, of_rates):
 
 @inner
 def take_stiffness(model, i, q, residual):
-    """Subtract the forces of the modal stiffness of body i by modes q from the residual of its modes."""
+    """Subtract the elastic forces K q of body i from the modal residual."""
     n, t = model.bodies.n_q[i], model.bodies.kind[i]
     K = model.body_types.blocks[model.body_types.block0[t, STIFFNESS] :]
     is_diagonal = model.body_types.is_diagonal[t, STIFFNESS - MASS]
@@ -413,7 +413,7 @@ def take_stiffness(model, i, q, residual):
 
 @inner
 def add_reactions(model, work, c_k):
-    """Add the wrenches of the velocity correction to those of joints and of other constraints.
+    """Add the wrenches of the velocity correction to the reactions of joints and other constraints.
 
     Those of force elements stay, as positions do. The wrench of a joint has parts along axes of the ground: all of them
     change, but for what acts along its soft rows, whose rates disagree with those they repeat by rounding.
@@ -436,7 +436,7 @@ def add_reactions(model, work, c_k):
 
 @inner
 def is_enough(norm, last, wanted, allowed):
-    """Whether a correction is small enough, or the next one will be, estimated from the ratio of the last two.
+    """Whether a correction is small enough, or the next one will be by the ratio of the last two.
 
     allowed: what is wanted and roundoff. A correction that is not made counts more than one at roundoff, for what is
     left open in every step has the same sign.
@@ -447,7 +447,7 @@ def is_enough(norm, last, wanted, allowed):
 
 @inner
 def correction_of_states(model, work, c_k):
-    """Return the largest correction of a state or of an unknown of an equation, relative to its size.
+    """Return the largest correction of a state or of a multiplier without constraint, relative to its size.
 
     The size is the typical one, the present one, or for a state that of its change in a step.
     """
@@ -470,7 +470,7 @@ def correction_of_states(model, work, c_k):
 
 @inner
 def roundoff_floor(model, work, length):
-    """Return the squared norm of rounding errors of the positions."""
+    """Return the squared norm of rounding errors of positions."""
     total = 0.0
     for i in range(model.bodies.kind.shape[0]):
         size = length
@@ -482,7 +482,7 @@ def roundoff_floor(model, work, length):
 
 @inner
 def local_error(model, work, memory, order, h):
-    """Return the estimated error of the increment of a converged step: the largest of all bodies."""
+    """Return the estimated error of the increment in a converged step, the largest of all bodies."""
     alpha_m, alpha_f = order.alpha_m, order.alpha_f
     largest = 0.0
     for i in range(model.bodies.kind.shape[0]):
@@ -501,13 +501,13 @@ def local_error(model, work, memory, order, h):
 
 @inner
 def error_factor(order, h):
-    """Return the factor from a change of the algorithmic acceleration in a step to the error of its increment."""
+    """Return the ratio of a step's increment error to the change of its algorithmic acceleration."""
     return abs(0.5 * order.gamma - order.beta - 1.0 / 12.0) * h * h  # 1/6 - (1/2 - gamma)/2 - beta
 
 
 @inner
 def mean_square(model, work, i, jump):
-    """Return jumpᵀ M jump of body i divided by its mass and the square of its size: the mean over its points.
+    """Return jumpᵀ M jump of body i divided by mass and squared size, a mean over the points of the body.
 
     A body is measured alone, so that a heavy one, or one far away, hides nothing. jump, (6 + n_q,), translation in
     ground axes, is turned to body axes.
@@ -523,7 +523,7 @@ def mean_square(model, work, i, jump):
 
 @inner
 def one_step(model, work, memory, order, h):
-    """Advance the memory by one step, unless its error is above the allowed error.
+    """Advance the memory by one step, unless the estimated error is larger than allowed.
 
     Return (status, index of what is singular, last correction by the allowed one, error; -1 if not estimated).
     """
@@ -677,14 +677,14 @@ def angular_accelerations(model, work, memory, i, alpha_m, alpha_f):
 
 @inner
 def next_acceleration(a, before, now, alpha_m, alpha_f):
-    """Return (3), the algorithmic acceleration after a step, for vectors in the same axes."""
+    """Return the algorithmic acceleration after a step by (3), for vectors in the same axes."""
     mean = add(scaled(1 - alpha_f, now), scaled(alpha_f, before))
     return scaled(1 / (1 - alpha_m), sub(mean, scaled(alpha_m, a)))
 
 
 @inner
 def keep_iterate(model, work, memory, h):
-    """Write the iterate, except rotations, into the memory; count turns and add work for a step of size h."""
+    """Write the iterate, except rotations, into the memory; count turns and add the work of a step of size h."""
     copy(work.state.r.reshape(memory.r.size), memory.r.reshape(memory.r.size))
     copy(work.state.q, memory.q)
     copy(work.state.u, memory.u)
@@ -700,7 +700,7 @@ def keep_iterate(model, work, memory, h):
 
 @inner
 def write_row(model, work, memory, t, rows):
-    """Evaluate at the state in the memory and write the next row of the results."""
+    """Evaluate the state in the memory and write the next result row."""
     k = work.counted.rows
     work.state.time = t
     work.counted.rows += 1
@@ -729,7 +729,7 @@ def write_row(model, work, memory, t, rows):
 
 @inner
 def settle_row(model, work, memory, rows):
-    """Write accelerations and reactions into the last row, computed from positions and velocities.
+    """Compute accelerations and reactions of the last row from its positions and velocities.
 
     In steps so short that they are noise otherwise: reactions of a step close its joints, whose gaps are known to
     rounding alone, and that by h² counts beside the accelerations. Rounding of velocities does not.
@@ -753,7 +753,7 @@ def settle_row(model, work, memory, rows):
 
 @inner
 def is_noise(model, work, h):
-    """Whether rounding of positions divided by h² is significant relative to the accelerations."""
+    """Whether rounding of positions, divided by h², is significant relative to the accelerations."""
     is_held, noise, size = False, 0.0, math.sqrt(dot(model.gravity, model.gravity))
     for k in range(model.rows.holds.shape[0]):
         is_held = is_held or model.rows.holds[k] != NOTHING
@@ -777,7 +777,7 @@ def shares(model):
 
 @inner
 def ratio_of_steps(model, memory, h):
-    """Return h divided by the size of the previous steps, the factor on the difference between `a` and u_dot.
+    """Return the ratio of h to the previous step size, by which the difference of `a` and u_dot is multiplied.
 
     Zero where steps grow in a system with contacts. What they differ by is then of the contact, and in the directions
     of joints of the scheme: it would grow with the step. So u_dot and a begin anew, from the equations of motion.
@@ -789,7 +789,7 @@ def ratio_of_steps(model, memory, h):
 
 @inner
 def resize(model, work, memory, t, h):
-    """Convert the algorithmic accelerations to those of a step of size h to t.
+    """Convert the algorithmic accelerations to those of a step of size h that ends at t.
 
     Their distance from u_dot is of first order. The iterate is the state of the memory where steps may begin anew.
     """
@@ -805,7 +805,7 @@ def resize(model, work, memory, t, h):
 
 @inner
 def step_after(h, error, most_error, has_failed):
-    """Return the size of the step after an accepted one of size h: local errors grow with its cube."""
+    """Return the next step size after an accepted step of size h; local errors grow with its cube."""
     if most_error <= 0.0:
         return h if has_failed else MOST * h
     fitting = MOST * h if error <= 0.0 else SAFETY * h * (most_error / error) ** (1.0 / 3.0)
@@ -831,7 +831,7 @@ def time_loop(load, try_step, write):
 
     @inner
     def advance(model, work, memory, rows, others, order):
-        """Advance by n_steps of size h, the first with the number `first` from t0; write a row at the interval `every`.
+        """Advance by n_steps of size h, beginning with step `first` counted from t0; write a row every `every` steps.
 
         The order is an `entry.Order`. With h_min above 0 each of these is divided into equal parts of at most the size
         that is wanted: one that fails, or whose error is above `most_error` (if above 0), is tried again, shorter, down
@@ -893,7 +893,7 @@ def time_loop(load, try_step, write):
 
 @inner
 def is_resized(model, work, memory, order, h):
-    """Whether the step size h differs from that of the previous steps; the weights of the norm are updated to h."""
+    """Whether the step size h differs from the previous one; the weights of the norm are updated to h."""
     if abs(h - memory.h) <= SAME * h:
         return False
     put_weights(model, work, order.beta * h * h)
@@ -902,7 +902,7 @@ def is_resized(model, work, memory, order, h):
 
 @inner
 def try_absolute_step(model, work, memory, others, order, t, h):
-    """Advance the memory to t by a step of size h, see `time_loop`."""
+    """Advance the memory by a step of size h to t, see `time_loop`."""
     if is_resized(model, work, memory, order, h):
         resize(model, work, memory, t, h)
     work.state.time = t
@@ -919,7 +919,7 @@ def write_absolute_row(model, work, memory, others, t, rows):
 
 @inner
 def load_memory(model, work, memory, others):
-    """Write the iterate at the state in the memory."""
+    """Write the state in the memory into the iterate."""
     load_state(work.state, memory)
 
 

@@ -1,4 +1,4 @@
-"""Motion of a marker from that of its body, and transfer of a wrench on the marker to the body.
+"""Motion of a marker from the motion of its body, and transfer of a wrench from the marker to the body.
 
 With [rho - c; th] = Psi q - 1/2 qᵀ K_P q (K_P, (6, n, n): zero unless the body is stiffened), Psi(q) = Psi - K_P q its
 derivative (t: rows of rho, r: rows of th), E = exp(th), T' = left Jacobian at th, nu = T' th_dot, all in body axes:
@@ -39,7 +39,7 @@ __all__ = [
 
 @loops
 def marker_motion(model, work, m):
-    """Write position and motion of marker m."""
+    """Write position, axes and velocities of marker m."""
     i, markers, own = model.markers.body[m], work.markers, model.markers
     if i < 0:
         put(markers.r[m], 0, vector(own.position[m]))
@@ -77,7 +77,7 @@ def pose_on_body(model, work, m):
 
 @loops
 def elastic_motion(model, work, m, i):
-    """Add the elastic displacement to rho and write elastic rotation, rates and the left Jacobian."""
+    """Add the elastic displacement to rho, and write the elastic rotation, its rate and the left Jacobian."""
     n, q0, u0, o = model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i], model.markers.psi0[m]
     is_bent = model.markers.bend0[m] >= 0
     if is_bent:
@@ -108,7 +108,7 @@ def elastic_motion(model, work, m, i):
 
 @loops
 def bent_shapes(model, m, n, q, factor, psi):
-    """Write Psi - factor K_P q of a marker of a flexible body, [6, k]; with factor 1: Psi(q)."""
+    """Write Psi - factor K_P q of a marker on a flexible body, [6, k]; factor 1 gives the shapes Psi(q)."""
     o, first, scale = model.markers.psi0[m], model.markers.bend0[m], 1.0 / factor
     own = model.markers.psi[o : o + 6 * n]
     if first < 0:
@@ -124,7 +124,7 @@ def bent_shapes(model, m, n, q, factor, psi):
 
 @loops
 def bent_rate(model, work, m, i, out):
-    """Write K_P q_dot [6, k], minus the rate of Psi(q), into out, (6 n_q,)."""
+    """Write K_P q_dot [6, k], which is minus the rate of Psi(q), into out, (6 n_q,)."""
     n, u0 = model.bodies.n_q[i], model.bodies.u0[i]
     bent_by(model, m, n, work.state.u[u0 + 6 : u0 + 6 + n], out)
 
@@ -139,7 +139,7 @@ def bent_by(model, m, n, factors, out):
 
 @loops
 def bent_bias(model, work, m, i):
-    """Return -q_dotᵀ K_P q_dot of marker m, displacement and rotation; for a sliding marker from its stations."""
+    """Return -q_dotᵀ K_P q_dot of marker m, displacement and rotation; a sliding marker interpolates its stations."""
     if model.markers.line[m] >= 0:
         bent = work.lines.bent[model.markers.line[m]]
         return vector(bent), vector(bent[3:])
@@ -154,7 +154,7 @@ def bent_bias(model, work, m, i):
 
 @loops
 def marker_acceleration_bias(model, work, m, out):
-    """Write the acceleration (3) and angular acceleration (3) of marker m at zero u_dot, ground axes, into out.
+    """Write the acceleration (3) and angular acceleration (3) of marker m at zero u_dot into out, ground axes.
 
     R (omega × (omega × rho + 2 rho_dot) + b_t) and R (omega × nu + (dT'/dth [th_dot]) th_dot + T' b_r), where
     b = -q_dotᵀ K_P q_dot.
@@ -177,7 +177,7 @@ def marker_acceleration_bias(model, work, m, out):
 
 @loops
 def marker_acceleration(model, work, m, out):
-    """Write the acceleration (3) and angular acceleration (3) of marker m at the iterate, ground axes, into out."""
+    """Write the acceleration (3) and angular acceleration (3) of marker m at the iterate into out, ground axes."""
     marker_acceleration_bias(model, work, m, out)
     i = model.markers.body[m]
     if i < 0:
@@ -194,7 +194,7 @@ def marker_acceleration(model, work, m, out):
 
 @loops
 def acceleration_columns(model, work, m, c_m, c_d, c_k, turning, row):
-    """Write c_k times the derivatives of the acceleration of marker m by the unknowns of a step, body axes.
+    """Write c_k times the derivatives of marker m's acceleration by the unknowns of a step, body axes.
 
     row, (6, 6 + n). In a step du_dot = c_m/c_k of the unknowns, their velocities c_d/c_k, the body turns by `turning`
     dtheta. In body axes, but for the acceleration of the frame origin,
@@ -242,13 +242,13 @@ def acceleration_columns(model, work, m, c_m, c_d, c_k, turning, row):
 
 @small
 def shape(psi, n, k):
-    """Return displacement and rotation by coordinate k of shapes [6, n]."""
+    """Return displacement and rotation in column k of the shapes [6, n]."""
     return (psi[k], psi[n + k], psi[2 * n + k]), (psi[3 * n + k], psi[4 * n + k], psi[5 * n + k])
 
 
 @loops
 def shape_sum(psi, n, factors):
-    """Return Σ_k factors_k of displacement and rotation of shape k, (6 n,)."""
+    """Return the sum of displacement and rotation over all shapes, (6 n,), weighted by `factors`."""
     d, th = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for k in range(n):
         d_k, th_k = shape(psi, n, k)
@@ -258,14 +258,14 @@ def shape_sum(psi, n, factors):
 
 @small
 def wrench_in_body(work, m, i):
-    """Return force and moment on marker m in axes of its body i."""
+    """Return force and moment on marker m in the axes of its body i."""
     R, wrench = work.state.R[i], work.markers.wrench[m]
     return turned_back(R, vector(wrench)), turned_back(R, vector(wrench[3:]))
 
 
 @loops
 def wrench_to_body(model, work, m):
-    """Subtract the generalised forces of the wrench on marker m from the residual of its body."""
+    """Subtract the generalised forces of marker m's wrench from the residual of its body."""
     i = model.markers.body[m]
     if i < 0:
         return
@@ -285,7 +285,7 @@ def wrench_to_body(model, work, m):
 
 @loops
 def marker_columns(model, work, m, rate, turning, column, row):
-    """Write the derivatives of the motion of marker m by the body unknowns (dx, dtheta, dq), in body axes.
+    """Write the derivatives of marker m's motion by the body unknowns (dx, dtheta, dq), body axes.
 
     column, (6, 6 + n): of position and rotation by velocities, whose transpose carries a wrench to the body.
     row, (12, 6 + n): of position, rotation, velocity, angular velocity by the unknowns of a step, in which
@@ -332,7 +332,7 @@ def marker_columns(model, work, m, rate, turning, column, row):
 
 @loops
 def marker_stiffness(model, work, m, c_k, H, turn):
-    """Add the derivative of minus the generalised forces of a constant wrench on marker m to H and `turn`.
+    """Add to H and `turn` the derivative of minus the generalised forces of a constant wrench on marker m.
 
     A wrench fixed in space turns against the body (turn); one fixed in the marker turns with its elastic rotation.
     """

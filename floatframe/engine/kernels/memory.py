@@ -38,7 +38,7 @@ __all__ = [
 ]
 
 N_DIAGNOSTICS = 12
-#: columns of `Rows.diagnostics`: energies; momentum (3), and angular momentum about the origin (3); work, as in
+#: columns of `Rows.diagnostics`: energies, momentum (3), angular momentum about the origin (3), and work as in
 #: `Memory`
 KINETIC, STRAIN, GRAVITATION, SPRINGS, MOMENTUM, ANGULAR_MOMENTUM, WORK_GIVEN, WORK_TAKEN = 0, 1, 2, 3, 4, 7, 10, 11
 N_DRIFTS = 4
@@ -51,48 +51,49 @@ n_t = Size("n_t")
 
 @tabled
 class Memory(NamedTuple):
-    """The memory of a method after a step; kernels overwrite it, everything else makes another with `changed`."""
+    """The memory of a method after a step; kernels overwrite it, all other code creates a new one with `changed`."""
 
     r: Array = real(n_b, 3, unit="m")
     p: Array = real(n_b, 4)  #: Euler parameters
     q: Array = real(n_q)
     u: Array = real(n_u, unit="m/s, rad/s, 1/s")
     u_dot: Array = real(n_u, unit="m/s², rad/s², 1/s²")
-    #: further memory of the method: algorithmic accelerations (n_u,), or multipliers
+    #: further memory of the method: algorithmic accelerations (n_u,), or constraint multipliers
     a: Array = real(Size("n_remembered"))
     w: Array = real(n_w, unit="N, N m")
-    work: Array = real(2, unit="J")  #: given by forces and drives, taken by dampers, friction and modal damping
-    power: Array = real(2, unit="W")  #: their rates
-    h: Array = real(unit="s")  #: size of the step for which `a` holds; 0 at the start
+    #: work supplied by forces and drives, and work dissipated by dampers, friction and modal damping
+    work: Array = real(2, unit="J")
+    power: Array = real(2, unit="W")  #: supplied and dissipated power
+    h: Array = real(unit="s")  #: step size for which `a` is valid; 0 at the start
     h_next: Array = real(unit="s")  #: desired size of the next step
-    n_steps: IntArray = integer()  #: accepted so far
-    n_rejected: IntArray = integer()  #: tried in vain so far
-    n_iterations: IntArray = integer()  #: of Newton's method so far
-    #: angles of `CompiledSystem.angles`, counted through full turns; empty: not counted
+    n_steps: IntArray = integer()  #: number of accepted steps so far
+    n_rejected: IntArray = integer()  #: number of rejected steps so far
+    n_iterations: IntArray = integer()  #: number of Newton iterations so far
+    #: angles of `CompiledSystem.angles`, counted through full turns; empty if not counted
     angle: Array = real(n_angles, unit="rad")
     angle_rate: Array = real(n_angles, unit="rad/s")
 
     @property
     def state(self) -> State:
-        """Positions and velocities."""
+        """Positions and velocities of the memory."""
         return State(self.r, self.p, self.q, self.u)
 
     def changed(self, *, state: State | None = None, **values: Any) -> "Memory":
-        """Return the memory with other values; arrays that stay are shared."""
+        """Return the memory with some values replaced; unchanged arrays are shared."""
         if state is not None:
             values |= {name: getattr(state, name) for name in ("r", "p", "q", "u")}
         arrays = {name: np.array(value, getattr(self, name).dtype, order="C") for name, value in values.items()}
         return self._replace(**arrays)
 
     def copied(self) -> "Memory":
-        """Return a copy for the kernels to overwrite."""
+        """Return a copy that the kernels may overwrite."""
         arrays: Any = (array.copy() for array in self)
         return type(self)(*arrays)
 
 
 @tabled
 class Rows(NamedTuple):
-    """Results of consecutive output times."""
+    """Results at consecutive output times."""
 
     t: Array = real(n_t, unit="s")
     r: Array = real(n_t, n_b, 3, unit="m")
@@ -105,11 +106,11 @@ class Rows(NamedTuple):
     drift: Array = real(n_t, n_c, N_DRIFTS, unit="m, rad, m/s, rad/s")
     angle: Array = real(n_t, n_angles, unit="rad")
     load: Array = real(n_t, n_loads, 6, unit="N, N m")  #: wrenches on the markers of loads, ground axes
-    load_case: Array = real(n_t, n_body_loads)  #: factors of load cases
+    load_case: Array = real(n_t, n_body_loads)  #: factors of the load cases on bodies
 
 
 def memory_at(state: State, u_dot: Array, w: Array, a: Array | None = None, *, n_angles: int = 0) -> Memory:
-    """Return the memory at a state, before any step.
+    """Return the memory for a state before the first step.
 
     a: of the method; None: accelerations. n_angles: how many angles are counted, all of the model or none.
     """

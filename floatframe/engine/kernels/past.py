@@ -1,4 +1,4 @@
-"""The memories after each step of a call, from which any step can be repeated."""
+"""The memories after each step of a call, so that any step can be repeated."""
 
 from floatframe.engine.kernels.compiler.compilation import inner
 
@@ -7,14 +7,14 @@ __all__ = ["keep_past"]
 
 @inner
 def keep_row(source, target, k):
-    """Copy numbers into row k."""
+    """Copy numbers into row k of an array."""
     for j in range(source.shape[0]):
         target[k, j] = source[j]
 
 
 @inner
 def keep_past(past, memory, a, h):
-    """Store the memory after a step of size h, for which the method has the accelerations a, if space is left."""
+    """Store the memory after a step of size h with accelerations a, if there is space left."""
     k, target = past.n, past.memory
     if k >= target.h.shape[0]:
         return

@@ -39,16 +39,16 @@ __all__ = [
 
 Record = TypeVar("Record", bound=NamedTuple)
 
-WORD = 8  #: bytes of a number of any type
-LINE = 8  #: numbers of a cache line, at whose beginning every array begins
+WORD = 8  #: size of a number of any type in bytes
+LINE = 8  #: size of a cache line in numbers; every array begins at a cache line
 
 
 class Tabled:
-    """What a record has beside its arrays; it lives and ends with the record."""
+    """Data that belong to a record beside its arrays and are freed with it."""
 
     @cached_property
     def table(self) -> IntArray:
-        """Address and shape of each array in its order, as kernels read them.
+        """Address and shape of each array in the order of the record, as kernels read them.
 
         Made once, since making it takes as long as a step.
         """
@@ -75,7 +75,7 @@ def tabled(record: type[Record]) -> type[Record]:
 
 @dataclass(frozen=True)
 class Size:
-    """A size of arrays: a named number of items, or factor * number + more."""
+    """A symbolic array size: a named number of items, or factor * number + more."""
 
     name: str
     factor: int = 1
@@ -88,7 +88,7 @@ class Size:
         return Size(self.name, self.factor, self.more + more)
 
     def of(self, sizes: Mapping[str, int]) -> int:
-        """Return the number."""
+        """Return the number for given sizes."""
         return self.factor * sizes[self.name] + self.more
 
     def __str__(self) -> str:
@@ -98,15 +98,15 @@ class Size:
 
 @dataclass(frozen=True)
 class Declared:
-    """Declaration of an array of a record."""
+    """Declaration of an array in a record."""
 
     dtype: type
-    shape: tuple[Size | int, ...]  #: () for one number
-    unit: str  #: "" for numbers without
+    shape: tuple[Size | int, ...]  #: shape of the array, () for a single number
+    unit: str  #: unit of the numbers, "" if they have none
 
 
 def real(*shape: Size | int, unit: str = "") -> Any:
-    """Declare an array of reals."""
+    """Declare an array of real numbers."""
     return Declared(np.float64, shape, unit)
 
 
@@ -116,24 +116,24 @@ def integer(*shape: Size | int) -> Any:
 
 
 def stacked(declaration: Record, size: Size) -> Record:
-    """Declare records of arrays, one after the other: each array gets one more dimension, its first."""
+    """Declare consecutive records of arrays: each array gets one more dimension, its first."""
     arrays: Any = (Declared(each.dtype, (size, *each.shape), each.unit) for each in declaration)
     return type(declaration)(*arrays)
 
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """Places of the arrays of a record in one block of memory."""
+    """Positions of the arrays of a record in one block of memory."""
 
-    arrays: tuple[tuple[type, tuple[int, ...], int], ...]  #: number type, shape and first byte of each
+    arrays: tuple[tuple[type, tuple[int, ...], int], ...]  #: number type, shape and first byte of each array
     n_words: int
-    table: IntArray  #: that of the record, for a block at address 0
-    addresses: IntArray  #: places of the addresses in the table
+    table: IntArray  #: table of the record for a block at address 0
+    addresses: IntArray  #: indices of the addresses in the table
 
 
 @lru_cache(maxsize=256)
 def layout_of(kind: type[Any], sizes: tuple[tuple[str, int], ...]) -> Layout:
-    """Return the layout of a record; each array begins with a cache line."""
+    """Return the layout of a record in which each array begins at a cache line."""
     known = dict(sizes)
     arrays: list[tuple[type, tuple[int, ...], int]] = []
     table: list[int] = []
@@ -149,7 +149,7 @@ def layout_of(kind: type[Any], sizes: tuple[tuple[str, int], ...]) -> Layout:
 
 
 def zeros(declaration: Record, sizes: Mapping[str, int]) -> Record:
-    """Return the arrays of a record, all zero, in one block of memory: addresses in it make the table at no cost."""
+    """Return a record of zero arrays in one block of memory, whose table follows from the address of the block."""
     layout = layout_of(type(declaration), tuple(sizes.items()))
     block = np.zeros(layout.n_words + LINE)
     address = block.__array_interface__["data"][0]
@@ -172,13 +172,13 @@ def declarations(declaration: Any) -> Iterator[Declared]:
 
 
 def grouped(declaration: Record, arrays: Iterator[Array]) -> Record:
-    """Return a record made of as many of the arrays as it declares."""
+    """Return a record that takes as many of the arrays as it declares."""
     made: list[Any] = [next(arrays) if isinstance(each, Declared) else grouped(each, arrays) for each in declaration]
     return type(declaration)(*made)
 
 
 def filled(declaration: Record, **values: Any) -> Record:
-    """Return a record with arrays made from lists of entries; an array of one number is made from the number.
+    """Return a record with arrays made from lists of entries, and numbers made from single values.
 
     A record in it is given as it is.
     """
@@ -195,13 +195,13 @@ def filled(declaration: Record, **values: Any) -> Record:
 
 
 def of_items(declaration: Record, items: Sequence[Mapping[str, Any]], **whole: Any) -> Record:
-    """Return a record with arrays from items with one entry per array, except for arrays given completely."""
+    """Return a record with one array entry for each item; some arrays may be given completely."""
     names = [name for name in declaration._fields if name not in whole]
     return filled(declaration, **{name: [item[name] for item in items] for name in names}, **whole)
 
 
 def leaves(record: Any, within: str = "") -> Iterator[tuple[str, Any]]:
-    """Return name and array (or declaration) of all fields in a record and in the records in it."""
+    """Return name and array (or declaration) of all fields of a record and of the records in it."""
     for name, each in zip(record._fields, record, strict=True):
         if isinstance(each, tuple):
             yield from leaves(each, f"{within}{name}.")
@@ -238,10 +238,10 @@ def measured(declaration: Record, record: Record) -> dict[str, int]:
 
 
 def described(value: Any) -> str:
-    """Return the description of an array for messages."""
+    """Return the description of an array, for messages."""
     return f"{value.dtype} of shape {value.shape}" if isinstance(value, np.ndarray) else repr(value)
 
 
 def flat(arrays: list[Array]) -> Array:
-    """Return arrays one after the other, as one vector."""
+    """Return arrays joined into one vector."""
     return np.concatenate([*(np.ascontiguousarray(each, dtype=float).ravel() for each in arrays), np.zeros(0)])

@@ -1,4 +1,4 @@
-"""Rotations in the kernels: exponential map and its Jacobians, as matrices of three rows (`kernels.vector`).
+"""Rotations in the kernels: exponential map and its Jacobians, with matrices as three rows (`kernels.vector`).
 
 With t = |theta|: exp = 1 + s tilde + a tilde², right Jacobian T = 1 - a tilde + b tilde², left Jacobian Tᵀ, with
 s = sin t / t, a = (1 - cos t)/t², b = (t - sin t)/t³; below t = 1/2 their series (the next term is under 1e-17).
@@ -31,7 +31,7 @@ SERIES_BELOW = 0.25  # t² at the switch
 
 @inner
 def quotient_s(x):
-    """Return sin t / t of x = t²."""
+    """Return sin t / t as a function of x = t²."""
     if x < SERIES_BELOW:
         return 1 + x * (
             -1 / 6 + x * (1 / 120 + x * (-1 / 5040 + x * (1 / 362880 + x * (-1 / 39916800 + x / 6227020800))))
@@ -42,7 +42,7 @@ def quotient_s(x):
 
 @inner
 def quotient_a(x):
-    """Return (1 - cos t)/t² of x = t²."""
+    """Return (1 - cos t)/t² as a function of x = t²."""
     if x < SERIES_BELOW:
         return 1 / 2 + x * (
             -1 / 24 + x * (1 / 720 + x * (-1 / 40320 + x * (1 / 3628800 + x * (-1 / 479001600 + x / 87178291200))))
@@ -52,7 +52,7 @@ def quotient_a(x):
 
 @inner
 def quotient_b(x):
-    """Return (t - sin t)/t³ of x = t²."""
+    """Return (t - sin t)/t³ as a function of x = t²."""
     if x < SERIES_BELOW:
         return 1 / 6 + x * (-1 / 120 + x * (1 / 5040 + x * (-1 / 362880 + x * (1 / 39916800 - x / 6227020800))))
     t = math.sqrt(x)
@@ -61,7 +61,7 @@ def quotient_b(x):
 
 @inner
 def quotient_da(x):
-    """Return (da/dt)/t of x = t²."""
+    """Return (da/dt)/t as a function of x = t², a = (1 - cos t)/t²."""
     if x < SERIES_BELOW:
         return -1 / 12 + x * (1 / 180 + x * (-1 / 6720 + x * (1 / 453600 + x * (-1 / 47900160 + x / 7264857600))))
     t = math.sqrt(x)
@@ -70,7 +70,7 @@ def quotient_da(x):
 
 @inner
 def quotient_db(x):
-    """Return (db/dt)/t of x = t²."""
+    """Return (db/dt)/t as a function of x = t², b = (t - sin t)/t³."""
     if x < SERIES_BELOW:
         return -1 / 60 + x * (1 / 1260 + x * (-1 / 60480 + x * (1 / 4989600 + x * (-1 / 622702080 + x / 108972864000))))
     t = math.sqrt(x)
@@ -79,7 +79,7 @@ def quotient_db(x):
 
 @inner
 def polynomial(th, first, second):
-    """Return 1 + first tilde(th) + second tilde(th)²."""
+    """Return the matrix 1 + first tilde(th) + second tilde(th)²."""
     x, y, z = th[0], th[1], th[2]
     xy, xz, yz = second * x * y, second * x * z, second * y * z
     return (
@@ -98,27 +98,27 @@ def exp_matrix(th):
 
 @inner
 def right_jacobian(th):
-    """Return T(th)."""
+    """Return the right Jacobian T(th) of the exponential map."""
     x = dot(th, th)
     return polynomial(th, -quotient_a(x), quotient_b(x))
 
 
 @inner
 def left_jacobian(th):
-    """Return T(th)ᵀ."""
+    """Return the left Jacobian T(th)ᵀ of the exponential map."""
     x = dot(th, th)
     return polynomial(th, quotient_a(x), quotient_b(x))
 
 
 @inner
 def slope_row(e, f, b, d, a, th, v):
-    """Return row e of f thᵀ + b th vᵀ + d 1 - a tilde(v)."""
+    """Return the row for unit vector e of the matrix f thᵀ + b th vᵀ + d 1 - a tilde(v)."""
     return add(add(scaled(dot(e, f), th), scaled(b * dot(e, th), v)), sub(scaled(d, e), scaled(a, cross(e, v))))
 
 
 @inner
 def left_jacobian_derivative(th, v, sign):
-    """Return d(Tᵀ v)/dth for sign = +1, d(T v)/dth for sign = -1, v held.
+    """Return d(Tᵀ v)/dth for sign = +1 or d(T v)/dth for sign = -1, at constant v.
 
     Tᵀ v = v + a c + b e with c = th × v, e = th × c = th (th·v) - v t², so that the derivative is
 
@@ -138,7 +138,7 @@ def left_jacobian_derivative(th, v, sign):
 
 @inner
 def turned_about(e, angle, x):
-    """Return exp(angle e) x for a unit vector e."""
+    """Return the vector x rotated by an angle about the unit vector e."""
     s, half = math.sin(angle), math.sin(0.5 * angle)
     c = cross(e, x)
     return add(x, add(scaled(s, c), scaled(2.0 * half * half, cross(e, c))))
@@ -146,14 +146,14 @@ def turned_about(e, angle, x):
 
 @inner
 def split_spin(e, th):
-    """Return the part of th along the unit vector e, as a number, and the part across it."""
+    """Return the component of th along the unit vector e, as a number, and the part normal to e."""
     along = dot(e, th)
     return along, sub(th, scaled(along, e))
 
 
 @inner
 def turn_of_axis(e, omega):
-    """Return the part of the angular acceleration due to the rotation of the axis e with the spin w: w omega × e.
+    """Return the angular acceleration w omega × e due to the rotation of axis e, where w is the spin rate.
 
     omega, alpha and all that follows are in axes of the body.
     """
@@ -162,14 +162,14 @@ def turn_of_axis(e, omega):
 
 @inner
 def after_spin(e, along, omega, rest):
-    """Return omega, alpha from omega, alpha - w omega × e, in axes that the body has left by a rotation `along` e."""
+    """Convert omega and alpha - w omega × e to omega and alpha in axes that rotate relatively by `along` about e."""
     omega = turned_about(e, -along, omega)
     return omega, add(turned_about(e, -along, rest), turn_of_axis(e, omega))
 
 
 @inner
 def changed_spin(e, theta, omega, alpha, by_theta, by_omega, by_alpha):
-    """Return theta, omega and alpha of a spinning body after a change that is linear in axes that do not spin with it.
+    """Return theta, omega, alpha of a spinning body after a correction, which is linear in axes that do not spin.
 
     These are those of the beginning of the step turned by exp(across): omega and alpha - w omega × e are changed there,
     and carried along by the change of theta, which is across + along e.
@@ -184,14 +184,14 @@ def changed_spin(e, theta, omega, alpha, by_theta, by_omega, by_alpha):
 
 @inner
 def turned_by_spin(e, theta):
-    """Return exp(across) exp(along e)."""
+    """Return the rotation matrix exp(across) exp(along e) of a spinning body."""
     along, across = split_spin(e, theta)
     return product(exp_matrix(across), exp_matrix(scaled(along, e)))
 
 
 @inner
 def spin_jacobian(e, theta):
-    """Return the rotation of a spinning body for a change of theta, both in its axes: along e for e, else T(across)."""
+    """Return the matrix from a change of theta to the body rotation, in body axes: 1 along e, else T(across)."""
     along, across = split_spin(e, theta)
     T = right_jacobian(turned_about(e, -along, across))
     bent = sub(e, turned(T, e))
@@ -204,7 +204,7 @@ def spin_jacobian(e, theta):
 
 @inner
 def matrix_of_euler_parameters(p):
-    """Return R_GB of p = (w, x, y, z)."""
+    """Return the rotation matrix R_GB for Euler parameters p = (w, x, y, z)."""
     w, x, y, z = p[0], p[1], p[2], p[3]
     return (
         (w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)),
@@ -215,7 +215,7 @@ def matrix_of_euler_parameters(p):
 
 @inner
 def quaternion_of(R):
-    """Return w and (x, y, z) of a quaternion of a rotation matrix, of any length; w >= 0."""
+    """Return scalar and vector of a quaternion of any length for a rotation matrix; the scalar is not negative."""
     w = 1.0 + R[0][0] + R[1][1] + R[2][2]  # 4 w², and 4 w times x
     x = (R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1])
     if w < 1.0:  # more than 120 degrees: the products of x, y, z with the largest of them, times 4
@@ -233,7 +233,7 @@ def quaternion_of(R):
 
 @inner
 def rotate_euler_parameters(p, th):
-    """Return p * exp(th/2), normalised."""
+    """Return the Euler parameters p * exp(th/2), normalised."""
     x = 0.25 * dot(th, th)
     b, c = scaled(0.5 * quotient_s(x), th), 1 - x * quotient_a(x)
     a = (p[1], p[2], p[3])

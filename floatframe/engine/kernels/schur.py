@@ -1,4 +1,4 @@
-"""Newton correction of the whole system: bodies are eliminated one by one, connections form a block-sparse system.
+"""Newton correction of the whole system: bodies are eliminated one by one, then connections in sparse block form.
 
     H_i y_i - Σ_ends sign J_columnᵀ R_iᵀ mu = -c_k residual_i                                    (each body)
     Σ_ends P R_i J_row y + V mu             = -g                                                 (each connection)
@@ -43,14 +43,14 @@ SWEEPS = 5  # number of iterations: with soft 1e-9 of A, constraints with a cond
 
 @inner
 def factorize_bodies(model, work, c_m, c_d, c_k):
-    """Linearise at the iterate, factorise H and write X, Z. Return the body whose H is singular, or -1."""
+    """Linearise at the iterate, factorise H of each body, write X, Z; return the body with singular H, or -1."""
     linearize(model, work, c_m, c_d, c_k)
     return factorize_tangents(model, work)
 
 
 @inner
 def factorize_tangents(model, work):
-    """Factorise H of every body and write X, Z. Return the body whose H is singular, or -1."""
+    """Factorise H of every body and write X and Z; return the body with singular H, or -1."""
     work.counted.factorisations += 1
     for i in range(model.bodies.kind.shape[0]):
         n = 6 + model.bodies.n_q[i]
@@ -82,7 +82,7 @@ def factorize_tangents(model, work):
 
 @inner
 def assemble(model, work, c_k):
-    """Write the block matrix of the connections at the iterate."""
+    """Assemble the block matrix of the connections at the iterate."""
     s = work.solver.blocks
     for k in range(s.shape[0]):
         s[k] = 0.0
@@ -121,7 +121,7 @@ def assemble(model, work, c_k):
 
 @inner
 def add_accelerated(model, work, p, r, s, place):
-    """Add the effect on row r of the first connection of pair p of the marker acceleration due to the other wrench.
+    """Add the effect of the pair's other wrench on row r through the acceleration of the first marker.
 
     place: where the row of the block begins in the store s.
     """
@@ -141,7 +141,7 @@ def add_accelerated(model, work, p, r, s, place):
 
 @inner
 def factorize_connections(elimination, connections, solver):
-    """Block LU of the connections in the planned order. Return the connection with a singular block, or -1."""
+    """Factorise the connections in the planned order; return the connection with a singular block, or -1."""
     s = solver.blocks
     for step in range(elimination.order.shape[0]):
         j = elimination.order[step]
@@ -175,7 +175,7 @@ def factorize_connections(elimination, connections, solver):
 
 @inner
 def solve_connections(elimination, connections, solver):
-    """Overwrite mu by the solution for the right side in mu."""
+    """Overwrite mu, which contains the right side, with the solution."""
     s, mu = solver.blocks, solver.mu
     for step in range(elimination.order.shape[0]):
         j = elimination.order[step]
@@ -208,7 +208,7 @@ def solve_connections(elimination, connections, solver):
 
 @inner
 def take_accelerated(model, work, m, n, y, mu):
-    """Subtract the effect on the rows of marker m of its acceleration due to the correction y of its body."""
+    """Subtract from mu the effect of the body correction y on the rows of marker m through its acceleration."""
     c, o, motion = model.markers.connection[m], model.markers.a0[m], work.solver.motion
     R, P_a = work.state.R[model.markers.body[m]], work.connections.P_a[model.markers.accelerated[m]]
     for r in range(6):
@@ -225,14 +225,14 @@ def take_accelerated(model, work, m, n, y, mu):
 
 @inner
 def renew_connections(model, work, c_k):
-    """Assemble and factorise the connections at the iterate. Return the connection with a singular block, or -1."""
+    """Assemble and factorise the connections at the iterate; return the connection with a singular block, or -1."""
     assemble(model, work, c_k)
     return factorize_connections(model.elimination, model.connections, work.solver)
 
 
 @inner
 def correction(model, work, c_k, is_new):
-    """Write the correction (y, mu) for the residuals in `work`; reassemble the connections if is_new.
+    """Write the correction (y, mu) for the residuals in `work`; with is_new, assemble the connections again.
 
     Return the connection with a singular block, or -1.
     """
@@ -249,7 +249,7 @@ def correction(model, work, c_k, is_new):
 
 @inner
 def move_bodies(model, work, c_k):
-    """Write the correction y of the bodies for their residuals alone."""
+    """Write the body correction y for the residuals of the bodies alone."""
     bodies, solver = model.bodies, work.solver
     y = solver.y
     for i in range(bodies.kind.shape[0]):
@@ -265,7 +265,7 @@ def move_bodies(model, work, c_k):
 
 @inner
 def close_connections(model, work):
-    """Write mu for the residuals of the connections, and add the displacement due to mu to y."""
+    """Write mu for the residuals of the connections, and add the body motion due to mu to y."""
     mu = work.solver.mu
     for k in range(mu.shape[0]):
         mu[k] = -work.connections.g[k]
@@ -276,7 +276,7 @@ def close_connections(model, work):
 
 @small
 def three_products(a, b, c, y):
-    """Return the products of three rows with y, whose sums do not wait for each other."""
+    """Return the products of three rows with y, computed in independent sums for speed."""
     first, second, third = 0.0, 0.0, 0.0
     for k in range(y.shape[0]):
         first, second, third = first + a[k] * y[k], second + b[k] * y[k], third + c[k] * y[k]
@@ -285,7 +285,7 @@ def three_products(a, b, c, y):
 
 @inner
 def take_motions(model, work):
-    """Subtract the effect of the motion y of the bodies on the rows of connections from mu."""
+    """Subtract from mu the effect of the body motion y on the rows of connections."""
     bodies, markers, connections, solver = model.bodies, model.markers, model.connections, work.solver
     y, mu, motion = solver.y, solver.mu, solver.motion
     for i in range(bodies.kind.shape[0]):
@@ -310,7 +310,7 @@ def take_motions(model, work):
 
 @inner
 def velocity_gaps(model, work, by_rate):
-    """Write into mu the difference between held positions and their rates in the correction.
+    """Write into mu the difference between position constraints and their rates in the correction.
 
     In unknowns: y by_rate is the change of velocities. The positions will be closed by a `correction`, which changes
     their rates by -by_rate g. Rows of positions that have no cheap rate, and all others, have no gap.
@@ -321,7 +321,7 @@ def velocity_gaps(model, work, by_rate):
 
 @inner
 def close_velocities(model, work):
-    """Write the correction (y, mu) that closes the gaps in mu.
+    """Write the correction (y, mu) that closes the velocity gaps in mu.
 
     Unknowns of rotation turn a body by `T_right` of them, velocities at once: y is what they turn it by. Its moments
     of inertia resist all of that, and mu holds against the unknowns alone: the rest is the `surplus`.
@@ -341,7 +341,7 @@ def close_velocities(model, work):
 
 @inner
 def add_wrenches(model, work):
-    """Add the motion X mu of the bodies due to the wrenches mu to y."""
+    """Add the body motion X mu due to the wrenches mu to y."""
     bodies, markers, connections, solver = model.bodies, model.markers, model.connections, work.solver
     y, mu = solver.y, solver.mu
     for i in range(bodies.kind.shape[0]):
@@ -362,7 +362,7 @@ def add_wrenches(model, work):
 
 @inner
 def assemble_masses(model, work, c_k):
-    """Factorise the masses of bodies and assemble the connections for accelerations; return whether that succeeds.
+    """Factorise the body masses and assemble the connections for accelerations; return whether both are regular.
 
     Modes without mass have c_k times their stiffness.
     """
@@ -383,7 +383,7 @@ def assemble_masses(model, work, c_k):
 
 @inner
 def settle_accelerations(model, work, c_k):
-    """Correct accelerations and wrenches of the iterate for its positions and velocities; return whether they exist.
+    """Correct accelerations and wrenches for the positions and velocities of the iterate; return whether they exist.
 
     M u_dot - Jᵀ w = f, G u_dot = -d(G)/dt u, by one step of Newton's method from those of a step, whose accelerations
     fulfil the second only as far as they are known by differences. `evaluate` has been called with c_k = 1.
@@ -421,7 +421,7 @@ def settle_accelerations(model, work, c_k):
 
 @inner
 def share_reactions(model, work, c_k):
-    """Share the reactions of the iterate among redundant constraints; return whether a solution exists.
+    """Distribute the reactions of the iterate among redundant constraints; return whether a solution exists.
 
     Of all wrenches w' that act on the bodies as w does, Jᵀ w' = Jᵀ w, those of the least sum of soft lambda², lambda
     being the reaction along a row that may give way, `soft` its mobility. With A = G M⁻¹ Jᵀ and S = soft lambda of w,

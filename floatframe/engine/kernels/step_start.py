@@ -1,4 +1,4 @@
-"""Force elements with memory at the beginning of a step, and accelerations where a motion restarts."""
+"""Start of a step for force elements with memory, and accelerations where a motion starts again."""
 
 import math
 
@@ -19,7 +19,7 @@ MOST_ITERATIONS = 10
 
 @inner
 def begin_step(model, work, memory, h, alpha_f):
-    """Set the known values from the last unknowns, advance angles and coordinates by their rates, prepare states."""
+    """Set known values from the last unknowns, advance angles and coordinates by their rates, prepare the states."""
     for k in range(memory.w.shape[0]):
         work.state.w_start[k] = memory.w[k]
         work.state.w[k] = memory.w[k]
@@ -32,7 +32,7 @@ def begin_step(model, work, memory, h, alpha_f):
 
 @inner
 def hold_states(model, work, memory):
-    """Set the states of force elements from the memory, with the rates from their laws."""
+    """Set the states of force elements from the memory, and their rates from their laws."""
     for k in range(memory.w.shape[0]):
         work.state.w_start[k] = memory.w[k]
     work.states.rho = 1.0
@@ -43,7 +43,7 @@ def hold_states(model, work, memory):
 
 @inner
 def accelerate(model, work, memory):
-    """Write the accelerations of the equations of motion at the iterate, the state in the memory, into the memory.
+    """Write the accelerations that the equations of motion give at the state in the memory into the memory.
 
     M u_dot - Jᵀ w = f,  G u_dot = -d(G)/dt u, iterated where forces depend on reactions; the memory stays where there
     are none.

@@ -9,7 +9,7 @@ __all__ = ["time_function"]
 
 @inner
 def time_function(functions, f, t):
-    """Return function f at t, its rate and its second rate: a polynomial of degree five and a sine on each piece."""
+    """Return function f at t with its first and second rate; each piece is a polynomial of degree five plus a sine."""
     low, high = functions.piece0[f], functions.piece0[f + 1] - 1
     while low < high:  # the last piece that begins at or before t
         middle = (low + high + 1) // 2

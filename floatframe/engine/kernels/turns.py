@@ -1,4 +1,4 @@
-"""Angles counted through full turns, from step to step.
+"""Angles that are counted through full turns from step to step.
 
 An angle is that by which the direction y of one body has turned about the axis x × z of another, from its direction z
 towards -x (as a TWIST row has it). With E = R_h x, Z = R_h z of the holder of the axis, D = R_o y of the other body,
@@ -25,13 +25,13 @@ __all__ = ["count_turns"]
 
 @inner
 def in_ground(state, i, x):
-    """Return a direction of body i, -1 for the ground, in ground axes."""
+    """Return a direction fixed in body i (-1: ground) in ground axes."""
     return vector(x) if i < 0 else turned(state.R[i], vector(x))
 
 
 @inner
 def spin(bodies, state, i):
-    """Return the angular velocity of body i in ground axes."""
+    """Return the angular velocity of body i (-1: ground) in ground axes."""
     if i < 0:
         return 0.0, 0.0, 0.0
     return turned(state.R[i], vector(state.u[bodies.u0[i] + 3 :]))
@@ -53,7 +53,7 @@ def angle_and_rate(angles, bodies, state, k):
 
 @inner
 def count_rotation(angles, bodies, state, memory, k, h):
-    """Store the rotation vector whose first component is angle k in the memory."""
+    """Store in the memory the rotation vector whose first component is angle k."""
     holder, other = angles.holder[k], angles.other[k]
     x, z = in_ground(state, holder, angles.x[k]), in_ground(state, holder, angles.z[k])
     A = transposed((x, cross(z, x), z))
@@ -71,7 +71,7 @@ def count_rotation(angles, bodies, state, memory, k, h):
 
 @inner
 def count_turns(model, work, memory, h):
-    """Store the angles of the iterate in the memory, a step of size h after the stored ones."""
+    """Store in the memory the angles of the iterate, a step of size h after the stored ones."""
     for k in range(memory.angle.shape[0]):
         if model.angles.part[k] == 0:
             count_rotation(model.angles, model.bodies, work.state, memory, k, h)

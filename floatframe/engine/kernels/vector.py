@@ -99,7 +99,7 @@ def unit_matrix():
 
 @small
 def tilde(x):
-    """Return the matrix of x ×."""
+    """Return the matrix of the cross product with x."""
     return (0.0, -x[2], x[1]), (x[2], 0.0, -x[0]), (-x[1], x[0], 0.0)
 
 
@@ -123,13 +123,13 @@ def transposed(A):
 
 @small
 def turned(A, x):
-    """Return A x."""
+    """Return the product A x."""
     return dot(A[0], x), dot(A[1], x), dot(A[2], x)
 
 
 @small
 def turned_back(A, x):
-    """Return Aᵀ x."""
+    """Return the product Aᵀ x."""
     return (
         A[0][0] * x[0] + A[1][0] * x[1] + A[2][0] * x[2],
         A[0][1] * x[0] + A[1][1] * x[1] + A[2][1] * x[2],
@@ -151,7 +151,7 @@ def congruent(R, J):
 
 @small
 def solved(A, x):
-    """Return A⁻¹ x by Cramer's rule."""
+    """Return the solution of A y = x by Cramer's rule."""
     c_0, c_1, c_2 = cross(A[1], A[2]), cross(A[2], A[0]), cross(A[0], A[1])
     both = add(scaled(x[0], c_0), add(scaled(x[1], c_1), scaled(x[2], c_2)))
     return scaled(1.0 / dot(A[0], c_0), both)

@@ -1,4 +1,4 @@
-"""The working arrays of the kernels: the iterate and everything that follows from it, overwritten by every evaluation.
+"""The working arrays of the kernels: the iterate and all results computed from it, overwritten by every evaluation.
 
 Sizes as in `kernels.model`, and n_most: most modes of a body, most_rows: most rows of a connection, n_x: Σ (6 + n_q)
 over the ends of connections. Vectors are in ground axes where nothing else is said.
@@ -58,52 +58,52 @@ n_law_inputs, n_law_outputs, n_law_slopes = (Size(f"{name} of a law") for name i
 
 
 class Iterate(NamedTuple):
-    """The iterate."""
+    """The state, rates and wrenches of the present Newton iterate."""
 
     r: Array = real(n_b, 3, unit="m")  #: position of the frame origins
-    R: Array = real(n_b, 3, 3)  #: R_GB
+    R: Array = real(n_b, 3, 3)  #: rotation matrices R_GB of the bodies
     q: Array = real(n_q)
     u: Array = real(n_u, unit="m/s, rad/s, 1/s")  #: velocities
     u_dot: Array = real(n_u, unit="m/s², rad/s², 1/s²")  #: accelerations
-    theta: Array = real(n_b, 3, unit="rad")  #: rotation since the beginning of the step, body axes
+    theta: Array = real(n_b, 3, unit="rad")  #: rotation of the body since the beginning of the step, body axes
     spins: IntArray = integer(n_b)  #: whether the step integrates the spin about the axis of symmetry separately
     w: Array = real(n_w, unit="N, N m")  #: wrenches of the connections on their markers A
-    w_start: Array = real(n_w, unit="N, N m")  #: the same at the beginning of the step
+    w_start: Array = real(n_w, unit="N, N m")  #: wrenches of the connections at the beginning of the step
     time: Array = real(unit="s")
     #: counted angles predicted by their rates; the counted rotations are those nearest to them
     angle: Array = real(n_angles, unit="rad")
 
 
 class BodyWork(NamedTuple):
-    """Bodies, see kernels/body.py; body axes."""
+    """Results for bodies, see kernels/body.py; body axes."""
 
     a_B: Array = real(n_b, 3, unit="m/s²")  # noqa: N815  #: acceleration of the frame origin minus gravity
-    s: Array = real(n_b, 3, unit="kg m")  #: s(q)
-    J: Array = real(n_b, 3, 3, unit="kg m²")  #: J(q)
-    D_q_dot: Array = real(n_b, 3, 3, unit="kg m²/s")  #: Σ q_dot_k D_k
-    C1: Array = real(3 * n_q, unit="kg m")  #: 1C(q) = ds/dq [a, k] of each body
-    K_t_q_dot: Array = real(3 * n_q, unit="kg m/s")  #: [a, k] of stiffened bodies
-    K_r_q_dot: Array = real(3 * n_q, unit="kg m²/s")  #: [a, k] of stiffened bodies
-    W: Array = real(9 * n_q, unit="kg m²")  #: S_ab q [ab, k] of each body
-    Y: Array = real(3 * n_q, unit="kg m²/s")  #: Σ_l 4C_kl q_dot_l [a, k] of each body
-    residual: Array = real(n_u, unit="N, N m, N m")  #: inertia and elastic minus applied and reaction forces
-    T_right: Array = real(n_b, 3, 3)  #: right Jacobian at theta: rotation of the body by its unknown
-    by_turn: Array = real(n_u, 3, unit="N/rad, N m/rad")  #: derivative of the residual by the rotation of its body
-    velocity: Array = real(n_most + 6, unit="m/s, rad/s, 1/s")  #: u of one body
-    momentum: Array = real(n_most + 6, unit="kg m/s, kg m²/s")  #: M u of one body
+    s: Array = real(n_b, 3, unit="kg m")  #: first moment s(q)
+    J: Array = real(n_b, 3, 3, unit="kg m²")  #: inertia J(q) about the frame origin
+    D_q_dot: Array = real(n_b, 3, 3, unit="kg m²/s")  #: sum of q_dot_k D_k
+    C1: Array = real(3 * n_q, unit="kg m")  #: modal coupling 1C(q) = ds/dq [a, k] of each body
+    K_t_q_dot: Array = real(3 * n_q, unit="kg m/s")  #: product K_t q_dot [a, k] of stiffened bodies
+    K_r_q_dot: Array = real(3 * n_q, unit="kg m²/s")  #: product K_r q_dot [a, k] of stiffened bodies
+    W: Array = real(9 * n_q, unit="kg m²")  #: product S_ab q [ab, k] of each body
+    Y: Array = real(3 * n_q, unit="kg m²/s")  #: product Σ_l 4C_kl q_dot_l [a, k] of each body
+    residual: Array = real(n_u, unit="N, N m, N m")  #: inertia and elastic forces minus applied and reaction forces
+    T_right: Array = real(n_b, 3, 3)  #: right Jacobian at theta: body rotation by the unknown dtheta
+    by_turn: Array = real(n_u, 3, unit="N/rad, N m/rad")  #: derivative of the residual by the rotation of the same body
+    velocity: Array = real(n_most + 6, unit="m/s, rad/s, 1/s")  #: velocities u of one body
+    momentum: Array = real(n_most + 6, unit="kg m/s, kg m²/s")  #: generalised momenta M u of one body
     modal: Array = real(n_most, unit="N m")  #: M q_ddot, K q or D q_dot of one body
 
 
 class MarkerWork(NamedTuple):
-    """Markers, see kernels/marker.py."""
+    """Results for markers, see kernels/marker.py."""
 
-    psi: Array = real(Size("numbers of psi"), unit="m, rad")  #: Psi(q), laid out as `Markers.psi`
-    rho: Array = real(n_m, 3, unit="m")  #: from the frame origin, body axes
-    rho_dot: Array = real(n_m, 3, unit="m/s")  #: its rate in the body, body axes
+    psi: Array = real(Size("numbers of psi"), unit="m, rad")  #: shapes Psi(q), in the order of `Markers.psi`
+    rho: Array = real(n_m, 3, unit="m")  #: vector from the frame origin to the marker, body axes
+    rho_dot: Array = real(n_m, 3, unit="m/s")  #: rate of rho relative to the body, body axes
     T_left: Array = real(n_m, 3, 3)  #: left Jacobian at the elastic rotation, body axes
     angle: Array = real(n_m, 3, unit="rad")  #: elastic rotation vector, body axes
-    angle_dot: Array = real(n_m, 3, unit="rad/s")  #: body axes
-    spin: Array = real(n_m, 3, unit="rad/s")  #: T_left angle_dot, body axes
+    angle_dot: Array = real(n_m, 3, unit="rad/s")  #: rate of the elastic rotation vector, body axes
+    spin: Array = real(n_m, 3, unit="rad/s")  #: angular velocity relative to the body, T_left angle_dot, body axes
     r: Array = real(n_m, 3, unit="m")  #: position
     A: Array = real(n_m, 3, 3)  #: axes as columns
     v: Array = real(n_m, 3, unit="m/s")
@@ -112,78 +112,80 @@ class MarkerWork(NamedTuple):
     bias: Array = real(n_m, 6, unit="m/s², rad/s²")  #: acceleration and angular acceleration at zero u_dot
     bend_dot: Array = real(6 * n_most, unit="m/s, rad/s")  #: K_P q_dot [6, k] of one marker
     bend_ddot: Array = real(6 * n_most, unit="m/s², rad/s²")  #: K_P q_ddot [6, k] of one marker
-    acceleration: Array = real(n_accelerated, 6, unit="m/s², rad/s²")  #: of those that are inputs of a law, ground axes
+    #: acceleration of markers whose acceleration is an input of a law, ground axes
+    acceleration: Array = real(n_accelerated, 6, unit="m/s², rad/s²")
 
 
 class LineWork(NamedTuple):
-    """Sliding markers on their lines, see kernels/joints/deformed_line.py."""
+    """Results for sliding markers on their lines, see kernels/joints/deformed_line.py."""
 
-    s: Array = real(n_lines, unit="m")  #: place
+    s: Array = real(n_lines, unit="m")  #: coordinate of the sliding marker along its line
     s_dot: Array = real(n_lines, unit="m/s")
-    slope: Array = real(n_lines)  #: |r'|
-    by_place: Array = real(n_lines)  #: 1/|r'|: factor with which s follows the point of B; 0 if s is prescribed
-    n_0: Array = real(n_lines, 3)  #: r'/|r'|
-    kappa: Array = real(n_lines, 3, unit="rad/m")  #: rotation of the axes by s
-    curve: Array = real(n_lines, 3, unit="1/m")  #: r''
-    slope_dot: Array = real(n_lines, 3, unit="1/s")  #: rate of r' at a place
+    slope: Array = real(n_lines)  #: length of the tangent, |r'|
+    #: change of s by the displacement of point B along the line, 1/|r'|; 0 if s is prescribed
+    by_place: Array = real(n_lines)
+    n_0: Array = real(n_lines, 3)  #: unit tangent r'/|r'|
+    kappa: Array = real(n_lines, 3, unit="rad/m")  #: rotation of the marker axes per unit of s
+    curve: Array = real(n_lines, 3, unit="1/m")  #: second derivative r'' of the line
+    slope_dot: Array = real(n_lines, 3, unit="1/s")  #: rate of r' at fixed s
     d: Array = real(n_stations, 3, unit="m")  #: displacement of a station, body axes
-    th: Array = real(n_stations, 3, unit="rad")  #: its rotation
-    turning: Array = real(n_lines, 3, unit="rad/s²")  #: angular acceleration of the axes by s_dot
-    bent: Array = real(n_lines, 6, unit="m/s², rad/s²")  #: `marker.bent_bias` of the line at the place
+    th: Array = real(n_stations, 3, unit="rad")  #: rotation of a station, body axes
+    turning: Array = real(n_lines, 3, unit="rad/s²")  #: angular acceleration of the marker axes due to s_dot
+    bent: Array = real(n_lines, 6, unit="m/s², rad/s²")  #: `marker.bent_bias` of the line at s
 
 
 class ConnectionWork(NamedTuple):
-    """Rows of connections, and their dependence on bodies and wrenches."""
+    """Residuals of connections, and their derivatives by bodies and wrenches."""
 
-    g: Array = real(n_w, unit="m, rad, kg m")  #: residual of the rows, scaled
-    P: Array = real(n_m, most_rows, 12)  #: derivative of the rows by the motion of a marker (r, phi, v, omega)
-    #: derivative by the acceleration of a marker, without the weight c_k
+    g: Array = real(n_w, unit="m, rad, kg m")  #: scaled residual of each row
+    P: Array = real(n_m, most_rows, 12)  #: derivative of the rows by the marker motion (r, phi, v, omega)
+    #: derivative of the rows by the marker acceleration, without the weight c_k
     P_a: Array = real(n_accelerated, most_rows, 6)
     V: Array = real(n_c, most_rows, most_rows)  #: derivative of the rows by their own wrench
-    rate: Array = real(n_w, unit="m/s, rad/s")  #: of what the rows hold
-    bias: Array = real(n_w, unit="m/s², rad/s²")  #: its second rate at zero u_dot
+    rate: Array = real(n_w, unit="m/s, rad/s")  #: rate of each row's constrained quantity
+    bias: Array = real(n_w, unit="m/s², rad/s²")  #: second rate of each row's constrained quantity at zero u_dot
 
 
 class PairWork(NamedTuple):
-    """One spring, bushing or contact, see kernels/connections/pair_force.py; ground axes."""
+    """Results for one spring, bushing or contact, see kernels/connections/pair_force.py; ground axes."""
 
-    d: Array = real(3, unit="m")  #: r_B - r_A
+    d: Array = real(3, unit="m")  #: vector r_B - r_A
     A: Array = real(3, 3)  #: axes of A
     B: Array = real(3, 3)  #: axes of B
-    v: Array = real(3, unit="m/s")  #: velocity of B seen from A
-    omega: Array = real(3, unit="rad/s")  #: of B less that of A
-    F: Array = real(3, unit="N")  #: on A
-    N: Array = real(3, unit="N m")  #: -N on B
+    v: Array = real(3, unit="m/s")  #: velocity of B relative to the axes of A
+    omega: Array = real(3, unit="rad/s")  #: angular velocity of B relative to A
+    F: Array = real(3, unit="N")  #: force on A
+    N: Array = real(3, unit="N m")  #: moment N; -N acts on B
     v_0: Array = real(unit="m/s")  #: speed of approach of a contact
-    motion: Array = real(12)  #: variation of d, of the rotation of B, of v and omega, seen from A
-    F_change: Array = real(3)  #: changes by it, seen from A
+    motion: Array = real(12)  #: variation of d, of the rotation of B, of v and of omega, relative to A
+    F_change: Array = real(3)  #: change of F by this variation, relative to A
     N_change: Array = real(3)
     v_0_change: Array = real()
-    slopes: Array = real(10, 12)  #: of F, nothing, N and v_0 by unit variations
+    slopes: Array = real(10, 12)  #: derivatives of F, an unused number, N and v_0 by the motion
 
 
 class SpringWork(NamedTuple):
-    """One spring, see kernels/connections/spring_damper.py."""
+    """Results for one spring, see kernels/connections/spring_damper.py."""
 
     length: Array = real(unit="m")
     rate: Array = real(unit="m/s")
     tension_by_length: Array = real(unit="N/m")
-    stiffness: Array = real(unit="N/m")  #: with the slope of the table
-    given: Array = real(unit="W")  #: power that enters by the table
+    stiffness: Array = real(unit="N/m")  #: stiffness including the slope of the table
+    given: Array = real(unit="W")  #: power supplied by the table
 
 
 class BushingWork(NamedTuple):
-    """One bushing, see kernels/connections/bushing.py; axes of C."""
+    """Results for one bushing, see kernels/connections/bushing.py; in the axes C."""
 
-    C: Array = real(3, 3)  #: its axes, in ground axes
-    xi: Array = real(6, unit="m, rad")  #: e, theta
+    C: Array = real(3, 3)  #: axes of the bushing, in ground axes
+    xi: Array = real(6, unit="m, rad")  #: deformations e and theta
     xi_dot: Array = real(6, unit="m/s, rad/s")
-    force: Array = real(6, unit="N, N m")  #: f, m
-    slope: Array = real(6, unit="N/m, N m")  #: of the tables
-    v: Array = real(3, unit="m/s")  #: of B seen from A
-    omega: Array = real(3, unit="rad/s")  #: of B less that of A
-    gamma: Array = real(3, unit="rad/s")  #: angular velocity of C seen from A
-    p: Array = real(3, unit="N m")  #: f × e
+    force: Array = real(6, unit="N, N m")  #: force f and moment m
+    slope: Array = real(6, unit="N/m, N m")  #: slopes of the tables
+    v: Array = real(3, unit="m/s")  #: velocity of B relative to the axes of A
+    omega: Array = real(3, unit="rad/s")  #: angular velocity of B relative to A
+    gamma: Array = real(3, unit="rad/s")  #: angular velocity of C relative to A
+    p: Array = real(3, unit="N m")  #: moment f × e
     alpha: Array = real()
     beta: Array = real()
     alpha_1: Array = real()  #: alpha'/t
@@ -191,22 +193,22 @@ class BushingWork(NamedTuple):
     tau: Array = real()
     tau_1: Array = real()  #: tau'/t
     sigma: Array = real()
-    dxi: Array = real(6, unit="m, rad")  #: changes by a variation
+    dxi: Array = real(6, unit="m, rad")  #: change of the deformations by a variation of the motion
     dxi_dot: Array = real(6, unit="m/s, rad/s")
     dforce: Array = real(6, unit="N, N m")
 
 
 class ContactWork(NamedTuple):
-    """One contact, see kernels/connections/contact.py."""
+    """Results for one contact, see kernels/connections/contact.py."""
 
     N: Array = real(3)
     rho: Array = real(3, unit="m")
     V: Array = real(3, unit="m/s")  #: velocity of B at the point of contact relative to A
-    V_t: Array = real(3, unit="m/s")  #: slip
-    slip: Array = real(unit="m/s")  #: sqrt(|V_t|² + v_s²)
+    V_t: Array = real(3, unit="m/s")  #: slip velocity
+    slip: Array = real(unit="m/s")  #: regularised slip speed sqrt(|V_t|² + v_s²)
     gap: Array = real(unit="m")
     depth: Array = real(unit="m")
-    rate: Array = real(unit="m/s")  #: of the gap
+    rate: Array = real(unit="m/s")  #: rate of the gap
     f: Array = real(unit="N")
     f_by_depth: Array = real(unit="N/m")
     f_by_rate: Array = real(unit="N s/m")
@@ -214,97 +216,100 @@ class ContactWork(NamedTuple):
 
 
 class GapWork(NamedTuple):
-    """Gaps over a step, see kernels/connections/gap.py."""
+    """Gaps at both ends of a step, see kernels/connections/gap.py."""
 
-    start: Array = real(n_gaps, unit="m, rad")  #: at its beginning
-    end: Array = real(n_gaps, unit="m, rad")  #: at its end
-    wrench: Array = real(n_m, 6)  #: on markers, conjugate to the change of a gap
+    start: Array = real(n_gaps, unit="m, rad")  #: gap at the beginning of the step
+    end: Array = real(n_gaps, unit="m, rad")  #: gap at the end of the step
+    wrench: Array = real(n_m, 6)  #: marker wrenches conjugate to the change of a gap
     step: Array = real(unit="s")  #: allowed size of the next step, or of the repeated one
-    shortest: IntArray = integer()  #: gap that determines it, -1 for none
-    n_closed: IntArray = integer()  #: number of gaps that are closed at its end
+    shortest: IntArray = integer()  #: gap that determines the step size, -1 for none
+    n_closed: IntArray = integer()  #: number of gaps that are closed at the end of the step
 
 
 class UserWork(NamedTuple):
-    """One user force."""
+    """Inputs and results of one user force."""
 
-    inputs: Array = real(n_inputs)  #: t, values and rates of the coordinates, states
-    outputs: Array = real(n_outputs)  #: forces, rates of states
-    trial: Array = real(n_outputs)  #: copy for differences
-    gradients: Array = real(n_gradients)  #: of the outputs by the inputs, row by row
+    inputs: Array = real(n_inputs)  #: time, values and rates of the coordinates, states
+    outputs: Array = real(n_outputs)  #: forces, then rates of states
+    trial: Array = real(n_outputs)  #: copy of the outputs for difference quotients
+    gradients: Array = real(n_gradients)  #: derivatives of the outputs by the inputs, row by row
 
 
 class LawWork(NamedTuple):
-    """One public element, see kernels/connections/element_law.py."""
+    """Inputs and results of one public element, see kernels/connections/element_law.py."""
 
-    inputs: Array = real(n_law_inputs)  #: t, motion of its markers, states, multipliers
-    outputs: Array = real(n_law_outputs)  #: wrenches, rates of states, held quantities, outputs
-    trial: Array = real(n_law_outputs)  #: the same along the motion
-    slopes: Array = real(n_law_slopes)  #: derivatives of all results except outputs by the variations, row by row
+    inputs: Array = real(n_law_inputs)  #: time, motion of the markers, states, multipliers
+    outputs: Array = real(n_law_outputs)  #: wrenches, rates of states, constraints, outputs
+    trial: Array = real(n_law_outputs)  #: results at a point of a difference quotient along the motion
+    #: derivatives of all results except outputs by motions, states and multipliers, row by row
+    slopes: Array = real(n_law_slopes)
 
 
 class StateWork(NamedTuple):
     """States of user forces and elements in a step, see kernels/connections/user_force.py."""
 
     base: Array = real(n_states)  #: known part of the value after the step
-    rate_base: Array = real(n_states, unit="1/s")  #: known part of its algorithmic rate
-    kappa: Array = real(n_states, unit="s")  #: factor from its rate to its value
+    rate_base: Array = real(n_states, unit="1/s")  #: known part of the algorithmic rate after the step
+    kappa: Array = real(n_states, unit="s")  #: factor from the rate of a state to its value
     rho: Array = real()
 
 
 class TapeWork(NamedTuple):
-    """One expression."""
+    """Results of one expression."""
 
-    results: Array = real(n_results)  #: of its operations
-    bars: Array = real(n_results)  #: derivatives of its value by its inputs
+    results: Array = real(n_results)  #: results of the operations
+    bars: Array = real(n_results)  #: derivatives of the expression's value by its inputs
 
 
 class Solver(NamedTuple):
-    """Newton's correction, see kernels/schur.py."""
+    """Data of Newton's correction, see kernels/schur.py."""
 
     H: Array = real(Size("numbers of H"))  #: tangent of each body, then its LU factors, flat
     pivot: IntArray = integer(n_u)
-    J_row: Array = real(12 * n_x)  #: marker motion (12) by body unknowns, at 12 x0
-    J_column: Array = real(6 * n_x)  #: marker motion (6) by body velocities, at 6 x0
-    X: Array = real(6 * n_x)  #: H⁻¹ J_columnᵀ [unknown, 6], at 6 x0
-    Z: Array = real(n_pairs, 12, 6)  #: J_row X for each pair of ends
-    J_a: Array = real(6 * n_a)  #: acceleration (6) of accelerated markers by body unknowns, times c_k, at 6 a0
-    Z_a: Array = real(Size("accelerated pairs"), 6, 6)  #: J_a X for each pair whose row marker is accelerated
+    J_row: Array = real(12 * n_x)  #: derivative of the marker motion (12) by body unknowns, from index 12 x0
+    J_column: Array = real(6 * n_x)  #: derivative of the marker motion (6) by body velocities, from index 6 x0
+    X: Array = real(6 * n_x)  #: body motion by a unit wrench, H⁻¹ J_columnᵀ [unknown, 6], from index 6 x0
+    Z: Array = real(n_pairs, 12, 6)  #: product J_row X for each pair of ends
+    J_a: Array = real(6 * n_a)  #: derivative of marker accelerations (6) by body unknowns, times c_k, from index 6 a0
+    Z_a: Array = real(Size("accelerated pairs"), 6, 6)  #: product J_a X for each pair whose row marker is accelerated
     blocks: Array = real(Size("numbers of blocks"))  #: block matrix of the connections, flat
     block_pivot: IntArray = integer(n_w)
     mu: Array = real(n_w)  #: correction of the wrenches, times c_k
-    y: Array = real(n_u)  #: correction of the bodies
-    y_rate: Array = real(n_u)  #: velocity correction of the bodies only, divided by c_d/c_k
-    surplus: Array = real(n_b, 3, unit="rad")  #: additional rotation of the bodies due to it, beyond their unknowns
-    late_gap: Array = real(n_w)  #: of velocities, over c_d/c_k, that the first iteration of the step before left open
-    late_gap_change: Array = real(n_w)  #: by how much that was more than in the step before it
-    has_late_gaps: IntArray = integer()  #: whether they are of steps like the next one
-    contraction: Array = real()  #: the second correction over the first when the factors were new, negative: not known
-    weight: Array = real(n_u, unit="kg, kg m²")  #: of the norm of corrections
+    y: Array = real(n_u)  #: correction of the body unknowns
+    y_rate: Array = real(n_u)  #: velocity correction of the bodies, divided by c_d/c_k
+    #: additional body rotation due to y_rate, beyond the change of the unknowns
+    surplus: Array = real(n_b, 3, unit="rad")
+    #: velocity gap, divided by c_d/c_k, that the first iteration of the previous step left open
+    late_gap: Array = real(n_w)
+    late_gap_change: Array = real(n_w)  #: change of late_gap from the step before the previous one
+    has_late_gaps: IntArray = integer()  #: whether late_gap belongs to steps of the same kind as the next one
+    contraction: Array = real()  #: ratio of the second to the first correction with new factors; negative if unknown
+    weight: Array = real(n_u, unit="kg, kg m²")  #: weights of the norm of corrections
     motion: Array = real(12)  #: correction of the motion of one marker
     row: Array = real(12)  #: one row of P in body axes
-    c_m: Array = real()  #: coefficients for which H was factorised, zero if never
+    c_m: Array = real()  #: weights c_m, c_d, c_k for which H was factorised, zero if never
     c_d: Array = real(unit="s")
     c_k: Array = real(unit="s²")
     is_due: IntArray = integer()  #: whether to factorise at the next iterate
-    price: Array = real()  #: cost of new factors, in iterations
+    price: Array = real()  #: cost of new factors, expressed in iterations
     n_steps: IntArray = integer()  #: number of steps with the present factors
-    n_spent: Array = real()  #: iterations of these steps, plus the cost of the factors
+    n_spent: Array = real()  #: number of iterations in these steps, plus the cost of the factors
 
 
 class Counted(NamedTuple):
-    """Counts since these arrays were made."""
+    """Counters since these arrays were created."""
 
     evaluations: IntArray = integer()
     factorisations: IntArray = integer()
     no_number: IntArray = integer()  #: 1 + the first connection of a step whose law was not finite, 0 for none
     stopped: IntArray = integer()  #: 1 + the first output of a step that ends the run, 0 for none
-    rows: IntArray = integer()  #: rows written into the results of the present call
+    rows: IntArray = integer()  #: number of rows written by the present call
 
 
 class Past(NamedTuple):
-    """The memories after each of the last steps, if there is space for them; see kernels/past.py."""
+    """The memories after the last steps, if there is space for them; see kernels/past.py."""
 
-    n: IntArray = integer()  #: number stored so far; the caller resets it to zero
+    n: IntArray = integer()  #: number of stored memories; the caller resets it to zero
     memory: Memory = stacked(Memory(), n_past)
 
 
@@ -357,7 +362,7 @@ def sizes_of(model: Model) -> dict[str, int]:
 
 
 def law_sizes(head: IntArray) -> dict[str, int]:
-    """Return the sizes of the arrays of a public element that suffice for all elements."""
+    """Return the array sizes of a public element that suffice for all elements."""
     n, width, n_z, n_lam, n_seen = head[:, :5].T
     n_out = 6 * n + n_z + n_lam
     return {
@@ -380,7 +385,7 @@ def acceleration_sizes(model: Model) -> dict[str, int]:
 
 
 def new_work(model: Model, n_past: int = 0) -> Work:
-    """Return working arrays for a compiled system, with room for the memories after n_past steps of a call."""
+    """Return working arrays for a compiled system, with space for the memories after n_past steps of a call."""
     sizes = sizes_of(model)
     remembered = max(sizes["n_u"], sizes["n_w"])
     work = zeros(Work(), sizes | {"n_past": n_past, "n_remembered": remembered})

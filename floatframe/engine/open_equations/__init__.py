@@ -1,4 +1,4 @@
-"""Open equations of a system (residual, matrices, constraints, maps) in Python, for integrators of the user."""
+"""Open equations of a system in Python (residual, matrices, constraints, maps), for the user's own integrators."""
 
 from floatframe.engine.open_equations.body_equations import BodyEquations, body_equations
 from floatframe.engine.open_equations.configuration import Configurations

@@ -29,7 +29,7 @@ __all__ = ["BodyEquations", "body_equations"]
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class BodyEquations:
-    """Invariants of a body about its frame, and the terms of its equations; all in axes of the frame.
+    """Invariants of a body about its frame origin and the terms of its equations of motion, all in body axes.
 
     Parameters
     ----------
@@ -77,28 +77,28 @@ class BodyEquations:
 
     @property
     def n_q(self) -> int:
-        """Number of modes."""
+        """Number of modes of the body."""
         return len(self.K)
 
     def first_moment(self, q: Array) -> Array:
-        """Return s(q) = S + 1C q + 1/2 qᵀ K_t q, (3,) [kg m]."""
+        """Return the first moment s(q) = S + 1C q + 1/2 qᵀ K_t q, (3,) [kg m]."""
         return np.asarray(self.S + self.C1 @ q + 0.5 * np.einsum("k,akl,l->a", q, self.K_t, q))
 
     def first_moment_rate(self, q: Array) -> Array:
-        """Return 1C(q) = ds/dq, (3, n)."""
+        """Return the derivative of the first moment, 1C(q) = ds/dq, (3, n)."""
         return np.asarray(self.C1 + self.K_t @ q)
 
     def coupling(self, q: Array) -> Array:
-        """Return the coupling of rotation and modes, B(q), (3, n): 2C_k + Σ 4C_kl q_l, plus K_r q if stiffened."""
+        """Return B(q), the coupling of rotation and modes, (3, n): 2C_k + Σ 4C_kl q_l, plus K_r q if stiffened."""
         W = np.einsum("abkl,l->abk", self.S_ab, q)
         return np.asarray(self.C2 + np.stack([W[2, 1] - W[1, 2], W[0, 2] - W[2, 0], W[1, 0] - W[0, 1]]))
 
     def inertia_rates(self, q: Array) -> Array:
-        """Return D_k(q) = 3C_k + Σ_l 5C_lk q_l, (n, 3, 3): dJ/dq_k = D_k + D_kᵀ."""
+        """Return D_k(q) = 3C_k + Σ_l 5C_lk q_l, (n, 3, 3), where dJ/dq_k = D_k + D_kᵀ."""
         return np.asarray(self.C3 + self.trace_less(q))
 
     def inertia(self, q: Array) -> Array:
-        """Return J(q) about the frame origin, (3, 3) [kg m²]."""
+        """Return the inertia J(q) about the frame origin, (3, 3) [kg m²]."""
         G = np.einsum("k,kab->ab", q, self.C3 + 0.5 * self.trace_less(q))
         return np.asarray(self.J0 + G + G.T)
 
@@ -108,7 +108,7 @@ class BodyEquations:
         return np.asarray(np.trace(W, axis1=1, axis2=2)[:, None, None] * np.eye(3) - W)
 
     def mass_matrix(self, q: Array, theta: Array | None = None) -> Array:
-        """Return M(theta, q), (6 + n, 6 + n), over (v, omega, q_dot), symmetric.
+        """Return the symmetric mass matrix M(theta, q) for velocities (v, omega, q_dot), (6 + n, 6 + n).
 
         theta: Euler parameters of the frame, (4,), if v is in ground axes. Without them, v is in body axes, and the
         matrix does not depend on the orientation of the body.
@@ -128,7 +128,7 @@ class BodyEquations:
         return np.asarray(turn @ M @ turn.T)
 
     def quadratic_velocity(self, omega: Array, q: Array, q_dot: Array) -> Array:
-        """Return k_omega, (6 + n,): inertia forces at zero accelerations, in body axes [N, N m, N].
+        """Return the inertia forces k_omega at zero accelerations in body axes, (6 + n,) [N, N m, N].
 
         omega × (omega × s) + 2 omega × 1C(q) q_dot + q_dotᵀ K_t q_dot; omega × J omega + 2 Σ q_dot_k D_k omega +
         q_dotᵀ K_r q_dot; 2 Σ_l 4C_kl·omega q_dot_l - omegaᵀ D_k omega.
@@ -142,11 +142,11 @@ class BodyEquations:
         return np.concatenate([f, tau, h])
 
     def elastic(self, q: Array, q_dot: Array) -> Array:
-        """Return k_e = (0, 0, K q + D q_dot), (6 + n,) [N, N m, N]."""
+        """Return the elastic and damping forces k_e = (0, 0, K q + D q_dot), (6 + n,) [N, N m, N]."""
         return np.concatenate([np.zeros(6), self.K @ q + self.D @ q_dot])
 
     def arrays(self) -> dict[str, Array]:
-        """Return all arrays by name: `np.savez(path, **arrays)`, `scipy.io.savemat(path, arrays)`."""
+        """Return all arrays by name, for `np.savez(path, **arrays)` or `scipy.io.savemat(path, arrays)`."""
         return {name: np.array(getattr(self, name)) for name in self.__dataclass_fields__}
 
 

@@ -1,4 +1,4 @@
-"""The group of configurations R³ × SO(3) × Rⁿ of each body, and its maps (docs/theory.md §0, §9).
+"""The configuration group R³ × SO(3) × Rⁿ of each body, and its maps (docs/theory.md §0, §9).
 
 A configuration x = (r, p, q) of a body consists of the position of the frame origin in ground axes (3), Euler
 parameters (4) and modal coordinates. A displacement dx = (dr in ground axes, rotation vector in body axes, dq) and a
@@ -28,7 +28,7 @@ __all__ = ["Configurations", "inverse_right_jacobian"]
 
 @dataclass(frozen=True, eq=False)
 class Configurations:
-    """The configuration group of a system, with the maps that integrators on it need."""
+    """The configuration group of a system, with the maps that geometric integrators need."""
 
     n_q: IntArray  #: number of modes of each body, (n_b,)
 
@@ -61,14 +61,14 @@ class Configurations:
         return result
 
     def normalized(self, x: Array) -> Array:
-        """Return x with Euler parameters normalised to length one; products of many rotations lose it by rounding."""
+        """Return x with Euler parameters of unit length, which products of many rotations lose by rounding."""
         result = np.array(x, dtype=float)
         for i, _, _ in self.parts():
             result[i + 3 : i + 7] /= np.linalg.norm(result[i + 3 : i + 7])
         return result
 
     def difference(self, x: Array, other: Array) -> Array:
-        """Return dx, (n_v,), with x (+) dx = other; rotations up to half a turn."""
+        """Return dx, (n_v,), that satisfies x (+) dx = other, for rotations up to half a turn."""
         result = np.zeros(self.n_v)
         for i, j, n in self.parts():
             result[j : j + 3] = other[i : i + 3] - x[i : i + 3]
@@ -77,7 +77,7 @@ class Configurations:
         return result
 
     def rate(self, x: Array, v: Array) -> Array:
-        """Return x_dot, (n_x,), from velocities v, (n_v,): p_dot = p * omega/2; the other components are equal."""
+        """Return x_dot, (n_x,), for velocities v, (n_v,): p_dot = p * omega/2, all other rates equal the velocities."""
         result = np.zeros(self.n_x)
         for i, j, n in self.parts():
             result[i : i + 3] = v[j : j + 3]
@@ -86,7 +86,7 @@ class Configurations:
         return result
 
     def velocity(self, x: Array, x_dot: Array) -> Array:
-        """Return the velocities v, (n_v,), from x_dot, (n_x,): omega_B = 2 p⁻¹ * p_dot."""
+        """Return the velocities v, (n_v,), for rates x_dot, (n_x,): omega_B = 2 p⁻¹ * p_dot."""
         result = np.zeros(self.n_v)
         for i, j, n in self.parts():
             back = np.array(x[i + 3 : i + 7]) * (1, -1, -1, -1)
@@ -96,15 +96,15 @@ class Configurations:
         return result
 
     def tangent(self, dx: Array) -> Array:
-        """Return T(dx), (n_v, n_v): x (+) dx moves by T d(dx), so that v = T(dx) d(dx)/dt at constant x."""
+        """Return T(dx), (n_v, n_v), where v = T(dx) d(dx)/dt is the velocity of x (+) dx at constant x."""
         return self.by_bodies(dx, right_jacobian)
 
     def inverse_tangent(self, dx: Array) -> Array:
-        """Return T(dx)⁻¹, (n_v, n_v), for rotations of less than a full turn: d(dx)/dt = T⁻¹ v."""
+        """Return T(dx)⁻¹, (n_v, n_v), where d(dx)/dt = T⁻¹ v; only for rotations of less than a full turn."""
         return self.by_bodies(dx, inverse_right_jacobian)
 
     def by_bodies(self, dx: Array, of_rotation) -> Array:
-        """Return the identity, with a matrix function of the rotation vector in the rotation block of each body."""
+        """Return the identity in which each body's rotation block is a matrix function of its rotation vector."""
         result = np.eye(self.n_v)
         for _, j, _ in self.parts():
             result[j + 3 : j + 6, j + 3 : j + 6] = of_rotation(np.asarray(dx)[j + 3 : j + 6])

@@ -1,4 +1,4 @@
-"""Integrators over the open equations, as examples: Radau IIA and Rattle."""
+"""Example integrators that use the open equations: Radau IIA and Rattle."""
 
 import numpy as np
 
@@ -28,7 +28,7 @@ A = np.linalg.solve(np.vander(C, 3, increasing=True).T, (np.vander(C, 4, increas
 
 
 def radau(eq: Equations, x: Array, v: Array, times: Array, *, tolerance: float = 1e-11) -> tuple[Array, Array, Array]:
-    """Return x, v, lam at all times, (n_t, n_x), (n_t, n_v), (n_t, n_lam), from consistent x, v at the first.
+    """Return x, v, lam at all times, (n_t, n_x), (n_t, n_v), (n_t, n_lam), from consistent initial x and v.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def radau(eq: Equations, x: Array, v: Array, times: Array, *, tolerance: float =
 
 
 def stage_rows(eq: Equations, t: float, h: float, x: Array, v: Array, stages: Array) -> tuple[Array, tuple]:
-    """Return the residuals of all stages followed by their constraints, and x, v of the last stage."""
+    """Return the residuals of all stages, then their constraints, and x and v of the last stage."""
     a, lam = np.split(stages, [3 * eq.n_v])
     a, lam = a.reshape(3, eq.n_v), lam.reshape(3, eq.n_lam)
     v_i, group = v + h * A @ a, eq.configurations
@@ -75,7 +75,7 @@ def stage_rows(eq: Equations, t: float, h: float, x: Array, v: Array, stages: Ar
 
 
 def stage_matrix(eq: Equations, t: float, x: Array, v: Array, a: Array, lam: Array, h: float) -> Array:
-    """Return the Newton matrix of the stages, with derivatives near the middle of the step for all stages."""
+    """Return the Newton matrix of the stages; all stages use derivatives near the middle of the step."""
     t, x, v = t + h / 2, eq.configurations.retract(x, h / 2 * v + h**2 / 8 * a), v + h / 2 * a
     by, G = eq.tangents(t, x, v, a, lam), eq.jacobian(t, x)
     bodies = np.kron(np.eye(3), by.by_a) + h * np.kron(A, by.by_v) + h**2 * np.kron(A @ A, by.by_x)
@@ -96,7 +96,7 @@ def stage_matrix(eq: Equations, t: float, x: Array, v: Array, a: Array, lam: Arr
 
 
 def rattle(eq: Equations, x: Array, v: Array, times: Array, *, tolerance: float = 1e-13) -> tuple[Array, Array]:
-    """Return x and v at all times, (n_t, n_x) and (n_t, n_v), from consistent x, v at the first.
+    """Return x and v at all times, (n_t, n_x) and (n_t, n_v), from consistent initial x and v.
 
     Raises
     ------

@@ -16,11 +16,11 @@ AXES = ("x", "y", "z")
 
 @dataclass(frozen=True)
 class Component:
-    """A component of a vector."""
+    """Name and unit of one component of a vector."""
 
     index: int
-    owner: str  #: body, joint or coupler
-    name: str  #: quantity of the owner
+    owner: str  #: name of the body, joint or coupler
+    name: str  #: name of the quantity
     unit: str
 
     def __str__(self) -> str:
@@ -30,14 +30,14 @@ class Component:
 
 @dataclass(frozen=True)
 class Layout:
-    """The components of x, v and lambda, in order."""
+    """The components of x, v and lambda, in their order."""
 
     x: tuple[Component, ...]  #: positions, (n_x,)
     v: tuple[Component, ...]  #: velocities, (n_v,); accelerations and rows of the residual have the same order
-    lam: tuple[Component, ...]  #: rows of the constraints, and their multipliers, (n_lam,)
+    lam: tuple[Component, ...]  #: constraint rows and their multipliers, (n_lam,)
 
     def index(self, vector: str, owner: str, name: str) -> int:
-        """Return the index of a component in "x", "v" or "lam".
+        """Return the index of a component in the vector "x", "v" or "lam".
 
         Raises
         ------
@@ -59,7 +59,7 @@ class Layout:
 
 
 def layout_of(compiled: CompiledSystem, held: Sequence[int], units: Units) -> Layout:
-    """Return the layout of a compiled system; `held` are the indices of the rows that are constraints."""
+    """Return the layout of a compiled system; `held`: indices of the constraint rows."""
     model = compiled.model
     m, s, F = units.length_symbol, units.time_symbol, units.force_symbol
     x: list[Component] = []
@@ -84,5 +84,5 @@ def layout_of(compiled: CompiledSystem, held: Sequence[int], units: Units) -> La
 
 
 def named(first: int, owner: str, parts: Sequence[tuple[str, str]]) -> list[Component]:
-    """Return consecutive components of an owner."""
+    """Return the consecutive components of one owner."""
     return [Component(first + k, owner, name, unit) for k, (name, unit) in enumerate(parts)]

@@ -1,4 +1,4 @@
-"""Rows of a system at one state, for each connection, as the kernels evaluate them; no global matrix is assembled."""
+"""Rows of a system at one state for each connection, as the kernels evaluate them, without a global matrix."""
 
 from dataclasses import dataclass
 
@@ -22,21 +22,22 @@ class End:
     marker: int
     body: int
     connection: int
-    w0: int  #: first index of its rows and wrench components
+    w0: int  #: index of the first row and wrench component of the connection
     size: int  #: number of rows of the connection
     u0: int  #: index of the first velocity of the body
     n: int  #: number of velocities of the body
-    x0: int  #: index of the first of its columns in the store
-    places: tuple[tuple[int, int], ...]  #: (part of the motion, part of the wrench) for force and moment on it
+    x0: int  #: index of the first column of the end in the array of all columns
+    #: pairs (part of the motion, part of the wrench) for the force and moment at the end
+    places: tuple[tuple[int, int], ...]
     sign: float
 
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """Data that do not change with the state: ends, and the constraint rows of each connection."""
+    """Data that do not change with the state: the ends and the constraint rows of each connection."""
 
     ends: tuple[End, ...]
-    holds: NDArray[np.bool_]  #: (n_w,)
+    holds: NDArray[np.bool_]  #: whether each row is a constraint, (n_w,)
     held: IntArray  #: indices of the constraint rows, (n_lam,)
     lam0: IntArray  #: index of the first multiplier of each connection, (n_c + 1,)
     n_u: int
@@ -44,17 +45,17 @@ class Structure:
 
 @dataclass(frozen=True, eq=False)
 class RowParts:
-    """Rows at one state, with derivatives by displacements in ground axes."""
+    """Rows at one state, with derivatives by body displacements in ground axes."""
 
     structure: Structure
     model: Model
-    G: tuple[Array, ...]  #: all rows of the connection by the displacement of the body at each end, (size, n)
-    J: tuple[Array, ...]  #: wrench of the connection to the body at each end, forces = J.T @ w, (size, n)
-    V: tuple[Array, ...]  #: rows of each connection by its own wrench, (size, size)
+    G: tuple[Array, ...]  #: for each end, derivatives of all connection rows by the displacement of the body, (size, n)
+    J: tuple[Array, ...]  #: for each end, transposed map from wrench to body forces: forces = J.T @ w, (size, n)
+    V: tuple[Array, ...]  #: for each connection, derivatives of the rows by its own wrench, (size, size)
     g: Array  #: residual of all rows, (n_w,)
 
     def held_force(self, lam: Array) -> Array:
-        """Return Gᵀ lam for the constraint rows, (n_u,)."""
+        """Return the constraint forces Gᵀ lam, (n_u,)."""
         at = self.structure
         every, result = np.zeros(len(at.holds)), np.zeros(at.n_u)
         every[at.held] = lam
@@ -63,20 +64,20 @@ class RowParts:
         return result
 
     def wrench_force(self, w: Array) -> Array:
-        """Return Jᵀ w, (n_u,)."""
+        """Return the body forces Jᵀ w of all wrenches, (n_u,)."""
         result = np.zeros(self.structure.n_u)
         for end, J in zip(self.structure.ends, self.J, strict=True):
             result[end.u0 : end.u0 + end.n] += w[end.w0 : end.w0 + end.size] @ J
         return result
 
     def held_jacobian(self) -> sp.csr_array:
-        """Return G for the constraint rows, (n_lam, n_u)."""
+        """Return the constraint Jacobian G, (n_lam, n_u)."""
         at = self.structure
         parts = [(G, end.w0, end.u0) for end, G in zip(at.ends, self.G, strict=True)]
         return sp.csr_array(summed(parts, (len(at.holds), at.n_u))[at.held])
 
     def of_connection(self, c: int) -> tuple[Array, Array]:
-        """Return the rows of connection c by the velocities of its bodies, and its wrench to them: (size, n_own)."""
+        """Return row derivatives and wrench map of connection c for velocities of its bodies, (size, n_own) each."""
         own = [k for k, end in enumerate(self.structure.ends) if end.connection == c]
         places: dict[int, int] = {}
         n = 0

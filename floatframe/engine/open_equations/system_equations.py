@@ -1,4 +1,4 @@
-"""The equations of motion of a system, for integrators and controllers of the user.
+"""The equations of motion of a system, for the user's own integrators and controllers.
 
     M(x) a = f(t, x, v) + G(t, x)ᵀ lam,     g(t, x) = 0,     x_dot = v (see `Configurations`)
 
@@ -47,17 +47,17 @@ from floatframe.model.system import System
 
 __all__ = ["Equations", "Tangents", "open_equations"]
 
-AGREES = 1e-9  #: relative defect below which rows and forces are taken as affine, or as transposes of each other
-STEP = 2e-3  #: step of the finite differences of a wrench by x at fixed multipliers
+AGREES = 1e-9  #: relative error below which rows and forces count as affine, or as transposes of each other
+STEP = 2e-3  #: difference step for derivatives of wrenches by x at fixed multipliers
 
 
 @dataclass(frozen=True, eq=False)
 class Tangents:
-    """Derivatives of the residual M a - f - Gᵀ lam, (n_v, n_v) each."""
+    """Derivatives of the residual M a - f - Gᵀ lam, each (n_v, n_v)."""
 
-    by_x: Array  #: by the displacement dx of x (+) dx; rotations in rad, translations in m
+    by_x: Array  #: derivative by the displacement dx in x (+) dx; rotations in rad, translations in m
     by_v: Array
-    by_a: Array  #: the mass matrix
+    by_a: Array  #: derivative by the accelerations: the mass matrix
 
 
 @presented
@@ -115,11 +115,11 @@ class Equations:
 
     @cached_property
     def is_holonomic(self) -> NDArray[np.bool_]:
-        """Whether each constraint is holonomic, (n_lam,) bool; the others (rolling) only constrain a velocity."""
+        """Whether each constraint is holonomic, (n_lam,) bool; the others (rolling) constrain only a velocity."""
         return ~is_held_velocity(self.model.rows.kind[self.structure.held])
 
     def require_no_stops(self, method: str) -> None:
-        """Raise `ModelError` naming an element that can end a run, for methods that do not evaluate outputs."""
+        """Raise `ModelError` with the name of an element that can end a run; `method` does not evaluate outputs."""
         if self.compiled.stop_words:
             raise ModelError(
                 f"{method}: {self.compiled.stop_words[0]}: an output may end a run, but this method does not "
@@ -129,11 +129,11 @@ class Equations:
     # states
 
     def vectors(self, state: State) -> tuple[Array, Array]:
-        """Return x, (n_x,), and v, (n_v,), of a state in the frames of the files, such as a state of a trajectory."""
+        """Return x, (n_x,), and v, (n_v,), of a state in the frames of the files, for example of a trajectory."""
         return self.vectors_of_engine(state_of_engine(self.compiled, state))
 
     def state(self, x: Array, v: Array) -> State:
-        """Return the state of x and v in the frames of the files, for `integrate`, `snapshot` and comparisons."""
+        """Return the state for x and v in the frames of the files, for `integrate`, `snapshot` and comparisons."""
         return state_of_file(self.compiled, self.engine_state(x, v))
 
     def vectors_of_engine(self, state: State) -> tuple[Array, Array]:
@@ -144,7 +144,7 @@ class Equations:
         return x, np.array(state.u)
 
     def engine_state(self, x: Array, v: Array | None = None) -> State:
-        """Return the state of x and v in the frames of the engine; v is zero by default."""
+        """Return the state for x and v in the frames of the engine; the default of v is zero."""
         x = vector("x", x, self.n_x)
         r, p, q = [], [], [np.zeros(0)]
         for j, _, n in self.configurations.parts():
@@ -166,13 +166,13 @@ class Equations:
         return x, v, *self.accelerations(t, x, v)
 
     def project(self, t: float, x: Array, v: Array) -> tuple[Array, Array]:
-        """Return x and v projected onto g = 0 and G v = g_1 with the least motion, as at the start of `integrate`."""
+        """Return x and v projected onto g = 0 and G v = g_1 with the least change, as at the start of `integrate`."""
         self.work.state.time[...] = t
         state = assembled(self.compiled, self.work, self.engine_state(self.configurations.normalized(x), v))
         return self.vectors_of_engine(with_compatible_velocities(self.compiled, self.work, state))
 
     def followed(self, t: float, x: Array) -> "Equations":
-        """Return equations in which the angles of couplers and user forces are counted on from their values at x.
+        """Return equations that count the angles of couplers and user forces from their values at x.
 
         Each angle is the one within half a turn of the last followed value, initially zero. If a coordinate rotates
         further, call this between steps: `eq = eq.followed(t, x)`.
@@ -202,7 +202,7 @@ class Equations:
     def mass(self, x: Array, *, sparse: Literal[True]) -> sp.csr_array: ...
 
     def mass(self, x: Array, *, sparse: bool = False) -> Array | sp.csr_array:
-        """Return the symmetric M(x), (n_v, n_v) [kg, kg m, kg m²]; with `sparse`, as a csr_array of its blocks."""
+        """Return the symmetric mass matrix M(x), (n_v, n_v) [kg, kg m, kg m²]; as a csr_array if `sparse`."""
         set_iterate(self.work, self.engine_state(x))
         blocks = linearized(self.model, self.work, 1.0, 0.0, 0.0).H
         for R, block in zip(self.work.state.R, blocks, strict=True):
@@ -211,7 +211,7 @@ class Equations:
         return sp.csr_array(sp.block_diag(blocks)) if sparse else np.asarray(la.block_diag(*blocks))
 
     def constraint(self, t: float, x: Array) -> Array:
-        """Return g, (n_lam,) [m, rad]; zero for rows that only constrain a velocity (`is_holonomic`)."""
+        """Return g, (n_lam,) [m, rad]; zero for rows that constrain only a velocity (see `is_holonomic`)."""
         return np.where(self.is_holonomic, self.rows_at(t, x).g[self.structure.held], 0.0)
 
     @overload
@@ -222,24 +222,24 @@ class Equations:
     def jacobian(self, t: float, x: Array, *, sparse: Literal[True]) -> sp.csr_array: ...
 
     def jacobian(self, t: float, x: Array, *, sparse: bool = False) -> Array | sp.csr_array:
-        """Return G, (n_lam, n_v): dg = G dx, rate of g = G v - g_1."""
+        """Return the Jacobian G, (n_lam, n_v): dg = G dx, and the rate of g is G v - g_1."""
         G = self.rows_at(t, x).held_jacobian()
         return G if sparse else G.toarray()
 
     def velocity_right(self, t: float, x: Array) -> Array:
-        """Return g_1 with G v = g_1, (n_lam,) [m/s, rad/s]; nonzero only for prescribed motions."""
+        """Return g_1, the right side of G v = g_1, (n_lam,) [m/s, rad/s]; nonzero only for prescribed motions."""
         return -self.rates(t, x, np.zeros(self.n_v))[0]
 
     def velocity_defect(self, t: float, x: Array, v: Array) -> Array:
-        """Return G v - g_1, (n_lam,) [m/s, rad/s], the rate of g."""
+        """Return the rate of g, G v - g_1, (n_lam,) [m/s, rad/s]."""
         return self.rates(t, x, v)[0]
 
     def acceleration_right(self, t: float, x: Array, v: Array) -> Array:
-        """Return g_2 with G a = g_2, (n_lam,) [m/s², rad/s²]."""
+        """Return g_2, the right side of G a = g_2, (n_lam,) [m/s², rad/s²]."""
         return -self.rates(t, x, v)[1]
 
     def accelerations(self, t: float, x: Array, v: Array) -> tuple[Array, Array]:
-        """Return a, (n_v,), and lam, (n_lam,), from M a - Gᵀ lam = f, G a = g_2; for redundant rows the least lam.
+        """Solve M a - Gᵀ lam = f, G a = g_2 for a, (n_v,), and lam, (n_lam,); of minimum norm for redundant rows.
 
         Raises
         ------
@@ -264,7 +264,7 @@ class Equations:
         return solution[:n], solution[n:]
 
     def ordinary(self, t: float, y: Array) -> Array:
-        """Return y_dot for y = (x, v), (n_x + n_v,): the underlying ordinary differential equation, index one.
+        """Return y_dot for y = (x, v), (n_x + n_v,), the underlying ordinary differential equation (index 1).
 
         For `scipy.integrate.solve_ivp`; constraints drift within its tolerances (`project` corrects them).
         """
@@ -273,7 +273,7 @@ class Equations:
         return np.concatenate([self.configurations.rate(x, v), a])
 
     def null_space(self, t: float, x: Array) -> Array:
-        """Return an M-orthonormal basis N of the motions allowed by the constraints, (n_v, n_free).
+        """Return an M-orthonormal basis N of the motions that the constraints allow, (n_v, n_free).
 
         G N = 0, Nᵀ M N = 1: v = N z + (a velocity that satisfies G v = g_1), and z_dot = Nᵀ (f - M N_dot z - ...).
         """
@@ -288,7 +288,7 @@ class Equations:
         return float(0.5 * v @ self.mass(x) @ v)
 
     def wrenches(self, t: float, x: Array, v: Array, lam: Array) -> Array:
-        """Return w = w_0 + W lam, (n_w,): wrenches of all connections on their markers A in ground axes, as in results.
+        """Return the wrenches w = w_0 + W lam, (n_w,), on markers A in ground axes, as in results.
 
         Raises
         ------
@@ -317,7 +317,7 @@ class Equations:
         return w
 
     def tangents(self, t: float, x: Array, v: Array, a: Array, lam: Array) -> Tangents:
-        """Return the derivatives of the residual by x, v and a, at fixed multipliers.
+        """Return the derivatives of the residual by x, v and a at fixed multipliers.
 
         The derivatives by v and a, and by x at fixed wrenches, are those of Newton's method in the kernels. The
         derivatives of the wrenches w_0 and the forces Gᵀ lam by x are central differences of fourth order (relative
@@ -342,7 +342,7 @@ class Equations:
     # parts
 
     def change_of_wrenches(self, t: float, x: Array, v: Array, lam: Array) -> tuple[Array, Array]:
-        """Return the derivatives of w_0, (n_w, n_v), and Gᵀ lam, (n_v, n_v), by x, as differences of fourth order."""
+        """Return the derivatives by x of w_0, (n_w, n_v), and Gᵀ lam, (n_v, n_v), from fourth-order differences."""
         scale = np.ones(self.n_v)
         for _, j, n in self.configurations.parts():
             scale[j : j + 3] = self.compiled.length
@@ -364,12 +364,12 @@ class Equations:
 
     @cached_property
     def modal_scale(self) -> float:
-        """A modal coordinate that moves markers by about 0.1 % of the size of the system."""
+        """Amplitude of a modal coordinate that moves markers by about 0.1 % of the system size."""
         largest = float(np.abs(self.model.markers.psi).max(initial=0.0))
         return 1e-2 * self.compiled.length / largest if largest > 0 else 1.0
 
     def turned_forces(self, own: Array) -> Array:
-        """Return the derivative of a residual in ground axes due to the rotation of the body axes, (n_v, n_v)."""
+        """Return the derivative, due to the rotation of body axes, of a residual in ground axes, (n_v, n_v)."""
         result = np.zeros((self.n_v, self.n_v))
         for i, (_, j, _) in enumerate(self.configurations.parts()):
             R = self.work.state.R[i]
@@ -377,7 +377,7 @@ class Equations:
         return result
 
     def turning(self, x: Array) -> Array:
-        """Return the matrix that rotates translations from body to ground axes, (n_v, n_v)."""
+        """Return the matrix that rotates translations from body axes to ground axes, (n_v, n_v)."""
         result = np.eye(self.n_v)
         for j, k, _ in self.configurations.parts():
             result[k : k + 3, k : k + 3] = rotation_matrix(x[j + 3 : j + 7])
@@ -388,7 +388,7 @@ class Equations:
         return slice(int(self.model.connections.w0[c]), int(self.model.connections.w0[c + 1]))
 
     def rows_at(self, t: float, x: Array, v: Array | None = None, a: Array | None = None) -> RowParts:
-        """Return the rows at a state with zero wrenches; the residual of the bodies is left in the working arrays."""
+        """Return the rows at a state with zero wrenches; the body residual stays in the working arrays."""
         from floatframe.engine.kernels.entry import evaluate_and_linearize
 
         set_iterate(self.work, self.engine_state(x, v), a, self.near.copy())
@@ -426,7 +426,7 @@ class Equations:
         return parts, result
 
     def law(self, parts: RowParts) -> Array:
-        """Return w_0, (n_w,): the least wrenches that satisfy the rows which define them."""
+        """Return w_0, (n_w,): the minimum-norm wrenches that satisfy the rows which define them."""
         w = self.near.copy()
         for c, V in enumerate(parts.V):
             own = self.own_rows(c)
@@ -436,7 +436,7 @@ class Equations:
         return w
 
     def rates(self, t: float, x: Array, v: Array) -> tuple[Array, Array]:
-        """Return rate and second rate (at a = 0) of the constraint rows, (n_lam,) each."""
+        """Return the rate and the second rate at a = 0 of the constraint rows, each (n_lam,)."""
         from floatframe.engine.kernels.entry import rates_of_constraints
 
         set_iterate(self.work, self.engine_state(x, v), w=self.near.copy())
@@ -446,7 +446,7 @@ class Equations:
 
 
 def open_equations(system: System) -> Equations:
-    """Return the open equations of a system: M a = f + Gᵀ lam with its constraints, as Python functions.
+    """Return the open equations of a system as Python functions: M a = f + Gᵀ lam with its constraints.
 
     Parameters
     ----------
@@ -487,7 +487,7 @@ def open_equations(system: System) -> Equations:
 
 
 def vector(name: str, value: Array, n: int) -> Array:
-    """Return a vector of n finite numbers; `ModelError` if it is not one."""
+    """Return a value as a vector of n finite numbers; `ModelError` if that is impossible."""
     result = np.asarray(value, dtype=float)
     if result.shape != (n,) or not np.isfinite(result).all():
         told = f"shape {result.shape}" if result.shape != (n,) else "numbers that are not finite"

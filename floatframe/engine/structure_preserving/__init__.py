@@ -1,1 +1,1 @@
-"""Conserving, decaying and variational schemes: constants of systems, and the compiled steps in `kernels`."""
+"""Conserving, decaying and variational schemes: system constants, and compiled steps in `kernels`."""

@@ -1,4 +1,4 @@
-"""Constants of bodies about their centre of mass; the formulas stand in `kernels.bodies`."""
+"""Constants of bodies about their centre of mass; the formulas are in `kernels.bodies`."""
 
 from dataclasses import dataclass
 
@@ -15,35 +15,35 @@ __all__ = ["CentralBody", "central_bodies"]
 
 @dataclass(frozen=True, eq=False)
 class CentralBody:
-    """Constants of a body."""
+    """Constants of a body for the structure-preserving schemes."""
 
     m: float
-    S: Array  #: first moment over mass: centre of mass in the frame, undeformed, (3,)
-    C1: Array  #: its derivative by q, undeformed, (3, n)
-    K_t: Array | None  #: its second derivative [l, a, k], (n, 3 n); None: zero
-    J0: Array  #: about the frame origin, (3, 3)
-    C2: Array  #: (3, n)
-    J_k: Array  #: 3C_k + 3C_kᵀ, (n, 3, 3)
-    S_ab: Array  #: [l, a, b, k], (n, 9 n)
-    S_ab_T: Array  #: [k, a, b, l], (n, 9 n)
-    M: Array  #: (n, n)
-    K: Array  #: (n, n)
-    D: Array  #: (n, n)
+    S: Array  #: first moment divided by mass: undeformed centre of mass in the frame, (3,)
+    C1: Array  #: derivative of S by q at zero deformation, (3, n)
+    K_t: Array | None  #: second derivative of S by q [l, a, k], (n, 3 n); None if zero
+    J0: Array  #: inertia about the frame origin, (3, 3)
+    C2: Array  #: coupling of rotation and modes, (3, n)
+    J_k: Array  #: derivative of the inertia by q_k, 3C_k + 3C_kᵀ, (n, 3, 3)
+    S_ab: Array  #: second-order inertia [l, a, b, k], (n, 9 n)
+    S_ab_T: Array  #: second-order inertia [k, a, b, l], (n, 9 n)
+    M: Array  #: modal mass matrix, (n, n)
+    K: Array  #: modal stiffness matrix, (n, n)
+    D: Array  #: modal damping matrix, (n, n)
 
     @property
     def n(self) -> int:
-        """Number of modes."""
+        """Number of modes of the body."""
         return len(self.K)
 
     @property
     def mass_matrix(self) -> Array:
-        """The matrix of (omega, q_dot) about the centre of mass of the undeformed body, (3 + n, 3 + n)."""
+        """Mass matrix of (omega, q_dot) about the undeformed centre of mass, (3 + n, 3 + n)."""
         A = np.hstack([-tilde(self.S), self.C1])
         return np.asarray(np.block([[self.J0, self.C2], [self.C2.T, self.M]]) - self.m * A.T @ A)
 
 
 def central_bodies(model: Model, names: tuple[str, ...], scheme: str) -> tuple[CentralBody, ...]:
-    """Return the constants of all bodies; `ModelError` if a mode of one has no mass."""
+    """Return the constants of all bodies; `ModelError` if a body has a mode without mass."""
     known: dict[int, CentralBody] = {}
     bodies = []
     for i, t in enumerate(int(kind) for kind in model.bodies.kind):
@@ -60,7 +60,7 @@ def central_bodies(model: Model, names: tuple[str, ...], scheme: str) -> tuple[C
 
 
 def central_body(model: Model, i: int) -> CentralBody:
-    """Return the constants of a body."""
+    """Return the constants of one body."""
     t, n = int(model.bodies.kind[i]), int(model.bodies.n_q[i])
     m, S = float(model.body_types.mass[t]), model.body_types.S[t]
 

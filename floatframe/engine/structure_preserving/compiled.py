@@ -1,4 +1,4 @@
-"""A discrete system in the arrays of the compiled steps: constants, sparsity of derivatives, working arrays."""
+"""A discrete system in the arrays of the compiled steps: constants, sparsity of derivatives and working arrays."""
 
 import weakref
 from dataclasses import dataclass
@@ -25,15 +25,15 @@ __all__ = ["Kept", "kept_of", "new_step_work"]
 
 @dataclass(frozen=True, eq=False)
 class Filter:
-    """Dissipation of the modes of one body."""
+    """Matrices of the numerical dissipation of one body's modes."""
 
     F: Array  #: (1 + 2 Phi chi Phiᵀ M_e)⁻¹ Phi chi Phiᵀ, (n, n)
     X: Array  #: Phi chi Phiᵀ M_e, (n, n)
-    E: Array  #: J⁻¹ B: how a free body turns against its vibrations, (3, n)
+    E: Array  #: rotation of a free body by its vibration, J⁻¹ B, (3, n)
 
 
 def filter_of(body: CentralBody, h: float, rho_inf: float) -> Filter:
-    """Return the dissipation of the modes of a body for steps of size h."""
+    """Return the numerical dissipation of a body's modes for steps of size h."""
     M = body.mass_matrix
     E = np.asarray(np.linalg.solve(M[:3, :3], M[:3, 3:]), dtype=np.float64)
     effective = M[3:, 3:] - M[3:, :3] @ E
@@ -45,7 +45,7 @@ def filter_of(body: CentralBody, h: float, rho_inf: float) -> Filter:
 
 
 def constants_of(ds: DiscreteSystem, h: float, rho_inf: float) -> tuple[Array, IntArray]:
-    """Return the constants of all types of bodies, flat, and the index of each, (n_t, N_BLOCKS)."""
+    """Return the constants of all body types in one flat array, and the index of each, (n_t, N_BLOCKS)."""
     model, parts, place = ds.model, [], 0
     block0 = np.zeros((len(model.body_types.mass), N_BLOCKS), dtype=np.int64)
     done = set()
@@ -69,7 +69,7 @@ def constants_of(ds: DiscreteSystem, h: float, rho_inf: float) -> tuple[Array, I
 
 
 def pattern_of(ds: DiscreteSystem) -> tuple[Pattern, dict[str, int]]:
-    """Return the sparsity of derivatives: the numbers of blocks, their rows and colors.
+    """Return the sparsity of the derivatives: numbers of blocks, their rows, and their colors.
 
     A block acts on itself and on those with which it shares a connection. Blocks whose rows have none in common are
     changed together.
@@ -124,7 +124,7 @@ def pattern_of(ds: DiscreteSystem) -> tuple[Pattern, dict[str, int]]:
 
 
 def discrete_of(ds: DiscreteSystem, scheme: int, h: float, rho_inf: float) -> tuple[Discrete, dict[str, int]]:
-    """Return a system in the arrays of the compiled steps of size h, and the sizes of their working arrays."""
+    """Return a system in the arrays of compiled steps of size h, and the sizes of their working arrays."""
     model = ds.model
     pattern, sizes = pattern_of(ds)
     blocks, block0 = constants_of(ds, h, rho_inf)
@@ -167,7 +167,7 @@ def discrete_of(ds: DiscreteSystem, scheme: int, h: float, rho_inf: float) -> tu
 
 
 def does_work(model: Model) -> bool:
-    """Whether anything but potentials and modal damping does work."""
+    """Whether forces other than potential forces and modal damping do work."""
     springs = model.springs
     counts = (
         model.loads.marker, model.body_loads.body, model.joint_forces.motor, model.contacts.stiffness,
@@ -182,35 +182,36 @@ def does_work(model: Model) -> bool:
 
 
 def remembered_rows(model: Model) -> IntArray:
-    """Return the rows of the memory of connections."""
+    """Return the rows in which connections remember values between steps."""
     contacts = model.connections.w0[:-1][model.connections.law == CONTACT] + V_0
     rows = [model.coordinates.row, model.states.row, model.states.row + 1, contacts, model.laws.equation]
     return np.concatenate(rows).astype(np.int64)
 
 
 def new_step_work(model: Model, discrete: Discrete, sizes: dict[str, int]) -> StepWork:
-    """Return working arrays of the steps of a system."""
+    """Return new working arrays for the steps of a system."""
     step = zeros(StepWork(), sizes_of(model) | measured(Discrete(), discrete) | sizes)
     step.is_due[:] = 1
     return step
 
 
-REMEMBERED = ("h", "band", "band_pivot", "is_due", "acceleration", "f_kept", "f_size")  #: of a step, by the next
+#: arrays of a step that the next step uses
+REMEMBERED = ("h", "band", "band_pivot", "is_due", "acceleration", "f_kept", "f_size")
 
 
 @dataclass(eq=False)
 class Kept:
-    """Data that belong to working arrays: for the steps from one memory to another."""
+    """Data that belong to working arrays and continue from one call of steps to the next."""
 
     key: tuple
     discrete: Discrete
     step: StepWork
-    before: object = None  #: memory at the start of the steps,
-    known: tuple[Array, ...] = ()  #: and what they knew
-    after: object = None  #: memory at their end
+    before: object = None  #: memory at the start of the last steps
+    known: tuple[Array, ...] = ()  #: arrays `REMEMBERED` at the start of the last steps
+    after: object = None  #: memory at the end of the last steps
 
     def go_on_from(self, memory: object, f: Array, *, is_anew: bool) -> None:
-        """Prepare the arrays for steps from a memory with multipliers f: as the previous steps left or found them.
+        """Prepare the arrays for steps from a memory with multipliers f, reusing those of the last steps if they fit.
 
         is_anew: without what was known, as a run that goes on from a file begins.
         """
@@ -226,12 +227,12 @@ class Kept:
         self.before, self.known = memory, tuple(array.copy() for array in arrays)
 
 
-#: by the identity of an array of the working arrays, with whose lifetime they end
+#: by the identity of an array of the working arrays; an entry is removed when that array is freed
 KEPT: dict[int, Kept] = {}
 
 
 def kept_of(work: Work, ds: DiscreteSystem, scheme: int, h: float, rho_inf: float) -> Kept:
-    """Return the data of working arrays for steps of size h."""
+    """Return the data that belong to the working arrays, for steps of size h."""
     key, wanted = id(work.solver.pivot), (scheme, h, rho_inf)
     known = KEPT.get(key)
     if known is None or known.key != wanted:

@@ -1,4 +1,4 @@
-"""A compiled system as the structure-preserving schemes see it: its bodies, and what each connection holds."""
+"""Data of a compiled system for structure-preserving schemes: its bodies, and the constraints of each connection."""
 
 from dataclasses import dataclass
 
@@ -17,20 +17,20 @@ __all__ = ["Connection", "DiscreteSystem", "discrete_system", "element_states", 
 
 @dataclass(frozen=True, eq=False)
 class Connection:
-    """A joint, force or coupler between markers A and B; a coupler or user force has a pair for each coordinate."""
+    """A joint, force or coupler between markers A and B; couplers and user forces have a pair for each coordinate."""
 
     number: int
     markers: tuple[int, ...]
-    bodies: tuple[int, ...]  #: numbers of its bodies, each once
-    held: tuple[int, ...]  #: rows that hold something
-    first: int  #: first multiplier
-    states: tuple[int, ...]  #: rows of its states
-    first_state: int  #: number of the first of them among all
+    bodies: tuple[int, ...]  #: numbers of its bodies, without repetition
+    held: tuple[int, ...]  #: constraint rows
+    first: int  #: index of the first multiplier
+    states: tuple[int, ...]  #: rows of the states
+    first_state: int  #: index of the first state among all states
 
 
 @dataclass(frozen=True, eq=False)
 class DiscreteSystem:
-    """Constants of a system."""
+    """Constants of a system for the structure-preserving schemes."""
 
     model: Model
     bodies: tuple[CentralBody, ...]
@@ -41,17 +41,17 @@ class DiscreteSystem:
 
     @property
     def held(self) -> IntArray:
-        """The constraint rows, one for each multiplier."""
+        """Constraint rows in the order of the multipliers."""
         return np.array([k for c in self.connections for k in c.held], dtype=np.int64)
 
     def is_driven(self, connection: Connection, k: int) -> bool:
-        """Whether held row k of a connection does the work of a prescribed motion."""
+        """Whether constraint k of a connection does the work of a prescribed motion."""
         line = line_of(self.model, connection.number)
         is_driven_line = line >= 0 and self.model.lines.row[line] >= 0
         return bool(is_driven_line or self.model.rows.motion[k] >= 0)
 
     def turns(self, m: int) -> bool:
-        """Whether marker m turns in its body."""
+        """Whether marker m rotates relative to its body."""
         markers, i = self.model.markers, int(self.model.markers.body[m])
         if i < 0:
             return False
@@ -87,7 +87,7 @@ def discrete_system(system: System, scheme: str) -> DiscreteSystem:
 
 
 def line_of(model: Model, c: int) -> int:
-    """Return the number of the deformed line along which marker A of connection c slides, -1 for none."""
+    """Return the deformed line along which marker A of connection c slides, -1 for none."""
     is_joint = int(model.connections.law[c]) == JOINT
     return int(model.markers.line[model.connections.a[c]]) if is_joint else -1
 
@@ -110,7 +110,7 @@ def coordinates_of(model: Model, element: int) -> range:
 
 
 def element_of(model: Model, c: int) -> int:
-    """Return the number of user force c among all elements (couplers come first)."""
+    """Return the index of user force c among all elements, in which couplers come first."""
     return int(model.connections.item[c]) + len(model.elements.core) - len(model.users.n_states)
 
 
@@ -127,7 +127,7 @@ def element_states(model: Model, c: int) -> tuple[int, ...]:
 
 
 def multiplier_rows(model: Model, c: int) -> tuple[int, ...]:
-    """Return the rows of the multipliers of element c, the last of its rows."""
+    """Return the multiplier rows of element c, which are its last rows."""
     n_multipliers, last = int(model.laws.head[int(model.connections.item[c]), 3]), int(model.connections.w0[c + 1])
     return tuple(range(last - n_multipliers, last))
 

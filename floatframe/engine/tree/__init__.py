@@ -1,1 +1,1 @@
-"""Relative coordinates: a tree of bodies, coordinates of its joints, recursive kinematics and forces."""
+"""Relative coordinates: the tree of bodies, its joint coordinates, recursive kinematics and forces."""

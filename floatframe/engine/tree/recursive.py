@@ -1,4 +1,4 @@
-"""Equations of a system in the coordinates of its tree, by recursion over the bodies (docs/recursive.md)."""
+"""Equations of a system in the coordinates of its tree, by recursion over bodies (docs/recursive.md)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -31,29 +31,30 @@ from floatframe.model.system import System
 
 __all__ = ["AccelerationDerivatives", "ForceDerivatives", "RelativeModel", "relative_model"]
 
-UNIT_DEFECT = 1e-6  #: allowed deviation of the length of Euler parameters from one
+UNIT_DEFECT = 1e-6  #: allowed difference of the norm of Euler parameters from one
 
 
 class ForceDerivatives(NamedTuple):
     """Derivatives of the forces of a motion, each (n_rates, n_rates); row: force, column: coordinate."""
 
-    by_z: Array  #: by positions, varied in the directions of the rates, at fixed rates and accelerations [N/rad, ...]
+    #: derivative by positions in the directions of the rates, at fixed rates and accelerations [N/rad, ...]
+    by_z: Array
     by_z_dot: Array
-    by_z_ddot: Array  #: the mass matrix
+    by_z_ddot: Array  #: derivative by accelerations: the mass matrix
 
 
 class AccelerationDerivatives(NamedTuple):
-    """Derivatives of the accelerations under forces, each (n_rates, n_rates); row: acceleration."""
+    """Derivatives of accelerations at given forces, each (n_rates, n_rates); row: acceleration, column: coordinate."""
 
-    by_z: Array  #: by positions along the rates, with rates and forces fixed
+    by_z: Array  #: derivative by positions in the directions of the rates, at fixed rates and forces
     by_z_dot: Array
-    by_force: Array  #: M⁻¹
+    by_force: Array  #: derivative by forces, M⁻¹
 
 
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class RelativeModel:
-    """Equations of a tree of rigid and flexible bodies: M(z) z_ddot + h(z, z_dot) = forces, evaluated by recursion.
+    """Equations of a tree of rigid and flexible bodies by recursion, M(z) z_ddot + h(z, z_dot) = forces.
 
     Positions z, (n_z,), rates z_dot, accelerations and forces, (n_rates,), stand body by body in the order of the
     system: those of the joint that carries the body, in the order of its coordinates, then its modal coordinates.
@@ -104,7 +105,7 @@ class RelativeModel:
 
     @property
     def driven(self) -> tuple[str, ...]:
-        """Names of the coordinates that are prescribed by functions of time."""
+        """Names of the coordinates that functions of time prescribe."""
         return tuple(each.name for each in self.expansion.tree.columns if each.is_driven)
 
     def named(self, *, is_position: bool) -> tuple[str, ...]:
@@ -125,7 +126,7 @@ class RelativeModel:
     def inverse_dynamics(
         self, z: Array, z_dot: Array, z_ddot: Array, *, wrenches: Mapping[Marker, Array] | None = None
     ) -> Array:
-        """Return the forces along all coordinates that a motion needs, (n_rates,) [N, N m; modes: N m^(1/2)].
+        """Return the forces along all coordinates for a given motion, (n_rates,) [N, N m; modes: N m^(1/2)].
 
         Recursive Newton-Euler, in a time that grows with the number of bodies: Walker & Orin (1982), for bodies in
         floating frames docs/recursive.md §2. Joints are taken to be driven, modes to be held by their own stiffness and
@@ -180,7 +181,7 @@ class RelativeModel:
         return result
 
     def mass_matrix(self, z: Array) -> Array:
-        """Return M(z), (n_rates, n_rates), symmetric, by composite bodies (Featherstone 2008, chapter 6)."""
+        """Return the symmetric mass matrix M(z), (n_rates, n_rates), by composite bodies (Featherstone 2008, ch. 6)."""
         self.take(z)
         self.run(MASS)
         return self.dense.M.copy()
@@ -188,7 +189,7 @@ class RelativeModel:
     def forward_dynamics(
         self, z: Array, z_dot: Array, force: Array | None = None, *, wrenches: Mapping[Marker, Array] | None = None
     ) -> Array:
-        """Return the accelerations under forces along the coordinates, (n_rates,).
+        """Return the accelerations for given forces along the coordinates, (n_rates,).
 
         Articulated bodies, in a time that grows with the number of bodies, modal coordinates eliminated in each
         (Featherstone 2008, chapter 7; docs/recursive.md §4).
@@ -233,7 +234,7 @@ class RelativeModel:
         return np.asarray(dense.columns.T.reshape(columns.shape))
 
     def derivatives(self, z: Array, z_dot: Array, z_ddot: Array) -> "ForceDerivatives":
-        """Return the derivatives of `inverse_dynamics` (without wrenches from outside), recursive and exact.
+        """Return exact derivatives of `inverse_dynamics`, without external wrenches, by recursion.
 
         By positions along the rates (rotations: R exp(dz)), by rates, by accelerations: docs/recursive.md §5, after
         Carpentier & Mansard (2018) and Singh, Russell & Wensing (2022).
@@ -243,7 +244,7 @@ class RelativeModel:
         return ForceDerivatives(self.dense.by_z.copy(), self.dense.by_rate.copy(), self.dense.M.copy())
 
     def forward_derivatives(self, z: Array, z_dot: Array, force: Array | None = None) -> "AccelerationDerivatives":
-        """Return the derivatives of `forward_dynamics`: -M⁻¹ times those of the forces at its end, and M⁻¹."""
+        """Return derivatives of `forward_dynamics`: -M⁻¹ times derivatives of the forces, and M⁻¹."""
         z_ddot = self.forward_dynamics(z, z_dot, force)
         forces = self.derivatives(z, z_dot, z_ddot)
         solved = self.solve(z, np.hstack([-forces.by_z, -forces.by_z_dot, np.eye(self.n_rates)]))
@@ -254,7 +255,7 @@ class RelativeModel:
         return state_of_file(self.expansion.compiled, self.engine_state(z, z_dot))
 
     def engine_state(self, z: Array, z_dot: Array | None = None) -> State:
-        """Return positions and velocities of all bodies as the engine moves them (stiffened ones in mean axes)."""
+        """Return positions and velocities of all bodies in frames of the engine (mean axes for stiffened bodies)."""
         self.take(z, np.zeros(self.n_rates) if z_dot is None else z_dot)
         self.run(PLACE)
         e, w = self.expansion, self.work
@@ -269,7 +270,7 @@ class RelativeModel:
         return State(r=np.array(r), p=np.array(p), q=np.concatenate(q), u=np.concatenate(u))
 
     def positions(self, state: State | None = None) -> tuple[Array, Array]:
-        """Return z, (n_z,), and z_dot, (n_rates,), of a state of the bodies; None: as placed.
+        """Return z, (n_z,), and z_dot, (n_rates,), for a state of the bodies; None: the assembled state.
 
         What joints hold is taken as held; angles are between -pi and pi. Rates are those nearest to the velocities.
         """
@@ -281,7 +282,7 @@ class RelativeModel:
         return z, np.asarray(np.linalg.lstsq(T, engine.u, rcond=None)[0], dtype=float)
 
     def moved(self, z: Array, dz: Array) -> Array:
-        """Return z moved by dz, (n_rates,), along the rates: rotations by the exponential map, others by addition."""
+        """Return z after a displacement dz along the rates, (n_rates,); rotations use the exponential map."""
         x, dx = checked("moved: z", z, self.n_z).copy(), checked("moved: dz", dz, self.n_rates)
         nodes, e = self.expansion.nodes, self.expansion
         for kind, n, x0, v0 in zip(nodes.kind, nodes.n_z, nodes.x0, nodes.v0, strict=True):
@@ -305,7 +306,7 @@ class RelativeModel:
         return np.asarray(r + R @ rho), np.asarray(R @ axes)
 
     def jacobian(self, z: Array, marker: Marker) -> Array:
-        """Return velocity and angular velocity of a marker, ground axes, by the rates, (6, n_rates)."""
+        """Return the matrix from rates to velocity and angular velocity of a marker, ground axes, (6, n_rates)."""
         found = find_marker(self.expansion.system, "jacobian", marker)
         self.take(z)
         self.run(PLACE)
@@ -330,12 +331,12 @@ class RelativeModel:
         return J
 
     def own_arm(self, k: int) -> Array:
-        """Return the vector from the origin of node k to its joint, frame of the node, (3,)."""
+        """Return the vector from the origin of node k to its joint, node axes, (3,)."""
         m = int(self.expansion.nodes.own[k])
         return np.zeros(3) if m < 0 else self.marker_work.markers.rho[m]
 
     def frame(self, i: int) -> tuple[Array, Array]:
-        """Return origin (3,) and axes (3, 3) of the frame of body i, as it was last placed; -1: of the ground."""
+        """Return origin (3,) and axes (3, 3) of body i at its last placement; -1: of the ground."""
         if i < 0:
             return np.zeros(3), np.eye(3)
         k = self.expansion.node_of[i]
@@ -362,22 +363,22 @@ class RelativeModel:
 
     @cached_property
     def rotations(self) -> tuple[int, ...]:
-        """First positions of all rotations."""
+        """Indices of the first position of each rotation."""
         nodes = self.expansion.nodes
         return tuple(int(first) for first in nodes.x0[nodes.kind == ROTATION])
 
     @cached_property
     def none(self) -> Dense:
-        """Empty matrices, for tasks that need none."""
+        """Empty matrices, for tasks that do not need matrices."""
         return new_dense(self.expansion.nodes, self.n_rates, 0, is_whole=False)
 
     @cached_property
     def dense(self) -> Dense:
-        """Matrices over the rates."""
+        """Matrices with one row or column for each rate."""
         return new_dense(self.expansion.nodes, self.n_rates, 0, is_whole=True)
 
     def run(self, what: int, times: int = 1) -> None:
-        """Run the kernels; `ModelError` if there is no inertia along a coordinate."""
+        """Run a task of the kernels; `ModelError` if a coordinate has no inertia."""
         self.require(self.ready.run(what, self.dense if what in (MASS, TANGENTS) else self.none, times))
 
     def require(self, node: int) -> None:
@@ -391,12 +392,12 @@ class RelativeModel:
 
 
 def shifted(columns: Array, p: Array) -> Array:
-    """Return motions (n, 6), transferred to a point at p."""
+    """Return motions (n, 6) transferred to a point at p."""
     return np.concatenate([columns[:, :3] + np.cross(columns[:, 3:], p), columns[:, 3:]], axis=1)
 
 
 def checked(name: str, value: Array, n: int) -> Array:
-    """Return a vector; `ModelError` unless it has n finite numbers."""
+    """Return a value as a vector; `ModelError` unless it has n finite numbers."""
     array = np.asarray(value, dtype=float)
     if array.shape != (n,) or not np.isfinite(array).all():
         got = f"shape {array.shape}" if array.shape != (n,) else "numbers that are not finite"
@@ -405,7 +406,7 @@ def checked(name: str, value: Array, n: int) -> Array:
 
 
 def relative_model(system: System) -> RelativeModel:
-    """Return the equations of a system in the coordinates of its tree, for recursion.
+    """Return the recursive equations of a system in the coordinates of its tree.
 
     Of forces, gravity counts; others are given to the calls (`force`, `wrenches`).
 

@@ -1,4 +1,4 @@
-"""From a system to its tree: which joints become coordinates, which stay constraints (docs/relative.md §1).
+"""The tree of a system: joints that become coordinates, and joints that stay constraints (docs/relative.md §1).
 
 The graph has bodies (and the ground) as nodes and joints with a chart as edges. Its spanning tree is that of least
 freedoms, Prim's algorithm from the ground: a cut joint of f freedoms leaves 6 - f constraints and a joint of the tree f
@@ -28,22 +28,23 @@ __all__ = ["CoordinateName", "SystemTree", "tree_of"]
 
 #: relative difference of two moments of inertia below which the spin may be integrated separately
 NEARLY_SYMMETRIC = 0.3
-MOST_ACROSS = 0.5  #: ratio of transverse angular velocity to spin, above which it is not
+#: ratio of transverse angular velocity to spin up to which the spin of these bodies is integrated separately
+MOST_ACROSS = 0.5
 
 
 @dataclass(frozen=True)
 class CoordinateName:
-    """Names of a column of the tree."""
+    """Names that identify a column of the tree."""
 
-    joint: str  #: "" for a free body
-    body: str  #: that it carries
+    joint: str  #: name of the joint, "" for a free body
+    body: str  #: name of the body that the joint carries
     coordinate: str
     unit: str
     is_driven: bool
 
     @property
     def name(self) -> str:
-        """Joint (or body) and coordinate."""
+        """Name of the joint, or of the free body, followed by the coordinate."""
         return f"{self.joint or self.body}/{self.coordinate}"
 
 
@@ -53,28 +54,28 @@ class SystemTree:
 
     tree: Tree
     columns: tuple[CoordinateName, ...]
-    motions: tuple[TimeFunction | None, ...]  #: rows that prescribe the columns
-    cut: tuple[str, ...]  #: joints that would have a chart, but close a loop
+    motions: tuple[TimeFunction | None, ...]  #: functions of time that prescribe the columns, or None
+    cut: tuple[str, ...]  #: joints with a chart that stay constraints because they close a loop
     constrained: tuple[str, ...]  #: joints without a chart, or kept as constraints because of their law
 
     @property
     def is_tree(self) -> bool:
-        """Whether every joint is in the tree and there are no couplers or elements, so that nothing closes a loop."""
+        """Whether every joint is in the tree and no coupler or element closes a loop."""
         return not len(self.tree.kept)
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """Names of the coordinates that are unknown, in their order."""
+        """Names of the unknown coordinates in their order."""
         return tuple(each.name for each in self.columns if not each.is_driven)
 
 
 @dataclass(frozen=True)
 class Branch:
-    """A body, and the joint that carries it."""
+    """A body with the joint that carries it."""
 
     body: int
     parent: int
-    joint: int  #: number among the joints, -1 for a free body
+    joint: int  #: index of the joint, -1 for a free body
     columns: tuple[Column, ...]
 
 
@@ -114,7 +115,7 @@ def make_tree(system: System) -> SystemTree:
 
 
 def charts_of(system: System, compiled: CompiledSystem) -> dict[int, tuple[Column, ...]]:
-    """Return the columns of the joints that may be part of a tree, by their number.
+    """Return the columns of each joint that may become part of the tree, by the index of the joint.
 
     Friction that grows with the normal force needs the reaction of its joint, so that this one stays a constraint.
     """
@@ -175,7 +176,7 @@ def spanning_tree(system: System, model: Model, charts: dict[int, tuple[Column, 
 
 
 def driving_row(compiled: CompiledSystem, joint: int, column: Column) -> tuple[int, float]:
-    """Return the row that prescribes a coordinate of a joint and the factor of its motion; (-1, 1) if none does."""
+    """Return the row that prescribes a joint coordinate and the factor of its motion; (-1, 1) if there is none."""
     model = compiled.model
     by = {column.name: 1.0, **dict(column.factors)}
     for row in range(model.connections.w0[joint], model.connections.w0[joint + 1]):
@@ -185,7 +186,7 @@ def driving_row(compiled: CompiledSystem, joint: int, column: Column) -> tuple[i
 
 
 def driving_motion(system: System, compiled: CompiledSystem, each: Branch, column: Column) -> TimeFunction | None:
-    """Return the motion that prescribes a coordinate, None for none."""
+    """Return the motion that prescribes a coordinate, or None."""
     row = -1 if each.joint < 0 else driving_row(compiled, each.joint, column)[0]
     if row < 0:
         return None
@@ -193,7 +194,7 @@ def driving_motion(system: System, compiled: CompiledSystem, each: Branch, colum
 
 
 def own_row(compiled: CompiledSystem, joint: int, column: Column) -> int:
-    """Return the row of a joint with forces along its coordinate, -1 if there is none."""
+    """Return the joint row of forces along its coordinate, -1 if there is none."""
     model = compiled.model
     for row in range(model.connections.w0[joint], model.connections.w0[joint + 1]):
         if model.rows.is_loaded[row] and compiled.coordinates[row] == column.name:
@@ -202,7 +203,7 @@ def own_row(compiled: CompiledSystem, joint: int, column: Column) -> int:
 
 
 def depth_first(branches: list[Branch]) -> list[int]:
-    """Return the bodies depth first, children in the order of their numbers."""
+    """Return the bodies in depth-first order, with children in ascending order."""
     children: dict[int, list[int]] = {}
     for each in branches:
         children.setdefault(each.parent, []).append(each.body)
@@ -224,7 +225,7 @@ def jets_of(
     column0: list[int],
     m0: list[int],
 ) -> tuple[list[int], list[tuple[int, int, int]]]:
-    """Return the index of the jets of each body, and kind, item and unknown of each jet, see `Tree`."""
+    """Return the index of each body's first jet, and kind, item and unknown of each jet, see `Tree`."""
     jet0, jets = [0], []
     for i, each in enumerate(ordered):
         jets += [(COLUMN, k, unknown[k]) for k in range(column0[i], column0[i + 1]) if unknown[k] >= 0]
@@ -237,7 +238,7 @@ def jets_of(
 
 
 def spin_axes(compiled: CompiledSystem, ordered: list[Branch], far: list[int]) -> tuple[Array, Array]:
-    """Return the symmetry axis of each body with separate spin, axes of its end of the joint, and `most_across`.
+    """Return each body's symmetry axis for separate spin, axes of its joint end, and `most_across`.
 
     These are bodies that are free or on a ball joint, rigid with all that is fixed to them; zero for others. Their
     inertia about the joint, or about the centre of mass, is symmetric, or nearly so if they turn mostly about the axis.
@@ -263,7 +264,7 @@ def spin_axes(compiled: CompiledSystem, ordered: list[Branch], far: list[int]) -
 
 
 def common_inertia(compiled: CompiledSystem, bodies: list[int], marker: int) -> Array:
-    """Return the assembled inertia of rigid bodies about a marker of the first, or their centre of mass (-1).
+    """Return the inertia of rigid bodies about a marker on the first one, or about their centre of mass (-1).
 
     In axes of the first, (3, 3).
     """
@@ -282,7 +283,7 @@ def common_inertia(compiled: CompiledSystem, bodies: list[int], marker: int) -> 
 
 
 def loop_markers(model: Model, ordered: list[Branch], near: list[int], kept: list[int]) -> list[tuple[int, int]]:
-    """Return the bodies in loops, each with the marker at which a loop leaves it outwards."""
+    """Return the bodies in loops, each with the marker at which the loop leaves it outwards."""
     found: set[tuple[int, int]] = set()
     for c in kept:
         if model.connections.law[c] != JOINT:
@@ -300,7 +301,7 @@ def loop_markers(model: Model, ordered: list[Branch], near: list[int], kept: lis
 
 
 def tree_record(compiled: CompiledSystem, branches: list[Branch]) -> Tree:
-    """Return the tree in the arrays of the kernels."""
+    """Return the tree as a record for the kernels."""
     model = compiled.model
     ordered = sorted(branches, key=lambda branch: branch.body)
     near, far, is_reversed = [], [], []

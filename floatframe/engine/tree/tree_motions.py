@@ -1,4 +1,4 @@
-"""Motions of bodies for the coordinates of a tree, which keep its joints closed (docs/relative.md §2, §3)."""
+"""Body motions for unit tree coordinates, which keep tree joints closed (docs/relative.md §2, §3)."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ __all__ = ["coordinate_motions"]
 
 
 def coordinate_motions(compiled: CompiledSystem, tree: Tree, state: State) -> Array:
-    """Return N_s: motions of the bodies, body axes of the engine, for all unknown coordinates, (n_u, n_s)."""
+    """Return N_s, (n_u, n_s), the body motions for each unknown coordinate, in body axes of the engine."""
     from floatframe.engine.tree.kernels.entry import motion_of_bodies, motion_of_joints
 
     model = compiled.model

@@ -33,12 +33,12 @@ SIGNATURES = {
     "tangent": "tangent(t, x, z, lam, data, slopes)",
 }
 
-#: compiled from functions of numba, by function and template; both are kept alive
+#: C functions compiled by numba, by the identity of the user's function and by template; the cache keeps both alive
 compiled: dict[tuple[int, str], tuple[Any, Any]] = {}
 
 
 def law_callbacks(where: str, law: ElementLaw, head: tuple[int, ...]) -> tuple[Callback, Callback]:
-    """Return the C functions of values and of derivatives of a law.
+    """Return two C functions of an element: one for the values of its law, one for the derivatives.
 
     Raises
     ------
@@ -54,14 +54,14 @@ def law_callbacks(where: str, law: ElementLaw, head: tuple[int, ...]) -> tuple[C
 
 
 def is_compiled(function: Callable[..., None]) -> bool:
-    """Return whether a function is compiled by numba."""
+    """Return whether a function is a compiled function of numba."""
     from numba.core.dispatcher import Dispatcher
 
     return isinstance(function, Dispatcher)
 
 
 def callback(where: str, function: Callable[..., None], kind: str, head: tuple[int, ...]) -> Callback:
-    """Return a user's function for an element as a C function, by the template of its kind."""
+    """Return a user's function for an element as a C function, made from the template of this kind."""
     from floatframe.engine.compiling.callbacks import law_templates
 
     templates = {
@@ -77,7 +77,7 @@ def callback(where: str, function: Callable[..., None], kind: str, head: tuple[i
 
 
 def compiled_callback(where: str, function: Any, kind: str, template: Callable[[int], FunctionType]) -> Callback:
-    """Return a function of numba as a C function."""
+    """Return a function compiled by numba as a C function."""
     from numba.core.errors import NumbaError
 
     key = id(function), template.__name__
@@ -101,7 +101,7 @@ def compiled_callback(where: str, function: Any, kind: str, template: Callable[[
 
 
 def reason_of(error: Exception) -> str:
-    """Return the line of a message of numba that says what is wrong."""
+    """Return the line of a numba error message that states the cause."""
     lines = str(error).strip().splitlines() or [type(error).__name__]
     return next((line for line in lines if line and not line.startswith(("Failed in", "-"))), lines[0])
 
@@ -109,7 +109,7 @@ def reason_of(error: Exception) -> str:
 def lean_c_function(
     where: str, function: Any, template: Callable[[int], FunctionType], digest: int | None
 ) -> Any | None:  # fmt: skip
-    """Return a function of numba as a C function by the lean compiler, None if that is impossible."""
+    """Return a numba function as a C function by the lean compiler; None if that cannot compile it."""
     from floatframe.engine.kernels.compiler import law
     from floatframe.engine.kernels.compiler.stored import compiler_key
 
@@ -124,7 +124,7 @@ def lean_c_function(
 
 
 def c_function(made: FunctionType, is_stored: bool, **options: Any) -> Any:
-    """Return a Python function compiled as a C function of pointers; stored on disk if it may be."""
+    """Return a Python function compiled as a C function of pointers; it is stored on disk if `is_stored`."""
     from numba import cfunc, types
 
     number = types.CPointer(types.float64)
@@ -137,7 +137,7 @@ def c_function(made: FunctionType, is_stored: bool, **options: Any) -> Any:
 
 
 def filled(template: Callable[[int], FunctionType], function: Any, digest: int) -> FunctionType:
-    """Return the function of a template with the user's function in place of `law`.
+    """Return the function of a template in which the user's function replaces `law`.
 
     Its name says the digest, so that each law has an index of its own in the cache: two processes that add different
     laws to one index at the same moment give both the same file, and the code of one law under the key of the other.
@@ -181,7 +181,7 @@ def python_callback(
 
 
 def called_law(address: int, head: tuple[int, ...], data: Array, inputs: Array, n_out: int) -> Array:
-    """Return the outputs of a function of an element for inputs, (n_t, 1 + n 18 + n_z + n_lam): (n_t, n_out)."""
+    """Return the outputs of an element's function, (n_t, n_out), for inputs, (n_t, 1 + n 18 + n_z + n_lam)."""
     function = C_FUNCTION(address)
     numbers = np.ascontiguousarray(data, dtype=float)
     sizes = np.array(head, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Derivatives of the law of an element by fourth-order differences: of its outputs, and to check its own tangent."""
+"""Derivatives of the law of an element by fourth-order differences, for its outputs and to check its own tangent."""
 
 from collections.abc import Sequence
 
@@ -11,13 +11,14 @@ from floatframe.model.rotations import rotation_exp
 __all__ = ["difference_slopes"]
 
 STEP = 1e-4  #: relative step of the differences
-LEAST = 1e-3  #: size of a state or multiplier whose value is near zero
-N_MOTIONS = 5  #: sizes of motions; those of states follow
-STENCIL = ((-2, 1 / 12), (-1, -8 / 12), (1, 8 / 12), (2, -1 / 12))  #: of fourth order
+LEAST = 1e-3  #: size used for the step of a state or multiplier whose value is near zero
+N_MOTIONS = 5  #: number of entries of `sizes` that belong to motions; the sizes of the states follow
+#: offsets and weights of the fourth-order central difference
+STENCIL = ((-2, 1 / 12), (-1, -8 / 12), (1, 8 / 12), (2, -1 / 12))
 
 
 def varied(inputs: Array, n: int, width: int, k: int, step: float) -> Array:
-    """Return the inputs of a law with variation k (dr, dphi, dv, domega of each marker, states, multipliers)."""
+    """Return the inputs of a law after a step of variable k, numbered as dr, dphi, dv, domega, states, multipliers."""
     y = inputs.copy()
     per = width - 6
     if k >= per * n:
@@ -35,7 +36,7 @@ def varied(inputs: Array, n: int, width: int, k: int, step: float) -> Array:
 
 
 def size_of(sizes: Sequence[float], inputs: Array, n: int, width: int, k: int) -> float:
-    """Return the size of variation k, from the sizes in `PlacedLaw.sizes`."""
+    """Return the size of variable k, which scales its step, from the sizes in `PlacedLaw.sizes`."""
     per = width - 6
     if k >= per * n:
         own = sizes[N_MOTIONS + k - per * n]
@@ -48,7 +49,7 @@ def difference_slopes(
     address: int, head: tuple[int, ...], data: Array | Sequence[float], inputs: Array, sizes: Sequence[float],
     step: float = STEP,
 ) -> Array:  # fmt: skip
-    """Return d(wrenches, rates, held, outputs)/d(inputs) for all variations, (6 n + n_z + n_lam + n_seen, n_columns).
+    """Return the derivatives of all results by all variables, (6 n + n_z + n_lam + n_seen, n_columns).
 
     sizes: by which inputs are measured, see `PlacedLaw.sizes`.
     """

@@ -1,4 +1,4 @@
-"""A key of a compiled function that changes with everything it refers to: code, constants, other functions."""
+"""A key of a compiled function that changes with all code, constants and functions that it refers to."""
 
 import hashlib
 from pathlib import Path
@@ -13,11 +13,11 @@ __all__ = ["digest_of"]
 
 
 class NoKeyError(Exception):
-    """A key is impossible for something."""
+    """No key can be computed for an object."""
 
 
 def digest_of(function: Any) -> int | None:
-    """Return a positive key of a numba function; None if it refers to something without a key."""
+    """Return a positive key of a numba function; None if the function refers to an object without a key."""
     digest = hashlib.sha256()
     try:
         add_value(digest, function, {})
@@ -27,7 +27,7 @@ def digest_of(function: Any) -> int | None:
 
 
 def add_value(digest: Any, value: Any, seen: dict[int, bool]) -> None:
-    """Add to the key the object that a name refers to; `seen`: functions, by whether all they name has been added."""
+    """Add to the key the object that a name refers to; `seen` maps each visited function to whether it is complete."""
     if seen.get(id(value)) is False:
         raise NoKeyError  # it calls itself: numba cannot use such code from disk
     if id(value) in seen:
@@ -59,7 +59,7 @@ def add_value(digest: Any, value: Any, seen: dict[int, bool]) -> None:
 
 
 def add_function(digest: Any, function: FunctionType, seen: dict[int, bool]) -> None:
-    """Add to the key the code of a function, its module, which compiled code uses, and all objects that it names."""
+    """Add to the key the code of a function, the name of its module and all objects that it names."""
     digest.update(str(function.__module__).encode())
     add_code(digest, function.__code__)
     for cell in function.__closure__ or ():

@@ -1,4 +1,4 @@
-"""C functions of the law of an element: its values, and its derivatives by complex steps or differences.
+"""C functions of the law of an element: its values, and its derivatives by complex steps or by differences.
 
     void f(const int64 *head, const double *inputs, const double *data, double *outputs)
 
@@ -28,7 +28,7 @@ ROUNDING = 2e-15  # fraction of a number below which a step is lost in rounding
 
 
 def law(*arguments):
-    """Placeholder for the user's function."""
+    """Placeholder that the user's function replaces."""
 
 
 @register_jitable
@@ -38,7 +38,7 @@ def new_vector(kind, n):
 
 
 def value_template(digest):
-    """Return the function of the values."""
+    """Return the C function of the values of a law."""
 
     def value(head_at, inputs_at, data_at, outputs_at):
         head = carray(head_at, HEAD)
@@ -59,7 +59,7 @@ def value_template(digest):
 
 
 def given_template(digest):
-    """Return the function of the derivatives that the user has given."""
+    """Return the C function of the derivatives for a law whose user has given them."""
 
     def slopes(head_at, inputs_at, data_at, slopes_at):
         head = carray(head_at, HEAD)
@@ -75,7 +75,7 @@ def given_template(digest):
 
 
 def complex_template(digest):
-    """Return the function of the derivatives by a complex step."""
+    """Return the C function that computes the derivatives by complex steps."""
 
     def slopes(head_at, inputs_at, data_at, slopes_at):
         head = carray(head_at, HEAD)
@@ -126,7 +126,7 @@ def complex_template(digest):
 
 
 def difference_template(digest):
-    """Return the function of the derivatives by central differences."""
+    """Return the C function that computes the derivatives by central differences."""
 
     def slopes(head_at, inputs_at, data_at, slopes_at):
         head = carray(head_at, HEAD)

@@ -19,19 +19,19 @@ C_FUNCTION = ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_double), ctypes.POIN
 
 @dataclass
 class Callback:
-    """A function with its address, and its last error, because an error cannot pass through the kernels."""
+    """A function with its address; it stores its last error, because an error cannot pass through the kernels."""
 
-    name: str  #: name of the force or element for messages
+    name: str  #: name of the force or element, for messages
     address: int
     keeps: Any  #: objects that must live as long as the address is used
     error: BaseException | None = None
-    is_python: bool = False  #: whether each call runs Python
-    n_calls: int = 0  #: of a Python function, since `cost_words`
-    seconds: float = 0.0  #: that these calls took
+    is_python: bool = False  #: whether each call runs Python code
+    n_calls: int = 0  #: number of calls of a Python function since the last `cost_words`
+    seconds: float = 0.0  #: time that these calls took [s]
 
 
 def callback_of(force: UserForce, n_coordinates: int) -> Callback:
-    """Return the C function f(inputs, outputs) of a user force with a function.
+    """Return the function of a user force as a C function f(inputs, outputs).
 
     Raises
     ------
@@ -47,7 +47,7 @@ def callback_of(force: UserForce, n_coordinates: int) -> Callback:
 
 
 def compiled_callback(force: UserForce, n: int, n_forces: int, n_states: int) -> Callback:
-    """Return a function made by numba.njit as a C function."""
+    """Return a function compiled by numba.njit as a C function."""
     from numba import carray, cfunc, types
     from numba.core.errors import NumbaError
 
@@ -82,7 +82,7 @@ class ReturnedValueError(ModelError):
 
 
 def returned_value_error(name: str, kind: str) -> ReturnedValueError:
-    """Return the error of a force whose function returns a value of a kind."""
+    """Return the error for a force whose function returns a value of the given kind."""
     return ReturnedValueError(
         f"{name}: its function(t, x, v, z, Q, z_dot) returns a value ({kind}), which has no effect; expected that it "
         "writes into Q and z_dot, such as Q[0] = ..., and returns nothing"
@@ -121,7 +121,7 @@ def python_callback(force: UserForce, n: int, n_forces: int, n_states: int) -> C
 
 
 def cost_words(callback: Callback) -> str:
-    """Describe whether a function is compiled, or what its calls have cost since the last description; count anew."""
+    """Describe whether a function is compiled or how long its calls took; the counters restart from zero."""
     if not callback.is_python:
         return f"{callback.name}: its function is compiled"
     n, seconds = callback.n_calls, callback.seconds

@@ -29,21 +29,21 @@ BITS = 8  # of a byte
 class Block(types.Array):
     """A contiguous array of numbers in C order."""
 
-    words = "block"  #: first words of the name of the type
-    from_end = False  #: whether negative indices count from the end, and slices end within the array
+    words = "block"  #: prefix of the name of the type
+    from_end = False  #: whether negative indices count from the end, and slices are clipped to the array
 
     def __init__(self, dtype, ndim):
         super().__init__(dtype, ndim, "C", name=f"{self.words}({dtype}, {ndim}d)")
 
     def copy(self, dtype=None, ndim=None, layout=None, readonly=None):
-        """Return the type of a part, which is a block if it is contiguous; that of a new array says `readonly`."""
+        """Return the type of a part, a block if the part is contiguous; numba passes `readonly` only for new arrays."""
         if layout in (None, "C") and readonly is None:
             return type(self)(dtype or self.dtype, self.ndim if ndim is None else ndim)
         return super().copy(dtype, ndim, layout, readonly)
 
 
 class SafeBlock(Block):
-    """The same for functions of users: indices and slices mean what they mean in Python."""
+    """A block for user functions, in which indices and slices have the meaning of Python."""
 
     words = "safe block"
     from_end = True
@@ -52,7 +52,7 @@ class SafeBlock(Block):
 @register_model(Block)
 @register_model(SafeBlock)
 class BlockModel(models.ArrayModel):
-    """numba's structure of an array; as an argument its address and shape."""
+    """numba's data model of an array, passed as an argument by its address and shape."""
 
     def get_argument_type(self):
         """Return the types of the parts of an argument."""
@@ -69,7 +69,7 @@ class BlockModel(models.ArrayModel):
 
 
 def assemble(builder, block, structure, data, shape):
-    """Return the structure of an array from its address and shape, with strides and number of items."""
+    """Return the structure of an array at an address, with its strides and number of items computed from the shape."""
     n, size = len(shape), WORD(block.dtype.bitwidth // BITS)
     known = [ir.Constant(part, ir.Undefined) for part in structure.elements]
     known[0], known[1] = (ir.Constant(part, None) for part in structure.elements[:2])
@@ -87,17 +87,17 @@ def assemble(builder, block, structure, data, shape):
 
 
 def make_block(context, builder, kind, data, shape):
-    """Return the value of type `kind` at an address, of a shape."""
+    """Return the value of an array of type `kind` at an address, with the given shape."""
     return assemble(builder, kind, context.get_value_type(kind), data, shape)
 
 
 def shape_of(builder, block, value):
-    """Return the numbers of the shape."""
+    """Return the shape of an array as a tuple of integers."""
     return [builder.extract_value(value, (SHAPE, k)) for k in range(block.ndim)]
 
 
 def offset_of(context, builder, block, value, kinds, indices):
-    """Return the number of elements before the one at the indices; missing indices are zero."""
+    """Return the offset, in elements, of the element at the indices; missing indices are zero."""
     offset = None
     for k in range(block.ndim):
         if offset is not None:
@@ -111,45 +111,45 @@ def offset_of(context, builder, block, value, kinds, indices):
 
 
 def from_start(builder, index, n):
-    """Return an index that counts from the start, for one that counts from the end if it is negative."""
+    """Return an index that counts from the start; a negative one counts from the end."""
     if isinstance(index, ir.Constant) and isinstance(index.constant, int):
         return index if index.constant >= 0 else builder.add(index, n)
     return builder.select(builder.icmp_signed("<", index, WORD(0)), builder.add(index, n), index)
 
 
 def within(builder, bound, n):
-    """Return the bound of a slice as numba takes it: counted from the start, and between zero and the size."""
+    """Return a slice bound counted from the start and clipped to between zero and the size, as numba does."""
     bound = from_start(builder, bound, n)
     bound = builder.select(builder.icmp_signed("<", bound, WORD(0)), WORD(0), bound)
     return builder.select(builder.icmp_signed("<", bound, n), bound, n)
 
 
 def place(builder, value, offset):
-    """Return the address of the number at an offset."""
+    """Return the address of the number at an offset from an address."""
     return builder.gep(builder.extract_value(value, DATA), [offset], inbounds=True)
 
 
 def parts_of(builder, kind, index):
-    """Return types and values of the parts of an index."""
+    """Return the types and values of the parts of an index."""
     if isinstance(kind, types.BaseTuple):
         return tuple(kind), [builder.extract_value(index, k) for k in range(len(kind))]  # type: ignore[arg-type]
     return (kind,), [index]
 
 
 def is_number(block, kinds):
-    """Whether an index of these types denotes one number."""
+    """Whether an index of these types selects one number."""
     return len(kinds) == block.ndim and all(isinstance(kind, types.Integer) for kind in kinds)
 
 
 def is_part(kinds):
-    """Whether an index of these types denotes a contiguous part: numbers, then at most one slice."""
+    """Whether an index of these types selects a contiguous part: numbers, then at most one slice."""
     last = kinds[-1]
     is_slice = isinstance(last, types.SliceType) and not last.has_step
     return all(isinstance(kind, types.Integer) for kind in kinds[:-1]) and (is_slice or isinstance(last, types.Integer))
 
 
 def get_part(context, builder, signature, value, kinds, indices):
-    """Return the part of a block that an index denotes."""
+    """Return the part of a block that an index selects."""
     block, part = signature.args[0], signature.return_type
     shape = shape_of(builder, block, value)
     rest = shape[len(kinds) :]
@@ -172,7 +172,7 @@ def get_part(context, builder, signature, value, kinds, indices):
 @lower_builtin(operator.getitem, Block, types.SliceType)
 @lower_builtin(operator.getitem, Block, types.BaseTuple)
 def get_item(context, builder, signature, arguments):
-    """Return one number or a contiguous part; other indices are left to numba."""
+    """Return one number or a contiguous part; numba handles all other indices."""
     block, kind = signature.args
     kinds, indices = parts_of(builder, kind, arguments[1])
     if is_number(block, kinds):
@@ -187,7 +187,7 @@ def get_item(context, builder, signature, arguments):
 @lower_builtin(operator.setitem, Block, types.Integer, types.Number)
 @lower_builtin(operator.setitem, Block, types.BaseTuple, types.Number)
 def set_item(context, builder, signature, arguments):
-    """Write one number; other assignments are left to numba."""
+    """Write one number; numba handles all other assignments."""
     block, kind, of_value = signature.args
     kinds, indices = parts_of(builder, kind, arguments[1])
     if not is_number(block, kinds):
@@ -200,7 +200,7 @@ def set_item(context, builder, signature, arguments):
 
 @lower_builtin("array.reshape", Block, types.BaseTuple)
 def reshape(context, builder, signature, arguments):
-    """Return the same numbers in another shape; their number is checked in functions of users alone."""
+    """Return the same numbers in another shape; their count is checked only in user functions."""
     if signature.args[0].from_end:
         return array_reshape(context, builder, signature, arguments)
     kinds, shape = parts_of(builder, signature.args[1], arguments[1])
@@ -221,11 +221,11 @@ def flatten(context, builder, signature, arguments):
 
 @lower_getattr(Block, "shape")
 def get_shape(context, builder, kind, value):
-    """Return the shape."""
+    """Return the shape of an array."""
     return builder.extract_value(value, SHAPE)
 
 
 @lower_getattr(Block, "size")
 def get_size(context, builder, kind, value):
-    """Return the number of elements."""
+    """Return the number of elements of an array."""
     return builder.extract_value(value, N_ITEMS)

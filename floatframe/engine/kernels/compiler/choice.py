@@ -1,4 +1,4 @@
-"""Choice of the compiler for the kernels: the lean one for supported versions of numba, otherwise plain numba.
+"""Choice of the compiler for the kernels: the lean compiler for supported versions of numba, otherwise plain numba.
 
 The lean compiler (kernels/compiler/lean.py) replaces inner parts of numba, which change from one version to the next.
 Plain numba makes the same kernels with any version the project supports: it compiles several times as long, once, and
@@ -22,7 +22,7 @@ installed = ".".join(numba.__version__.split(".")[:2])
 
 
 def chosen() -> str:
-    """Return the compiler to use; `FloatframeError` if the requested one does not exist or is unusable."""
+    """Return the compiler to use; `FloatframeError` if the requested compiler is unknown or cannot be used."""
     asked = os.environ.get(VARIABLE, "")
     if asked not in ("", *CHOICES):
         raise FloatframeError(f"environment variable {VARIABLE}: expected one of {', '.join(CHOICES)}, got {asked!r}")
@@ -36,11 +36,11 @@ def chosen() -> str:
 
 is_lean = chosen() == "lean"
 level = int(config.OPT)  # type: ignore[attr-defined]  #: of optimisation, from NUMBA_OPT
-compiler = f"{chosen()} at level {level}"  #: what decides the machine code of a source
+compiler = f"{chosen()} at level {level}"  #: the settings that determine the machine code of a given source
 
 
 def words() -> str:
-    """Return the way in which the kernels are compiled, in one line for the user."""
+    """Describe how the kernels are compiled, in one line for the user."""
     if is_lean:
         return f"lean, with numba {numba.__version__}"
     asked = f"asked for by {VARIABLE}"

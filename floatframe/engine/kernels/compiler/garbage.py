@@ -1,4 +1,4 @@
-"""Suspension of Python's garbage collection while very many objects are made: by a compilation or a parser."""
+"""Suspension of Python's garbage collection while a compilation or a parser creates very many objects."""
 
 import gc
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ __all__ = ["without_garbage_collection"]
 
 @contextmanager
 def without_garbage_collection() -> Iterator[None]:
-    """Suspend garbage collection, which would walk through all these objects again and again."""
+    """Suspend garbage collection, which would traverse all new objects again and again."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:

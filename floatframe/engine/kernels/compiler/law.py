@@ -24,15 +24,15 @@ from floatframe.engine.kernels.compiler.sources import names_of
 
 __all__ = ["LawEntryCompiler", "block_at", "lean_law", "new_vector"]
 
-#: options of `njit` and `register_jitable` that change no result
+#: options of `njit` and `register_jitable` that do not change results
 SAME = {"nopython", "nogil", "boundscheck", "error_model", "cache", "no_cpython_wrapper"}
 
-#: inner functions by the identities of those that they replace, which are kept alive; None while one is made
+#: inner function for each replaced function, by the identity of the latter, which is kept alive; None while compiling
 made: dict[int, tuple[Any, Any]] = {}
 
 
 def lean_law(function: Any) -> Any:
-    """Return the inner function that computes the same as a function of numba.
+    """Return the inner function that computes the same as a numba function.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def lean_law(function: Any) -> Any:
 
 
 def inner_function(function: Any) -> Any:
-    """Return an inner function with the code of a function of numba; it calls inner functions too."""
+    """Return an inner function with the code of a numba function; the functions that it calls become inner ones too."""
     plain = function
     if isinstance(function, Dispatcher):
         plain = function.py_func
@@ -69,13 +69,13 @@ def inner_function(function: Any) -> Any:
 
 
 def replaced(value: Any) -> Any:
-    """Return the inner function for a function of numba; other values are unchanged."""
+    """Return the inner function that replaces a numba function; other values are unchanged."""
     is_function = isinstance(value, Dispatcher) or (isinstance(value, FunctionType) and is_jitable(value))
     return lean_law(value) if is_function else value
 
 
 def is_jitable(function: FunctionType) -> bool:
-    """Whether a function was decorated by `register_jitable`, without options that change its results."""
+    """Whether a function was decorated by `register_jitable` without options that change its results."""
     context = cpu_target.typing_context
     context.refresh()
     for template in getattr(context._lookup_global(function), "templates", ()):
@@ -88,7 +88,7 @@ def is_jitable(function: FunctionType) -> bool:
 
 @intrinsic
 def block_at(typing_context, pointer, shape):
-    """Return the array of a shape at an address, as `carray` does."""
+    """Return the array of a given shape at an address, as `carray` does."""
     block = SafeBlock(pointer.dtype, len(shape) if isinstance(shape, types.BaseTuple) else 1)
 
     def generate(context, builder, signature, arguments):
@@ -101,7 +101,7 @@ def block_at(typing_context, pointer, shape):
 
 @intrinsic
 def new_vector(typing_context, kind, n):
-    """Return a vector on the stack, where it lives until the function ends."""
+    """Return a vector on the stack, which exists until the function returns."""
     block = SafeBlock(kind.dtype, 1)
 
     def generate(context, builder, signature, arguments):

@@ -1,4 +1,4 @@
-"""The lean compiler of kernels: inner functions to intermediate code only, which an entry optimises once together.
+"""The lean compiler: each inner function becomes intermediate code, and an entry optimises all of it once.
 
 Left alone, numba optimises each function and makes machine code of it, and optimises everything below it once more
 with each caller; it also looks up what an operator means for numbers at every single place, and looks in each function
@@ -81,7 +81,7 @@ __all__ = [
 
 @register_pass(mutates_CFG=False, analysis_only=False)
 class ConstantIndices(FunctionPass):
-    """Types use constant indices of tuples; this is the only rewrite of numba that kernels need."""
+    """Return the types with constant indices of tuples; this is the only numba rewrite that kernels need."""
 
     _name = "constant_indices"
 
@@ -99,7 +99,7 @@ class ConstantIndices(FunctionPass):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class OneAssignment(FunctionPass):
-    """One assignment a variable, without analyses of lifetimes."""
+    """Conversion to one assignment per variable, without analysis of lifetimes."""
 
     _name = "one_assignment"
 
@@ -115,7 +115,7 @@ class OneAssignment(FunctionPass):
 
 @register_pass(mutates_CFG=False, analysis_only=False)
 class NoPhis(PreLowerStripPhis):
-    """Assignments at the ends of blocks instead of phi nodes, without analyses of lifetimes."""
+    """Replacement of phi nodes by assignments at the ends of blocks, without analysis of lifetimes."""
 
     _name = "no_phis"
 
@@ -128,30 +128,30 @@ class NoPhis(PreLowerStripPhis):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class KernelLowering(NativeLowering):
-    """Lowering of an inner function."""
+    """Lowering of an inner function to LLVM code."""
 
     _name = "kernel_lowering"
 
     @property
     def lowering_class(self):
-        """The lowering for kernels."""
+        """The class that lowers kernels."""
         return KernelLower
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class LawLowering(NativeLowering):
-    """Lowering of a function of a law."""
+    """Lowering of a function of a law to LLVM code."""
 
     _name = "law_lowering"
 
     @property
     def lowering_class(self):
-        """The lowering for laws."""
+        """The class that lowers laws."""
         return LawLower
 
 
 class Passes(PassManager):
-    """Passes in order, without analyses of lifetimes after each of them."""
+    """Compiler passes in order, without analysis of lifetimes after each pass."""
 
     def _runPass(self, index, pss, internal_state):
         pss.analysis = self._analysis
@@ -161,12 +161,12 @@ class Passes(PassManager):
 
 
 FRONT = [IRProcessing, ConstantIndices, OneAssignment, NopythonTypeInference, NoPhis]
-INNER = [KernelLowering, NoPythonBackend]  #: the last passes of an inner function
-ENTRY = [IRLegalization, NativeLowering, NoPythonBackend]  #: those of an entry
+INNER = [KernelLowering, NoPythonBackend]  #: the last passes for an inner function
+ENTRY = [IRLegalization, NativeLowering, NoPythonBackend]  #: the last passes for an entry
 
 
 def pipeline(state, back):
-    """Return the passes that kernels need."""
+    """Return the compiler passes that kernels need, ending with the passes in `back`."""
     passes = [*FRONT, *back] if state.func_ir else [TranslateByteCode, FixupArgs, *FRONT, *back]
     manager = Passes("kernel")
     for each in passes:
@@ -179,23 +179,23 @@ def pipeline(state, back):
 
 
 class WithoutEngine:
-    """Replaces the code generator for a library that never runs on its own."""
+    """Replacement for the code generator of a library that never runs on its own."""
 
     @staticmethod
     def set_env(name, environment):
-        """Leave the environment of Python objects unchanged, because inner functions use none."""
+        """Leave the environment of Python objects unset, because inner functions do not use it."""
 
 
 class InnerLibrary(JITCodeLibrary):
     """The intermediate code of an inner function (1)."""
 
-    attributes: tuple[str, ...] = ()  #: of LLVM
-    key: str | None = None  #: of its code on disk (6)
-    known: ClassVar[dict[str, "InnerLibrary"]] = {}  #: by key
+    attributes: tuple[str, ...] = ()  #: LLVM attributes of the function
+    key: str | None = None  #: key of the code on disk (6), None if it is not stored
+    known: ClassVar[dict[str, "InnerLibrary"]] = {}  #: libraries of this process by key
 
     @classmethod
     def stored(cls, codegen, key, code):
-        """Return the library of stored code with those that it calls; None if one of them is missing."""
+        """Return the library of stored code with the libraries that it calls; None if one of them is missing."""
         called = [cls.found(codegen, each) for each in code.called]
         if None in called:
             return None
@@ -210,13 +210,13 @@ class InnerLibrary(JITCodeLibrary):
 
     @classmethod
     def found(cls, codegen, key):
-        """Return the library of a key, of this process or from disk, or None."""
+        """Return the library with a key, from this process or from disk; None if there is none."""
         if key not in cls.known and (code := read_code(key)) is not None:
             cls.stored(codegen, key, code)
         return cls.known.get(key)
 
     def add_ir_module(self, ir_module):
-        """Parse the code of the function, the only module here, without linking it into an empty one first."""
+        """Parse the code of the function as the only module, instead of linking it into an empty module."""
         self._raise_if_finalized()
         module = parse_assembly(cgutils.normalize_ir_text(str(ir_module)))
         module.name = ir_module.name
@@ -224,7 +224,7 @@ class InnerLibrary(JITCodeLibrary):
         self._final_module = module
 
     def store(self, key, result):
-        """Write the code to disk, if all kernels that it calls are there too."""
+        """Write the code to disk if all kernels that it calls are stored too."""
         libraries = [each for each in dict.fromkeys(self._linking_libraries) if each is not rtsys.library]
         called = [each for each in libraries if isinstance(each, InnerLibrary)]
         keys = tuple(each.key for each in called if each.key is not None)
@@ -238,7 +238,7 @@ class InnerLibrary(JITCodeLibrary):
         write_code(key, StoredCode(result, keys, module.as_bitcode()))
 
     def _get_module_for_linking(self):
-        """Return the code itself, no copy: an entry links it once."""
+        """Return the code itself instead of a copy, because an entry links it only once."""
         self._ensure_finalized()
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == Linkage.external:
@@ -246,7 +246,7 @@ class InnerLibrary(JITCodeLibrary):
         return self._final_module
 
     def finalize(self):
-        """Register the called functions: no linking, no optimisation, no machine code."""
+        """Register the called functions without linking, optimisation or machine code."""
         self._raise_if_finalized()
         for library in dict.fromkeys(self._linking_libraries):
             self._reload_init.update(library._reload_init)
@@ -254,7 +254,7 @@ class InnerLibrary(JITCodeLibrary):
         self._finalized = True
 
     def get_pointer_to_function(self, name):
-        """Return zero: there is no machine code."""
+        """Return zero, because there is no machine code."""
         self._ensure_finalized()
         return 0
 
@@ -265,7 +265,7 @@ class InnerLibrary(JITCodeLibrary):
 
 
 def add_internal(module, other):
-    """Link a copy of another module into one; its functions cannot be seen from outside."""
+    """Link a copy of another module into a module, with functions that are not visible outside."""
     names = {function.name for function in other.functions if not function.is_declaration}
     module.link_in(other, preserve=True)  # without those that are not called
     for function in module.functions:
@@ -274,9 +274,9 @@ def add_internal(module, other):
 
 
 class EntryLibrary(JITCodeLibrary):
-    """The code of an entry and of all functions that it calls (2)."""
+    """The code of an entry together with all functions that it calls (2)."""
 
-    attributes = ()  #: of LLVM
+    attributes = ()  #: LLVM attributes of the function
 
     def finalize(self):
         """Link, optimise, and generate machine code."""
@@ -296,7 +296,7 @@ class EntryLibrary(JITCodeLibrary):
 
 
 def with_callees(library, known):
-    """Add a library and all libraries that its code calls to the known ones."""
+    """Add a library, and recursively all libraries that it calls, to `known`."""
     if library not in known:
         known[library] = None
         for other in library._linking_libraries:
@@ -304,7 +304,7 @@ def with_callees(library, known):
 
 
 def variables_in(self, part):
-    """Return the variables in a part of a statement of numba, as `Inst._rec_list_vars` does."""
+    """Return the variables in a part of a numba statement, as `Inst._rec_list_vars` does."""
     kind = type(part)
     if kind is Var:
         return [part]
@@ -324,12 +324,12 @@ plain_variables_in = Inst._rec_list_vars
 
 
 def without_warnings(self, filename=None, lineno=None):
-    """Return a context that does nothing, in place of the one that collects warnings of a statement."""
+    """Return a context that does nothing, which replaces the collection of warnings for each statement."""
     return nullcontext()
 
 
 def needed_rewrites(self, rewrites, code):
-    """Apply the rewrites of byte code that kernels may need, without those for `with` and keyword dictionaries."""
+    """Apply the byte code rewrites that kernels may need, without those for `with` and keyword dictionaries."""
     return plain_rewrites(self, [each for each in rewrites if each.__name__ not in NOT_NEEDED], code)
 
 
@@ -339,7 +339,7 @@ plain_rewrites = Interpreter.post_process
 
 @contextmanager
 def shorter_ways() -> Iterator[None]:
-    """(3), within the compiler's lock."""
+    """Replace slow functions of numba by faster ones while the compiler's lock is held (3)."""
     replaced = (
         (Inst, "_rec_list_vars", variables_in),
         (WarningsFixer, "catch_warnings", without_warnings),
@@ -357,7 +357,7 @@ def shorter_ways() -> Iterator[None]:
 
 @contextmanager
 def remembered_calls() -> Iterator[None]:
-    """(3), within the compiler's lock."""
+    """Cache the types of calls while the compiler's lock is held (3)."""
     plain = BaseFunction.get_call_type
     known: dict = {}
 
@@ -376,7 +376,7 @@ def remembered_calls() -> Iterator[None]:
 
 
 def identity(function, key):
-    """Return the identity of a function, from whose number its name in LLVM is made: the same in every process."""
+    """Return the identity of a function with a number, used in its LLVM name, that is the same in every process."""
     known = FunctionIdentity.from_function(function)
     if key is not None:
         known.unique_id = key
@@ -385,12 +385,12 @@ def identity(function, key):
 
 
 class InnerCompiler(CompilerBase):
-    """The pipeline of an inner function."""
+    """The compiler of an inner function."""
 
     #: LLVM attribute of the function: small code, because its loops are short
     attributes: tuple[str, ...] = ("optsize",)
     context: ClassVar[Any] = KernelContext
-    passes: ClassVar[Sequence[type]] = INNER  #: the last ones
+    passes: ClassVar[Sequence[type]] = INNER  #: last passes of the pipeline
 
     def define_pipelines(self):
         """Return the one pipeline."""
@@ -416,7 +416,7 @@ class InnerCompiler(CompilerBase):
         return result
 
     def stored_result(self, func, key, kind, library):
-        """Return what a compilation returns, with a library from disk."""
+        """Return the result of a compilation for a library from disk."""
         state = self.state
         context, known = state.targetctx, identity(func, key)
         described = FunctionDescriptor(
@@ -438,7 +438,7 @@ class InnerCompiler(CompilerBase):
 
 
 class EntryCompiler(CompilerBase):
-    """The pipeline of an entry."""
+    """The compiler of an entry."""
 
     def define_pipelines(self):
         """Return the one pipeline."""
@@ -455,7 +455,7 @@ class EntryCompiler(CompilerBase):
 
 
 class LawEntryCompiler(EntryCompiler):
-    """The pipeline of the C function of a law."""
+    """The compiler of the C function of a law."""
 
     def define_pipelines(self):
         """Return the one pipeline."""
@@ -463,32 +463,32 @@ class LawEntryCompiler(EntryCompiler):
 
 
 class LoopCompiler(InnerCompiler):
-    """The same for a function whose loops run over modes or matrices: they are unrolled and vectorised."""
+    """The compiler of an inner function with loops over modes or matrices, which are unrolled and vectorised."""
 
     attributes = ()
 
 
 class SmallCompiler(InnerCompiler):
-    """The same for a function of a few operations, or with one caller: it is inlined into its callers."""
+    """The compiler of an inner function with few operations or one caller, which is inlined."""
 
     attributes = ("alwaysinline",)
 
 
 class MatrixLoopCompiler(InnerCompiler):
-    """The same for such a function that is not inlined, because it is long and has many callers."""
+    """The compiler of a long function with loops and many callers, which is not inlined."""
 
     attributes = ("noinline",)
 
 
 class LawCompiler(InnerCompiler):
-    """The same for a function of a law, see kernels/compiler/law.py."""
+    """The compiler of a function of a law, see kernels/compiler/law.py."""
 
     attributes = ()
     context = LawContext
     passes = (LawLowering, NoPythonBackend)
 
     def compile_extra(self, func):
-        """Compile as other inner functions, else as one that makes arrays."""
+        """Compile as an inner function or, if it creates arrays, with `OwnerCompiler`."""
         state = self.state
         try:
             return super().compile_extra(func)
@@ -503,7 +503,7 @@ class LawCompiler(InnerCompiler):
 
 
 class OwnerCompiler(LawCompiler):
-    """The same for a function that makes arrays: by the passes of numba, with counted references."""
+    """The compiler of a function that creates arrays, with numba's passes and reference counts."""
 
     def define_pipelines(self):
         """Return numba's pipeline."""
@@ -515,11 +515,11 @@ class OwnerCompiler(LawCompiler):
 
 
 class NotLeanError(Exception):
-    """The lean compiler does not know something in a function."""
+    """The lean compiler does not support something in a function."""
 
 
 def decorator(pipeline_class, **options):
-    """Return the decorator of functions that only compiled code calls.
+    """Return the decorator for functions that only compiled code calls.
 
     They have no wrappers for Python, no test before each division, and no counted references (all arrays belong to
     Python) but where options say so.
@@ -533,8 +533,8 @@ def decorator(pipeline_class, **options):
     )
 
 
-inner = decorator(InnerCompiler)  #: decorator of functions that only compiled code calls
-small = decorator(SmallCompiler)  #: the same for functions of a few operations
+inner = decorator(InnerCompiler)  #: decorator for functions that only compiled code calls
+small = decorator(SmallCompiler)  #: the same for functions with few operations
 loops = decorator(LoopCompiler)  #: the same for functions with loops over modes or matrices (5)
 matrix_loops = decorator(MatrixLoopCompiler)  #: the same for long functions with many callers
 view = decorator(LoopCompiler, _nrt=True)  #: the same for functions that return a part of an array
@@ -547,10 +547,10 @@ def entry(function, *, cache=True):
 
 
 def array_type(dtype, ndim):
-    """Return the type of a contiguous array in kernels."""
+    """Return the type of a contiguous array in the kernels."""
     return Block(dtype, ndim)
 
 
 def array_value(context, builder, kind, data, shape):
-    """Return the value of an array at an address, which belongs to Python."""
+    """Return the value of an array at an address whose memory Python owns."""
     return make_block(context, builder, kind, data, shape)

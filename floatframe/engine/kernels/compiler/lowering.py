@@ -1,4 +1,4 @@
-"""From numba's intermediate code of an inner function to LLVM code, without features that kernels do not need.
+"""Translation of numba's intermediate code of inner functions to LLVM code, without features that kernels omit.
 
 Kernels own no memory and raise no errors, so that here
 
@@ -37,7 +37,7 @@ OPERATIONS = {
 
 
 def single_assignments(blocks):
-    """Return the variables with one assignment, which precedes every use on all paths (2)."""
+    """Return the variables with one assignment that precedes every use on all paths (2)."""
     assigned = defaultdict(list)
     for label, block in blocks.items():
         for statement in block.find_insts(ir.Assign):
@@ -58,29 +58,29 @@ def single_assignments(blocks):
 class KernelLower(Lower):
     """numba's lowering of a function, for kernels."""
 
-    operations = OPERATIONS  #: (4)
+    operations = OPERATIONS  #: numeric operations that are written directly (4)
 
     def _find_singly_assigned_variable(self):
         self._singly_assigned_vars = single_assignments(self.func_ir.blocks)
         self._blk_local_varmap = {}
 
     def setup_function(self, fndesc):
-        """Begin a function (5)."""
+        """Set up the LLVM function (5)."""
         super().setup_function(fndesc)
         for attribute in self.library.attributes:
             self.function.attributes.add(attribute)
 
     def incref(self, typ, val):
-        """Do not count references (1)."""
+        """Do nothing, because references are not counted (1)."""
 
     def decref(self, typ, val):
-        """Do not count references (1)."""
+        """Do nothing, because references are not counted (1)."""
 
     def delvar(self, name):
-        """Leave the variable unchanged (1)."""
+        """Do nothing, because variables own no references (1)."""
 
     def alloca_lltype(self, name, lltype, datamodel=None):
-        """Return a place on the stack without initialisation (1)."""
+        """Return uninitialised memory on the stack (1)."""
         with self.builder.goto_entry_block():
             return self.builder.alloca(lltype, name=name)
 
@@ -92,13 +92,13 @@ class KernelLower(Lower):
             self.builder.store(value, self.getvar(name))
 
     def lower_assign(self, ty, inst):
-        """Return the value of an assignment; a kernel as a value has none."""
+        """Return the value of an assignment; a kernel used as a value has none."""
         if isinstance(ty, types.Dispatcher):
             return self.context.get_dummy_value()
         return super().lower_assign(ty, inst)
 
     def lower_block(self, block):
-        """Write a block of statements; an error names the line."""
+        """Write a block of statements; an error states the line."""
         self.pre_block(block)
         for statement in block.body:
             self.loc = statement.loc
@@ -132,7 +132,7 @@ class KernelLower(Lower):
         return super().lower_expr(resty, expr)
 
     def lower_getitem(self, resty, expr, value, index, signature):
-        """Return a part of an array (4)."""
+        """Return an element or a part of an array (4)."""
         if not isinstance(signature.args[0], Block):
             return super().lower_getitem(resty, expr, value, index, signature)
         arguments = [self.loadvar(value.name), self.value_as(index, signature.args[1])]
@@ -140,7 +140,7 @@ class KernelLower(Lower):
         return self.context.cast(self.builder, part, signature.return_type, resty)
 
     def value_as(self, variable, kind):
-        """Return the value of a variable as one of another type."""
+        """Return the value of a variable converted to another type."""
         return self.context.cast(self.builder, self.loadvar(variable.name), self.typeof(variable.name), kind)
 
 
@@ -150,24 +150,24 @@ def parts(builder, x):
 
 
 def complex_number(builder, kind, real, imag):
-    """Return the complex number with these parts."""
+    """Return the complex number with these real and imaginary parts."""
     return builder.insert_value(builder.insert_value(llvm.Constant(kind, llvm.Undefined), real, 0), imag, 1)
 
 
 def complex_sum(builder, x, y):
-    """Return x + y."""
+    """Return the complex sum x + y."""
     (a, b), (c, d) = parts(builder, x), parts(builder, y)
     return complex_number(builder, x.type, builder.fadd(a, c), builder.fadd(b, d))
 
 
 def complex_difference(builder, x, y):
-    """Return x - y."""
+    """Return the complex difference x - y."""
     (a, b), (c, d) = parts(builder, x), parts(builder, y)
     return complex_number(builder, x.type, builder.fsub(a, c), builder.fsub(b, d))
 
 
 def complex_product(builder, x, y):
-    """Return x y."""
+    """Return the complex product x y."""
     (a, b), (c, d) = parts(builder, x), parts(builder, y)
     real = builder.fsub(builder.fmul(a, c), builder.fmul(b, d))
     return complex_number(builder, x.type, real, builder.fadd(builder.fmul(a, d), builder.fmul(b, c)))
@@ -180,7 +180,7 @@ LAW_OPERATIONS = {
     (operator.sub, *COMPLEX): complex_difference,
     (operator.mul, *COMPLEX): complex_product,
 }
-MAKES_ARRAYS = ("call", "binop", "unary")  #: expressions whose arrays may be new
+MAKES_ARRAYS = ("call", "binop", "unary")  #: kinds of expressions that may create a new array
 
 
 class LawLower(KernelLower):
@@ -189,23 +189,23 @@ class LawLower(KernelLower):
     operations = LAW_OPERATIONS
 
     def lower_expr(self, resty, expr):
-        """Return the value of an expression; a new array is refused, because it would never be freed (1)."""
+        """Return the value of an expression; a new array is rejected, because it would never be freed (1)."""
         if expr.op in MAKES_ARRAYS and self.context.data_model_manager[resty].contains_nrt_meminfo():
             raise NotImplementedError("an array that must be freed")
         return super().lower_expr(resty, expr)
 
 
 class LawContext(CPUContext):
-    """numba's context of compilation, for functions of laws: errors pass through calls."""
+    """numba's compilation context for functions of laws, in which errors pass through calls."""
 
     @classmethod
     def of(cls, context):
-        """Return the context itself."""
+        """Return the context unchanged."""
         return context
 
 
 def call_of_kernel(fndesc, libraries):
-    """Return the function that writes a call of a kernel (3), with numba's calling convention."""
+    """Return the function that writes a call of a kernel with numba's calling convention (3)."""
 
     def write_call(context, builder, signature, arguments):
         function = context.declare_function(builder.module, fndesc)
@@ -224,16 +224,16 @@ def call_of_kernel(fndesc, libraries):
 
 
 class KernelContext(CPUContext):
-    """numba's context of compilation for functions that are kernels."""
+    """numba's compilation context for functions that are kernels."""
 
     @classmethod
     def of(cls, context):
-        """Return a context for kernels that shares all data of the given one."""
+        """Return a context for kernels that shares all data with the given one."""
         shared = context.subtarget()
         shared.__class__ = cls
         return shared
 
     def insert_user_function(self, func, fndesc, libs=()):
-        """Register how a kernel is called."""
+        """Register how a kernel is called by other kernels."""
         write_call = call_of_kernel(fndesc, libs)
         self._defns[func].append(write_call, write_call.signature)

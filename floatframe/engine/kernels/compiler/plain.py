@@ -1,4 +1,4 @@
-"""Kernels compiled by plain numba of any supported version: slower to compile, but only with its public interface.
+"""Kernels compiled by plain numba of any supported version, slower but only with numba's public interface.
 
 The names are those of kernels/compiler/lean.py, which says what they are for.
 """
@@ -21,12 +21,12 @@ def entry(function, *, cache=True):
 
 
 def array_type(dtype, ndim):
-    """Return the type of a contiguous array in kernels."""
+    """Return the type of a contiguous array in the kernels."""
     return types.Array(dtype, ndim, "C")
 
 
 def array_value(context, builder, kind, data, shape):
-    """Return the value of an array at an address, which belongs to Python."""
+    """Return the value of an array at an address whose memory Python owns."""
     array = context.make_array(kind)(context, builder)
     strides = [WORD(BYTES)]
     for size in reversed(shape[1:]):

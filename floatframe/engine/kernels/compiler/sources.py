@@ -19,14 +19,14 @@ __all__ = ["imported_modules", "names_of", "source_digest", "source_files"]
 
 ROOT = Path(__file__).parents[4]  #: folder of the packages
 PACKAGES = ("cms", "fe_models", "floatframe")
-#: an import statement: the module and the names of `from`, or the modules
+#: an import statement: module and names after `from`, or the imported modules
 STATEMENT = re.compile(
     r"^[ \t]*(?:from[ \t]+([\w.]+)[ \t]+import[ \t]*(\([^)]*\)|[^\n#]*)|import[ \t]+([^\n#]*))", re.MULTILINE
 )
 
 
 def imported_modules(text: str) -> set[str]:
-    """Return the names in the import statements of a source: modules, and names in them, which may be modules too."""
+    """Return the names in the import statements of a source; a name imported from a module may itself be a module."""
     found = set()
     for module, names, plain in STATEMENT.findall(text):
         words = re.findall(r"[\w.]+", re.sub(r"#[^\n]*|\bas[ \t]+\w+", "", names or plain))
@@ -35,7 +35,7 @@ def imported_modules(text: str) -> set[str]:
 
 
 def source_files(module: str, root: Path = ROOT) -> list[Path]:
-    """Return the files of a module of the project and of all that it imports, in a fixed order."""
+    """Return the files of a project module and of all modules that it imports, in a fixed order."""
     known: set[Path] = set()
     left = [module]
     while left:
@@ -48,7 +48,7 @@ def source_files(module: str, root: Path = ROOT) -> list[Path]:
 
 
 def source_digest(module: str, *extra: str, root: Path = ROOT) -> int:
-    """Return a positive key that changes with the syntax of a module, of all that it imports, and with `extra`.
+    """Return a positive key that changes with `extra` and with the syntax of a module and of all that it imports.
 
     Syntax trees take a few tenths of a second; a file beside this one keeps the last key together with a digest of the
     sources as they were. Where no file can be written, as in an installation of another user, the sources count as they
@@ -68,7 +68,7 @@ def source_digest(module: str, *extra: str, root: Path = ROOT) -> int:
 
 
 def digest_of(extra: tuple[str, ...], texts: dict[str, bytes]) -> int:
-    """Return a positive number of 56 bits."""
+    """Return a positive hash of 56 bits."""
     digest = hashlib.sha256(repr(extra).encode())
     for name, text in texts.items():
         digest.update(repr((name, len(text))).encode() + text)
@@ -95,13 +95,13 @@ DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 
 def record_of(root: Path, module: str, extra: tuple[str, ...]) -> Path:
-    """Return the file that keeps the key of a module: one for each version of Python, whose trees differ."""
+    """Return the file that stores the key of a module, one for each Python version because syntax trees differ."""
     name = "-".join((module, *extra, str(sys.implementation.cache_tag)))
     return root / PACKAGES[-1] / "__pycache__" / f"{name}.key"
 
 
 def keep(record: Path, words: str) -> bool:
-    """Write a record, whole or not at all; return whether it was written."""
+    """Write a record completely or not at all; return whether it was written."""
     part = record.with_name(f"{record.name}.{os.getpid()}")
     try:
         record.parent.mkdir(exist_ok=True)
@@ -113,7 +113,7 @@ def keep(record: Path, words: str) -> bool:
 
 
 def names_of(code: CodeType) -> list[str]:
-    """Return the names that a code and those in it use, in a fixed order."""
+    """Return the names used in a code object and in the code objects inside it, in a fixed order."""
     found = list(code.co_names)
     for each in code.co_consts:
         if isinstance(each, CodeType):

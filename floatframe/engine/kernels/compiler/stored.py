@@ -1,4 +1,4 @@
-"""Intermediate code of inner functions on disk: an edited line compiles its function and the callers of it alone.
+"""Intermediate code of inner functions on disk; after an edit, only that function and its callers are compiled.
 
 The key of a function is a digest of everything from which its code follows: its byte code and constants, the values of
 the names that it uses, the same for the functions that it calls, the types of its arguments, the modules of the
@@ -34,7 +34,7 @@ from floatframe.engine.kernels.compiler.sources import PACKAGES
 
 __all__ = ["StoredCode", "code_key", "compiler_key", "delete_old", "read_code", "write_code"]
 
-#: beside the code that numba stores: in NUMBA_CACHE_DIR if that is set
+#: folder beside numba's own cache, in NUMBA_CACHE_DIR if that is set
 FOLDER = Path(os.environ.get("NUMBA_CACHE_DIR") or Path(__file__).parents[3] / "__pycache__") / "inner"
 MONTH = 30 * 24 * 3600.0  # seconds
 
@@ -42,21 +42,21 @@ keys: WeakKeyDictionary[FunctionType, str | None] = WeakKeyDictionary()  # of fu
 
 
 class UnknownKindError(Exception):
-    """A value of unknown kind."""
+    """A value whose kind has no key."""
 
 
 @dataclass(frozen=True)
 class StoredCode:
-    """What the compilation of an inner function gave."""
+    """The stored result of compiling an inner function."""
 
     result: types.Type
-    called: tuple[str, ...]  #: keys of the functions that it calls
-    bitcode: bytes  #: of LLVM
+    called: tuple[str, ...]  #: keys of the inner functions that it calls
+    bitcode: bytes  #: LLVM bitcode of the function
 
 
 @cache
 def compiler_key() -> str:
-    """Return the digest of the modules of the compiler and of the versions."""
+    """Return the digest of the compiler's modules and of the versions of Python, NumPy, numba and llvmlite."""
     folder = Path(__file__).parent
     sources = [path.read_bytes() for path in (*sorted(folder.glob("*.py")), folder.parent / "records.py")]
     versions = numba.__version__, llvmlite.__version__, np.__version__, sys.version
@@ -64,12 +64,12 @@ def compiler_key() -> str:
 
 
 def digest(words: str) -> str:
-    """Return a short digest."""
+    """Return a short digest of a text."""
     return hashlib.sha256(words.encode()).hexdigest()[:32]
 
 
 def code_key(function: FunctionType, arguments: tuple, options: str) -> str | None:
-    """Return the key of a function for the types of its arguments and the options of its compilation, if it has one."""
+    """Return the key of a function for its argument types and compiler options; None if it has none."""
     try:
         words = function_words(function), [type_words(each) for each in arguments], options
     except UnknownKindError:
@@ -78,7 +78,7 @@ def code_key(function: FunctionType, arguments: tuple, options: str) -> str | No
 
 
 def function_words(function: FunctionType) -> str:
-    """Return the digest of a function of Python and of everything that it uses."""
+    """Return the digest of a Python function and of everything that it uses."""
     if function not in keys:
         keys[function] = None  # of a function that calls itself
         with contextlib.suppress(UnknownKindError):
@@ -92,12 +92,12 @@ def function_words(function: FunctionType) -> str:
 
 
 def default_words(function: FunctionType) -> list:
-    """Return the words of the default values of parameters."""
+    """Return a description of the default values of the parameters of a function."""
     return [value_words(each) for each in (function.__defaults__, tuple((function.__kwdefaults__ or {}).items()))]
 
 
 def code_words(code: CodeType, known: dict) -> tuple:
-    """Return the words of byte code and of the values of its names."""
+    """Return a description of byte code and of the values of all names in it."""
     modules = [value for name in code.co_names if isinstance(value := known.get(name), ModuleType)]
     values: list[tuple] = []
     for name in code.co_names:
@@ -118,12 +118,12 @@ def code_words(code: CodeType, known: dict) -> tuple:
 
 
 def is_ours(module: str | None) -> bool:
-    """Whether a module belongs to the packages of the project, or is unknown."""
+    """Whether a module belongs to this project, or is unknown."""
     return module is None or module.partition(".")[0] in (*PACKAGES, "tests", "__main__")
 
 
 def value_words(value) -> object:
-    """Return words that are equal only for equal values; `UnknownKindError` for a kind that is unknown here."""
+    """Return a description that is equal only for equal values; `UnknownKindError` for an unknown kind of value."""
     if value is None or isinstance(value, PLAIN):
         return type(value).__qualname__, repr(value)
     if isinstance(value, Enum):
@@ -150,20 +150,20 @@ def value_words(value) -> object:
     raise UnknownKindError
 
 
-#: modules whose code does not change while the versions of Python, NumPy and numba are the same
+#: modules whose code changes only with the versions of Python, NumPy and numba
 FOREIGN = ("builtins", "cmath", "math", "numba", "numpy", "operator", "_operator", "None")
 PLAIN = (bool, int, float, complex, str, bytes, type(Ellipsis))
 
 
 def record_words(kind: type) -> object:
-    """Return the words of a class of records."""
+    """Return a description of a class of records."""
     if not issubclass(kind, tuple) or not hasattr(kind, "_fields"):
         raise UnknownKindError
     return "record", kind.__module__, kind.__qualname__, kind._fields
 
 
 def type_words(kind: types.Type) -> object:
-    """Return words that are equal only for equal types; `UnknownKindError` for a kind that is unknown here."""
+    """Return a description that is equal only for equal types; `UnknownKindError` for an unknown kind of type."""
     if isinstance(fields := getattr(kind, "fields", None), dict):  # a record of arrays
         return str(kind), [(name, type_words(each), place) for name, (each, place) in fields.items()]
     if isinstance(kind, types.BaseTuple):
@@ -177,7 +177,7 @@ def type_words(kind: types.Type) -> object:
 
 
 def read_code(key: str) -> StoredCode | None:
-    """Return the stored code of a key, if there is any."""
+    """Return the stored code with a key, or None."""
     path = FOLDER / key
     try:
         code = pickle.loads(path.read_bytes())
@@ -188,7 +188,7 @@ def read_code(key: str) -> StoredCode | None:
 
 
 def write_code(key: str, code: StoredCode) -> None:
-    """Store code, whole or not at all."""
+    """Write code to disk completely or not at all."""
     part = FOLDER / f"{key}.{os.getpid()}"
     with contextlib.suppress(OSError, pickle.PicklingError):
         FOLDER.mkdir(parents=True, exist_ok=True)
@@ -197,7 +197,7 @@ def write_code(key: str, code: StoredCode) -> None:
 
 
 def delete_old(age: float = MONTH) -> None:
-    """Delete the files that were not read or written for so many seconds."""
+    """Delete the files that have not been read or written for `age` seconds."""
     oldest = time.time() - age
     with contextlib.suppress(OSError):
         for path in FOLDER.iterdir():

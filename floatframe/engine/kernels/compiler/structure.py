@@ -1,4 +1,4 @@
-"""Records of arrays in the kernels: each is one pointer to a table of addresses and shapes.
+"""Records of arrays in the kernels: each record is a pointer to a table of addresses and shapes.
 
 The table of a record (`records.tabled`) has for each array, in its order, the address and then the shape; a record in
 a record has its part of the table. A kernel that reads `work.markers.r` gets the array back from there; one number
@@ -28,12 +28,12 @@ WORD = ir.IntType(64)
 
 
 def n_words(declared) -> int:
-    """Return the length of the table for an array, number or record."""
+    """Return the number of table words for an array, number or record."""
     return 1 + len(declared.shape) if isinstance(declared, Declared) else sum(map(n_words, declared))
 
 
 def type_of(declared) -> types.Type:
-    """Return the kernel type of an array, number or record."""
+    """Return the type that the kernels see for an array, number or record."""
     if not isinstance(declared, Declared):
         return Structure(declared)
     number = from_dtype(np.dtype(declared.dtype))
@@ -41,7 +41,7 @@ def type_of(declared) -> types.Type:
 
 
 class Structure(types.Type):
-    """A pointer to a table, with a named array, number or record for each field of a declaration."""
+    """A pointer to a table, with a named array, number or record for each declared field."""
 
     def __init__(self, declaration):
         self.fields: dict[str, tuple[types.Type, int]] = {}  # name: (type, index of its part of the table)
@@ -57,7 +57,7 @@ register_model(Structure)(models.OpaqueModel)
 
 @infer_getattr
 class StructureFields(AttributeTemplate):
-    """Types of the fields."""
+    """Types of the fields of a record."""
 
     key = Structure
 
@@ -67,7 +67,7 @@ class StructureFields(AttributeTemplate):
 
 
 def word_of(builder, pointer, place):
-    """Return a word of a table."""
+    """Return one word of a table."""
     table = builder.bitcast(pointer, WORD.as_pointer())
     word = builder.load(builder.gep(table, [WORD(place)], inbounds=True))
     word.set_metadata("invariant.load", builder.module.add_metadata([]))
@@ -75,13 +75,13 @@ def word_of(builder, pointer, place):
 
 
 def address_of(context, builder, number, pointer, place):
-    """Return the address of numbers of a type."""
+    """Return the address of the numbers of a field, as a pointer to their type."""
     return builder.inttoptr(word_of(builder, pointer, place), context.get_data_type(number).as_pointer())
 
 
 @lower_getattr_generic(Structure)
 def get_field(context, builder, structure, pointer, name):
-    """Return a field: an array made from its address and shape in the table, a number, or a record."""
+    """Return a field: an array with address and shape from the table, a number, or a record."""
     kind, place = structure.fields[name]
     if isinstance(kind, Structure):
         table = builder.bitcast(pointer, WORD.as_pointer())
@@ -95,14 +95,14 @@ def get_field(context, builder, structure, pointer, name):
 
 @lower_setattr_generic(Structure)
 def set_field(context, builder, signature, arguments, name):
-    """Write a field that is a number."""
+    """Write a field that holds a number."""
     kind, place = signature.args[0].fields[name]
     value = context.cast(builder, arguments[1], signature.args[1], kind)
     builder.store(value, address_of(context, builder, kind, arguments[0], place))
 
 
 def converter(declaration):
-    """Return a compiled function from a table to the structure of a declaration."""
+    """Return a compiled function that converts a table to the structure of a declaration."""
     structure = Structure(declaration)
 
     @intrinsic
@@ -117,7 +117,7 @@ def converter(declaration):
 
 
 def table_of_numbers(declaration, values: Mapping[str, float]) -> tuple[IntArray, Array]:
-    """Return the table of a record of numbers (zero if not given) and the numbers, which the caller keeps alive."""
+    """Return the table of a record of numbers, zero if not given, and the numbers, which the caller must keep alive."""
     reals = np.zeros(len(declaration))
     integers = reals.view(np.int64)
     for name, value in values.items():

@@ -1,4 +1,4 @@
-"""Calls from the kernels to a user's function by its address, so that no compilation is needed for it."""
+"""Calls from the kernels to a user's function by its address, which need no compilation of the kernels."""
 
 from typing import Any
 
@@ -17,7 +17,7 @@ def pointer_to(context, builder, array_type, value):
 
 
 def write_call(context, builder, signature, arguments):
-    """Write the call of the C function at the first argument, an address, with pointers to the following arrays."""
+    """Write a call of the C function at the address in the first argument, with pointers to the arrays that follow."""
     pointers = [
         pointer_to(context, builder, array_type, value)
         for array_type, value in zip(signature.args[1:], arguments[1:], strict=True)
@@ -37,5 +37,5 @@ def call_law_by_address(typing_context, address, head, inputs, data, outputs):
     return types.void(address, head, inputs, data, outputs), write_call
 
 
-call_user_function: Any = intrinsic(call_by_address)  #: in kernels: call_user_function(address, inputs, outputs)
-call_law: Any = intrinsic(call_law_by_address)  #: in kernels: call_law(address, head, inputs, data, outputs)
+call_user_function: Any = intrinsic(call_by_address)  #: call in kernels: call_user_function(address, inputs, outputs)
+call_law: Any = intrinsic(call_law_by_address)  #: call in kernels: call_law(address, head, inputs, data, outputs)

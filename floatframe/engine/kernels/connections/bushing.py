@@ -60,7 +60,7 @@ B1, B2, B3, B4, B5 = 1 / 12, 1 / 720, 1 / 30240, 1 / 1209600, 1 / 47900160  # se
 
 @inner
 def rotation_vector(A, B):
-    """Return the rotation vector of R = Aᵀ B, at most pi long."""
+    """Return the rotation vector of Aᵀ B, with a length of at most pi."""
     w, x = quaternion_of(product(transposed(A), B))
     length = norm(x)
     return scaled(2.0 * math.atan2(length, w) / length if length > 0.0 else 0.0, x)
@@ -68,7 +68,7 @@ def rotation_vector(A, B):
 
 @inner
 def continued(theta, expected):
-    """Return theta + 2 pi n theta/t, t = |theta| <= pi, nearest to the expected rotation vector."""
+    """Return the rotation vector theta + 2 pi n theta/|theta|, |theta| <= pi, that is nearest to the expected one."""
     t, size = norm(theta), norm(expected)
     if size + t < math.pi:
         return theta
@@ -80,7 +80,7 @@ def continued(theta, expected):
 
 @inner
 def scalars(t2, share):
-    """Return alpha, beta, alpha'/t, beta'/t, tau, tau'/t of t²."""
+    """Return alpha, beta, alpha'/t, beta'/t, tau, tau'/t as functions of t², t the angle of rotation."""
     if share == 0.5:
         return scalars_half_way(t2)
     if t2 < SERIES_BELOW:
@@ -103,7 +103,7 @@ def scalars(t2, share):
 
 @inner
 def scalars_half_way(t2):
-    """Return the same as `scalars`, half way."""
+    """Return the same as `scalars` for axes half way between A and B."""
     if t2 < SERIES_BELOW:
         y2 = t2 / 16
         return (
@@ -126,7 +126,7 @@ def scalars_half_way(t2):
 
 @inner
 def by_S(s, u, sigma):
-    """Return S u, Sᵀ u for the opposite sigma."""
+    """Return S u for the sign sigma; the opposite sign gives Sᵀ u."""
     theta = vector(s.xi[3:])
     both = add(scaled(s.alpha, u), scaled(s.beta * dot(theta, u), theta))
     return add(both, scaled(sigma, cross(theta, u)))
@@ -134,7 +134,7 @@ def by_S(s, u, sigma):
 
 @inner
 def by_dS(s, k, h, u, sigma):
-    """Return dS u for dtheta = h and k = theta · h, dSᵀ u for the opposite sigma."""
+    """Return dS u for dtheta = h and k = theta · h; the opposite sign sigma gives dSᵀ u."""
     theta = vector(s.xi[3:])
     along = dot(theta, u)
     by_theta = s.beta_1 * k * along + s.beta * dot(h, u)
@@ -144,7 +144,7 @@ def by_dS(s, k, h, u, sigma):
 
 @inner
 def axes_of(A, B, theta, share):
-    """Return the axes of a bushing: those of A, of B, or half way between them."""
+    """Return the axes of a bushing: those of A, those of B, or the axes half way between them."""
     if share == 0.0:
         return matrix(A)
     if share == 1.0:
@@ -154,7 +154,7 @@ def axes_of(A, B, theta, share):
 
 @inner
 def law(row, x):
-    """Return the product of a row of stiffness or damping, (6,), by deformations or their rates, (6,)."""
+    """Return the product of a row of stiffness or damping, (6,), with the deformations or their rates, (6,)."""
     return row[0] * x[0] + row[1] * x[1] + row[2] * x[2] + row[3] * x[3] + row[4] * x[4] + row[5] * x[5]
 
 
@@ -197,7 +197,7 @@ def bushing_state(model, work, c):
 
 @inner
 def bushing_variation(model, work, c):
-    """Write the change of F and N, seen from A, for the variation of the motion in work.pair."""
+    """Write the change of F and N, relative to A, for the variation of the motion in work.pair."""
     s, pair, i = work.bushing, work.pair, model.connections.item[c]
     K, D, C, share = model.bushings.stiffness[i], model.bushings.damping[i], matrix(s.C), model.bushings.share[i]
     e, theta, omega, gamma = vector(s.xi), vector(s.xi[3:]), vector(s.omega), vector(s.gamma)
@@ -230,7 +230,7 @@ def bushing_variation(model, work, c):
 
 @inner
 def bushing_power(model, work, c):
-    """Return 1/2 xiᵀ K xi + preload · xi, the power that enters by tables, and the power dissipated by damping."""
+    """Return 1/2 xiᵀ K xi + preload · xi, the power supplied by tables, and the power dissipated by damping."""
     s, own, i = work.bushing, model.bushings, model.connections.item[c]
     stored, given, taken = 0.0, 0.0, 0.0
     for r in range(6):

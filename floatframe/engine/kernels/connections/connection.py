@@ -69,7 +69,7 @@ def connection_rows(model, work, c, c_k):
 
 @small
 def joint_row(model, work, k, a, b, d, w, c_k):
-    """Write the residual of row k of a joint; d: distance of its markers. The formulas of most rows stand here too."""
+    """Write the residual of row k of a joint; d: vector from A to B. The most frequent formulas are repeated here."""
     kind, soft = model.rows.kind[k], model.rows.soft[k]
     if model.rows.holds[k] == NOTHING:
         work.connections.g[k] = c_k * wrench_value(kind, model, work, k, a, b, w)
@@ -89,7 +89,7 @@ def joint_row(model, work, k, a, b, d, w, c_k):
 
 @inner
 def connection_derivatives(model, work, c, c_k):
-    """Write P at the markers and V of connection c."""
+    """Write the derivatives of connection c: P by the motion of its markers, V by its own wrench."""
     law = model.connections.law[c]
     if law == COUPLER:
         coupler_derivatives(model, work, c, c_k)
@@ -118,7 +118,7 @@ def connection_derivatives(model, work, c, c_k):
 
 @small
 def joint_row_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
-    """Write row r of P and V of row k of a joint.
+    """Write row r of P and V, the derivatives of row k of a joint.
 
     A velocity that is held has no position: for c_k = 0, where rows stand for velocities or accelerations, its P is
     that by the velocities. The change of a soft row's reaction with its direction is left out: of second order.
@@ -143,7 +143,7 @@ def joint_row_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
 
 @inner
 def write_velocity_gaps(model, work, c, factor, gap):
-    """Write g - factor dg/dt of the held positions of joint or coupler c into gap, (n_w,), and zero for its other rows.
+    """Write g - factor dg/dt for the position constraints of joint or coupler c into gap, (n_w,), and zero elsewhere.
 
     Zero for elements, too: their rates ask for the law many times.
     """
@@ -174,7 +174,7 @@ def write_velocity_gaps(model, work, c, factor, gap):
 
 @inner
 def held_rate(model, work, k, a, b, v):
-    """Return the rate of the position that row k of a joint holds; v: relative velocity of its markers."""
+    """Return the rate of the constrained position of row k; v: relative velocity of its markers."""
     kind, markers = model.rows.kind[k], work.markers
     _, n, m_a, m_b = held_value(kind, model, work, k, a, b)
     rate, _ = held_rates(kind, model, work, k, a, b)
@@ -189,7 +189,7 @@ def along(n, m_a, m_b, v, omega_a, omega_b):
 
 @inner
 def row_rates(model, work, k, a, b):
-    """Return the rate of the held quantity of row k, and its second rate at zero u_dot; zero for other rows.
+    """Return the rate of row k's constrained quantity and its second rate at zero u_dot; zero for other rows.
 
     Of a velocity that is held: it, and its rate. `work.markers.bias` holds the accelerations of markers at zero u_dot.
     """
@@ -208,7 +208,7 @@ def row_rates(model, work, k, a, b):
 
 @inner
 def constraint_rates(model, work):
-    """Write for every row the rate of the held quantity and its second rate at zero u_dot into `work.connections`.
+    """Write, for every row, the rate of the constrained quantity and its second rate at zero u_dot.
 
     `evaluate` has been called for the iterate.
     """
@@ -220,7 +220,7 @@ def constraint_rates(model, work):
 
 @inner
 def connection_rates(model, work, c):
-    """Write the same as `constraint_rates` for the rows of connection c, from accelerations in `work.markers.bias`."""
+    """Write the result of `constraint_rates` for connection c, from accelerations in `work.markers.bias`."""
     rate, bias = work.connections.rate, work.connections.bias
     a, b = model.connections.a[c], model.connections.b[c]
     for k in range(model.connections.w0[c], model.connections.w0[c + 1]):

@@ -24,7 +24,7 @@ V_0 = 9  # index of the approach speed among the unknowns, after F, M, N
 
 @inner
 def contact_gap(model, r, A, c):
-    """Return the gap of contact c for positions r and axes A of the markers."""
+    """Return the gap of contact c for given positions r and axes A of its markers."""
     a, b, i, own = model.connections.a[c], model.connections.b[c], model.connections.item[c], model.contacts
     d = sub(vector(r[b]), vector(r[a]))
     if own.is_sphere[i]:
@@ -34,7 +34,7 @@ def contact_gap(model, r, A, c):
 
 @inner
 def contact_state(model, work, c):
-    """Write the contact quantities of contact c into work.contact, and F, N and v_0 into work.pair."""
+    """Write the quantities of contact c into work.contact, and F, N and the approach speed v_0 into work.pair."""
     i, own, s, pair = model.connections.item[c], model.contacts, work.contact, work.pair
     d, v = vector(pair.d), vector(pair.v)
     if own.is_sphere[i]:
@@ -60,7 +60,7 @@ def contact_state(model, work, c):
 
 @inner
 def normal_force(model, work, c):
-    """Write f with its derivatives by depth and rate, and v_0 with its derivative by the rate."""
+    """Write the normal force f with its derivatives by depth and rate, and v_0 with its derivative by rate."""
     s, own, i = work.contact, model.contacts, model.connections.item[c]
     start, slow = work.state.w_start[model.connections.w0[c] + V_0], own.slow[i]
     s.depth, s.f, s.f_by_depth, s.f_by_rate, s.v_0_by_rate = max(-s.gap, 0.0), 0.0, 0.0, 0.0, 0.0
@@ -80,7 +80,7 @@ def normal_force(model, work, c):
 
 @inner
 def contact_variation(model, work, c):
-    """Write the change of F, N and v_0, seen from A, for the variation of the motion in work.pair."""
+    """Write the change of F, N and v_0, relative to A, for the variation of the motion in work.pair."""
     i, own, s, pair = model.connections.item[c], model.contacts, work.contact, work.pair
     N, rho, V, V_t, F = vector(s.N), vector(s.rho), vector(s.V), vector(s.V_t), vector(pair.F)
     dd, dv, dN = vector(pair.motion), vector(pair.motion[6:]), (0.0, 0.0, 0.0)
@@ -105,7 +105,7 @@ def contact_variation(model, work, c):
 
 @inner
 def contact_power(model, work, c):
-    """Return k x^(n + 1)/(n + 1), the power that enters, zero, and the power dissipated by restitution and friction."""
+    """Return k x^(n + 1)/(n + 1), a supplied power of zero, and the power dissipated by restitution and friction."""
     s, own, i = work.contact, model.contacts, model.connections.item[c]
     spring = own.stiffness[i] * s.depth ** own.exponent[i]
     lost = -(s.f - spring) * s.rate + own.friction[i] * s.f * dot(s.V_t, s.V_t) / s.slip

@@ -50,7 +50,7 @@ def ends_and_row(model, p):
 
 @inner
 def force_direction(model, work, p):
-    """Return the direction in which the force of coordinate p acts, ground axes."""
+    """Return the direction of the force along coordinate p, ground axes."""
     rows, markers = model.rows, work.markers
     a, b, k = ends_and_row(model, p)
     if rows.kind[k] == SPAN:
@@ -61,20 +61,20 @@ def force_direction(model, work, p):
 
 @inner
 def relative_rotation(markers, a, b):
-    """Return omega_B - omega_A."""
+    """Return the relative angular velocity omega_B - omega_A."""
     return sub(markers.omega[b], markers.omega[a])
 
 
 @inner
 def turning_gradient(model, work, k, a, b):
-    """Return the derivative of an angle by the rotation of A; the derivative by that of B is its opposite."""
+    """Return the derivative of an angle by a rotation of A; for a rotation of B it has the opposite sign."""
     _, t = turned_angle(model.rows, work.markers, k, a, b)
     return t
 
 
 @inner
 def coordinate_motion(model, work, p):
-    """Return value and rate of coordinate p; an angle is the value nearest to the unknown X."""
+    """Return value and rate of coordinate p; for an angle the value nearest to the unknown X."""
     rows, markers = model.rows, work.markers
     a, b, k = ends_and_row(model, p)
     if rows.kind[k] == SPAN:
@@ -88,14 +88,14 @@ def coordinate_motion(model, work, p):
 
 @inner
 def predict_coordinate(coordinates, state, p, h):
-    """Advance the unknown X of coordinate p by its rate, so that a fast angle is tracked."""
+    """Advance the unknown X of coordinate p by its rate, so that fast angles are counted correctly."""
     k = coordinates.row[p]
     state.w[k] += h * state.w[k + 1]
 
 
 @inner
 def coordinate_rows(model, work, p, Q, c_k):
-    """Write the rows of coordinate p with force Q, and its wrench on both markers."""
+    """Write the rows of coordinate p with force Q, and the wrench that Q applies to both markers."""
     a, b, k = ends_and_row(model, p)
     g, w, wrench = work.connections.g, work.state.w, work.markers.wrench
     x, v = coordinate_motion(model, work, p)
@@ -117,7 +117,7 @@ def coordinate_rows(model, work, p, Q, c_k):
 
 @inner
 def coordinate_gradient(model, work, p, r, by_x, by_v):
-    """Add by_x dx + by_v dv of coordinate p to row r of P at both markers."""
+    """Add by_x dx + by_v dv to row r of P at both markers; x, v: value and rate of coordinate p."""
     markers = work.markers
     a, b, k = ends_and_row(model, p)
     P_a, P_b = work.connections.P[a], work.connections.P[b]
@@ -132,7 +132,7 @@ def coordinate_gradient(model, work, p, r, by_x, by_v):
 
 @inner
 def clear_derivatives(model, work, c, i):
-    """Set V of connection c, and P at the markers of all coordinates of element i, to zero."""
+    """Set V of connection c and P at the markers of all coordinates of element i to zero."""
     size, V = model.connections.size[c], work.connections.V[c]
     for r in range(size):
         for j in range(size):
@@ -145,7 +145,7 @@ def clear_derivatives(model, work, c, i):
 
 @inner
 def coordinate_derivatives(model, work, c, p, Q, column, by_unknown, c_k):
-    """Write the rows of P and V of coordinate p, of connection c, whose force is Q = by_unknown w[column]."""
+    """Write P and V for the rows of coordinate p of connection c, with force Q = by_unknown w[column]."""
     a, b, k = ends_and_row(model, p)
     w0 = model.connections.w0[c]
     P_a, P_b, V = work.connections.P[a], work.connections.P[b], work.connections.V[c]
@@ -178,7 +178,7 @@ def coordinate_derivatives(model, work, c, p, Q, column, by_unknown, c_k):
 
 @inner
 def coordinate_tangent_rate(model, work, p):
-    """Return the rate of coordinate p from its gradient; for an angle between non-parallel axes it differs from v."""
+    """Return the rate of coordinate p from its gradient; it differs from v for an angle of non-parallel axes."""
     rows = model.rows
     a, b, k = ends_and_row(model, p)
     if rows.kind[k] == SPAN or rows.kind[k] == PUSH:
@@ -189,7 +189,7 @@ def coordinate_tangent_rate(model, work, p):
 
 @inner
 def coordinate_second_rate(model, work, p, bias_a, bias_b):
-    """Return the second rate of coordinate p for given accelerations (6) of both markers.
+    """Return the second rate of coordinate p for given accelerations (6) of its two markers.
 
     For angles with parallel axes.
     """

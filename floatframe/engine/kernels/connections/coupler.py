@@ -43,7 +43,7 @@ def coupler_rows(model, work, c, c_k):
 
 @inner
 def coupler_derivatives(model, work, c, c_k):
-    """Write P at the markers and V of coupler c."""
+    """Write the derivatives of coupler c: P by the motion of its markers, V by its own wrench."""
     i, V = model.connections.item[c], work.connections.V[c]
     k = model.elements.core[i]
     clear_derivatives(model, work, c, i)
@@ -90,7 +90,7 @@ def coupler_rates(model, work, c, rate, bias):
 
 @inner
 def coupler_power(model, work, c):
-    """Return the power that enters if the constant of the coupler changes with time: lam dc/dt."""
+    """Return the power lam dc/dt that a time-dependent constant of the coupler supplies."""
     k = model.elements.core[model.connections.item[c]]
     if model.rows.kind[k] == RELEASED:
         return 0.0

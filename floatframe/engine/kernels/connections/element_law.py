@@ -1,4 +1,4 @@
-"""Public elements: wrenches, rates of states and held quantities, from functions that are called by address.
+"""Public elements: wrenches, rates of states and constraints, from functions that are called by address.
 
 The law of an element with n markers, states z and multipliers lam gives, from the motion x of the markers,
 
@@ -30,14 +30,14 @@ from floatframe.model.joints.rows.kinds import NOTHING, POSITION, VELOCITY
 
 __all__ = ["FIRST", "law_derivatives", "law_power", "law_rates", "law_rows", "law_values", "n_results", "note_stops"]
 
-#: steps of differences in time, if the time over which a law changes is unknown: how many are tried, the first of them
-#: relative to `REACH`, and the ratio of the next to the one before
+#: time steps of difference quotients if the time scale of a law is unknown: number of trials, the first step
+#: relative to `REACH`, and the ratio of each step to the one before
 MOST_LEVELS, SHORTEST, LONGER = 22, 2.0**-20, 4.0
 ROUNDING = 1e-15  #: relative step of positions in differences
 REACH = 5e-3  #: displacement for the differences of rates, relative to the length over which the law changes
-#: coefficients of sixth-order differences at -3 to 3
+#: coefficients of sixth-order first differences at the points -3 to 3
 FIRST = (-1 / 60, 9 / 60, -45 / 60, 0.0, 45 / 60, -9 / 60, 1 / 60)
-FOURTH_FIRST = (0.0, 1 / 12, -8 / 12, 0.0, 8 / 12, -1 / 12, 0.0)  #: coefficients of fourth-order differences
+FOURTH_FIRST = (0.0, 1 / 12, -8 / 12, 0.0, 8 / 12, -1 / 12, 0.0)  #: coefficients of fourth-order first differences
 FOURTH_SECOND = (0.0, -1 / 12, 16 / 12, -30 / 12, 16 / 12, -1 / 12, 0.0)
 SECOND = (2 / 180, -27 / 180, 270 / 180, -490 / 180, 270 / 180, -27 / 180, 2 / 180)
 
@@ -74,20 +74,20 @@ def law_inputs(model, work, c):
 
 @inner
 def law_call(model, work, i, outputs):
-    """Evaluate law i for the inputs and write its results."""
+    """Evaluate law i for the inputs in `work` and write its results to `outputs`."""
     data = model.laws.data[model.laws.data0[i] : model.laws.data0[i + 1]]
     call_law(model.laws.address[i], model.laws.head[i], work.laws.inputs, data, outputs)
 
 
 @inner
 def n_results(head):
-    """Return the number of wrench components, rates of states and held quantities; outputs follow them."""
+    """Return the number of wrench components, rates of states and constraints; the outputs follow them."""
     return 6 * head[0] + head[2] + head[3]
 
 
 @inner
 def note_stops(model, work, i):
-    """Note the first output of law i that ends the run."""
+    """Record the first output of law i that ends the run."""
     first = n_results(model.laws.head[i])
     for k in range(model.laws.stop0[i], model.laws.stop0[i + 1]):
         if work.laws.outputs[first + model.laws.stop[k]] > 0.0 and work.counted.stopped == 0:
@@ -96,7 +96,7 @@ def note_stops(model, work, i):
 
 @inner
 def law_values(model, work, c):
-    """Write the outputs of element c at the iterate into work.laws.outputs."""
+    """Write the results of element c at the iterate into work.laws.outputs."""
     law_inputs(model, work, c)
     law_call(model, work, model.connections.item[c], work.laws.outputs)
 
@@ -140,7 +140,7 @@ def note_what_is_no_number(model, work, c):
 
 @inner
 def law_derivatives(model, work, c, c_k):
-    """Write P at the markers and V of element c.
+    """Write the derivatives of element c: P by the motion of its markers, V by its own wrench.
 
     A velocity that is held has no position: for c_k = 0, where rows stand for velocities or accelerations, its P is
     that by the velocities.
@@ -189,7 +189,7 @@ def law_derivatives(model, work, c, c_k):
 
 @inner
 def add_slopes(model, work, V, a, n, n_z, n_lam, per, states, r, by_motion, by_unknown, own):
-    """Add derivatives of one output to row r of P, P_a and V, each multiplied by a factor."""
+    """Add the scaled derivatives of one output to row r of P, P_a and V."""
     for m in range(n):
         for j in range(12):
             work.connections.P[a + m, r, j] = by_motion * own[per * m + j]
@@ -205,7 +205,7 @@ def add_slopes(model, work, V, a, n, n_z, n_lam, per, states, r, by_motion, by_u
 
 @inner
 def held_slopes(work, V, a, n, n_z, n_lam, per, states, r, holds, c_k, own):
-    """Write the derivatives of the held quantities into row r of P and V."""
+    """Write the derivatives of the constrained quantities into row r of P and V."""
     for m in range(n):
         for j in range(12):
             if holds == POSITION:
@@ -224,7 +224,7 @@ def held_slopes(work, V, a, n, n_z, n_lam, per, states, r, holds, c_k, own):
 
 @inner
 def law_rates(model, work, c, rate, bias):
-    """Write the rates of the held quantities of element c, and their second rates at zero u_dot, for multiplier rows.
+    """Write the rates of the constraints of element c and their second rates at zero u_dot, for multiplier rows.
 
     From the values along the motion with the accelerations of `work.markers.bias`: differences of sixth order, by
     steps in which neither the motion nor the time changes the law much. Where the time over which it changes is not
@@ -267,7 +267,7 @@ def law_rates(model, work, c, rate, bias):
 
 @inner
 def rates_by_steps(model, work, c, h, rate, bias):
-    """Write the differences of `law_rates` with steps h; return the deviation of fourth-order differences [g/s²]."""
+    """Write the differences of `law_rates` with step h; return their deviation from fourth-order differences [g/s²]."""
     i, a, w0 = model.connections.item[c], model.connections.a[c], model.connections.w0[c]
     size = model.connections.size[c]
     laws, fourth = model.laws, work.laws.slopes  # data that the derivatives overwrite
@@ -318,7 +318,7 @@ def rates_by_steps(model, work, c, h, rate, bias):
 
 @inner
 def power_on_bodies(model, work, c):
-    """Return the power of the wrenches of element c."""
+    """Return the power of the wrenches of element c on the bodies."""
     first, last = model.connections.a[c], model.connections.a[c] + model.laws.head[model.connections.item[c], 0]
     w = work.state.w[model.connections.w0[c] :]
     total = 0.0
@@ -333,7 +333,7 @@ def power_on_bodies(model, work, c):
 
 @inner
 def law_power(model, work, c):
-    """Return the energy of element c, the power that it supplies, and the power that it dissipates, at the iterate.
+    """Return energy, supplied power and dissipated power of element c at the iterate.
 
     An output that ends the run is noted.
 

@@ -57,14 +57,14 @@ MOST_SEARCHES = 40
 
 @inner
 def last_marker(model, c):
-    """Return the number of the last marker of connection c, plus one."""
+    """Return one more than the number of the last marker of connection c."""
     n = model.laws.head[model.connections.item[c], 0] if model.connections.law[c] == ELEMENT else 2
     return model.connections.a[c] + n
 
 
 @inner
 def gap_of_markers(model, work, g):
-    """Return gap g for the motion of the markers in `work`."""
+    """Return gap g for the marker motion in `work`."""
     c = model.gaps.connection[g]
     i = model.connections.item[c]
     if model.connections.law[c] == ELEMENT:
@@ -82,7 +82,7 @@ def place_markers(model, work, c):
 
 @inner
 def gap_after(model, work, g, t, e):
-    """Return gap g at the time e after t; the iterate is at t, and its accelerations are in `work.markers.bias`."""
+    """Return gap g at time t + e; the iterate is at t, with its accelerations in `work.markers.bias`."""
     c = model.gaps.connection[g]
     for m in range(model.connections.a[c], last_marker(model, c)):
         marker_motion(model, work, m)
@@ -101,7 +101,7 @@ def gap_after(model, work, g, t, e):
 
 @inner
 def take_gap(model, work, g, t):
-    """Store gap g at the time t of the iterate, the beginning of a step."""
+    """Store gap g at time t, the beginning of a step; the iterate is at t."""
     place_markers(model, work, model.gaps.connection[g])
     work.state.time = t
     work.gaps.start[g] = gap_of_markers(model, work, g)
@@ -109,7 +109,7 @@ def take_gap(model, work, g, t):
 
 @inner
 def is_far(model, work, c, gap, h):
-    """Whether the markers of a contact of spheres remain apart in a step of size h."""
+    """Whether the two spheres of a contact stay apart during a step of size h."""
     if model.connections.law[c] == ELEMENT:
         return False
     a, b, markers = model.connections.a[c], model.connections.b[c], work.markers
@@ -121,7 +121,7 @@ def is_far(model, work, c, gap, h):
 
 @inner
 def nearest_time(model, work, c):
-    """Return the time of the smallest distance of two spheres on straight paths; below zero if it has passed."""
+    """Return the time at which two spheres on straight paths are closest; negative if it has passed."""
     if model.connections.law[c] == ELEMENT or not model.contacts.is_sphere[model.connections.item[c]]:
         return -1.0
     a, b, markers = model.connections.a[c], model.connections.b[c], work.markers
@@ -132,7 +132,7 @@ def nearest_time(model, work, c):
 
 @inner
 def step_before_contact(model, work, t, h):
-    """(1): store all gaps of the iterate, the beginning of a step at t; return the allowed step, at most h."""
+    """(1): store all gaps at time t, the beginning of a step; return the allowed step size, at most h."""
     for g in range(model.gaps.connection.shape[0]):
         take_gap(model, work, g, t)
         if work.gaps.start[g] < 0.0:
@@ -147,7 +147,7 @@ def step_before_contact(model, work, t, h):
 
 @inner
 def step_to_gap(model, work, g, t, h):
-    """Return the step, at most h, that ends before gap g closes."""
+    """Return the step size, at most h, for a step that ends before gap g closes."""
     nearest = nearest_time(model, work, model.gaps.connection[g])
     before, open_gap, e, gap = 0.0, work.gaps.start[g], 0.0, 0.0
     for k in range(PARTS):
@@ -171,7 +171,7 @@ def step_to_gap(model, work, g, t, h):
 
 @inner
 def touching_time(model, work, g, t, low, open_gap, high, gap, fine):
-    """Return the time between two times at which gap g closes, by false position with the Illinois modification."""
+    """Return the time, between two given times, at which gap g closes, by false position (Illinois variant)."""
     side = 0
     for _ in range(MOST_SEARCHES):
         if high - low <= NEAR * fine:
@@ -197,7 +197,7 @@ def touching_time(model, work, g, t, low, open_gap, high, gap, fine):
 
 @inner
 def step_of_gap(model, work, g, t, depth, speed):
-    """Return the fine step of gap g for a depth and a speed, with the iterate at t; infinite without motion."""
+    """Return the fine step size of gap g for a depth and a speed at t; infinite if there is no motion."""
     k, n = model.gaps.stiffness[g], model.gaps.exponent[g]
     mobility = rigid_mobility(model, work, g, t)
     if mobility <= 0.0 or (speed == 0.0 and depth == 0.0):
@@ -211,13 +211,13 @@ def step_of_gap(model, work, g, t, depth, speed):
 
 @inner
 def depth_of(k, n, mobility, depth, speed):
-    """Return the largest depth that a contact reaches from a depth with a speed."""
+    """Return the largest depth that a contact reaches after it has a given depth and speed."""
     return (depth ** (n + 1.0) + 0.5 * (n + 1.0) * speed * speed / (mobility * k)) ** (1.0 / (n + 1.0))
 
 
 @inner
 def put_unit_wrench(model, work, g, t):
-    """Write the wrenches on the markers of gap g that are conjugate to its change, ground axes."""
+    """Write the marker wrenches that are conjugate to the change of gap g, ground axes."""
     c = model.gaps.connection[g]
     a, markers, wrench = model.connections.a[c], work.markers, work.gaps.wrench
     place_markers(model, work, c)
@@ -252,7 +252,7 @@ def put_unit_wrench(model, work, g, t):
 
 @inner
 def is_first_on_body(model, first, m):
-    """Whether marker m is the first marker on its body, counted from marker `first`."""
+    """Whether marker m is on a body, and no marker from `first` to m - 1 is on the same body."""
     i = model.markers.body[m]
     if i < 0:
         return False
@@ -264,7 +264,7 @@ def is_first_on_body(model, first, m):
 
 @inner
 def rigid_mobility(model, work, g, t):
-    """Return J M⁻¹ Jᵀ of gap g by the rigid-body motions of its bodies."""
+    """Return the mobility J M⁻¹ Jᵀ of gap g for rigid bodies without joints."""
     c = model.gaps.connection[g]
     first, last = model.connections.a[c], last_marker(model, c)
     put_unit_wrench(model, work, g, t)
@@ -283,14 +283,14 @@ def rigid_mobility(model, work, g, t):
 
 @inner
 def wrench_in_body(work, i, m):
-    """Return force and moment of the unit wrench on marker m in the axes of its body i."""
+    """Return force and moment of the unit wrench on marker m in the axes of its body."""
     wrench = work.gaps.wrench[m]
     return turned_back(work.state.R[i], vector(wrench)), turned_back(work.state.R[i], vector(wrench[3:]))
 
 
 @inner
 def body_mobility(model, t, f, tau):
-    """Return the mobility of a rigid body of type t for a force and a torque about its frame origin, body axes."""
+    """Return the mobility of a rigid body of type t for force f and torque tau about its frame origin, body axes."""
     m, J = model.body_types.mass[t], matrix(model.body_types.J0[t])
     s = scaled(1.0 / m, vector(model.body_types.S[t]))
     tau = sub(tau, cross(s, f))
@@ -301,7 +301,7 @@ def body_mobility(model, t, f, tau):
 
 @inner
 def modal_mobility(model, work, g, stiffness):
-    """Return the contribution of modes to the mobility of gap g, for the wrenches left by `rigid_mobility`."""
+    """Return the contribution of modes to the mobility of gap g, for the wrenches that `rigid_mobility` wrote."""
     c = model.gaps.connection[g]
     first, last, total = model.connections.a[c], last_marker(model, c), 0.0
     for m in range(first, last):
@@ -326,14 +326,14 @@ def modal_mobility(model, work, g, stiffness):
 
 @inner
 def modal_number(model, t, n, which, k):
-    """Return the diagonal entry k of the mass or stiffness of the modes of a type."""
+    """Return diagonal entry k of a type's modal mass or stiffness matrix."""
     step = 1 if model.body_types.is_diagonal[t, which - MASS] else n + 1
     return model.body_types.blocks[model.body_types.block0[t, which] + k * step]
 
 
 @inner
 def step_after_gap(model, work, g, end, t, h):
-    """(2): return the step that gap g allows after one of size h to the value `end`; below h: that step is too long."""
+    """(2): return the step size that gap g allows after a step of size h to the value `end`; below h: repeat it."""
     start = work.gaps.start[g]
     x_0, x_1 = max(-start, 0.0), max(-end, 0.0)
     deepest, change = max(x_0, x_1), abs(x_1 - x_0)
@@ -351,14 +351,14 @@ def step_after_gap(model, work, g, end, t, h):
 
 @inner
 def take_ends(model, work):
-    """Store all gaps for the motion of the markers in `work`, at the end of a step."""
+    """Store all gaps at the end of a step, for the marker motion in `work`."""
     for g in range(model.gaps.connection.shape[0]):
         work.gaps.end[g] = gap_of_markers(model, work, g)
 
 
 @inner
 def next_step(model, work, t, h):
-    """Return the longest step that all gaps allow after a step of size h to the iterate at t.
+    """Return the longest step that all gaps allow after a step of size h that ended at t.
 
     Below h: it is too long.
     """

@@ -1,4 +1,4 @@
-"""Forces between two markers by their relative motion: spring-dampers, bushings and contacts of spheres.
+"""Forces from the relative motion of two markers: spring-dampers, bushings and contacts of spheres.
 
 A law gives the force F on A, -F on B, and the moment -N on B from the motion of B seen from A: d = r_B - r_A, the axes
 of both, v = d_dot - omega_A × d and omega = omega_B - omega_A. The moment on A balances them, M = N + d × F. The
@@ -29,7 +29,7 @@ ON_A, ON_B = 3, 6  # first rows of M and N in the wrench
 
 @small
 def is_pair(law):
-    """Whether a law of a connection is one of these."""
+    """Whether a connection law is one of the forces in this module."""
     return law == SPRING or law == BUSHING or law == CONTACT
 
 
@@ -54,7 +54,7 @@ def pair_state(model, work, c):
 
 @inner
 def pair_power(model, work, c):
-    """Return the energy of connection c, the power that enters by its tables, and the power that it dissipates."""
+    """Return the energy of connection c, the power supplied by its tables, and its dissipated power."""
     pair_state(model, work, c)
     if model.connections.law[c] == SPRING:
         return spring_power(model, work, c)
@@ -79,7 +79,7 @@ def pair_rows(model, work, c, c_k):
 
 @inner
 def pair_derivatives(model, work, c, c_k):
-    """Write P at both markers and V of connection c; both are zero before."""
+    """Write P at both markers and V of connection c, which must be zero before."""
     a, b, size, pair = model.connections.a[c], model.connections.b[c], model.connections.size[c], work.pair
     P_a, P_b = work.connections.P[a], work.connections.P[b]
     pair_state(model, work, c)
@@ -127,6 +127,6 @@ def pair_derivatives(model, work, c, c_k):
 
 @small
 def slopes_of(pair, r):
-    """Return the derivatives of number r by d, u, v and omega."""
+    """Return the derivatives of result r (F, unused, N, v_0) by d, u, v and omega."""
     row = pair.slopes[r]
     return vector(row), vector(row[3:]), vector(row[6:]), vector(row[9:])

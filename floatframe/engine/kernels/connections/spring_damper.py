@@ -48,7 +48,7 @@ def spring_variation(model, work, c):
 
 @inner
 def spring_power(model, work, c):
-    """Return k (l - l_0)²/2 + preload l, the power that enters by the table, and the power dissipated by damping."""
+    """Return k (l - l_0)²/2 + preload l, the power supplied by the table, and the power dissipated by damping."""
     i, springs, s = model.connections.item[c], model.springs, work.spring
     stretch = s.length - springs.free_length[i]
     stored = 0.5 * springs.stiffness[i] * stretch**2 + springs.preload[i] * s.length

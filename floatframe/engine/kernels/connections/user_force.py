@@ -143,7 +143,7 @@ def binary(op, x, y):
 
 @inner
 def tape_value(tapes, functions, f, inputs, registers):
-    """Return the value of tape f at the inputs; the results of its operations remain in the registers."""
+    """Return the value of tape f for the inputs; all intermediate results stay in `registers`."""
     results = registers.results
     first, last = tapes.operation0[f], tapes.operation0[f + 1]
     for k in range(first, last):
@@ -210,7 +210,7 @@ ROUNDING = 2e-15  # fraction of a number below which a step is lost in rounding
 
 @inner
 def element_of(model, c):
-    """Return the number of user force c among all elements (couplers come first)."""
+    """Return the index of user force c among all elements, in which couplers come first."""
     return model.connections.item[c] + model.elements.coordinate0.shape[0] - 1 - model.users.n_states.shape[0]
 
 
@@ -258,7 +258,7 @@ def user_outputs(model, work, c, n_in):
 
 @inner
 def note_no_number(work, c, outputs, n_out, inputs, n_in):
-    """Record the first connection of a step whose outputs are not finite for finite inputs."""
+    """Record the first connection of a step that has finite inputs but outputs that are not finite."""
     if work.counted.no_number == 0 and not are_finite(outputs, n_out) and are_finite(inputs, n_in):
         work.counted.no_number = c + 1
 
@@ -274,7 +274,7 @@ def are_finite(values, n):
 
 @inner
 def user_gradients(model, work, c):
-    """Write the derivatives of all outputs by all inputs into `gradients`, row by row; return the numbers as above."""
+    """Write the derivatives of all outputs by all inputs, row by row; return the numbers of coordinates and inputs."""
     u = model.connections.item[c]
     n, n_in, n_out = user_values(model, work, c)
     if model.users.address[u] == 0:
@@ -323,7 +323,7 @@ def user_force_rows(model, work, c, c_k):
 
 @inner
 def state_rows(work, s, k, output, c_k):
-    """Write the residual of state s, whose rows begin at k; output: its rate by the law."""
+    """Write the residual of state s in the rows from k; `output` is the rate that the law gives."""
     w, g, states = work.state.w, work.connections.g, work.states
     g[k] = c_k * (w[k] - states.base[s] - states.kappa[s] * w[k + 1])
     g[k + 1] = c_k * (w[k + 1] - output)
@@ -332,7 +332,7 @@ def state_rows(work, s, k, output, c_k):
 
 @inner
 def put_state_derivatives(work, V, s, r):
-    """Write the rows of state s, from r on, into V, without the derivatives of its law."""
+    """Write the derivatives of the rows of state s, from row r, into V, without those of its law."""
     V[r, r], V[r, r + 1] = 1.0, -work.states.kappa[s]
     V[r + 1, r + 1] = 1.0
     V[r + 2, r + 2], V[r + 2, r + 1] = 1.0, -work.states.rho
@@ -340,7 +340,7 @@ def put_state_derivatives(work, V, s, r):
 
 @inner
 def user_force_derivatives(model, work, c, c_k):
-    """Write P at the markers and V of user force c."""
+    """Write the derivatives of user force c: P by the motion of its markers, V by its own wrench."""
     i, u, V = element_of(model, c), model.connections.item[c], work.connections.V[c]
     first, last = model.elements.coordinate0[i], model.elements.coordinate0[i + 1]
     clear_derivatives(model, work, c, i)
@@ -364,7 +364,7 @@ def user_force_derivatives(model, work, c, c_k):
 
 @inner
 def user_force_power(model, work, c):
-    """Return the power of user force c on the bodies."""
+    """Return the power that user force c supplies to the bodies."""
     i = element_of(model, c)
     total = 0.0
     for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
@@ -376,7 +376,7 @@ def user_force_power(model, work, c):
 
 @inner
 def begin_states(rows, states, memory, h, alpha_f):
-    """Write b, b', kappa (one for all) and rho of a step of size h, with rho_inf = alpha_f/(1 - alpha_f).
+    """Write the constants b, b', kappa, rho of the integration of states, with rho_inf = alpha_f/(1 - alpha_f).
 
     The value of each state stands at its row of w, then its rate and algorithmic rate.
 
@@ -398,7 +398,7 @@ def begin_states(rows, states, memory, h, alpha_f):
 
 @inner
 def resize_states(rows, memory, ratio):
-    """Convert the algorithmic rates to steps that are longer by the factor `ratio`."""
+    """Convert the algorithmic rates to a step size multiplied by `ratio`."""
     for s in range(rows.shape[0]):
         k = rows[s]
         memory.w[k + 2] = memory.w[k + 1] + ratio * (memory.w[k + 2] - memory.w[k + 1])

@@ -19,7 +19,7 @@ __all__ = ["bisector_derivatives", "bisector_value", "equal_turn_rates", "equal_
 
 @inner
 def equal_turn_value(model, work, k, a, b):
-    """EQUAL_TURN: E · U - Z · D."""
+    """Return the value of EQUAL_TURN: E · U - Z · D."""
     rows, markers = model.rows, work.markers
     g_1, zero, m_1, _ = product(direction(markers, a, rows.x[k]), direction(markers, b, rows.u[k]))
     g_2, _, m_2, _ = product(direction(markers, a, rows.z[k]), direction(markers, b, rows.y[k]))
@@ -29,7 +29,7 @@ def equal_turn_value(model, work, k, a, b):
 
 @inner
 def equal_turn_rates(model, work, k, a, b):
-    """EQUAL_TURN."""
+    """Return the rates of EQUAL_TURN."""
     rows, markers, zero = model.rows, work.markers, (0.0, 0.0, 0.0)
     o, p = vector(markers.omega[a]), vector(markers.omega[b])
     E, Z, D, U = (
@@ -45,13 +45,13 @@ def equal_turn_rates(model, work, k, a, b):
 
 @inner
 def shafts(rows, markers, k, a, b):
-    """Return E, the shaft of A and that of B."""
+    """Return the shaft direction of A, E, and the shaft direction of B."""
     return direction(markers, a, rows.x[k]), direction(markers, a, rows.z[k]), direction(markers, b, rows.y[k])
 
 
 @inner
 def bisector_value(model, work, k, a, b, w):
-    """BISECTOR: M · (E × (Z_A + Z_B))."""
+    """Return the value of BISECTOR: M · (E × (Z_A + Z_B))."""
     rows = model.rows
     E, Z_a, Z_b = shafts(rows, work.markers, k, a, b)
     return dot(vector(w[rows.part[k] :]), cross(E, add(Z_a, Z_b)))

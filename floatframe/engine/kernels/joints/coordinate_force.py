@@ -13,14 +13,14 @@ __all__ = ["coordinate_force", "coordinate_power", "coordinate_strain", "excess"
 
 @inner
 def excess(forces, i, is_angle, x):
-    """Return a coordinate minus its free value; for an angle the value between -pi and pi."""
+    """Return a coordinate minus its force-free value; an angle is reduced to between -pi and pi."""
     x -= forces.free[i]
     return x - 2 * math.pi * math.floor(x / (2 * math.pi) + 0.5) if is_angle else x
 
 
 @inner
 def given_force(model, i, t, d):
-    """Return preload, motor and characteristic of force i at the excess d, and the slope of the characteristic."""
+    """Return preload, motor force and tabulated force of force i at the excess d, and the slope of the table."""
     f, functions, slope = model.joint_forces, model.functions, 0.0
     Q = f.preload[i]
     if f.motor[i] >= 0:
@@ -34,7 +34,7 @@ def given_force(model, i, t, d):
 
 @inner
 def coordinate_force(model, work, k, is_angle, x, v, normal):
-    """Return the force of row k in the direction of its coordinate x, and its derivatives by x, v and `normal`.
+    """Return the force along coordinate x of row k, and its derivatives by x, v and the normal force.
 
     -k x - c v + preload + motor(t) + characteristic(x) - (T + mu normal) tanh(v/v_0), summed over the forces there.
     """
@@ -66,7 +66,7 @@ def coordinate_strain(model, k, is_angle, x):
 
 @inner
 def coordinate_power(model, work, k, is_angle, x, v, Q):
-    """Return the power supplied by row k, and the power dissipated by dampers and friction; Q: its total force."""
+    """Return the power supplied along row k, and the power dissipated by dampers and friction; Q: total force."""
     given, springs, f = 0.0, 0.0, model.joint_forces
     for i in range(model.rows.force0[k], model.rows.force1[k]):
         d = excess(f, i, is_angle, x)

@@ -56,7 +56,7 @@ MOST, CLOSE = 30, 1e-14
 
 @inner
 def piece(lines, stations, k, s):
-    """Return the first of the two stations around s and their distance.
+    """Return the first of the two stations that enclose s, and the distance between both.
 
     Beyond the ends of the line the nearest piece.
     """
@@ -68,7 +68,7 @@ def piece(lines, stations, k, s):
 
 @inner
 def weights(stations, j, h, s, order):
-    """Return a_1, a_2, b_1, b_2 or their derivatives by s."""
+    """Return the interpolation functions a_1, a_2, b_1, b_2 at s, or their derivatives of the given order."""
     x = (s - stations.s[j]) / h
     if x < 0.0 or x > 1.0:
         end = 1.0 if x > 1.0 else 0.0
@@ -90,7 +90,7 @@ def weights(stations, j, h, s, order):
 
 @inner
 def linear_weight(stations, j, h, s):
-    """Return l_2 and its derivative."""
+    """Return the linear interpolation weight l_2 and its derivative."""
     x = (s - stations.s[j]) / h
     if x < 0.0:
         return 0.0, 0.0
@@ -101,7 +101,7 @@ def linear_weight(stations, j, h, s):
 
 @inner
 def mean(l_2, x_1, x_2):
-    """Return (1 - l_2) x_1 + l_2 x_2."""
+    """Return the linear interpolation (1 - l_2) x_1 + l_2 x_2."""
     return add(scaled(1 - l_2, x_1), scaled(l_2, x_2))
 
 
@@ -115,7 +115,7 @@ def combined(e, weight, d_1, th_1, d_2, th_2):
 
 @inner
 def displacement(model, d, th, k, s, order):
-    """Return D, D', D'' or D''' at s for displacements and rotations of all stations, (n, 3); body axes."""
+    """Return displacement D, or D', D'', D''', at s from displacements and rotations of stations, (n, 3), body axes."""
     j, h = piece(model.lines, model.stations, k, s)
     weight = weights(model.stations, j, h, s, order)
     return combined(
@@ -125,7 +125,7 @@ def displacement(model, d, th, k, s, order):
 
 @inner
 def twist(model, th, k, s, order):
-    """Return e (e · Σ l_j th_j) at s, or its derivative."""
+    """Return the twist e (e · Σ l_j th_j) at s, or its derivative."""
     e = vector(model.lines.axis[k])
     j, h = piece(model.lines, model.stations, k, s)
     l_2, slope = linear_weight(model.stations, j, h, s)
@@ -136,7 +136,7 @@ def twist(model, th, k, s, order):
 
 @inner
 def place_of(model, d, th, k, x):
-    """Return the place s nearest to a point x from that of s = 0, body axes."""
+    """Return the coordinate s of the point on the line nearest to x, given relative to the point s = 0, body axes."""
     e = vector(model.lines.axis[k])
     s = dot(x, e)
     length = model.stations.s[model.lines.station0[k + 1] - 1]
@@ -217,7 +217,7 @@ def slide_marker(model, work, k):
 
 @inner
 def turning_change(T, th, s_dot, th_t, th_s, th_st, th_ss):
-    """Return d(T th_s)/dt + d(T th_t)/ds s_dot along the moving place, with the body at rest; _t: at a fixed place.
+    """Return d(T th_s)/dt + d(T th_t)/ds s_dot at the moving point, body at rest; th_t: rate at fixed s, th_s: by s.
 
     What s_dot times it adds to the angular acceleration of axes that turn with T (th_t + th_s s_dot).
     """
@@ -228,7 +228,7 @@ def turning_change(T, th, s_dot, th_t, th_s, th_st, th_ss):
 
 @inner
 def add_shapes(model, k, s, first, second, n, factor, out):
-    """Add the derivatives of displacement and rotation at s by q, [6, n], from those of the stations around s."""
+    """Add the derivatives by q, [6, n], of displacement and rotation at s, interpolated from the nearest stations."""
     e, stations = vector(model.lines.axis[k]), model.stations
     j, h = piece(model.lines, stations, k, s)
     value, slopes = weights(stations, j, h, s, 0), weights(stations, j, h, s, 1)
@@ -245,7 +245,7 @@ def add_shapes(model, k, s, first, second, n, factor, out):
 
 @inner
 def unit_normal(part, n_0, y):
-    """Return n_i of a line along the unit vector n_0: 0 along it, 1 nearest to y, 2 normal to both."""
+    """Return normal i of a line with unit tangent n_0; part 0: n_0 itself, 1: nearest to y, 2: normal to both."""
     if part == 0:
         return n_0
     y = sub(y, scaled(dot(y, n_0), n_0))
@@ -255,21 +255,21 @@ def unit_normal(part, n_0, y):
 
 @inner
 def normal(model, work, row, a):
-    """Return n_i of row k, ground axes, y being the second axis of the marker."""
+    """Return the normal n_i of row k, ground axes, where y is the second axis of the marker."""
     n_0 = vector(work.lines.n_0[model.markers.line[a]])
     return unit_normal(model.rows.part[row], n_0, direction(work.markers, a, unit(1)))
 
 
 @inner
 def line_value(model, work, k, a, b):
-    """LINE: n_i · d; A follows the point of B, so its axes do not contribute."""
+    """Return the value of LINE, n_i · d; the axes of A do not contribute, because A follows the point of B."""
     n, zero = normal(model, work, k, a), (0.0, 0.0, 0.0)
     return dot(n, distance(work.markers, a, b)), n, zero, zero
 
 
 @inner
 def place_rates(model, work, a):
-    """Return the rate of the place if prescribed, else 0, the remainder of its second rate, and the change due to B.
+    """Return the prescribed rate of s, else 0, the remaining second rate of s, and the change due to B.
 
     r_ddot of the place = a + 2 s_dot r'_dot + s_dot² r'' + s_ddot r', A fixed in the line.
     """
@@ -284,7 +284,7 @@ def place_rates(model, work, a):
 
 @inner
 def line_rates(model, work, k, a, b):
-    """LINE."""
+    """Return the rates of LINE."""
     rate, second, own = place_rates(model, work, a)
     held = dot(normal(model, work, k, a), own)
     if model.rows.part[k] == 0:
@@ -295,7 +295,7 @@ def line_rates(model, work, k, a, b):
 
 @inner
 def line_turn_value(model, work, k, a, b):
-    """LINE_TURN: E · D; A also rotates with kappa s_dot if s follows the points."""
+    """Return the value of LINE_TURN, E · D; A also rotates with kappa s_dot if s follows the points."""
     rows = model.rows
     line, j = work.lines, model.markers.line[a]
     E, D = direction(work.markers, a, rows.x[k]), direction(work.markers, b, rows.y[k])
@@ -306,7 +306,7 @@ def line_turn_value(model, work, k, a, b):
 
 @inner
 def line_turn_rates(model, work, k, a, b):
-    """LINE_TURN."""
+    """Return the rates of LINE_TURN."""
     rows = model.rows
     line, j = work.lines, model.markers.line[a]
     E, D = direction(work.markers, a, rows.x[k]), direction(work.markers, b, rows.y[k])
@@ -322,7 +322,7 @@ def line_turn_rates(model, work, k, a, b):
 
 @inner
 def free_moment(model, work, a):
-    """Return n_0, and kappa / |r'| if the joint transmits a moment, else zero."""
+    """Return the tangent n_0, and kappa/|r'| if the joint transmits a moment, else zero."""
     j, line = model.markers.line[a], work.lines
     f = 1.0 / line.slope[j] if model.markers.moment[a] >= 0 else 0.0
     return vector(line.n_0[j]), scaled(f, vector(line.kappa[j]))
@@ -330,7 +330,7 @@ def free_moment(model, work, a):
 
 @inner
 def line_free_value(model, work, k, a, b, w):
-    """LINE_FREE: n_0 · F + kappa · M / |r'|."""
+    """Return the value of LINE_FREE: n_0 · F + kappa · M / |r'|."""
     n_0, m = free_moment(model, work, a)
     total = dot(n_0, vector(w))
     if model.markers.moment[a] >= 0:
@@ -340,7 +340,7 @@ def line_free_value(model, work, k, a, b, w):
 
 @inner
 def line_free_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
-    """LINE_FREE."""
+    """Write the derivatives of LINE_FREE."""
     n_0, m = free_moment(model, work, a)
     put(V[r], FORCE, n_0)
     turn = cross(n_0, vector(w))

@@ -1,4 +1,4 @@
-"""Constraint rows of two markers: their values, and their derivatives by the motion and by time alone.
+"""Constraint rows between two markers: values, and derivatives by the motion and explicitly by time.
 
 What a row holds, g, depends on d = r_B - r_A, on the axes of both markers and on time, so that
 
@@ -57,7 +57,7 @@ def turned_twice(omega, x):
 
 @inner
 def along_rates(markers, a, b, E):
-    """Return beta of E · d with E fixed in A."""
+    """Return the velocity terms beta of E · d with E fixed in A."""
     omega = vector(markers.omega[a])
     d, v = distance(markers, a, b), relative_velocity(markers, a, b)
     return dot(turned_twice(omega, E), d) + 2 * dot(cross(omega, E), v)
@@ -72,7 +72,7 @@ def product(E, D):
 
 @inner
 def product_rates(o, p, E, E_1, E_2, D):
-    """Return dg/dt and beta of E · D, with E_1 and E_2 the rates of E relative to A."""
+    """Return dg/dt and the velocity terms beta of E · D; E_1, E_2: rates of E relative to A."""
     E_dot, D_dot = add(cross(o, E), E_1), cross(p, D)
     E_ddot = add(add(turned_twice(o, E), scaled(2.0, cross(o, E_1))), E_2)
     return dot(E_1, D), dot(E_ddot, D) + 2 * dot(E_dot, D_dot) + dot(E, cross(p, D_dot))
@@ -80,7 +80,7 @@ def product_rates(o, p, E, E_1, E_2, D):
 
 @small
 def point_value(model, work, k, a, b):
-    """POINT: -x · d, x in ground axes."""
+    """Return the value of POINT: -x · d, with x in ground axes."""
     x = vector(model.rows.x[k])
     zero = (0.0, 0.0, 0.0)
     return -dot(x, distance(work.markers, a, b)), scaled(-1.0, x), zero, zero
@@ -88,13 +88,13 @@ def point_value(model, work, k, a, b):
 
 @inner
 def point_rates(model, work, k, a, b):
-    """POINT: only the motion of the points contributes."""
+    """Return the rates of POINT, to which only the motion of the points contributes."""
     return 0.0, 0.0
 
 
 @small
 def angle_value(model, work, k, a, b):
-    """DOT: E · D - c."""
+    """Return the value of DOT: E · D - c."""
     rows, markers = model.rows, work.markers
     g, n, m_a, m_b = product(direction(markers, a, rows.x[k]), direction(markers, b, rows.y[k]))
     return g - rows.c[k], n, m_a, m_b
@@ -102,7 +102,7 @@ def angle_value(model, work, k, a, b):
 
 @inner
 def angle_rates(model, work, k, a, b):
-    """DOT."""
+    """Return the rates of DOT."""
     rows, markers = model.rows, work.markers
     E, D, zero = direction(markers, a, rows.x[k]), direction(markers, b, rows.y[k]), (0.0, 0.0, 0.0)
     return product_rates(vector(markers.omega[a]), vector(markers.omega[b]), E, zero, zero, D)
@@ -110,7 +110,7 @@ def angle_rates(model, work, k, a, b):
 
 @inner
 def turning_direction(model, work, k, a, sense):
-    """Return E cos f + Z sin f, and E', E'', ground axes; sense -1: the angle is measured from B."""
+    """Return E cos f + Z sin f with its derivatives E', E'' by f, ground axes; sense -1: f is measured from B."""
     f, rate, second = prescribed(model, work, k)
     c, s, x, z = math.cos(f), sense * math.sin(f), vector(model.rows.x[k]), vector(model.rows.z[k])
     E = turned(work.markers.A[a], add(scaled(c, x), scaled(s, z)))
@@ -120,14 +120,14 @@ def turning_direction(model, work, k, a, sense):
 
 @small
 def turn_value(model, work, k, a, b):
-    """TURN: (E cos f + Z sin f) · D."""
+    """Return the value of TURN: (E cos f + Z sin f) · D."""
     E, _, _ = turning_direction(model, work, k, a, 1.0)
     return product(E, direction(work.markers, b, model.rows.y[k]))
 
 
 @inner
 def turn_rates(model, work, k, a, b):
-    """TURN."""
+    """Return the rates of TURN."""
     markers = work.markers
     E, E_1, E_2 = turning_direction(model, work, k, a, 1.0)
     D = direction(markers, b, model.rows.y[k])
@@ -136,7 +136,7 @@ def turn_rates(model, work, k, a, b):
 
 @inner
 def turn_b_value(model, work, k, a, b):
-    """TURN_B: TURN with A and B exchanged; relative to B, A rotates backwards."""
+    """Return the value of TURN_B, which is TURN with A and B exchanged; A rotates backwards relative to B."""
     E, _, _ = turning_direction(model, work, k, b, -1.0)
     g, n, m_b, m_a = product(E, direction(work.markers, a, model.rows.y[k]))
     return g, n, m_a, m_b
@@ -144,7 +144,7 @@ def turn_b_value(model, work, k, a, b):
 
 @inner
 def turn_b_rates(model, work, k, a, b):
-    """TURN_B."""
+    """Return the rates of TURN_B."""
     markers = work.markers
     E, E_1, E_2 = turning_direction(model, work, k, b, -1.0)
     D = direction(markers, a, model.rows.y[k])
@@ -153,7 +153,7 @@ def turn_b_rates(model, work, k, a, b):
 
 @small
 def slide_value(model, work, k, a, b):
-    """SLIDE: E · d - f."""
+    """Return the value of SLIDE: E · d - f."""
     markers = work.markers
     f, _, _ = prescribed(model, work, k)
     E, d = direction(markers, a, model.rows.x[k]), distance(markers, a, b)
@@ -162,7 +162,7 @@ def slide_value(model, work, k, a, b):
 
 @inner
 def slide_rates(model, work, k, a, b):
-    """SLIDE."""
+    """Return the rates of SLIDE."""
     markers = work.markers
     _, rate, second = prescribed(model, work, k)
     return -rate, along_rates(markers, a, b, direction(markers, a, model.rows.x[k])) - second
@@ -170,7 +170,7 @@ def slide_rates(model, work, k, a, b):
 
 @inner
 def distance_value(model, work, k, a, b):
-    """DISTANCE: (d · d/f - f)/2."""
+    """Return the value of DISTANCE: (d · d/f - f)/2."""
     f, _, _ = prescribed(model, work, k)
     d, zero = distance(work.markers, a, b), (0.0, 0.0, 0.0)
     return 0.5 * (dot(d, d) / f - f), scaled(1.0 / f, d), zero, zero
@@ -178,7 +178,7 @@ def distance_value(model, work, k, a, b):
 
 @inner
 def distance_rates(model, work, k, a, b):
-    """DISTANCE."""
+    """Return the rates of DISTANCE."""
     markers = work.markers
     f, rate, second = prescribed(model, work, k)
     d, v = distance(markers, a, b), relative_velocity(markers, a, b)
@@ -189,7 +189,7 @@ def distance_rates(model, work, k, a, b):
 
 @inner
 def screw_value(model, work, k, a, b):
-    """SCREW: E · d - c th, with E the axis and th the angle of D about it, counted to the nearest turn."""
+    """Return the value of SCREW, E · d - c th; E: axis, th: angle of D about it, counted to the nearest turn."""
     rows, markers = model.rows, work.markers
     c, d, E = rows.c[k], distance(markers, a, b), axis_between(rows, markers, k, a)
     th, t = angle_between(rows, markers, k, a, b)
@@ -200,6 +200,6 @@ def screw_value(model, work, k, a, b):
 
 @inner
 def screw_rates(model, work, k, a, b):
-    """SCREW: the second rate of the angle is that for parallel axes."""
+    """Return the rates of SCREW; the second rate of the angle is the one for parallel axes."""
     markers = work.markers
     return 0.0, along_rates(markers, a, b, axis_between(model.rows, markers, k, a))

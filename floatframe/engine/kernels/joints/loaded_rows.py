@@ -1,4 +1,4 @@
-"""Rows of free coordinates along which forces act: PUSH, TWIST and TWIST_B, e · part + Q = 0.
+"""Rows of free coordinates along which forces act: PUSH, TWIST and TWIST_B, with the residual e · part + Q.
 
 With e the axis, d = r_B - r_A, s the slip of B seen from A and n the size of the force normal to e:
 
@@ -21,7 +21,7 @@ __all__ = ["loaded_derivatives", "loaded_value", "normal_force"]
 
 @inner
 def normal_force(w, e):
-    """Return the size of the force normal to the axis, and its part along it."""
+    """Return the size of the force normal to the axis, and the force component along the axis."""
     F = vector(w)
     along = dot(e, F)
     return math.sqrt(max(dot(F, F) - along * along, 0.0)), along
@@ -29,7 +29,7 @@ def normal_force(w, e):
 
 @inner
 def loaded_value(model, work, k, a, b, w):
-    """PUSH, TWIST, TWIST_B: e · part + Q."""
+    """Return the value of PUSH, TWIST or TWIST_B: e · part + Q."""
     rows, markers = model.rows, work.markers
     e = loaded_axis(rows, markers, k, a, b)
     x, v = loaded_coordinate(rows, markers, k, a, b)
@@ -40,7 +40,7 @@ def loaded_value(model, work, k, a, b, w):
 
 @inner
 def loaded_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
-    """PUSH, TWIST, TWIST_B."""
+    """Write the derivatives of PUSH, TWIST or TWIST_B."""
     rows, markers = model.rows, work.markers
     part, is_angle = rows.part[k], rows.kind[k] != PUSH
     e = loaded_axis(rows, markers, k, a, b)

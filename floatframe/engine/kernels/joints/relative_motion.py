@@ -1,4 +1,4 @@
-"""Relative motion of two markers, from which rows of joints and coordinates are made."""
+"""Relative motion of two markers, the basis of rows of joints and coordinates."""
 
 import math
 
@@ -27,13 +27,13 @@ __all__ = [
 
 @inner
 def prescribed(model, work, k):
-    """Return the motion of row k at the time of the iterate, its rate and its second rate."""
+    """Return the prescribed value of row k at the time of the iterate, with its first and second rate."""
     return prescribed_at(model, k, work.state.time)
 
 
 @inner
 def prescribed_at(model, k, t):
-    """Return the motion of row k at time t, its rate and its second rate; its constant if not driven."""
+    """Return the prescribed value of row k at time t with its first and second rate; a constant without motion."""
     if model.rows.motion[k] < 0:
         return model.rows.c[k], 0.0, 0.0
     return time_function(model.functions, model.rows.motion[k], t)
@@ -47,13 +47,13 @@ def direction(markers, m, x):
 
 @small
 def distance(markers, a, b):
-    """Return d = r_B - r_A."""
+    """Return the vector d = r_B - r_A."""
     return sub(vector(markers.r[b]), vector(markers.r[a]))
 
 
 @small
 def relative_velocity(markers, a, b):
-    """Return v_B - v_A."""
+    """Return the relative velocity v_B - v_A."""
     return sub(vector(markers.v[b]), vector(markers.v[a]))
 
 
@@ -65,7 +65,7 @@ def slip(markers, a, b, d):
 
 @inner
 def angle_between(rows, markers, k, a, b):
-    """Return the angle th of D about the axis of row k in A, and its derivative t by a rotation of A (of B: -t).
+    """Return the angle th of D about the axis of row k in A, and its derivative by a rotation of A (by B: opposite).
 
     th = atan2(S, C), S = -E · D, C = Z · D;  t = -(C E × D + S Z × D)/(S² + C²).
     """
@@ -84,7 +84,7 @@ def axis_between(rows, markers, k, a):
 
 @inner
 def turned_angle(rows, markers, k, a, b):
-    """Return the angle of B about an axis of A (TWIST_B: of B), and its derivative by a rotation of A.
+    """Return the angle of B about the axis of row k in A (TWIST_B: in B), and its derivative by a rotation of A.
 
     By a rotation of B: the opposite.
     """
@@ -96,7 +96,7 @@ def turned_angle(rows, markers, k, a, b):
 
 @inner
 def loaded_axis(rows, markers, k, a, b):
-    """Return the axis of a coordinate with forces, ground axes."""
+    """Return the axis of a coordinate along which forces act, ground axes."""
     if rows.kind[k] == PUSH:
         return direction(markers, a, rows.x[k])
     return axis_between(rows, markers, k, b if rows.kind[k] == TWIST_B else a)
@@ -104,7 +104,7 @@ def loaded_axis(rows, markers, k, a, b):
 
 @inner
 def loaded_coordinate(rows, markers, k, a, b):
-    """Return value and rate of a coordinate with forces.
+    """Return value and rate of a coordinate along which forces act.
 
     It is a distance along an axis of A, or an angle about it (TWIST_B: about an axis of B).
     """
@@ -118,7 +118,7 @@ def loaded_coordinate(rows, markers, k, a, b):
 
 @inner
 def add_coordinate_gradient(rows, markers, k, a, b, P_a, P_b, r, by_x, by_v):
-    """Add by_x dx + by_v dv of the coordinate of row k to row r of P; see kernels/joints/loaded_rows.py."""
+    """Add by_x dx + by_v dv to row r of P; x, v: value and rate of the coordinate of row k, see `loaded_rows`."""
     e = loaded_axis(rows, markers, k, a, b)
     add_pair(P_a, P_b, r, 9 if rows.kind[k] != PUSH else 6, scaled(-by_v, e))
     if rows.kind[k] != PUSH:
@@ -136,13 +136,13 @@ def add_coordinate_gradient(rows, markers, k, a, b, P_a, P_b, r, by_x, by_v):
 
 @small
 def add_pair(P_a, P_b, r, column, x):
-    """Add x to a row of P at A, and its opposite at B."""
+    """Add x to row r of P at marker A, and -x at marker B."""
     put_sum(P_a[r], column, x)
     put_sum(P_b[r], column, scaled(-1.0, x))
 
 
 @small
 def put_pair(P_a, P_b, r, column, x):
-    """Write x into a row of P at A, and its opposite at B."""
+    """Write x into row r of P at marker A, and -x at marker B."""
     put(P_a[r], column, x)
     put(P_b[r], column, scaled(-1.0, x))

@@ -31,7 +31,7 @@ __all__ = [
 
 @inner
 def rim(rows, markers, k, a, b):
-    """Return N, n, c, s and rho, ground axes."""
+    """Return N, n, c, s and the vector rho to the lowest rim point, ground axes."""
     N, n = direction(markers, a, rows.z[k]), direction(markers, b, rows.y[k])
     c = dot(N, n)
     u = sub(N, scaled(c, n))
@@ -56,7 +56,7 @@ def rim_rates(markers, a, b, N, n):
 
 @inner
 def height_value(model, work, k, a, b):
-    """RIM_HEIGHT: d(-R s) = R c/s dc."""
+    """Return the value of RIM_HEIGHT, whose change by the tilt is d(-R s) = R c/s dc."""
     rows, markers = model.rows, work.markers
     N, n, c, s, _ = rim(rows, markers, k, a, b)
     R, d = rows.c[k], distance(markers, a, b)
@@ -66,7 +66,7 @@ def height_value(model, work, k, a, b):
 
 @inner
 def height_rates(model, work, k, a, b):
-    """RIM_HEIGHT."""
+    """Return the rates of RIM_HEIGHT."""
     rows, markers = model.rows, work.markers
     N, n, c, s, _ = rim(rows, markers, k, a, b)
     N_dot, n_dot, c_dot = rim_rates(markers, a, b, N, n)
@@ -79,7 +79,7 @@ def height_rates(model, work, k, a, b):
 
 @inner
 def roll_value(model, work, k, a, b):
-    """ROLL: t · V, linear in the velocities."""
+    """Return the value of ROLL, t · V, which is linear in the velocities."""
     rows, markers = model.rows, work.markers
     _, _, _, _, rho = rim(rows, markers, k, a, b)
     t = direction(markers, a, rows.x[k])
@@ -93,7 +93,7 @@ def roll_value(model, work, k, a, b):
 
 @inner
 def roll_rates(model, work, k, a, b):
-    """ROLL: rho_dot = -R u_dot, u_dot = (N_dot - c_dot n - c n_dot)/s + u c c_dot/s²."""
+    """Return the rates of ROLL: rho_dot = -R u_dot, u_dot = (N_dot - c_dot n - c n_dot)/s + u c c_dot/s²."""
     rows, markers = model.rows, work.markers
     N, n, c, s, rho = rim(rows, markers, k, a, b)
     N_dot, n_dot, c_dot = rim_rates(markers, a, b, N, n)
@@ -107,7 +107,7 @@ def roll_rates(model, work, k, a, b):
 
 @inner
 def roll_by_place(model, work, k, r, a, b, P_a, P_b):
-    """Write the derivative of a ROLL row by the positions of the markers into row r of P."""
+    """Write the derivatives of a ROLL row by the marker positions into row r of P."""
     rows, markers = model.rows, work.markers
     N, n, c, s, rho = rim(rows, markers, k, a, b)
     omega_a, omega_b = vector(markers.omega[a]), vector(markers.omega[b])
@@ -120,7 +120,7 @@ def roll_by_place(model, work, k, r, a, b, P_a, P_b):
 
 @inner
 def rim_value(model, work, k, a, b, w):
-    """RIM: x · (N_w - rho × F), x in ground axes."""
+    """Return the value of RIM: x · (N_w - rho × F), x in ground axes."""
     rows = model.rows
     _, _, _, _, rho = rim(rows, work.markers, k, a, b)
     return dot(vector(rows.x[k]), sub(vector(w[MOMENT_B:]), cross(rho, vector(w))))
@@ -128,7 +128,7 @@ def rim_value(model, work, k, a, b, w):
 
 @inner
 def rim_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
-    """RIM: x · (dN_w - rho × dF - drho × F)."""
+    """Write the derivatives of RIM: x · (dN_w - rho × dF - drho × F)."""
     rows = model.rows
     N, n, c, s, rho = rim(rows, work.markers, k, a, b)
     x = vector(rows.x[k])
@@ -139,7 +139,7 @@ def rim_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
 
 @inner
 def add_by_rim(P_a, P_b, r, R, g, N, n, c, s):
-    """Add g · d(rho) to row r of P.
+    """Add the derivatives of g · rho to row r of P.
 
     rho = -R u,  du = (dN - dc n - c dn)/s + u c dc/s²,  dc = dN·n + N·dn, dN = dphi_A × N, ... so that
     g·du = A·dN + B·dn with m = (u c/s - n)·g/s:  A = g/s + m n,  B = m N - c g/s.

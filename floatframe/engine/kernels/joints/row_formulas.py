@@ -1,4 +1,4 @@
-"""The formulas of each kind of row of a joint, by its code: the compiled part of the record `ROW_KINDS`.
+"""The formulas of each kind of joint row, by its code: the compiled part of the record `ROW_KINDS`.
 
 A kind that holds something brings `value` and `rates` (held_rows.py), one that says what the wrench is `value` and
 `derivatives` (wrench_rows.py). Kernels call them by the code of the row and know nothing else of it.
@@ -61,7 +61,7 @@ __all__ = [
 
 
 def by_code(name: str, functions: Mapping[int, Callable[..., Any]], arguments: str) -> Callable[..., Any]:
-    """Return the inner function name(code, ...) that calls functions[code](...).
+    """Return the inner function name(code, ...) that calls the function with this code.
 
     All of them take the arguments named and return the same types; a code that is not in the table is not asked for.
     The name is its own among such functions: the symbols of two of one name and types differ by a number that counts
@@ -89,19 +89,19 @@ Function = Callable[..., Any]
 
 
 class Held(NamedTuple):
-    """Functions of a constraint row."""
+    """Functions that evaluate a constraint row."""
 
-    value: Function  #: (model, work, k, a, b) -> g, n, m_a, m_b
-    rates: Function  #: (model, work, k, a, b) -> dg/dt, beta
-    #: for a velocity constraint: (model, work, k, r, a, b, P_a, P_b), its derivative by positions
+    value: Function  #: returns the value, (model, work, k, a, b) -> g, n, m_a, m_b
+    rates: Function  #: returns the rates, (model, work, k, a, b) -> dg/dt, beta
+    #: for velocity constraints: writes derivatives by positions, (model, work, k, r, a, b, P_a, P_b)
     by_place: Function | None = None
 
 
 class Wrench(NamedTuple):
-    """Functions of a row that defines the wrench."""
+    """Functions that evaluate a row which defines part of the wrench."""
 
-    value: Function  #: (model, work, k, a, b, w) -> number
-    derivatives: Function  #: (model, work, k, r, a, b, w, c_k, P_a, P_b, V)
+    value: Function  #: returns the value, (model, work, k, a, b, w) -> number
+    derivatives: Function  #: writes the derivatives, (model, work, k, r, a, b, w, c_k, P_a, P_b, V)
 
 
 LOADED = Wrench(loaded_rows.loaded_value, loaded_rows.loaded_derivatives)

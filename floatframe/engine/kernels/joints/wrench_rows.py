@@ -1,4 +1,4 @@
-"""Rows that define the wrench of a joint: zero along free directions, and its parts on A and B are in balance.
+"""Rows that define the wrench of a joint: zero along free directions, and balance of its parts on A and B.
 
 A kind is two functions: `value`(model, work, k, a, b, w) with w the wrench of the connection, and
 `derivatives`(model, work, k, r, a, b, w, c_k, P_a, P_b, V), which writes row r of P (times c_k) and V; both are zero
@@ -26,14 +26,14 @@ __all__ = [
 
 @small
 def gauge_value(model, work, k, a, b, w):
-    """GAUGE: E · part."""
+    """Return the value of GAUGE: E · part."""
     rows = model.rows
     return dot(direction(work.markers, a, rows.x[k]), vector(w[rows.part[k] :]))
 
 
 @small
 def gauge_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
-    """GAUGE."""
+    """Write the derivatives of GAUGE."""
     rows = model.rows
     part, E = rows.part[k], direction(work.markers, a, rows.x[k])
     put(P_a[r], 3, scaled(c_k, cross(E, vector(w[part:]))))
@@ -42,14 +42,14 @@ def gauge_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
 
 @inner
 def gauge_b_value(model, work, k, a, b, w):
-    """GAUGE_B: D · part."""
+    """Return the value of GAUGE_B: D · part."""
     rows = model.rows
     return dot(direction(work.markers, b, rows.y[k]), vector(w[rows.part[k] :]))
 
 
 @inner
 def gauge_b_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
-    """GAUGE_B."""
+    """Write the derivatives of GAUGE_B."""
     rows = model.rows
     part, D = rows.part[k], direction(work.markers, b, rows.y[k])
     put(P_b[r], 3, scaled(c_k, cross(D, vector(w[part:]))))
@@ -58,7 +58,7 @@ def gauge_b_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
 
 @inner
 def thread_value(model, work, k, a, b, w):
-    """THREAD: E · (N + c F)."""
+    """Return the value of THREAD: E · (N + c F)."""
     rows = model.rows
     W = add(vector(w[MOMENT_B:]), scaled(rows.c[k], vector(w)))
     return dot(direction(work.markers, a, rows.x[k]), W)
@@ -66,7 +66,7 @@ def thread_value(model, work, k, a, b, w):
 
 @inner
 def thread_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
-    """THREAD."""
+    """Write the derivatives of THREAD."""
     rows = model.rows
     c, E = rows.c[k], direction(work.markers, a, rows.x[k])
     W = add(vector(w[MOMENT_B:]), scaled(c, vector(w)))
@@ -77,7 +77,7 @@ def thread_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
 
 @small
 def arm_value(model, work, k, a, b, w):
-    """ARM: x · (M - N - d × F), x in ground axes; N is omitted if only the force acts on B."""
+    """Return the value of ARM, x · (M - N - d × F), x in ground axes; without N if only the force acts on B."""
     M = sub(vector(w[MOMENT:]), cross(distance(work.markers, a, b), vector(w)))
     if len(w) > MOMENT_B:
         M = sub(M, vector(w[MOMENT_B:]))
@@ -86,7 +86,7 @@ def arm_value(model, work, k, a, b, w):
 
 @small
 def arm_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
-    """ARM: (x × d) · F = d · (F × x)."""
+    """Write the derivatives of ARM; (x × d) · F = d · (F × x)."""
     x, d = vector(model.rows.x[k]), distance(work.markers, a, b)
     put(V[r], FORCE, cross(d, x))
     put(V[r], MOMENT, x)
@@ -97,13 +97,13 @@ def arm_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
 
 @inner
 def rod_value(model, work, k, a, b, w):
-    """ROD: x · (F - mu d), x in ground axes."""
+    """Return the value of ROD: x · (F - mu d), x in ground axes."""
     return dot(vector(model.rows.x[k]), sub(vector(w), scaled(w[3], distance(work.markers, a, b))))
 
 
 @inner
 def rod_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
-    """ROD."""
+    """Write the derivatives of ROD."""
     x = vector(model.rows.x[k])
     put(V[r], FORCE, x)
     V[r, 3] = -dot(x, distance(work.markers, a, b))

@@ -1,1 +1,1 @@
-"""Compiled steps of the conserving, decaying and variational schemes: a module for each part, with its formulas."""
+"""Compiled steps of the conserving, decaying and variational schemes, one module for each part of the formulas."""

@@ -1,4 +1,4 @@
-"""Bodies about their centre of mass, and one step of a body.
+"""Bodies relative to their centre of mass, and the motion of one body over a step.
 
 With v the velocity of the centre of mass and a = omega × s + 1C q_dot, s = s(q)/m, 1C = ds/dq (over the mass here, and
 with K_t of a stiffened body, docs/theory.md §7), the kinetic energy separates:
@@ -59,7 +59,7 @@ __all__ = ["begin_bodies", "body_inertia", "body_step", "end_rates", "interval",
 
 @inner
 def cayley(theta):
-    """Return cay(theta)."""
+    """Return the rotation matrix of the Cayley vector theta."""
     s = 1.0 / (1.0 + 0.25 * dot(theta, theta))
     x, y, z = theta
     a = 0.5 * s
@@ -72,7 +72,7 @@ def cayley(theta):
 
 @loops
 def shapes(discrete, t, n, q, out):
-    """Write 1C(q) = ds/dq over the mass, [a, k]."""
+    """Write 1C(q) divided by the mass, [a, k], the derivative of the centre of mass by q."""
     C = block(discrete, t, C1, 3 * n)
     for k in range(3 * n):
         out[k] = C[k]
@@ -82,7 +82,7 @@ def shapes(discrete, t, n, q, out):
 
 @loops
 def center(discrete, t, n, q, C):
-    """Return s(q) divided by the mass, for C = shapes(q)."""
+    """Return the centre of mass s(q)/m in the body, for C from `shapes`."""
     s = vector(discrete.center[t])
     both = add(column_sum(block(discrete, t, C1, 3 * n), n, q), column_sum(C, n, q))
     return add(s, scaled(0.5, both))
@@ -90,7 +90,7 @@ def center(discrete, t, n, q, C):
 
 @loops
 def products(discrete, t, n, q, which, out):
-    """Write V_ab,k = Σ_l S_ab,kl q_l."""
+    """Write the products V_ab,k = Σ_l S_ab,kl q_l."""
     for k in range(9 * n):
         out[k] = 0.0
     add_products(block(discrete, t, which, 9 * n * n), q, out[: 9 * n])
@@ -98,7 +98,7 @@ def products(discrete, t, n, q, which, out):
 
 @loops
 def matrix_product(discrete, t, which, n, x, out):
-    """Write A x of a stored matrix, (n, n)."""
+    """Write the product A x with a stored matrix A, (n, n)."""
     A = block(discrete, t, which, n * n)
     for i in range(n):
         total = 0.0
@@ -109,7 +109,7 @@ def matrix_product(discrete, t, which, n, x, out):
 
 @loops
 def momenta(model, discrete, step, t, n, q, omega, q_dot, Y):
-    """Return Pi and write Y, (n,)."""
+    """Return the angular momentum Pi, and write the modal momenta Y, (n,)."""
     J = matrix(model.body_types.J0[t])
     Pi = turned(J, omega)
     s = vector(discrete.center[t])
@@ -135,7 +135,7 @@ def momenta(model, discrete, step, t, n, q, omega, q_dot, Y):
 
 @loops
 def inertia_force(model, discrete, step, t, n, q_0, q_1, q_mean, C_mean, omega_0, rate_0, omega_1, rate_1, out):
-    """Write N_k, (n,): 1/2 w_0ᵀ M_c,k w_1 between two configurations."""
+    """Write N_k, (n,), the modal inertia force 1/2 w_0ᵀ M_c,k w_1 between two configurations."""
     m = model.body_types.mass[t]
     V, W, C = step.V, step.W, step.C
     products(discrete, t, n, q_mean, PRODUCTS, V)
@@ -169,7 +169,7 @@ def inertia_force(model, discrete, step, t, n, q_0, q_1, q_mean, C_mean, omega_0
 
 @inner
 def begin_bodies(model, discrete, step, memory):
-    """Write centres of mass, velocities and momenta of all bodies at the state in the memory."""
+    """Write centres of mass, velocities and momenta of all bodies for the state in the memory."""
     for i in range(model.bodies.kind.shape[0]):
         t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
         R = matrix_of_euler_parameters(memory.p[i])
@@ -192,7 +192,7 @@ def begin_bodies(model, discrete, step, memory):
 
 @inner
 def put_momenta(model, discrete, step, i, q, w, P):
-    """Write m v, Pi and Y of body i with velocities w."""
+    """Write the momenta m v, Pi and Y of body i for velocities w."""
     t, n, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.u0[i]
     put(P, u0, scaled(model.body_types.mass[t], vector(w[u0:])))
     omega, q_dot = vector(w[u0 + 3 :]), w[u0 + 6 : u0 + 6 + n]
@@ -201,7 +201,7 @@ def put_momenta(model, discrete, step, i, q, w, P):
 
 @inner
 def move_bodies(model, step):
-    """Use the end of the step as the configuration at which the next one starts."""
+    """Copy the configuration at the end of the step to its beginning."""
     for i in range(model.bodies.kind.shape[0]):
         n, q0, u0 = model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
         p, half = step.p_0[i], scaled(0.5, vector(step.z[u0 + 3 :]))
@@ -221,7 +221,7 @@ def move_bodies(model, step):
 
 @inner
 def keep_bodies(model, discrete, step, memory):
-    """Write the configuration with velocities w_1 into the memory."""
+    """Write the final configuration, with velocities w_1, into the memory."""
     for i in range(model.bodies.kind.shape[0]):
         t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
         q, q_dot, omega = step.q_0[q0 : q0 + n], step.w_1[u0 + 6 : u0 + 6 + n], vector(step.w_1[u0 + 3 :])
@@ -241,7 +241,7 @@ def keep_bodies(model, discrete, step, memory):
 
 @inner
 def body_step(model, discrete, step, i):
-    """Write the motion of body i over the step from its unknowns.
+    """Compute the motion of body i over the step from its unknowns.
 
     Forces of the variational scheme act at one configuration. The angular velocity there that belongs to the momentum
     of the interval is (1 + theta²/4) theta/h (exactly, for turns about a principal axis).
@@ -276,7 +276,7 @@ def body_step(model, discrete, step, i):
 
 @inner
 def end_rates(model, discrete, step, i):
-    """(1): write the velocities of body i at the end of a conserving step."""
+    """(1): compute the velocities of body i at the end of a conserving step."""
     t, n, q0, u0, h = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i], step.h
     put(step.w_1, u0, sub(scaled(2.0 / h, vector(step.d[i])), vector(step.w_0[u0:])))
     for k in range(3, 6 + n):
@@ -300,7 +300,7 @@ def end_rates(model, discrete, step, i):
 
 @inner
 def body_inertia(model, discrete, step, i):
-    """Write the residual of body i without loads, in its axes at the beginning: h/2 times the change of momentum."""
+    """Write the inertia residual of body i in its initial axes: h/2 times the change of momentum."""
     t, n, q0, u0, h = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i], step.h
     m, R, out = model.body_types.mass[t], matrix(step.R_0[i]), step.residual
     if step.is_closing:
@@ -345,7 +345,7 @@ def body_inertia(model, discrete, step, i):
 
 @loops
 def subtract_elastic(discrete, step, t, n, q_mean, dq, N):
-    """Subtract K q and D dq/h from modal forces, with the dissipating part in q."""
+    """Subtract elastic forces K q and damping forces D dq/h from the modal forces, with numerical dissipation in q."""
     K, D, q = block(discrete, t, STIFFNESS, n * n), block(discrete, t, DAMPING, n * n), step.vector
     for k in range(n):
         q[k] = q_mean[k]
@@ -363,7 +363,7 @@ def subtract_elastic(discrete, step, t, n, q_mean, dq, N):
 
 @inner
 def interval(model, discrete, step, i):
-    """Write Pi and Y between two configurations into P_1, and the modal force there into `force`; variational."""
+    """Write the momenta Pi and Y between two configurations into P_1 and the modal force into `force`; variational."""
     t, n, q0, u0, h = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i], step.h
     omega, rate, q = scaled(1.0 / h, vector(step.z[u0 + 3 :])), step.w_1[u0 + 6 : u0 + 6 + n], step.middle[:n]
     for k in range(n):

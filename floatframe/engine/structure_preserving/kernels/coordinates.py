@@ -1,4 +1,4 @@
-"""Coordinates over a step: their values at its ends, how they change, and forces along them whose work is exact.
+"""Coordinates over a step: values at both ends, their change, and forces along them that do exact work.
 
 A distance along an axis of A is a sum of products of a direction and a position, a distance of points the root of one,
 an angle that of kernels/rows.py: each has a discrete derivative, so that a force Q along a coordinate does the
@@ -35,7 +35,7 @@ __all__ = ["add_coordinate_force", "add_impulsive_force", "coordinate_at", "coor
 
 @inner
 def span(step, a, b):
-    """Return the mean distance of two points over the force interval, and its derivative by the mean of r_B - r_A."""
+    """Return the mean distance of two points over the force interval, and its derivative by the mean r_B - r_A."""
     d_0, d_1 = sub(vector(step.x_0[b]), vector(step.x_0[a])), sub(vector(step.x_f[b]), vector(step.x_f[a]))
     mean = 0.5 * (norm(d_0) + norm(d_1))
     return mean, scaled(0.5 / mean, add(d_0, d_1))
@@ -43,7 +43,7 @@ def span(step, a, b):
 
 @inner
 def coordinate_change(model, discrete, step, k, a, b):
-    """Return the change of the coordinate of row k over the step: the work of a unit force along it."""
+    """Return the change of row k's coordinate over the step, which is the work of a unit force along it."""
     begin_unit_load(step, a, b)
     add_coordinate_force(model, discrete, step, k, a, b, 1.0)
     return end_unit_load(model, step, a, b)
@@ -51,7 +51,7 @@ def coordinate_change(model, discrete, step, k, a, b):
 
 @inner
 def coordinate_at(model, x, A, k, a, b):
-    """Return the coordinate of row k for places x and axes A of the markers; an angle between -pi and pi."""
+    """Return the coordinate of row k for marker positions x and axes A; angles are between -pi and pi."""
     kind = model.rows.kind[k]
     if kind == TWIST_B:
         return -angle_of(model, A, k, b, a)
@@ -65,7 +65,7 @@ def coordinate_at(model, x, A, k, a, b):
 
 @inner
 def coordinate_ends(model, step, k, a, b, change):
-    """Return the coordinate of row k at the start and end of the force interval; angles are not counted."""
+    """Return the coordinate of row k at both ends of the force interval; angles are not counted."""
     end = coordinate_at(model, step.x_f, step.A_f, k, a, b)
     if step.is_still:
         return end, end
@@ -74,7 +74,7 @@ def coordinate_ends(model, step, k, a, b, change):
 
 @inner
 def counted(model, k, x, known):
-    """Return the value of the coordinate of row k; for angles the value nearest to the previous one."""
+    """Return the value of row k's coordinate; for angles the value nearest to the known one."""
     if not model.rows.is_angle[k]:
         return x
     return x + 2 * math.pi * math.floor((known - x) / (2 * math.pi) + 0.5)
@@ -82,7 +82,7 @@ def counted(model, k, x, known):
 
 @inner
 def ends_of_step(model, step, k, a, b):
-    """Return the coordinate of row k, counted, at both ends of the step itself."""
+    """Return the counted coordinate of row k at both ends of the step."""
     begin = counted(model, k, coordinate_at(model, step.x_0, step.A_0, k, a, b), step.known[k])
     return begin, counted(model, k, coordinate_at(model, step.end.markers.r, step.end.markers.A, k, a, b), begin)
 
@@ -104,7 +104,7 @@ def add_coordinate_force(model, discrete, step, k, a, b, Q):
 
 @inner
 def angle_axis(model, step, k, a):
-    """Return the unit axis of the angle of row k, fixed in marker a, from the mean of its directions."""
+    """Return the unit axis, fixed in marker a, of row k's angle, from the mean of its directions."""
     axis = mean_direction(step, a, cross(vector(model.rows.x[k]), vector(model.rows.z[k])))
     length = norm(axis)
     return scaled(1.0 / length, axis) if length > 0.0 else axis
@@ -112,7 +112,7 @@ def angle_axis(model, step, k, a):
 
 @inner
 def coordinate_rate(model, discrete, step, k, a, b):
-    """Return the mean rate of the coordinate of row k; for an angle that of the angular velocities about its axis."""
+    """Return the mean rate of row k's coordinate; for an angle the mean angular velocity about its axis."""
     kind = model.rows.kind[k]
     if kind == PUSH or kind == SPAN:
         return coordinate_change(model, discrete, step, k, a, b) / step.h
@@ -122,7 +122,7 @@ def coordinate_rate(model, discrete, step, k, a, b):
 
 @inner
 def add_impulsive_force(model, discrete, step, k, a, b, Q):
-    """Add the loads of a force or torque Q along the coordinate of row k: impulse h Q, work h Q times its rate."""
+    """Add the loads of an impulsive force or torque Q along row k's coordinate: impulse h Q, work h Q times rate."""
     kind = model.rows.kind[k]
     if kind == PUSH or kind == SPAN:
         add_coordinate_force(model, discrete, step, k, a, b, Q)

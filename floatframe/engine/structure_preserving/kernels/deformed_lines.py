@@ -1,4 +1,4 @@
-"""A point that slides along the deformed line of a body over a step, see engine/kernels/joints/deformed_line.py.
+"""A point that slides along a deformed line of a body over a step, see engine/kernels/joints/deformed_line.py.
 
 With d_j(q), th_j(q) of the stations and Hermite functions a_j, b_j of the place s, in the axes of the body from its
 centre of mass,
@@ -73,7 +73,7 @@ BEGIN, END, MEAN = range(3)
 
 @inner
 def put_stations(model, step, k, end, q, s):
-    """Write displacements and rotations of the stations of line k at one end of the step; s: centre of mass."""
+    """Write displacements and rotations of line k's stations at one end of the step; s: centre of mass."""
     for j in range(model.lines.station0[k], model.lines.station0[k + 1]):
         m = model.stations.marker[j]
         sigma, th = deformation(model, step, m, model.markers.body[m], q, s)
@@ -83,7 +83,7 @@ def put_stations(model, step, k, end, q, s):
 
 @inner
 def put_mean_stations(model, step, k):
-    """Write the means of displacements and rotations of the stations of line k."""
+    """Write mean displacements and rotations of line k's stations."""
     for j in range(model.lines.station0[k], model.lines.station0[k + 1]):
         d, th = step.station_d, step.station_th
         put(d[MEAN, j], 0, scaled(0.5, add(vector(d[BEGIN, j]), vector(d[END, j]))))
@@ -92,7 +92,7 @@ def put_mean_stations(model, step, k):
 
 @inner
 def found_place(model, step, k, end, t, R, center, way):
-    """Return the place of line k at one end: prescribed at t, or nearest to B, at `way` from the centre of mass."""
+    """Return the coordinate s of line k at one end: prescribed at t, or nearest to B, `way` from the centre of mass."""
     if model.lines.row[k] >= 0:
         value, _ = held(model, model.lines.row[k], t)
         return value
@@ -103,7 +103,7 @@ def found_place(model, step, k, end, t, R, center, way):
 
 @inner
 def on_line(model, step, k, end, s, center):
-    """Return the point of line k at s from the centre of mass, the rotation there and r', body axes."""
+    """Return the point of line k at coordinate s relative to the centre of mass, its rotation and r', body axes."""
     e, d, th = vector(model.lines.axis[k]), step.station_d[end], step.station_th[end]
     D, slope = displacement(model, d, th, k, s, 0), displacement(model, d, th, k, s, 1)
     sigma = sub(add(add(vector(model.markers.position[model.lines.marker[k]]), scaled(s, e)), D), center)
@@ -112,7 +112,7 @@ def on_line(model, step, k, end, s, center):
 
 @inner
 def begin_lines(model, step):
-    """Write the sliding markers at the beginning of the step; all other markers are known."""
+    """Write the sliding markers at the beginning of the step, after all other markers."""
     for k in range(model.lines.marker.shape[0]):
         m, b = model.lines.marker[k], model.lines.other[k]
         i = model.markers.body[m]
@@ -133,14 +133,14 @@ def begin_lines(model, step):
 
 @inner
 def line_steps(model, discrete, step):
-    """Write the motion of the sliding markers over the step; all other markers are known."""
+    """Write the motion of the sliding markers over the step, after all other markers."""
     for k in range(model.lines.marker.shape[0]):
         line_step(model, discrete, step, k)
 
 
 @inner
 def line_step(model, discrete, step, k):
-    """Write the motion of the sliding marker of line k, at its place and along the line."""
+    """Write the motion of line k's sliding marker over the step, from body motion and sliding along the line."""
     m, b = model.lines.marker[k], model.lines.other[k]
     i = model.markers.body[m]
     n, q0, R_m = model.bodies.n_q[i], model.bodies.q0[i], matrix(step.R_m[i])
@@ -182,7 +182,7 @@ def line_step(model, discrete, step, k):
 
 @loops
 def put_shapes(model, discrete, step, k, s_0, s_1):
-    """Write the derivatives of position and rotation of the sliding marker by q, as means over both places."""
+    """Write the mean derivatives by q of the sliding marker's position and rotation, over both coordinates s."""
     m, psi = model.lines.marker[k], step.psi
     n = model.bodies.n_q[model.markers.body[m]]
     own = psi[6 * discrete.psi0[m] : 6 * discrete.psi0[m] + 6 * n]
@@ -198,7 +198,7 @@ def put_shapes(model, discrete, step, k, s_0, s_1):
 
 @inner
 def ways_by_place(model, step, k, end, s_0, s_1):
-    """Return T and T_r by Gauss' rule with two points between the passed stations."""
+    """Return T and T_r by two-point Gauss quadrature between the passed stations."""
     e, way, d, th = vector(model.lines.axis[k]), s_1 - s_0, step.station_d[end], step.station_th[end]
     T, slope = e, (0.0, 0.0, 0.0)
     T_r = (0.0, 0.0, 0.0)
@@ -222,7 +222,7 @@ def ways_by_place(model, step, k, end, s_0, s_1):
 
 @inner
 def line_value(model, step, k, a, b):
-    """Return the value of row k, LINE or LINE_TURN, at the end of a step."""
+    """Return the value of a LINE or LINE_TURN row k at the end of a step."""
     if model.rows.kind[k] == LINE_TURN:
         E, D = (
             turned(step.end.markers.A[a], vector(model.rows.x[k])),
@@ -236,7 +236,7 @@ def line_value(model, step, k, a, b):
 
 @inner
 def turn_by_place(model, step, k, a, b):
-    """Return the change of E · D by s."""
+    """Return the change of E · D with s."""
     eps = turned(step.E_mean[a], vector(model.rows.x[k]))
     by_s = turned(step.R_m[model.markers.body[a]], cross(vector(step.line_kappa[model.markers.line[a]]), eps))
     return dot(mean_direction(step, b, vector(model.rows.y[k])), by_s)
@@ -244,14 +244,14 @@ def turn_by_place(model, step, k, a, b):
 
 @inner
 def mean_normal(model, step, k, a):
-    """Return N of row k over the step."""
+    """Return the mean normal N of row k over the step."""
     along = vector(step.line_t[model.markers.line[a]])
     return unit_normal(model.rows.part[k], scaled(1.0 / norm(along), along), mean_direction(step, a, unit(1)))
 
 
 @inner
 def add_line_reaction(model, discrete, step, k, a, b, f):
-    """Add the loads of row k, LINE or LINE_TURN, with multiplier f."""
+    """Add the loads of a LINE or LINE_TURN row k with multiplier f."""
     if model.rows.kind[k] != LINE_TURN:
         add_pair(step, a, b, scaled(f, mean_normal(model, step, k, a)))
         return
@@ -264,7 +264,7 @@ def add_line_reaction(model, discrete, step, k, a, b, f):
 
 @inner
 def line_rate(model, step, k, a, b, t):
-    """Return the rate of row k without motion: that of the prescribed place."""
+    """Return the explicit time derivative of row k, due to a prescribed coordinate."""
     line = model.markers.line[a]
     if model.lines.row[line] < 0:
         return 0.0

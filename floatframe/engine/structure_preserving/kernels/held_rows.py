@@ -1,4 +1,4 @@
-"""Constraint rows of joints and couplers over a step, for all kinds."""
+"""Constraint rows of joints and couplers over a step, dispatched by kind."""
 
 import math
 
@@ -32,7 +32,7 @@ __all__ = ["add_reaction", "row_change", "row_rate", "row_value"]
 
 @inner
 def row_value(model, discrete, step, c, k):
-    """Return the value of row k of connection c at the end of a step; for ROLL the displacement of the rim over it."""
+    """Return the value of row k of connection c at the end of the step; for ROLL the rim displacement in the step."""
     kind, a, b = model.rows.kind[k], model.connections.a[c], model.connections.b[c]
     if kind == COUPLE:
         return coupler_value(model, step, c)
@@ -61,7 +61,7 @@ def add_reaction(model, discrete, step, c, k, f):
 
 @inner
 def row_change(model, discrete, step, c, k):
-    """Return the change of row k over the step due to the motion alone: the work of a unit multiplier."""
+    """Return the change of row k over the step due to motion alone, which is the work of a unit multiplier."""
     if model.rows.kind[k] == COUPLE:
         return coupler_change(model, discrete, step, c)
     a, b = model.connections.a[c], model.connections.b[c]
@@ -72,7 +72,7 @@ def row_change(model, discrete, step, c, k):
 
 @inner
 def row_rate(model, step, c, k, t):
-    """Return the rate of row k at the beginning of a step without motion: that of its prescribed motion."""
+    """Return the explicit time derivative of row k at the beginning of a step, due to its prescribed motion."""
     kind, a, b = model.rows.kind[k], model.connections.a[c], model.connections.b[c]
     if kind == COUPLE:
         return coupler_rate(model, c, t)
@@ -89,7 +89,7 @@ def row_rate(model, step, c, k, t):
 
 @inner
 def coupler_value(model, step, c):
-    """Return the value of the row of coupler c at the end of the step."""
+    """Return the value of coupler c's row at the end of the step."""
     i = model.connections.item[c]
     k = model.elements.core[i]
     constant, _ = held(model, k, step.end.state.time)
@@ -113,7 +113,7 @@ def add_coupler_reaction(model, discrete, step, c, f):
 
 @inner
 def coupler_change(model, discrete, step, c):
-    """Return the change of the row of coupler c due to the motion over the step."""
+    """Return the change of coupler c's row over the step due to motion alone."""
     i, total = model.connections.item[c], 0.0
     for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
         a, b, row = ends_and_row(model, p)
@@ -123,7 +123,7 @@ def coupler_change(model, discrete, step, c):
 
 @inner
 def coupler_rate(model, c, t):
-    """Return the rate of the row of coupler c without motion."""
+    """Return the explicit time derivative of coupler c's row."""
     k = model.elements.core[model.connections.item[c]]
     _, rate = held(model, k, t)
     return -model.rows.x[k, 0] * rate
@@ -140,7 +140,7 @@ def coupler_rate(model, c, t):
 
 @inner
 def slope(model, step, k, a, b):
-    """Return -R ds/dc over the step."""
+    """Return the discrete derivative -R ds/dc over the step."""
     N_0, N_1 = ends(step, a, vector(model.rows.z[k]))
     n_0, n_1 = ends(step, b, vector(model.rows.y[k]))
     c_0, c_1 = dot(N_0, n_0), dot(N_1, n_1)
@@ -149,7 +149,7 @@ def slope(model, step, k, a, b):
 
 @inner
 def add_height_reaction(model, discrete, step, k, a, b, f):
-    """Add the loads of the height with multiplier f."""
+    """Add the loads of the height constraint with multiplier f."""
     z, y = vector(model.rows.z[k]), vector(model.rows.y[k])
     add_slide(model, discrete, step, a, b, z, f)
     add_product(model, discrete, step, a, z, b, y, f * slope(model, step, k, a, b))
@@ -157,7 +157,7 @@ def add_height_reaction(model, discrete, step, k, a, b, f):
 
 @inner
 def rim(model, step, k, a, b):
-    """Return the direction t and rho in the middle of the step."""
+    """Return the direction t and the vector rho to the rim at mid-step."""
     N, n = mean_direction(step, a, vector(model.rows.z[k])), mean_direction(step, b, vector(model.rows.y[k]))
     n = scaled(1.0 / norm(n), n)
     u = sub(N, scaled(dot(N, n), n))

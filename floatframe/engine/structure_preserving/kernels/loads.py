@@ -1,4 +1,4 @@
-"""Forces over a step: loads whose work is the change of their potential, and what they give and take.
+"""Forces over a step: loads whose work equals the change of their potential, with supplied and dissipated work.
 
 Springs act by the discrete derivative of their potential (Gonzalez 1996), here in closed form: with the lengths l_0,
 l_1 at both ends, |d_1|² - |d_0|² = 2 d_mean·(d_1 - d_0), so that the tension k ((l_0 + l_1)/2 - l_free) along
@@ -61,7 +61,7 @@ def spring_load(model, step, c):
 
 @inner
 def point_load(model, step, k):
-    """Add load k, fixed in space or in its marker, and return the supplied work."""
+    """Add load k, with constant direction in ground or marker axes, and return the supplied work."""
     m, factor, work = model.loads.marker[k], 1.0, 0.0
     if model.loads.factor[k] >= 0:
         factor, _, _ = time_function(model.functions, model.loads.factor[k], step.t_force)
@@ -99,7 +99,7 @@ def body_load(model, discrete, step, k):
 
 @inner
 def normal_force(model, discrete, step, c, k):
-    """Return the size of the force in joint c normal to the axis of its row k."""
+    """Return the size of the joint force in c normal to the axis of row k."""
     a, b = model.connections.a[c], model.connections.b[c]
     F = (0.0, 0.0, 0.0)
     for j in range(discrete.first[c], discrete.first[c + 1]):
@@ -115,7 +115,7 @@ def normal_force(model, discrete, step, c, k):
 
 @inner
 def coordinate_load(model, discrete, step, k, a, b, normal):
-    """Add the forces along the coordinate of row k (PUSH, TWIST, TWIST_B); normal: force in the joint normal to it.
+    """Add the forces along row k's coordinate (PUSH, TWIST, TWIST_B); normal: joint force normal to the coordinate.
 
     Springs do the work of the change of their potential; the impulse of all others is h times their force.
     """

@@ -1,4 +1,4 @@
-"""Markers over a step: where they are, how they turn, and how loads on them act on their bodies, exactly in work.
+"""Markers over a step: positions, rotations, and the exact transfer of the work of marker loads to bodies.
 
 cay(theta) = (1 - tilde/2)⁻¹ (1 + tilde/2), the rotation by 2 atan(|theta|/2) about theta. With R_1 = R_0 cay(theta) and
 theta_G = R_0 theta
@@ -54,7 +54,7 @@ NONE = (0.0, 0.0, 0.0)
 
 @loops
 def deformation(model, step, m, i, q, s):
-    """Return the position of marker m from the centre of mass and its elastic rotation; s: centre of mass."""
+    """Return the position of marker m relative to the centre of mass s, and its elastic rotation."""
     n, o = model.bodies.n_q[i], model.markers.psi0[m]
     sigma = sub(vector(model.markers.position[m]), s)
     if o < 0:
@@ -67,7 +67,7 @@ def deformation(model, step, m, i, q, s):
 
 @inner
 def begin_markers(model, discrete, step):
-    """Write the markers in the configuration at the start of a step."""
+    """Write the markers at the configuration at the start of the step."""
     for m in range(model.markers.body.shape[0]):
         i = model.markers.body[m]
         if i < 0:
@@ -143,7 +143,7 @@ def marker_step(model, discrete, step, m):
 
 @inner
 def put_end_of_forces(step, m):
-    """Write the end of the force interval of marker m: the end of the step, or its start."""
+    """Write the end of the force interval of marker m: the end of the step, or its start if forces act there."""
     if step.is_still:
         put(step.x_f[m], 0, vector(step.x_0[m]))
         put_matrix(step.A_f[m], matrix(step.A_0[m]))
@@ -154,7 +154,7 @@ def put_end_of_forces(step, m):
 
 @inner
 def mean_jacobian(th_0, th_1):
-    """Return Gamma: the discrete derivative of the elastic rotation."""
+    """Return Gamma, the discrete derivative of the elastic rotation."""
     T = left_jacobian(scaled(0.5, add(th_0, th_1)))
     dth = sub(th_1, th_0)
     square = dot(dth, dth)
@@ -166,7 +166,7 @@ def mean_jacobian(th_0, th_1):
 
 @inner
 def relative_cayley(th_0, th_1):
-    """Return psi with exp(th_1) = cay(psi) exp(th_0)."""
+    """Return the relative Cayley vector psi, for which exp(th_1) = cay(psi) exp(th_0)."""
     c0, b0 = half_turn(th_0)
     c1, b1 = half_turn(th_1)
     both = sub(sub(scaled(c0, b1), scaled(c1, b0)), cross(b1, b0))
@@ -175,7 +175,7 @@ def relative_cayley(th_0, th_1):
 
 @inner
 def half_turn(th):
-    """Return the Euler parameters of a rotation vector: scalar and vector."""
+    """Return the Euler parameters of a rotation vector, as scalar and vector."""
     x = 0.25 * dot(th, th)
     if x < 1e-4:
         return 1 - x / 2 + x * x / 24 - x**3 / 720, scaled(0.5 * (1 - x / 6 + x * x / 120 - x**3 / 5040), th)
@@ -185,13 +185,13 @@ def half_turn(th):
 
 @inner
 def ends(step, m, e):
-    """Return the direction e of a marker at the start and end of the force interval."""
+    """Return direction e of a marker at both ends of the force interval."""
     return turned(step.A_0[m], e), turned(step.A_f[m], e)
 
 
 @inner
 def change(model, discrete, step, m, e, mean):
-    """Return the change of the direction e of a marker over the step; mean: its mean."""
+    """Return the change of a marker's direction e over the step; mean: its mean."""
     i = model.markers.body[m]
     if i < 0:
         return NONE
@@ -204,7 +204,7 @@ def change(model, discrete, step, m, e, mean):
 
 @inner
 def turning(model, step, m):
-    """Return the rotation of a marker over the step."""
+    """Return the rotation vector of a marker over the step."""
     i = model.markers.body[m]
     if i < 0:
         return NONE
@@ -213,7 +213,7 @@ def turning(model, step, m):
 
 @small
 def clear_loads(step, which, m):
-    """Set a set of loads on a marker to zero."""
+    """Set one set of loads on a marker to zero."""
     put(step.F[which, m], 0, NONE)
     put(step.T[which, m], 0, NONE)
     put(step.m[which, m], 0, NONE)
@@ -221,7 +221,7 @@ def clear_loads(step, which, m):
 
 @inner
 def begin_unit_load(step, a, b):
-    """Take the loads that follow on two markers as those whose work is asked for."""
+    """Begin to collect the loads on two markers in the second set, whose work is needed."""
     clear_loads(step, 1, a)
     clear_loads(step, 1, b)
     step.is_unit = 1
@@ -229,14 +229,14 @@ def begin_unit_load(step, a, b):
 
 @inner
 def end_unit_load(model, step, a, b):
-    """Return the work of the loads since `begin_unit_load` over the step."""
+    """Return the work over the step of the loads added since `begin_unit_load`."""
     step.is_unit = 0
     return work_of_loads(model, step, a) + work_of_loads(model, step, b)
 
 
 @inner
 def work_of_loads(model, step, m):
-    """Return the work of the second set of loads on a marker: F · dx + T · theta_G + m · psi."""
+    """Return the work of a marker's second set of loads: F · dx + T · theta_G + m · psi."""
     i = model.markers.body[m]
     if i < 0:
         return 0.0
@@ -252,14 +252,14 @@ def add_force(step, m, F):
 
 @inner
 def add_pair(step, a, b, F):
-    """Add a force on B and its opposite on A."""
+    """Add a force on B and the opposite force on A."""
     add_force(step, b, F)
     add_force(step, a, scaled(-1.0, F))
 
 
 @inner
 def add_direction(model, discrete, step, m, e, G):
-    """Add a load on direction e of a marker, with work G · dE."""
+    """Add a load on direction e of a marker, with the work G · dE."""
     E_0, E_1 = ends(step, m, e)
     put_sum(step.T[step.is_unit, m], 0, cross(scaled(0.5, add(E_0, E_1)), G))
     i = model.markers.body[m]
@@ -269,7 +269,7 @@ def add_direction(model, discrete, step, m, e, G):
 
 @inner
 def add_moment(model, step, m, T):
-    """Add a moment on a marker, whose work is that over its rotation."""
+    """Add a moment T on a marker, whose work is T times the rotation of the marker over the step."""
     put_sum(step.T[step.is_unit, m], 0, T)
     i = model.markers.body[m]
     if i >= 0:
@@ -278,7 +278,7 @@ def add_moment(model, step, m, T):
 
 @loops
 def marker_loads(model, discrete, step, m):
-    """Add the loads on a marker to those of its body."""
+    """Add the loads on a marker to the loads of its body."""
     i = model.markers.body[m]
     if i < 0:
         return

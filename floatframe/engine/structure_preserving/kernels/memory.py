@@ -1,4 +1,4 @@
-"""Memory of connections between steps: angles beyond full turns, states, approach speeds of contacts.
+"""Values that connections remember between steps: angles beyond full turns, states, approach speeds of contacts.
 
 They stand in the rows of the memory that are theirs; the other rows hold wrenches of the results.
 """
@@ -14,21 +14,21 @@ __all__ = ["expect_angles", "keep", "recall", "remember"]
 
 @inner
 def recall(memory, step):
-    """Read the memory at the start of the step."""
+    """Read the remembered values at the start of the step."""
     for k in range(step.known.shape[0]):
         step.known[k] = memory.w[k]
 
 
 @inner
 def expect_angles(memory, step):
-    """Advance counted angles by their rates to the time of the forces."""
+    """Advance counted angles by their rates to the time at which forces act."""
     for k in range(memory.angle.shape[0]):
         step.angle[k] = memory.angle[k] + (step.t_force - step.t_0) * memory.angle_rate[k]
 
 
 @inner
 def remember(model, discrete, step):
-    """Compute the memory at the end of the step from its unknowns and the positions of markers there."""
+    """Compute the remembered values at the end of the step from its unknowns and final marker positions."""
     for c in range(model.connections.size.shape[0]):
         if model.connections.law[c] == CONTACT:
             step.known[model.connections.w0[c] + V_0] = speed_of_approach(model, step, c)
@@ -46,6 +46,6 @@ def remember(model, discrete, step):
 
 @inner
 def keep(discrete, step, memory):
-    """Write the data of connections into the memory."""
+    """Write the remembered values of connections into the memory."""
     for j in range(discrete.remembered.shape[0]):
         memory.w[discrete.remembered[j]] = step.known[discrete.remembered[j]]

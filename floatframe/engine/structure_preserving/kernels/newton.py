@@ -1,4 +1,4 @@
-"""Newton's method for one step, with factors that serve for many steps.
+"""Newton's method for one step, with factors that are reused in many steps.
 
 Unknowns are the increments x = (d, theta, dq) of the bodies and mu = h²/2 f, with f the multipliers of the joints; the
 equations of motion are multiplied by h/2, so that the matrix stays well-conditioned as h falls. Unknowns and residuals
@@ -49,7 +49,7 @@ __all__ = [
 
 @matrix_loops
 def band_factor(A, pivot, below, above):
-    """Overwrite A with its factors. Return False if a pivot is zero or not finite."""
+    """Overwrite A with its band LU factors; return False if a pivot is zero or not finite."""
     n, reach = A.shape[0], below + above
     for k in range(n):
         last, end = min(n - 1, k + below), min(n, k + reach + 1)
@@ -111,7 +111,7 @@ ROUNDOFF = 2e-15  # of a position
 
 @inner
 def move(model, discrete, step):
-    """Write the motion of bodies and markers over the step by its unknowns."""
+    """Compute the motion of bodies and markers over the step from the unknowns."""
     for i in range(model.bodies.kind.shape[0]):
         body_step(model, discrete, step, i)
     for m in range(model.markers.body.shape[0]):
@@ -123,7 +123,7 @@ def move(model, discrete, step):
 
 @inner
 def add_loads(model, work, discrete, step):
-    """Add all forces except reactions to the loads on markers and bodies, and sum their work over the step."""
+    """Add all forces except reactions to markers and bodies, and sum their work over the step."""
     given, taken = 0.0, 0.0
     for i in range(model.bodies.kind.shape[0]):
         weight = scaled(model.body_types.mass[model.bodies.kind[i]], vector(model.gravity))
@@ -141,7 +141,7 @@ def add_loads(model, work, discrete, step):
 
 @inner
 def connection_load(model, work, discrete, step, c):
-    """Add the forces of connection c, and return the work that they supply and dissipate."""
+    """Add the forces of connection c; return supplied and dissipated work."""
     law = model.connections.law[c]
     if law == SPRING:
         return spring_load(model, step, c)
@@ -170,7 +170,7 @@ def connection_load(model, work, discrete, step, c):
 
 @inner
 def has_normal(forces, first, last):
-    """Whether some forces depend on the normal force of their joint."""
+    """Whether some of the forces depend on the normal force in their joint."""
     for i in range(first, last):
         if forces.coefficient[i] > 0.0:
             return True
@@ -179,7 +179,7 @@ def has_normal(forces, first, last):
 
 @inner
 def write_residual(model, work, discrete, step):
-    """Write the residual at the unknowns."""
+    """Write the residual for the present unknowns."""
     n_u, h = step.load.shape[0], step.h
     c = 0.5 * h * h
     for j in range(step.f.shape[0]):
@@ -217,7 +217,7 @@ def write_residual(model, work, discrete, step):
 
 @inner
 def write_state_residual(model, work, discrete, step, c):
-    """Write the equations of the states of connection c; while velocities are closed they do not change."""
+    """Write the residuals of the states of connection c; states are constant while velocities are being closed."""
     if not step.is_closing:
         user_state_residual(model, work, discrete, step, c)
         return
@@ -229,7 +229,7 @@ def write_state_residual(model, work, discrete, step, c):
 
 @inner
 def put_changes(model, discrete, step):
-    """Write the changes of unknowns for derivatives: SMALL times their size, if known.
+    """Write the difference steps of the unknowns: SMALL times their size, if known.
 
     A multiplier of an equation of its own, or a state, may be of any size; a change of far less than that is lost in
     the rounding of what depends on it.
@@ -247,7 +247,7 @@ def put_changes(model, discrete, step):
 
 @inner
 def factorize(model, work, discrete, step, stage):
-    """Write the factors of the derivatives of the residual, and return whether they exist."""
+    """Factorise the derivatives of the residual; return whether they are regular."""
     pattern, A, n = discrete.pattern, step.band[stage], step.z.shape[0]
     below, above = pattern.below, pattern.above
     for i in range(n):
@@ -277,7 +277,7 @@ def factorize(model, work, discrete, step, stage):
 
 @inner
 def correct(model, discrete, step, stage):
-    """Add Newton's correction to the unknowns; return its norm, and write the largest relative correction of states."""
+    """Add Newton's correction to the unknowns and return its norm; write the largest relative state correction."""
     pattern, total, first_state = discrete.pattern, 0.0, step.load.shape[0] + step.f.shape[0]
     step.state_change = 0.0
     for i in range(step.z.shape[0]):
@@ -301,7 +301,7 @@ def correct(model, discrete, step, stage):
 
 @inner
 def size_of(discrete, step):
-    """Return the size of the increments in the norm of corrections."""
+    """Return the size of the increments in the norm used for corrections."""
     total = 0.0
     for k in range(discrete.weight.shape[0]):
         total += discrete.weight[k] * step.z[k] * step.z[k]
@@ -310,7 +310,7 @@ def size_of(discrete, step):
 
 @inner
 def smallest(model, step, order):
-    """Return the allowed correction: tolerance times the displacement in a step, plus rounding."""
+    """Return the allowed size of a correction: tolerance times the displacement in a step, plus rounding."""
     floor, mass = 0.0, 0.0
     for i in range(model.bodies.kind.shape[0]):
         m, size = model.body_types.mass[model.bodies.kind[i]], order.length
@@ -324,7 +324,7 @@ def smallest(model, step, order):
 
 @inner
 def solve(model, work, discrete, step, order, stage, is_exact):
-    """Find the unknowns of a step. Return DONE, DIVERGED or SINGULAR.
+    """Solve for the unknowns of a step; return DONE, DIVERGED or SINGULAR.
 
     is_exact: with derivatives made anew in each iteration that needs them, as far as it goes.
     """

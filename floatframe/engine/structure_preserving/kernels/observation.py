@@ -1,4 +1,4 @@
-"""Accelerations and reactions at the end of a step, from the equations of motion, as in `initial_conditions.initial`.
+"""Accelerations and reactions at the end of a step from the equations of motion, as in `initial_conditions.initial`.
 
 (2) W du - Jᵀ w = 0,       G du = -G u              velocities that fulfil the joints, W = M + s K
 (3) M u_dot - Jᵀ w = f,    G u_dot = -d(G)/dt u     there
@@ -24,7 +24,7 @@ MOST_ITERATIONS = 30
 
 @inner
 def factorize(model, work, discrete, is_weighted):
-    """Factorise the matrices of (2), if is_weighted, or (3); return whether they are regular."""
+    """Factorise the matrices of (2) if is_weighted, else those of (3); return whether they are regular."""
     linearize(model, work, 1.0, 0.0, 0.0)
     if is_weighted:
         for i in range(model.bodies.kind.shape[0]):
@@ -41,7 +41,7 @@ def factorize(model, work, discrete, is_weighted):
 
 @inner
 def put_in_ground_axes(model, work, out, is_sum):
-    """Write or add the correction of bodies, with translations rotated from body to ground axes."""
+    """Write or add the body correction, with translations rotated from body axes to ground axes."""
     for i in range(model.bodies.kind.shape[0]):
         n, u0 = model.bodies.n_q[i], model.bodies.u0[i]
         dx = turned(work.state.R[i], vector(work.solver.y[u0:]))
@@ -55,7 +55,7 @@ def put_in_ground_axes(model, work, out, is_sum):
 
 @inner
 def begin(model, work, memory, t):
-    """Use the state in the memory without accelerations and with unknown reactions."""
+    """Set the state from the memory, with zero accelerations and unknown reactions."""
     load_state(work.state, memory)
     work.state.time = t
     for k in range(work.state.u_dot.shape[0]):
@@ -77,7 +77,7 @@ def begin(model, work, memory, t):
 
 @inner
 def observe(model, work, discrete, step, memory, t, rows):
-    """Write the next row of the results, with accelerations and reactions, also into the memory.
+    """Write the next result row with accelerations and reactions, and store both in the memory.
 
     Return whether they exist.
 

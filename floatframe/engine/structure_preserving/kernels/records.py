@@ -1,4 +1,4 @@
-"""Data of a system for the compiled steps in addition to its model, and their working arrays.
+"""System data for the compiled steps in addition to the model, and the working arrays of the steps.
 
 Sizes as in `kernels.model`, and n_z: unknowns of a step, n_u increments of the bodies (d, theta in the axes of the body
 at the beginning of the step, dq), then n_mu multipliers, then changes of states. Blocks are the bodies and then the
@@ -18,73 +18,75 @@ __all__ = [
 ]  # fmt: skip
 
 CONSERVING, VARIATIONAL = range(2)
-#: columns of `Discrete.block0`: those of `bodies.CentralBody` by name, and the filters of dissipation
+#: columns of `Discrete.block0`: arrays of `bodies.CentralBody` by name, and the filters of dissipation
 (
     C1, BENT, C2, INERTIA, PRODUCTS, TURNED_PRODUCTS, MASS, STIFFNESS, DAMPING, FILTER, STIFFNESS_FILTER, FREE_TURNING,
 ) = range(12)  # fmt: skip
 N_BLOCKS = 12
-#: changes of unknowns for derivatives, relative to the size of the system, in rad, or relative to their own size
+#: difference step for unknowns, relative to the size of the system, in rad, or relative to the size of the unknown
 SMALL = 1e-7
 
 n_mu, n_z, n_blocks = (Size(name) for name in ("n_mu", "n_z", "blocks of unknowns"))
 
 
 class Pattern(NamedTuple):
-    """The sparsity of the derivatives of the residual, and the columns that one evaluation determines."""
+    """The sparsity of the residual's derivatives, and the columns that one evaluation can determine together."""
 
-    place: IntArray = integer(n_z)  #: number of each unknown in the elimination order
+    place: IntArray = integer(n_z)  #: position of each unknown in the elimination order
     block: IntArray = integer(n_z)  #: block of each unknown
-    row0: IntArray = integer(n_blocks + 1)  #: rows that depend on a block
-    row: IntArray = integer(Size("rows of blocks"))  #: their numbers
-    color0: IntArray = integer(Size("colors") + 1)  #: unknowns that are changed together
-    column: IntArray = integer(n_z)  #: their numbers
+    row0: IntArray = integer(n_blocks + 1)  #: index in `row` of the first row that depends on each block
+    row: IntArray = integer(Size("rows of blocks"))  #: rows that depend on each block
+    #: index in `column` of the first unknown of each group that is varied together
+    color0: IntArray = integer(Size("colors") + 1)
+    column: IntArray = integer(n_z)  #: unknowns of each group
     below: IntArray = integer()  #: number of entries in a row before its diagonal, in elimination order
-    above: IntArray = integer()  #: and after it
+    above: IntArray = integer()  #: number of entries in a row after its diagonal, in elimination order
 
 
 @tabled
 class Discrete(NamedTuple):
-    """A system in the arrays of the steps."""
+    """A system in the arrays of the compiled steps."""
 
     scheme: IntArray = integer()  #: CONSERVING or VARIATIONAL
-    center: Array = real(n_t, 3, unit="m")  #: undeformed centre of mass in the frame
+    center: Array = real(n_t, 3, unit="m")  #: undeformed centre of mass in the body frame
     is_bent: IntArray = integer(n_t)  #: whether 1C depends on q
-    is_filtered: IntArray = integer()  #: whether unresolved modes dissipate
+    is_filtered: IntArray = integer()  #: whether unresolved modes have numerical dissipation
     is_loaded: IntArray = integer()  #: whether forces or drives do work
     blocks: Array = real(Size("numbers of steps"))
-    block0: IntArray = integer(n_t, N_BLOCKS)  #: where they begin
-    turns: IntArray = integer(n_m)  #: whether a marker rotates in its body
-    psi0: IntArray = integer(n_m)  #: Σ n over the previous markers
-    first: IntArray = integer(n_c + 1)  #: multipliers of a connection
+    block0: IntArray = integer(n_t, N_BLOCKS)  #: index of each constant array in `blocks`
+    turns: IntArray = integer(n_m)  #: whether the marker rotates relative to its body
+    psi0: IntArray = integer(n_m)  #: offset of its columns: sum of n over the previous markers
+    first: IntArray = integer(n_c + 1)  #: index of the first multiplier of each connection
     row: IntArray = integer(n_mu)  #: row of the model of each multiplier
     is_driven: IntArray = integer(n_mu)  #: whether a multiplier does the work of a prescribed motion
-    weight: Array = real(n_u, unit="kg, kg m²")  #: of the norm of corrections
-    remembered: IntArray = integer(Size("remembered"))  #: rows of the memory of connections
+    weight: Array = real(n_u, unit="kg, kg m²")  #: weights of the norm of corrections
+    remembered: IntArray = integer(Size("remembered"))  #: rows in which connections remember values between steps
     scale: Array = real(n_z)  #: scale factors of unknowns in the matrix
-    row_scale: Array = real(n_z)  #: and residuals
-    delta: Array = real(n_z)  #: smallest changes of unknowns for derivatives
-    equation: IntArray = integer(Size("equations of laws"))  #: multipliers of elements without constraints
+    row_scale: Array = real(n_z)  #: scale factors of residuals in the matrix
+    delta: Array = real(n_z)  #: smallest difference steps of the unknowns
+    equation: IntArray = integer(Size("equations of laws"))  #: multipliers of elements that are not constraints
     is_linear: IntArray = integer()  #: whether the equations of motion are linear in reactions
-    weighted: Array = real(Size("numbers of s K"), unit="kg m²")  #: s K of each body, used to close velocities
-    weighted0: IntArray = integer(n_b)  #: where it begins
+    #: weighted stiffness s K of each body, used to close velocities
+    weighted: Array = real(Size("numbers of s K"), unit="kg m²")
+    weighted0: IntArray = integer(n_b)  #: index of each body's matrix in `weighted`
     pattern: Pattern = Pattern()
 
 
 class Clock(NamedTuple):
-    """The time, as `kernels.work` has it."""
+    """The time, with the same name as in `kernels.work`."""
 
     time: Array = real(unit="s")
 
 
 class MarkerPlaces(NamedTuple):
-    """Positions and axes of all markers, as `kernels.work` has them."""
+    """Positions and axes of all markers, with the same names as in `kernels.work`."""
 
     r: Array = real(n_m, 3, unit="m")
     A: Array = real(n_m, 3, 3)
 
 
 class Configuration(NamedTuple):
-    """All that the values of constraint rows depend on (`kernels.joints.held_rows`)."""
+    """The configuration, on which the values of constraint rows depend (`kernels.joints.held_rows`)."""
 
     state: Clock = Clock()
     markers: MarkerPlaces = MarkerPlaces()
@@ -92,22 +94,23 @@ class Configuration(NamedTuple):
 
 @tabled
 class StepWork(NamedTuple):
-    """Working arrays of a step, ground axes where nothing else is said; 0 at its beginning, 1 at its end."""
+    """Working arrays of a step, in ground axes unless stated otherwise; suffix 0: beginning of the step, 1: end."""
 
     h: Array = real(unit="s")
     t_0: Array = real(unit="s")
-    t_force: Array = real(unit="s")  #: time of the forces
-    is_still: IntArray = integer()  #: whether forces act at one configuration
-    is_closing: IntArray = integer()  #: 0 while positions are closed, 1 for forces at the end, 2 for velocities
-    given: Array = real(unit="J")  #: work over the step
+    t_force: Array = real(unit="s")  #: time at which the forces act
+    is_still: IntArray = integer()  #: whether forces act at one configuration instead of over an interval
+    #: present stage: 0 closes positions, 1 finds forces at the end, 2 closes velocities
+    is_closing: IntArray = integer()
+    given: Array = real(unit="J")  #: work supplied over the step
     taken: Array = real(unit="J")
     # bodies
     c_0: Array = real(n_b, 3, unit="m")
     p_0: Array = real(n_b, 4)
     R_0: Array = real(n_b, 3, 3)
     q_0: Array = real(n_q)
-    w_0: Array = real(n_u)  #: v, omega (body axes), q_dot
-    P_0: Array = real(n_u)  #: m v, Pi (body axes), Y
+    w_0: Array = real(n_u)  #: velocities v, omega (body axes) and q_dot
+    P_0: Array = real(n_u)  #: momenta m v, Pi (body axes) and Y
     w_1: Array = real(n_u)
     P_1: Array = real(n_u)
     R_1: Array = real(n_b, 3, 3)
@@ -118,79 +121,84 @@ class StepWork(NamedTuple):
     q_1: Array = real(n_q)
     q_mean: Array = real(n_q)
     dq: Array = real(n_q)
-    V: Array = real(9 * n_most, unit="kg m²")  #: `CentralBody.products`
+    V: Array = real(9 * n_most, unit="kg m²")  #: result of `kernels.bodies.products`
     W: Array = real(9 * n_most, unit="kg m²")
-    C: Array = real(3 * n_most)  #: `CentralBody.shapes`
-    C_mean: Array = real(3 * n_q)  #: values at q_mean, of each body
-    C_interval: Array = real(3 * n_most)  #: values in the middle of a variational step
-    middle: Array = real(n_most)  #: q there
+    C: Array = real(3 * n_most)  #: result of `kernels.bodies.shapes`
+    C_mean: Array = real(3 * n_q)  #: result of `kernels.bodies.shapes` at q_mean, for each body
+    C_interval: Array = real(3 * n_most)  #: result of `kernels.bodies.shapes` in the middle of a variational step
+    middle: Array = real(n_most)  #: modal coordinates in the middle of a variational step
     force: Array = real(n_most)
     vector: Array = real(n_most)
     matrix: Array = real(n_most, n_most)
     pivot: IntArray = integer(n_most)
-    s_0: Array = real(n_b, 3, unit="m")  #: centre of mass in the body
+    s_0: Array = real(n_b, 3, unit="m")  #: centre of mass in the body frame
     s_1: Array = real(n_b, 3, unit="m")
-    s_mean: Array = real(n_b, 3, unit="m")  #: that of q_mean
+    s_mean: Array = real(n_b, 3, unit="m")  #: centre of mass at q_mean
     # markers
     arm_0: Array = real(n_m, 3, unit="m")
-    th_0: Array = real(n_m, 3, unit="rad")  #: elastic rotation
-    E_0: Array = real(n_m, 3, 3)  #: axes in the body
+    th_0: Array = real(n_m, 3, unit="rad")  #: elastic rotation vector
+    E_0: Array = real(n_m, 3, 3)  #: axes of the marker in the body frame
     x_0: Array = real(n_m, 3, unit="m")
     A_0: Array = real(n_m, 3, 3)
     end: Configuration = Configuration()
-    x_f: Array = real(n_m, 3, unit="m")  #: end of the force interval: that of the step, or x_0 if still
+    #: end of the force interval: end of the step, or x_0 if forces act at one configuration
+    x_f: Array = real(n_m, 3, unit="m")
     A_f: Array = real(n_m, 3, 3)
-    E_mean: Array = real(n_m, 3, 3)  #: mean axes in the body
+    E_mean: Array = real(n_m, 3, 3)  #: mean axes of the marker in the body frame
     lever: Array = real(n_m, 3, unit="m")
     dx: Array = real(n_m, 3, unit="m")
     Gamma: Array = real(n_m, 3, 3)
-    dpsi: Array = real(n_m, 3, unit="rad")  #: body axes
-    psi: Array = real(Size("6 n of markers"))  #: Psi_sigma, Psi_r [6, k] at q_mean, at 6 psi0
-    shape: Array = real(6 * n_most)  #: those of one marker
-    F: Array = real(2, n_m, 3, unit="N")  #: loads of all forces, and of one alone whose work is asked for
+    dpsi: Array = real(n_m, 3, unit="rad")  #: change of the elastic rotation, body axes
+    psi: Array = real(Size("6 n of markers"))  #: shapes Psi_sigma and Psi_r [6, k] at q_mean, from index 6 psi0
+    shape: Array = real(6 * n_most)  #: shapes of one marker
+    F: Array = real(2, n_m, 3, unit="N")  #: loads of all forces, and loads of one force whose work is needed
     T: Array = real(2, n_m, 3, unit="N m")
-    m: Array = real(2, n_m, 3, unit="N m")  #: on the elastic rotation, body axes
-    is_unit: IntArray = integer()  #: whether loads are added to the second set
+    m: Array = real(2, n_m, 3, unit="N m")  #: moment conjugate to the elastic rotation, body axes
+    is_unit: IntArray = integer()  #: whether loads are added to the second set of loads
     # deformed lines
-    station_d: Array = real(3, n_stations, 3, unit="m")  #: displacements of stations at both ends, and means, body axes
-    station_th: Array = real(3, n_stations, 3, unit="rad")  #: and rotations
-    line_s: Array = real(n_lines, 2, unit="m")  #: places at both ends
-    line_t: Array = real(n_lines, 3)  #: displacement of the sliding marker by its place
-    line_kappa: Array = real(n_lines, 3, unit="rad/m")  #: rotation of its axes by its place, body axes
-    line_end: Array = real(n_lines, 3)  #: r' at the end of the step
+    #: displacements of the stations at both ends of the step, and their means, body axes
+    station_d: Array = real(3, n_stations, 3, unit="m")
+    #: rotations of the stations at both ends of the step, and their means, body axes
+    station_th: Array = real(3, n_stations, 3, unit="rad")
+    line_s: Array = real(n_lines, 2, unit="m")  #: coordinates s at both ends of the step
+    line_t: Array = real(n_lines, 3)  #: displacement of the sliding marker per unit of s
+    #: rotation of the sliding marker's axes per unit of s, body axes
+    line_kappa: Array = real(n_lines, 3, unit="rad/m")
+    line_end: Array = real(n_lines, 3)  #: tangent r' at the end of the step
     # markers of public elements
-    r_law: Array = real(n_m, 3, unit="m")  #: in the middle of the step
-    A_law: Array = real(n_m, 3, 3)  #: there
-    d_law: Array = real(n_m, 3, unit="m")  #: way over the step
-    turn: Array = real(n_m, 3, unit="rad")  #: Cayley vector of the rotation over the step
+    r_law: Array = real(n_m, 3, unit="m")  #: marker position in the middle of the step
+    A_law: Array = real(n_m, 3, 3)  #: marker axes in the middle of the step
+    d_law: Array = real(n_m, 3, unit="m")  #: displacement of the marker over the step
+    turn: Array = real(n_m, 3, unit="rad")  #: Cayley vector of the marker's rotation over the step
     wrench: Array = real(n_m, 6, unit="N, N m")
-    way: Array = real(n_m, 6, unit="m, m² rad")  #: direction of the correction of the potential
+    way: Array = real(n_m, 6, unit="m, m² rad")  #: direction of the correction for exact work
     # connections
-    known: Array = real(n_w)  #: memory of connections, in its rows
+    known: Array = real(n_w)  #: values that connections remember, in their rows
     #: counted angles predicted at t_force; the counted rotations are those nearest to them
     angle: Array = real(n_angles, unit="rad")
     xi: Array = real(6, unit="m, rad")  #: mean deformations of a bushing
-    dxi: Array = real(6, unit="m, rad")  #: their changes,
+    dxi: Array = real(6, unit="m, rad")  #: changes of the deformations over the step
     xi_force: Array = real(6, unit="N, N m")  #: forces for these deformations
     # unknowns
     z: Array = real(n_z)
     residual: Array = real(n_z)
     base: Array = real(n_z)  #: residual at the base point of differences
-    center: Array = real(n_z)  #: unknowns there,
-    delta: Array = real(n_z)  #: changes of unknowns
+    center: Array = real(n_z)  #: unknowns at the base point of differences
+    delta: Array = real(n_z)  #: differences of the unknowns
     right: Array = real(n_z)
     f: Array = real(n_mu, unit="N, N m")  #: multipliers
     change: Array = real(n_mu)  #: changes of rows due to the motion over the step
     kept: Array = real(n_mu, unit="N, N m")
     elastic: Array = real(n_u, unit="N m")  #: modal forces in the middle of a variational step
-    f_kept: Array = real(n_mu, unit="N, N m")  #: those of the last step
-    f_size: Array = real(n_mu, unit="N, N m")  #: typical sizes of multipliers without constraints, from previous steps
+    f_kept: Array = real(n_mu, unit="N, N m")  #: multipliers of the last step
+    #: typical sizes of multipliers that are not constraints, from previous steps
+    f_size: Array = real(n_mu, unit="N, N m")
     band: Array = real(2, n_z, Size("width"))  #: factors of the matrices of both stages
     band_pivot: IntArray = integer(2, n_z)
     is_due: IntArray = integer(2)  #: whether to factorise at the next iterate
     n_iterations: IntArray = integer()
     n_factors: IntArray = integer()
     excess: Array = real()
-    state_change: Array = real()  #: largest relative correction of a state
-    #: change of w over the last step divided by h, v in body axes; for the initial guess of Newton's method
+    state_change: Array = real()  #: largest relative correction of a state in the last iteration
+    #: acceleration for Newton's initial guess: change of w over the last step divided by h, v in body axes
     acceleration: Array = real(n_u)

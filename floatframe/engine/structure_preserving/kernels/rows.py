@@ -1,4 +1,4 @@
-"""Constraints of joints over a step: their values at its end, and loads that do no work while joints stay closed.
+"""Joint constraints over a step: values at its end, and reactions that do no work while joints stay closed.
 
 A constraint is a sum of products of marker positions and directions; by the product rule with means,
 a_1·b_1 - a_0·b_0 = (a_1 - a_0)·b_mean + a_mean·(b_1 - b_0), each has discrete derivatives whose sum with the changes of
@@ -29,7 +29,7 @@ __all__ = ["add_reaction", "add_slide", "angle_loads", "angle_of", "force_of_row
            "mean_distance", "row_rate", "row_value"]  # fmt: skip
 
 
-#: the value of a row that depends on places and time alone, as in all other formulations
+#: the value function of rows that depend only on positions and time, shared with all other formulations
 value_of_places = by_code(
     "value_of_places",
     {code: HELD[code].value for code in (DOT, TURN, TURN_B, SLIDE, DISTANCE, SCREW, RIM_HEIGHT, EQUAL_TURN)},
@@ -39,14 +39,14 @@ value_of_places = by_code(
 
 @inner
 def held(model, k, t):
-    """Return the value that row k holds at time t, and its rate."""
+    """Return the value that row k prescribes at time t, and its rate."""
     value, rate, _ = prescribed_at(model, k, t)
     return value, rate
 
 
 @inner
 def turn_direction(model, k, t):
-    """Return the direction of marker A (TURN_B: of B, with A rotating backwards) of a prescribed angle at time t."""
+    """Return the direction of a prescribed angle at time t in marker A; TURN_B: in B, with the opposite sign."""
     angle, _ = held(model, k, t)
     if model.rows.kind[k] == TURN_B:
         angle = -angle
@@ -55,14 +55,14 @@ def turn_direction(model, k, t):
 
 @inner
 def slide_axis(model, k):
-    """Return the axis in A along which row k measures a distance."""
+    """Return the axis in A along which row k measures its distance."""
     x = vector(model.rows.x[k])
     return cross(x, vector(model.rows.z[k])) if model.rows.kind[k] == SCREW else x
 
 
 @inner
 def point_axis(model, step, k, a, b):
-    """Return the direction of a POINT row in ground axes: fixed in the body of A, or of B, where the step begins."""
+    """Return the ground direction of a POINT row, fixed at the start of the step in the body of A, or of B."""
     i = model.markers.body[a]
     if i < 0:
         i = model.markers.body[b]
@@ -71,21 +71,21 @@ def point_axis(model, step, k, a, b):
 
 @inner
 def mean_distance(step, a, b):
-    """Return the mean of the vector from A to B."""
+    """Return the mean of the vector from A to B over the step."""
     d_0 = sub(vector(step.x_0[b]), vector(step.x_0[a]))
     return scaled(0.5, add(d_0, sub(vector(step.x_f[b]), vector(step.x_f[a]))))
 
 
 @inner
 def mean_direction(step, m, e):
-    """Return the mean of the direction e of a marker."""
+    """Return the mean of a marker's direction e over the step."""
     E_0, E_1 = ends(step, m, e)
     return scaled(0.5, add(E_0, E_1))
 
 
 @inner
 def row_value(model, step, k, a, b):
-    """Return the value of row k at the end of a step."""
+    """Return the value of row k at the end of the step."""
     if model.rows.kind[k] == POINT:
         d = sub(vector(step.end.markers.r[b]), vector(step.end.markers.r[a]))
         return dot(d, point_axis(model, step, k, a, b))
@@ -95,7 +95,7 @@ def row_value(model, step, k, a, b):
 
 @inner
 def force_of_row(model, step, k, a, b):
-    """Return the force on B of a unit multiplier of row k, which holds a distance."""
+    """Return the force on B for a unit multiplier of a distance row k."""
     kind = model.rows.kind[k]
     if kind == POINT:
         return point_axis(model, step, k, a, b)
@@ -125,7 +125,7 @@ def add_reaction(model, discrete, step, k, a, b, f):
 
 @inner
 def factors(model, step, k, a, b):
-    """Return marker and direction of both factors of a row that holds a product of directions; EQUAL_TURN: E and U."""
+    """Return marker and direction of both factors of a product row k; EQUAL_TURN: E and U."""
     kind, x, y = model.rows.kind[k], vector(model.rows.x[k]), vector(model.rows.y[k])
     if kind == TURN_B:
         return b, turn_direction(model, k, step.t_force), a, y
@@ -146,7 +146,7 @@ def add_product(model, discrete, step, a, e, b, y, f):
 
 @inner
 def row_rate(model, step, k, a, b, t):
-    """Return the rate of row k at the beginning of a step without motion: that of its prescribed motion."""
+    """Return the explicit time derivative of row k at the beginning of a step, due to its prescribed motion."""
     kind = model.rows.kind[k]
     if model.rows.motion[k] < 0:
         return 0.0
@@ -166,7 +166,7 @@ def row_rate(model, step, k, a, b, t):
 
 @inner
 def angle_of(model, A, k, a, b):
-    """Return the angle of row k: of D, from Z towards -E; A: axes of the markers."""
+    """Return the angle of D in row k, measured from Z towards -E; A: marker axes."""
     D = turned(A[b], vector(model.rows.y[k]))
     return math.atan2(-dot(turned(A[a], vector(model.rows.x[k])), D), dot(turned(A[a], vector(model.rows.z[k])), D))
 
@@ -188,7 +188,7 @@ def angle_parts(model, step, k, a, b):
 
 @inner
 def angle_loads(model, discrete, step, k, a, b, f):
-    """Add the loads of a torque f along the angle of row k, whose work is f times its change."""
+    """Add the loads of torque f along the angle of row k, whose work is f times the angle's change."""
     E, Z, D, S, C, kappa = angle_parts(model, step, k, a, b)
     f *= kappa
     add_direction(model, discrete, step, a, vector(model.rows.x[k]), scaled(-f * C, D))
@@ -199,7 +199,7 @@ def angle_loads(model, discrete, step, k, a, b, f):
 
 @inner
 def add_slide(model, discrete, step, a, b, x, f):
-    """Add the loads of a force f along the axis x of A, whose work is f times the change of the distance along it."""
+    """Add the loads of force f along axis x of A, whose work is f times the change of distance along x."""
     E, d = mean_direction(step, a, x), mean_distance(step, a, b)
     add_pair(step, a, b, scaled(f, E))
     add_direction(model, discrete, step, a, x, scaled(f, d))

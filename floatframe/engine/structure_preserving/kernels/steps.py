@@ -1,4 +1,4 @@
-"""The steps of the conserving and variational schemes in a compiled loop.
+"""Steps of the conserving and variational schemes in a compiled time loop.
 
 Described in `floatframe.integrators.energy_momentum`, `floatframe.integrators.variational`.
 """
@@ -55,7 +55,7 @@ FADING = 0.9
 
 @inner
 def guess(model, step):
-    """Write the initial guess of increments and multipliers for Newton's method: constant accelerations."""
+    """Write Newton's initial guess of increments and multipliers, with constant accelerations."""
     h, n_u = step.h, step.load.shape[0]
     for k in range(n_u):
         step.z[k] = h * (step.w_0[k] + 0.5 * h * step.acceleration[k])
@@ -71,7 +71,7 @@ def guess(model, step):
 
 @inner
 def learn(model, discrete, step):
-    """Store the change of velocities over the step for the next guess, v in body axes, and sizes of multipliers."""
+    """Store the velocity change over the step for the next guess, v in body axes, and the multiplier sizes."""
     for i in range(model.bodies.kind.shape[0]):
         u0, n, R = model.bodies.u0[i], model.bodies.n_q[i], matrix(step.R_0[i])
         dv = turned_back(R, sub(vector(step.w_1[u0:]), vector(step.w_0[u0:])))
@@ -100,7 +100,7 @@ def work_of_dampers(model, discrete, step):
 
 @inner
 def add_drives(model, discrete, step):
-    """Add the work of prescribed motions, from their multipliers, to the supplied work."""
+    """Add the work of prescribed motions, computed from their multipliers, to the supplied work."""
     for c in range(model.connections.size.shape[0]):
         for j in range(discrete.first[c], discrete.first[c + 1]):
             if discrete.is_driven[j]:
@@ -119,7 +119,7 @@ def begin(model, discrete, step, memory):
 
 @inner
 def solve_both_ways(model, work, discrete, step, order, stage):
-    """Find the unknowns with the stored factors, otherwise with new factors in each iteration."""
+    """Solve for the unknowns with the stored factors; if that fails, with new factors in each iteration."""
     guess(model, step)
     status = solve(model, work, discrete, step, order, stage, False)
     if status != DONE:
@@ -130,7 +130,7 @@ def solve_both_ways(model, work, discrete, step, order, stage):
 
 @inner
 def conserving_step(model, work, discrete, step, memory, order):
-    """Advance the memory by one step of the conserving or decaying scheme; return the status."""
+    """Advance the memory by one conserving or decaying step; return the status."""
     step.t_force, step.is_still, step.is_closing = 0.5 * (step.t_0 + step.end.state.time), 0, 0
     begin(model, discrete, step, memory)
     status = solve_both_ways(model, work, discrete, step, order, 0)
@@ -159,7 +159,7 @@ def conserving_step(model, work, discrete, step, memory, order):
 
 @inner
 def take_multipliers(step):
-    """Write the multipliers of the unknowns."""
+    """Copy the multipliers from the vector of unknowns."""
     n_u = step.load.shape[0]
     for j in range(step.f.shape[0]):
         step.f[j] = 2.0 * step.z[n_u + j] / (step.h * step.h)
@@ -167,7 +167,7 @@ def take_multipliers(step):
 
 @inner
 def variational_step(model, work, discrete, step, memory, order):
-    """Advance the memory by one step of the variational scheme; return the status."""
+    """Advance the memory by one variational step; return the status."""
     step.t_force, step.is_still, step.is_closing = step.t_0, 1, 0
     h = step.h
     begin(model, discrete, step, memory)
@@ -243,14 +243,14 @@ def variational_step(model, work, discrete, step, memory, order):
 
 @inner
 def learn_multipliers(step):
-    """Store the multipliers of positions as the initial guess of the next step."""
+    """Store the multipliers of the position stage as the next step's initial guess."""
     for j in range(step.f.shape[0]):
         step.kept[j] = step.f[j]
 
 
 @inner
 def put_elastic(model, step, i):
-    """Store the modal forces of the middle of the step."""
+    """Store the modal forces at mid-step."""
     u0, n = model.bodies.u0[i], model.bodies.n_q[i]
     for k in range(n):
         step.elastic[u0 + 6 + k] = step.force[k]
@@ -258,7 +258,7 @@ def put_elastic(model, step, i):
 
 @inner
 def is_too_long(model, work, discrete, step):
-    """Whether the step, whose unknowns are known, is too long for a contact; see `kernels.connections.gap`."""
+    """Whether the step that was just solved is too long for a contact; see `kernels.connections.gap`."""
     if model.gaps.connection.shape[0] == 0:
         return False
     for g in range(model.gaps.connection.shape[0]):
@@ -271,7 +271,7 @@ def is_too_long(model, work, discrete, step):
 
 @inner
 def begin_iterate(model, work, memory, others):
-    """Use the state in the memory as the iterate, with the mean accelerations of the previous step.
+    """Set the iterate from the state in the memory, with the mean accelerations of the previous step.
 
     Not those of the memory, which are those of the last output: outputs do not change a motion.
     """
@@ -288,7 +288,7 @@ def begin_iterate(model, work, memory, others):
 
 @inner
 def take_size(step, h):
-    """Set the size of the step."""
+    """Set the step size."""
     if step.h != h:
         step.h = h
         step.is_due[0], step.is_due[1] = 1, 1
@@ -296,7 +296,7 @@ def take_size(step, h):
 
 @inner
 def try_discrete_step(model, work, memory, others, order, t, h):
-    """Advance the memory to t by a step of size h, see `kernels.generalized_alpha.time_loop`."""
+    """Advance the memory by a step of size h to t, see `kernels.generalized_alpha.time_loop`."""
     discrete, step = others
     work.counted.no_number = 0
     step.t_0, step.end.state.time = t - h, t
@@ -332,7 +332,7 @@ def write_discrete_row(model, work, memory, others, t, rows):
 
 @inner
 def count_angles(model, work, memory, h):
-    """Continue to count the turns of angles."""
+    """Continue the count of full turns."""
     if memory.angle.shape[0] == 0:
         return
     load_state(work.state, memory)
@@ -350,7 +350,7 @@ as_discrete, as_step = converter(Discrete()), converter(StepWork())
 
 
 def make_entry(digest):
-    """Return the cached entry; the digest of the sources enters its key."""
+    """Return the cached entry; the digest of the sources is part of its key."""
 
     def run(model_table, work_table, discrete_table, step_table, memory_table, rows_table, order_table):
         if digest == 0:

@@ -21,7 +21,7 @@ __all__ = ["accelerate", "constrain"]
 
 @inner
 def constrain(model, work, tree, joints, tangent, is_group):
-    """Write constraints, their rates, and C for increments x (is_group: increments of the group, otherwise rates)."""
+    """Write constraints, their rates and the Jacobian C for increments x if is_group, otherwise for rates."""
     move_joints(tree, joints)
     place_bodies(model, work, tree, joints)
     evaluate_tree(model, work, tree, joints, 1.0)
@@ -33,7 +33,7 @@ def constrain(model, work, tree, joints, tangent, is_group):
 
 @inner
 def kept_rates(model, work, tree):
-    """Write the rates and second rates of the constraints, with the accelerations of the iterate."""
+    """Write rates and second rates of the constraints outside the tree, for the accelerations of the iterate."""
     for m in range(model.markers.body.shape[0]):
         marker_acceleration(model, work, m, work.markers.bias[m])
     for e in range(tree.kept.shape[0]):
@@ -42,7 +42,7 @@ def kept_rates(model, work, tree):
 
 @inner
 def accelerate(model, work, tree, joints, tangent):
-    """Write accelerations and all wrenches for positions and rates; return whether they exist."""
+    """Compute accelerations and all wrenches from positions and rates; return whether they exist."""
     for s in range(tree.slot.shape[0]):
         if tree.column[s] >= 0:
             joints.acceleration[tree.column[s]] = 0.0

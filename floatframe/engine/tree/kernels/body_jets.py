@@ -1,4 +1,4 @@
-"""How the forces of one body change with the motion of what carries it, ground axes, moments about one point O.
+"""Change of the forces of a body with the motion of its carrier, ground axes, moments about one point O.
 
 With mass m, first moment s and inertia J about O, momentum p, and D = Σ q_dot_k D_k of the modes (kernels/body.py), the
 residual of the body, seen from what carries it, changes by
@@ -33,14 +33,14 @@ __all__ = ["mode_row", "moments_of_body", "momentum_of_modes", "turning_of_momen
 
 @small
 def moments_of_body(model, work, i, R):
-    """Return mass, first moment and inertia of body i about its origin, ground axes; its forces have been evaluated."""
+    """Return mass, first moment and inertia of body i about its origin, ground axes; call after its forces."""
     m = model.body_types.mass[model.bodies.kind[i]]
     return m, turned(R, work.bodies.s[i]), congruent(R, matrix(work.bodies.J[i]))
 
 
 @inner
 def momentum_of_modes(model, work, i, R):
-    """Return the momentum of the modes of body i and Σ q_dot_k D_k, ground axes."""
+    """Return the modal momentum of body i and Σ q_dot_k D_k, ground axes."""
     n, q0, u0 = model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i] + 6
     p = column_sum(work.bodies.C1[3 * q0 : 3 * (q0 + n)], n, work.state.u[u0 : u0 + n])
     return turned(R, p), congruent(R, matrix(work.bodies.D_q_dot[i]))
@@ -48,7 +48,7 @@ def momentum_of_modes(model, work, i, R):
 
 @inner
 def turning_of_momentum(m, s, J, by_modes, r, v, omega):
-    """Return p, and Q about O, of a body at r from O; m, s, J about its origin, by_modes: its `momentum_of_modes`."""
+    """Return momentum p and Q about O of a body at r; m, s, J: about its origin, by_modes: from `momentum_of_modes`."""
     p = add(by_modes[0], add(scaled(m, v), cross(omega, s)))
     Q = matrix_sum(scaled_matrix(-2.0, product(tilde(s), tilde(v))), scaled_matrix(-1.0, product(J, tilde(omega))))
     Q = matrix_sum(Q, gyroscopic(omega, J, by_modes[1]))
@@ -57,7 +57,7 @@ def turning_of_momentum(m, s, J, by_modes, r, v, omega):
 
 @inner
 def mode_row(model, work, i, k, R, v, omega):
-    """Return b, B and the row by turning of mode k of body i, about its origin; v, omega: its motion, body axes."""
+    """Return b, B and the rotation derivatives of modal row k of body i about its origin; v, omega: body axes."""
     bodies, t, n, q0 = work.bodies, model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i]
     W, Y = bodies.W[9 * q0 : 9 * (q0 + n)], bodies.Y[3 * q0 : 3 * (q0 + n)]
     b, B = column(bodies.C1[3 * q0 : 3 * (q0 + n)], n, k), coupling(block(model.body_types, t, C2, 3 * n), W, n, k)

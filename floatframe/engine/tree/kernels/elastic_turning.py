@@ -1,4 +1,4 @@
-"""Motion of a marker in its flexible body to second order, in axes of the body.
+"""Motion of a marker relative to its flexible body up to second rates, in body axes.
 
 With the elastic angle th, its rate w and the left Jacobian T at th, the angular velocity is nu = T w, its rate
 T w_dot + c, c = (dT/dth [w]) w. With a = a(|th|), b = b(|th|) of kernels/rotation.py, p = th·w, x = th × w, y = th × x
@@ -21,12 +21,12 @@ __all__ = [
     "spin_matrix",
 ]
 
-SERIES_UP_TO = 4.0  #: value of t² at the switch to series; below it the closed forms lose digits
+SERIES_UP_TO = 4.0  #: value of t² below which series replace the closed forms, which lose digits there
 
 
 @inner
 def deformation_accelerations(model, work, m, i):
-    """Return the second rates of position and elastic angle of marker m, which has modes, relative to its body i."""
+    """Return the second rates of position and elastic rotation vector of marker m relative to its body i."""
     n, o, u0 = model.bodies.n_q[i], model.markers.psi0[m], model.bodies.u0[i] + 6
     d, th = shape_sum(work.markers.psi[o : o + 6 * n], n, work.state.u_dot[u0 : u0 + n])
     b_t, b_r = bent_bias(model, work, m, i)
@@ -35,7 +35,7 @@ def deformation_accelerations(model, work, m, i):
 
 @inner
 def turning_bias(th, w):
-    """Return c."""
+    """Return the velocity term c of the elastic angular acceleration."""
     return turned(left_jacobian_derivative(th, w, 1.0), w)
 
 
@@ -73,7 +73,7 @@ def quotient_ddb(x):
 
 @inner
 def turning_bias_by_angle(th, w, d):
-    """Return the change of c for a change d of th."""
+    """Return the change of c for a change d of the rotation vector th."""
     x = dot(th, th)
     p, m, b = dot(th, w), cross(th, w), quotient_b(x)
     y = cross(th, m)
@@ -105,7 +105,7 @@ def second_turning(th, w, nu, v, b, b_1):
 
 @loops
 def marker_rates(model, work, m):
-    """Return rho_ddot and nu_dot of marker m, whose motion in its body is written."""
+    """Return rho_ddot and nu_dot of marker m, whose position and velocity in its body are known."""
     markers, zero = work.markers, (0.0, 0.0, 0.0)
     if model.markers.psi0[m] < 0:
         return zero, zero
@@ -116,7 +116,7 @@ def marker_rates(model, work, m):
 
 @small
 def spin_matrix(omega, alpha):
-    """Return U = alpha~ + omega~ omega~."""
+    """Return U = alpha~ + omega~ omega~, the acceleration of points per unit distance."""
     x, y, z = omega
     xx, yy, zz, xy, xz, yz = x * x, y * y, z * z, x * y, x * z, y * z
     return (
@@ -128,13 +128,13 @@ def spin_matrix(omega, alpha):
 
 @small
 def relative_acceleration(omega, U, rho, rho_dot, rho_ddot):
-    """Return the acceleration of a point of a body less that of the frame origin, body axes."""
+    """Return the acceleration of a body point minus the acceleration of the frame origin, body axes."""
     return add(add(turned(U, rho), scaled(2.0, cross(omega, rho_dot))), rho_ddot)
 
 
 @loops
 def elastic_carrier(model, work, m, omega, alpha, a):
-    """Return omega, alpha of marker m and the acceleration of its point, body axes, from those of its body."""
+    """Return omega, alpha and point acceleration of marker m from the motion of its body, body axes."""
     markers = work.markers
     rho_ddot, nu_dot = marker_rates(model, work, m)
     nu, U = vector(markers.spin[m]), spin_matrix(omega, alpha)
@@ -144,7 +144,7 @@ def elastic_carrier(model, work, m, omega, alpha, a):
 
 @loops
 def elastic_body_in_joint(model, work, m, omega, alpha, a):
-    """Return omega, alpha, a of a flexible body from the motion of its marker m; all in body axes."""
+    """Return omega, alpha and origin acceleration of a flexible body from the motion of its marker m, body axes."""
     markers = work.markers
     rho_ddot, nu_dot = marker_rates(model, work, m)
     nu = vector(markers.spin[m])

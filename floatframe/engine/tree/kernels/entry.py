@@ -1,4 +1,4 @@
-"""The compiled entry of relative coordinates, and a plain function for each thing it does."""
+"""The compiled entry for relative coordinates, with one plain function for each of its tasks."""
 
 import numpy as np
 
@@ -44,7 +44,7 @@ as_tangent = converter(TangentWork())
 
 
 def make_entry(digest):
-    """Return the cached entry; the digest of the sources enters its key."""
+    """Return the cached entry; the digest of the sources is part of its key."""
 
     def run(model_table, work_table, tree_table, joint_table, tangent_table, memory_table, rows_table, order_table):
         if digest == 0:
@@ -132,19 +132,19 @@ def motion_of_bodies(model: Model, work: Work, tree: Tree, joints: JointWork) ->
 
 
 def moved(model: Model, work: Work, tree: Tree, joints: JointWork, x: Array) -> None:
-    """Write the absolute iterate with joints moved by x, (n_columns,), from d_start, Q_start."""
+    """Write the absolute iterate for joints displaced by x, (n_columns,), from d_start and Q_start."""
     joints.x[:] = np.asarray(x)
     call(model, work, tree, joints, what=MOVE)
 
 
 def projected(model: Model, work: Work, tree: Tree, joints: JointWork, c_k: float = 1.0) -> Array:
-    """Return the projected residual, (n_s,), of the iterate; reactions of joints go into `work.state.w`."""
+    """Return the projected residual of the iterate, (n_s,); reactions of joints are stored in `work.state.w`."""
     call(model, work, tree, joints, what=PROJECT, c_k=c_k)
     return joints.residual.copy()
 
 
 def newton_matrix(model: Model, work: Work, tree: Tree, joints: JointWork, c_m: float, c_d: float, c_k: float) -> Array:
-    """Return the Newton matrix at the iterate, (n_s + n_rows)², for unknowns and kept wrenches (times c_k)."""
+    """Return the Newton matrix, (n_s + n_rows)², for the unknowns and for c_k times wrenches of the kept rows."""
     tangent = new_tangent_work(model, tree, is_dense=True)
     call(model, work, tree, joints, tangent, what=TANGENT, c_m=c_m, c_d=c_d, c_k=c_k)
     return tangent.K
@@ -161,7 +161,7 @@ def newton_step(
     *,
     is_exact: bool = True,
 ) -> tuple[Array, Array]:
-    """Return Newton's correction of unknowns, (n_s,), and of kept wrenches times c_k, (n_rows,), at the iterate.
+    """Return Newton's correction of the unknowns, (n_s,), and of c_k times the kept wrenches, (n_rows,).
 
     is_exact: with the exact matrix, else with that of `kernels.kept_factors`. Not a number where it is singular.
     """
@@ -177,12 +177,12 @@ def newton_step(
 def constraints(
     model: Model, work: Work, tree: Tree, joints: JointWork, tangent: TangentWork, *, by_increments: bool
 ) -> None:
-    """Write the values and rates of kept rows, and C, for increments x or rates, with joints moved by `joints.x`."""
+    """Write values and rates of kept rows and their Jacobian C by increments or rates, with joints moved by `x`."""
     call(model, work, tree, joints, tangent, what=CONSTRAIN, n_steps=int(by_increments))
 
 
 def accelerations(model: Model, work: Work, tree: Tree, joints: JointWork, tangent: TangentWork) -> bool:
-    """Write accelerations of joints and bodies, and kept wrenches.
+    """Write the accelerations of joints and bodies, and the kept wrenches.
 
     Return whether they exist for the positions and rates.
 

@@ -1,4 +1,4 @@
-"""Evaluation of a system in relative coordinates at one iterate: motion of bodies, their residuals, projection."""
+"""Evaluation of a system in relative coordinates at one iterate: body motion, residuals, projection."""
 
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.connection import connection_rows
@@ -12,7 +12,7 @@ __all__ = ["evaluate_placed", "evaluate_tree"]
 
 @inner
 def evaluate_tree(model, work, tree, joints, c_k):
-    """Write residuals of bodies and rows, wrenches of the joints of the tree, and the projected residual.
+    """Write residuals of bodies and rows, wrenches of the tree joints, and the projected residual.
 
     As `kernels.evaluation.evaluate`, rows of joints of the tree being zero; `joints.own` keeps the residuals of the
     bodies without these joints.
@@ -23,7 +23,7 @@ def evaluate_tree(model, work, tree, joints, c_k):
 
 @inner
 def evaluate_placed(model, work, tree, joints, c_k):
-    """Write the same directly after `place_bodies`, which has computed the motion of the ends of tree joints."""
+    """Write the results of `evaluate_tree` after `place_bodies`, which has computed the ends of the tree joints."""
     for m in range(model.markers.body.shape[0]):
         c, i = model.markers.connection[m], model.markers.body[m]
         if c < 0 or tree.is_kept[c] != 0 or i < 0:
@@ -34,7 +34,7 @@ def evaluate_placed(model, work, tree, joints, c_k):
 
 @inner
 def project_residuals(model, work, tree, joints, c_k):
-    """Write the same as `evaluate_tree`, with the motion of all markers in `work`."""
+    """Write the results of `evaluate_tree`, with the motion of all markers already in `work`."""
     for c in range(model.connections.size.shape[0]):
         if tree.is_kept[c] != 0:
             connection_rows(model, work, c, c_k)

@@ -1,4 +1,4 @@
-"""Variations of the motion of bodies by the unknowns, with their rates (docs/relative.md §5).
+"""Variations of body motion by the unknowns, with their rates (docs/relative.md §5).
 
 A variation xi = (delta of the point at O, rotation), a spatial vector about a point O at rest, is that of a body and of
 all that hangs at it: xi of a body = xi of its parent + those of the columns of its joint, of the modes of the parent at
@@ -33,7 +33,7 @@ __all__ = ["carrier", "put_mode_jet", "write_jets"]
 
 @inner
 def put_jets(out, S_0, S_1, S_2, V, V_dot):
-    """Write xi, xi_dot, xi_ddot, (18,), of a variation with S theta = S_0, S theta_dot = S_1, S theta_ddot = S_2."""
+    """Write variation xi and its rates, (18,), where S theta = S_0, S theta_dot = S_1, S theta_ddot = S_2."""
     xi_dot, xi_ddot = variation_rates(S_0, S_1, S_2, V, V_dot)
     put_pair_of(out, 0, S_0)
     put_pair_of(out, 6, xi_dot)
@@ -42,14 +42,14 @@ def put_jets(out, S_0, S_1, S_2, V, V_dot):
 
 @inner
 def put_reach(out, S_0, S_1, V):
-    """Write xi and xi_dot, (12,)."""
+    """Write the variation xi and its rate xi_dot, (12,)."""
     put_pair_of(out, 0, S_0)
     put_pair_of(out, 6, pair_sum(S_1, spatial_cross(V, S_0)))
 
 
 @inner
 def write_jets(model, work, tree, joints, tangent, c_m, c_d, c_k, rate):
-    """Write screws, jets with the weights c_m, c_d, c_k, and reaches with 1 and `rate`, of all joints."""
+    """Write screws, jets with weights c_m, c_d, c_k, and reaches with weights 1 and `rate`, of all joints."""
     put(tangent.origin, 0, vector(work.state.r[tree.order[0]]))
     for i in range(tree.parent.shape[0]):
         column_jets(model, work, tree, joints, tangent, i, c_m, c_d, c_k, rate)
@@ -59,7 +59,7 @@ def write_jets(model, work, tree, joints, tangent, c_m, c_d, c_k, rate):
 
 @inner
 def mode_jets(model, work, tree, tangent, i, kind, m, sign, c_m, c_d, c_k, rate):
-    """Write screws, jets and reaches of the modes at marker m of the joint of body i."""
+    """Write screws, jets and reaches of the modes of body i at marker m of its joint."""
     if m < 0 or model.markers.psi0[m] < 0:
         return
     body = model.markers.body[m]
@@ -76,7 +76,7 @@ def mode_jets(model, work, tree, tangent, i, kind, m, sign, c_m, c_d, c_k, rate)
 
 @inner
 def spatial_end(end, origin):
-    """Return p from the origin, axes, V and V' of a frame with the motion of `end_motion`."""
+    """Return position from `origin`, axes, V and V' of a frame whose motion comes from `end_motion`."""
     r, A, v, omega, a, alpha = end
     p = sub(r, origin)
     V, V_dot = spatial_motion(p, v, omega, a, alpha)
@@ -85,7 +85,7 @@ def spatial_end(end, origin):
 
 @inner
 def carrier(model, work, tangent, m, i):
-    """Return R, p, V, V' of the frame of body i, which carries marker m, and the `second_rates` of the marker there."""
+    """Return R, p, V, V' of the frame of body i that carries marker m, and the marker's `second_rates`."""
     p, R, V, V_dot = spatial_end(end_motion(model, work, -1, i), vector(tangent.origin))
     rho_2, angle_2 = second_rates(model, work, m, i)
     return R, p, V, V_dot, rho_2, angle_2
@@ -93,7 +93,7 @@ def carrier(model, work, tangent, m, i):
 
 @inner
 def put_mode_jet(out, S, S_1, S_2, held, c_m, c_d, c_k):
-    """Write the jet of a mode with the screws that `mode_screws` returns."""
+    """Write the jet of a mode from the screws that `mode_screws` returns."""
     by_rate = pair_sum(scaled_pair(c_d, S), scaled_pair(c_k, S_1))
     by_second = pair_sum(scaled_pair(c_m, S), pair_sum(scaled_pair(2 * c_d, S_1), scaled_pair(c_k, S_2)))
     put_jets(out, scaled_pair(c_k, S), by_rate, by_second, held[2], held[3])
@@ -101,7 +101,7 @@ def put_mode_jet(out, S, S_1, S_2, held, c_m, c_d, c_k):
 
 @inner
 def column_jets(model, work, tree, joints, tangent, i, c_m, c_d, c_k, rate):
-    """Write screws, jets and reaches of the columns of the joint of body i."""
+    """Write screws, jets and reaches of the joint columns of body i."""
     if tree.column0[i] == tree.column0[i + 1]:
         return
     origin, zero = vector(tangent.origin), (0.0, 0.0, 0.0)

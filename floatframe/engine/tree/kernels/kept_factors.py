@@ -1,4 +1,4 @@
-"""Newton's correction over the tree with matrices of bodies that are reused in many steps (docs/relative.md §6).
+"""Newton's correction over the tree with body matrices that are reused in many steps (docs/relative.md §6).
 
 An approximation of `kernels.tree_factors`, six wide instead of eighteen and symmetric: a body turns and moves as a
 whole, so that its own matrix H, mass, damping and stiffness weighted, is constant in its axes but for its deformation;
@@ -49,7 +49,7 @@ __all__ = ["factorize_poses", "keep_bodies", "solve_kept"]
 
 @inner
 def keep_bodies(model, work, tree, c_m, c_d, c_k):
-    """Write the reused matrices of bodies; `evaluate_tree` has been called."""
+    """Write the reused body matrices; call after `evaluate_tree`."""
     for i in range(tree.parent.shape[0]):
         turning = work.bodies.T_right[i]
         put_matrix(turning, scaled_matrix(0.0, unit_matrix()))
@@ -60,7 +60,7 @@ def keep_bodies(model, work, tree, c_m, c_d, c_k):
 
 @matrix_loops
 def symmetrise(H):
-    """Reduce a matrix to its symmetric part."""
+    """Replace a matrix by its symmetric part."""
     for r in range(H.shape[0]):
         for k in range(r):
             mean = 0.5 * (H[r, k] + H[k, r])
@@ -70,7 +70,7 @@ def symmetrise(H):
 
 @inner
 def factorize_poses(model, work, tree, joints, tangent, c_d, c_k):
-    """Factorise with the reused matrices at the poses of the iterate; return whether the matrix is regular."""
+    """Factorise the reused body matrices at the poses of the iterate; return whether the matrix is regular."""
     for i in range(tree.parent.shape[0]):
         n, m = model.bodies.n_q[i], tree.far[i]
         H = newton_block(model, work, i)
@@ -101,14 +101,14 @@ def factorize_poses(model, work, tree, joints, tangent, c_d, c_k):
 
 @view
 def front(tree, tangent, i):
-    """Return the front of body i, (n_l + 6, n_l + 6)."""
+    """Return the frontal matrix of body i, (n_l + 6, n_l + 6)."""
     size = tree.s0[i + 1] - tree.s0[i] + 6
     return tangent.front[tree.front0[i] : tree.front0[i + 1]].reshape((size, size))
 
 
 @loops
 def put_screws(model, work, m, n, S):
-    """Write the screws of all modes of its body at marker m, (6, n), body axes."""
+    """Write the screws at marker m of all modes of its body, (6, n), body axes."""
     if m < 0 or model.markers.psi0[m] < 0:
         S[:, :] = 0.0
         return
@@ -120,7 +120,7 @@ def put_screws(model, work, m, n, S):
 
 @loops
 def take_away(T, S, n):
-    """T -= S."""
+    """Subtract matrix S from matrix T in place."""
     for r in range(6):
         for k in range(n):
             T[r, k] -= S[r, k]
@@ -128,7 +128,7 @@ def take_away(T, S, n):
 
 @matrix_loops
 def write_front(H, S, Z, F, n, n_l):
-    """Write (1) into the front; its columns follow."""
+    """Write the matrix of (1) into the front; the rows of the joint columns follow."""
     for r in range(6):
         for e in range(6):
             F[n_l + r, n_l + e] = H[r, e]
@@ -151,7 +151,7 @@ def write_front(H, S, Z, F, n, n_l):
 
 @inner
 def pose_columns(work, tree, joints, tangent, i):
-    """Write the screws by which the columns of the joint of body i move it, body axes about its origin."""
+    """Write the screws of body i for its joint columns, body axes about the body origin."""
     R, sense = work.state.R[i], -1.0 if tree.is_reversed[i] != 0 else 1.0
     for k in range(tree.column0[i], tree.column0[i + 1]):
         s = tree.unknown[k]
@@ -163,7 +163,7 @@ def pose_columns(work, tree, joints, tangent, i):
 
 @matrix_loops
 def add_columns(F, J, n):
-    """Write the rows and columns of the joint into the front (3)."""
+    """Add the rows and columns of the joint to the front (3)."""
     n_u = J.shape[0]
     o = n + n_u
     for c in range(n_u):
@@ -205,7 +205,7 @@ def factorize_front(F, n_l):
 
 @inner
 def relative_pose(work, tangent, i, parent):
-    """Write axes and origin of body i in those of its parent."""
+    """Write axes and origin of body i relative to its parent."""
     R = matrix(work.state.R[parent])
     put_matrix(tangent.turn[i], product(transposed(R), matrix(work.state.R[i])))
     put(tangent.shift[i], 0, turned_back(R, sub(vector(work.state.r[i]), vector(work.state.r[parent]))))
@@ -213,7 +213,7 @@ def relative_pose(work, tangent, i, parent):
 
 @loops
 def upper_part(F, row, column):
-    """Return a block of three rows of the upper half of a symmetric matrix."""
+    """Return a block of three rows from the upper half of a symmetric matrix."""
     if row == column:
         x, y, z = F[row, column + 1], F[row, column + 2], F[row + 1, column + 2]
         return (F[row, row], x, y), (x, F[row + 1, row + 1], z), (y, z, F[row + 2, row + 2])
@@ -222,7 +222,7 @@ def upper_part(F, row, column):
 
 @loops
 def move_inwards(F, turn, shift, P):
-    """Write Adᵀ P Ad of the remainder of a front, in axes and about the origin of the parent."""
+    """Write Adᵀ P Ad, the remainder of a front transformed to axes and origin of the parent."""
     o, R, arm = F.shape[0] - 6, matrix(turn), tilde(vector(shift))
     back, minus = transposed(R), scaled_matrix(-1.0, arm)
     vv = product(product(R, upper_part(F, o, o)), back)
@@ -237,7 +237,7 @@ def move_inwards(F, turn, shift, P):
 
 @matrix_loops
 def add_child(P, T, Z, F, n):
-    """Add (2) of a child to the front of its parent."""
+    """Add the terms (2) of a child to the front of its parent."""
     o = F.shape[0] - 6
     for r in range(6):
         for e in range(6):
@@ -259,7 +259,7 @@ def add_child(P, T, Z, F, n):
 
 @loops
 def solve_kept(model, tree, joints, tangent, c_k):
-    """Write the corrections of the unknowns into tangent.step, and those of bodies (own axes) into tangent.X.
+    """Write the corrections of the unknowns into tangent.step, and of bodies (body axes) into tangent.X.
 
     From the leaves inwards minus the force of a subtree at rest, `b`, and the right sides z = U⁻ᵀ (q, u); then outwards
     Y, q, u, and X.
@@ -315,7 +315,7 @@ def solve_kept(model, tree, joints, tangent, c_k):
 
 @loops
 def add_force(T, b, x, f, m, n):
-    """Add the force (f, m) of a child to that of its parent and to the right sides of its modes."""
+    """Add the force f and moment m of a child to its parent's force and to the right sides of the parent's modes."""
     for a in range(3):
         b[a] += f[a]
         b[3 + a] += m[a]
@@ -325,7 +325,7 @@ def add_force(T, b, x, f, m, n):
 
 @loops
 def hold(T, above, q, Y, n):
-    """Write the motion of the carrier of a body: that of its parent, with its modes."""
+    """Write the motion Y of a body's carrier: motion of the parent plus its modes."""
     for r in range(6):
         total = above[r]
         for k in range(n):
@@ -335,7 +335,7 @@ def hold(T, above, q, Y, n):
 
 @matrix_loops
 def reduce_right_side(F, z, n_l):
-    """Overwrite (q, u) of z by U⁻ᵀ times them, and subtract their part from the force at Y."""
+    """Forward substitution: overwrite (q, u) in z by U⁻ᵀ (q, u), and reduce the force on Y."""
     for k in range(n_l):
         y = z[k] * F[k, k]
         z[k] = y
@@ -345,7 +345,7 @@ def reduce_right_side(F, z, n_l):
 
 @matrix_loops
 def finish_solution(F, z, n_l):
-    """Overwrite (q, u) of z by the solution, with Y known."""
+    """Back substitution: overwrite (q, u) in z by the solution, with Y known."""
     for k in range(n_l - 1, -1, -1):
         total = z[k]
         for j in range(k + 1, z.shape[0]):

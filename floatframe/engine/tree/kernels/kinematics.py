@@ -1,4 +1,4 @@
-"""Motion of the bodies from that of the joints, and back (docs/relative.md §3).
+"""Body motion from joint motion, and the reverse (docs/relative.md §3).
 
 With n, f the markers of a joint at parent and body, A, B its ends, D = A_A d, s = Σ t_k z_dot_k, w = Σ a_k z_dot_k and
 s', w' the same with z_ddot_k,
@@ -38,7 +38,7 @@ __all__ = ["column_screw", "end_motion", "joint_ends", "joint_motion", "move_joi
 
 @loops
 def end_motion(model, work, m, i):
-    """Return r, A, v, omega, a, alpha of marker m, of the frame of body i if m = -1, of the ground if i = -1 too."""
+    """Return r, A, v, omega, a, alpha of marker m; m = -1: of the frame of body i, i = -1: of the ground."""
     zero = (0.0, 0.0, 0.0)
     if m >= 0:
         markers, out = work.markers, work.markers.bias[m]
@@ -54,7 +54,7 @@ def end_motion(model, work, m, i):
 
 @inner
 def joint_ends(model, work, tree, i):
-    """Return the motions of the ends A and B of the joint of body i, as `end_motion`."""
+    """Return the motions of ends A and B of the joint of body i, as `end_motion` does."""
     near, far = end_motion(model, work, tree.near[i], tree.parent[i]), end_motion(model, work, tree.far[i], i)
     if tree.is_reversed[i] == 0:
         return near, far
@@ -63,7 +63,7 @@ def joint_ends(model, work, tree, i):
 
 @loops
 def put_columns(tree, joints, i, A_a, A_b):
-    """Write directions of the columns of the joint of body i, ground axes."""
+    """Write the directions of the joint columns of body i in ground axes."""
     for k in range(tree.column0[i], tree.column0[i + 1]):
         put(joints.t[k], 0, turned(A_a, tree.tau[k]))
         alpha = vector(tree.alpha[k])
@@ -75,7 +75,7 @@ def put_columns(tree, joints, i, A_a, A_b):
 
 @loops
 def sums(tree, joints, i, x):
-    """Return Σ t_k x_k and Σ a_k x_k of the joint of body i."""
+    """Return Σ t_k x_k and Σ a_k x_k over the joint columns of body i."""
     s, w = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for k in range(tree.column0[i], tree.column0[i + 1]):
         s = add(s, scaled(x[k], vector(joints.t[k])))
@@ -85,7 +85,7 @@ def sums(tree, joints, i, x):
 
 @loops
 def turning_of_columns(tree, joints, i, omega_a, omega_b):
-    """Return Σ omega_side × a_k z_dot_k."""
+    """Return Σ omega_side × a_k z_dot_k over the joint columns of body i."""
     total = (0.0, 0.0, 0.0)
     for k in range(tree.column0[i], tree.column0[i + 1]):
         omega = omega_a if tree.side[k] == 0 else omega_b
@@ -95,7 +95,7 @@ def turning_of_columns(tree, joints, i, omega_a, omega_b):
 
 @inner
 def column_screw(work, tree, joints, i, k, origin):
-    """Return translation at a point and rotation for column k of the joint of body i, of B against A, ground axes."""
+    """Return the screw of joint column k of body i, B relative to A: velocity at a point and rotation, ground axes."""
     m, point = tree.far[i], vector(work.state.r[i])
     if tree.side[k] == tree.is_reversed[i]:  # fixed in the marker on the parent
         m, point = tree.near[i], (0.0, 0.0, 0.0)
@@ -110,14 +110,14 @@ def column_screw(work, tree, joints, i, k, origin):
 
 @inner
 def place_bodies(model, work, tree, joints):
-    """Write r, R, u, u_dot of all bodies from d, Q, z_dot, z_ddot of their joints and their modal coordinates."""
+    """Write r, R, u, u_dot of all bodies from d, Q, z_dot, z_ddot of the joints and from modal coordinates."""
     for place in range(tree.order.shape[0]):
         place_body(model, work, tree, joints, tree.order[place])
 
 
 @loops
 def place_body(model, work, tree, joints, i):
-    """Write the motion of the frame of body i; that of its parent is known."""
+    """Write the frame motion of body i; the motion of its parent is known."""
     is_reversed = tree.is_reversed[i] != 0
     r, A, v, omega, a, alpha = end_motion(model, work, tree.near[i], tree.parent[i])
     put(joints.near[i], 0, a)
@@ -142,7 +142,7 @@ def place_body(model, work, tree, joints, i):
 
 @loops
 def put_body(model, work, tree, i, r, A, v, omega, a, alpha):
-    """Write the motion of body i from that of its far marker."""
+    """Write the motion of body i from the motion of its marker at the joint."""
     state, u0, m = work.state, model.bodies.u0[i], tree.far[i]
     u, u_dot = state.u[u0 : u0 + 6], state.u_dot[u0 : u0 + 6]
     if m < 0:
@@ -176,7 +176,7 @@ def put_body(model, work, tree, i, r, A, v, omega, a, alpha):
 
 @inner
 def joint_motion(model, work, tree, joints):
-    """Write d, Q, z_dot, z_ddot of all joints from the motion of the bodies.
+    """Write d, Q, z_dot, z_ddot of all joints from the body motion.
 
     Coordinates are those nearest to the motion, so that one that the joints do not allow is left out.
     """
@@ -199,7 +199,7 @@ def joint_motion(model, work, tree, joints):
 
 @inner
 def nearest(tree, joints, i, s, w, out):
-    """Write x_k of s = Σ t_k x_k, w = Σ a_k x_k; columns of a joint are orthogonal."""
+    """Solve s = Σ t_k x_k, w = Σ a_k x_k for x_k by least squares; the columns of a joint are orthogonal."""
     for k in range(tree.column0[i], tree.column0[i + 1]):
         t, a = vector(joints.t[k]), vector(joints.a[k])
         out[k] = (dot(t, s) + dot(a, w)) / (dot(t, t) + dot(a, a))
@@ -207,7 +207,7 @@ def nearest(tree, joints, i, s, w, out):
 
 @inner
 def move_joints(tree, joints):
-    """Write d and Q: those of the beginning of the step, moved by the increments x."""
+    """Write d and Q as their values at the beginning of the step, moved by the increments x."""
     for i in range(tree.parent.shape[0]):
         d, left, right = vector(joints.d_start[i]), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         for k in range(tree.column0[i], tree.column0[i + 1]):

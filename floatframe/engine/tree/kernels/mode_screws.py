@@ -1,4 +1,4 @@
-"""What the modes of a body do at a marker: screws, their rates, and their changes with the modes.
+"""Screws of the modes at a marker, their rates, and their derivatives by the modes.
 
 In axes of the body about its origin the screw of mode k is S = (Psi_t + rho × b, b), b = T' Psi_r; its rates relative
 to the body follow from those of rho, of the elastic angle and of Psi(q) = Psi - K_P q. A variation S theta of what a
@@ -20,7 +20,7 @@ __all__ = ["add_second_order", "mode_rate", "mode_screw", "mode_screws", "second
 
 @small
 def mode_screw(model, work, m, i, k):
-    """Return the screw of mode k at marker m about the frame origin of body i: (Psi_t + rho × b, b), b = T' Psi_r."""
+    """Return the screw of mode k at marker m about the body origin: (Psi_t + rho × b, b), b = T' Psi_r."""
     d, th = shape(work.markers.psi[model.markers.psi0[m] :], model.bodies.n_q[i], k)
     b = turned(work.markers.T_left[m], th)
     return add(d, cross(vector(work.markers.rho[m]), b)), b
@@ -28,7 +28,7 @@ def mode_screw(model, work, m, i, k):
 
 @inner
 def mode_rate(model, work, m, i, k):
-    """Return the screw of mode k at marker m, its rate relative to the body, and the derivative of T' times Psi_r.
+    """Return the screw of mode k at marker m, its rate relative to the body, and (dT'/dt) Psi_r.
 
     `work.markers.bend_dot` has been written for the marker.
     """
@@ -46,7 +46,7 @@ def mode_rate(model, work, m, i, k):
 
 @inner
 def second_rates(model, work, m, i):
-    """Return the second rates of position and elastic angle of marker m in its body i, and write K_P q_dot, K_P q_ddot.
+    """Return the second rates of position and rotation vector of marker m in body i; write K_P q_dot and K_P q_ddot.
 
     `mode_screws` reads them.
     """
@@ -82,7 +82,7 @@ def mode_screws(model, work, m, i, k, held):
 
 @inner
 def variation_rates(S_0, S_1, S_2, V, V_dot):
-    """Return xi_dot and xi_ddot of a variation with S theta = S_0 and the rates S_1, S_2 of it in a moving frame."""
+    """Return xi_dot, xi_ddot of a variation with S theta = S_0; S_1, S_2: its rates in a moving frame."""
     turned_once = spatial_cross(V, S_0)
     own = pair_sum(scaled_pair(2.0, spatial_cross(V, S_1)), spatial_cross(V_dot, S_0))
     return pair_sum(S_1, turned_once), pair_sum(S_2, pair_sum(own, spatial_cross(V, turned_once)))
@@ -90,7 +90,7 @@ def variation_rates(S_0, S_1, S_2, V, V_dot):
 
 @inner
 def add_second_order(model, work, m, k, R, p, factor, F, row):
-    """Add the change of the screw of mode k at marker m due to all modes of its body, relative to the body, times F.
+    """Add the derivative by all modes of mode k's screw at marker m, relative to the body, times F.
 
     R, p: axes and origin of the body.
 

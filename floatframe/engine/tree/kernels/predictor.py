@@ -1,4 +1,4 @@
-"""Initial guess of a step in relative coordinates, by extrapolating the algorithmic accelerations of the last steps.
+"""Initial guess of a step in relative coordinates, from extrapolated algorithmic accelerations.
 
 So long as steps of one size follow each other, by the constant, the line or the parabola through the last of them,
 whichever would have led nearest to those of the step before: smooth motions follow a parabola, modes that the step does
@@ -16,7 +16,7 @@ __all__ = ["learn", "predict"]
 
 @inner
 def predicted(tangent, s, degree):
-    """Return the algorithmic acceleration of an unknown after the step by the polynomial through the last ones."""
+    """Return the algorithmic acceleration of an unknown after the step, extrapolated by a polynomial."""
     a, before = tangent.a_last[s], tangent.a_before[s]
     if degree == 0:
         return a
@@ -27,7 +27,7 @@ def predicted(tangent, s, degree):
 
 @inner
 def predict(model, work, tree, joints, tangent, memory, order, h):
-    """(1): a_new of every unknown; prescribed coordinates follow their functions."""
+    """(1): predict a_new of every unknown; prescribed coordinates follow their functions."""
     alpha_m, alpha_f, beta, gamma = order.alpha_m, order.alpha_f, order.beta, order.gamma
     begin_step(model, work, memory, h, alpha_f)
     state, degree = work.state, min(tangent.degree, tangent.n_known - 1)
@@ -62,7 +62,7 @@ def predict(model, work, tree, joints, tangent, memory, order, h):
 
 @inner
 def learn(tree, tangent, memory):
-    """Store the algorithmic accelerations after a step, and the degree that would have predicted them best."""
+    """Store the algorithmic accelerations after a step, and the polynomial degree that would have fitted best."""
     miss, best = 0.0, 0
     for degree in range(tangent.n_known):
         total = 0.0

@@ -1,4 +1,4 @@
-"""Projection of residuals over the tree: reactions of its joints, equations of coordinates and modes.
+"""Projection of residuals onto the tree: joint reactions, equations of coordinates and modes.
 
 From the leaves inwards the wrench of a joint on its body is what the residual of the body, with what hangs at it, asks
 for; it acts on the parent with the opposite sign. Its part along a coordinate, less the force Q that acts there, is the
@@ -17,7 +17,7 @@ __all__ = ["project", "put_reactions", "subtract_slopes"]
 
 @inner
 def project(model, work, tree, joints):
-    """Write the wrenches of all joints of the tree on their markers B, and the projected residual.
+    """Write the wrenches of all tree joints on their markers B, and the projected residual.
 
     `work.bodies.residual` is that of bodies without joints of the tree; it is left with what remains: only modal parts.
     """
@@ -56,7 +56,7 @@ def project(model, work, tree, joints):
 
 @inner
 def force_along(model, work, tree, i, k):
-    """Return the force of springs, dampers, motors and friction along column k of the joint of body i."""
+    """Return the force of springs, dampers, motors and friction along joint column k of body i."""
     row = tree.row[k]
     if row < 0:
         return 0.0
@@ -66,7 +66,7 @@ def force_along(model, work, tree, i, k):
 
 @inner
 def force_slopes(model, work, tree, i, row):
-    """Return the force along the coordinate of a row, and its derivatives by coordinate and rate."""
+    """Return the force along a row's coordinate, and its derivatives by coordinate and rate."""
     c = tree.joint[i]
     a, b = model.connections.a[c], model.connections.b[c]
     x, v = loaded_coordinate(model.rows, work.markers, row, a, b)
@@ -76,7 +76,7 @@ def force_slopes(model, work, tree, i, row):
 
 @inner
 def subtract_slopes(model, work, tree, i, K, shift, c_d, c_k):
-    """Subtract the derivatives of forces along the coordinates of the joint of body i; shift: of unknowns to rows."""
+    """Subtract derivatives of forces along joint coordinates of body i; shift: offset from unknowns to rows."""
     for k in range(tree.column0[i], tree.column0[i + 1]):
         s = tree.unknown[k]
         if s >= 0 and tree.row[k] >= 0:
@@ -86,7 +86,7 @@ def subtract_slopes(model, work, tree, i, K, shift, c_d, c_k):
 
 @inner
 def put_reactions(model, work, tree, joints):
-    """Write the wrenches of the joints of the tree into state.w as their rows have them: F, M on A, N reversed on B."""
+    """Write the wrenches of the tree joints into state.w in the order of their rows: F, M on A, N on B reversed."""
     for i in range(tree.parent.shape[0]):
         c = tree.joint[i]
         if c < 0:

@@ -1,4 +1,4 @@
-"""Spatial vectors: pairs ((3,), (3,)) of the motion of the point at an origin at rest and a rotation."""
+"""Spatial vectors as pairs ((3,), (3,)): translation of the point at a fixed origin, and rotation."""
 
 from floatframe.engine.kernels.compiler.compilation import inner, small
 from floatframe.engine.kernels.vector import add, cross, dot, put, scaled, sub, turned, vector
@@ -24,7 +24,7 @@ def pair(x):
 
 @small
 def spatial_cross(V, S):
-    """Return V × S of spatial motions."""
+    """Return the spatial cross product V × S of two motions."""
     return add(cross(V[1], S[0]), cross(V[0], S[1])), cross(V[1], S[1])
 
 
@@ -49,27 +49,27 @@ def put_pair_of(out, first, S):
 
 @inner
 def spatial_motion(p, v, omega, a, alpha):
-    """Return spatial velocity and its rate of a frame at p from the origin, given its motion."""
+    """Return spatial velocity of a frame at p from the origin, and its rate, for given motion of the frame."""
     V = (sub(v, cross(omega, p)), omega)
     return V, (sub(sub(a, cross(alpha, p)), cross(omega, v)), alpha)
 
 
 @small
 def world_screw(R, p, S):
-    """Return a spatial vector in the ground from one about the point p and in the axes R of a frame."""
+    """Return in the ground a spatial vector given about point p in axes R of a frame."""
     ang = turned(R, S[1])
     return add(turned(R, S[0]), cross(p, ang)), ang
 
 
 @small
 def wrench_of_column(H, c, R, p):
-    """Return the wrench of column c of a matrix of a body, ground axes; R, p: axes and origin of the body."""
+    """Return the wrench in column c of a body matrix H, ground axes; R, p: axes and origin of the body."""
     f = turned(R, (H[0, c], H[1, c], H[2, c]))
     return f, add(turned(R, (H[3, c], H[4, c], H[5, c])), cross(p, f))
 
 
 @small
 def turned_power(xi, screw, F):
-    """Return (xi × J) · F, the screw J and F as arrays of six."""
+    """Return (xi × J) · F; J is given as a screw, F as an array of six."""
     S = spatial_cross(xi, pair(screw))
     return dot(S[0], F) + dot(S[1], F[3:])

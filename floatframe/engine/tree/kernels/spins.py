@@ -1,4 +1,4 @@
-"""Spin of axisymmetric bodies that are free or on a ball joint, integrated separately (docs/relative.md §6).
+"""Separately integrated spin of axisymmetric bodies that are free or on a ball joint (docs/relative.md §6).
 
 As in absolute coordinates (`kernels.generalized_alpha`), with the motion of the body against its parent, omega and
 alpha in axes of the body's end of the joint: these are z_dot and z_ddot of the three columns of rotation, the last of
@@ -47,13 +47,13 @@ __all__ = [
 
 @small
 def first_rotation(tree, i):
-    """Return the first of the three columns of rotation of the joint of body i."""
+    """Return the index of the first of three rotation columns of the joint of body i."""
     return tree.column0[i + 1] - 3
 
 
 @inner
 def of_body(tree, i, Q, x):
-    """Return three values of rotation columns as a vector of body i relative to its parent, axes of its end."""
+    """Return three values of rotation columns as a vector relative to the parent, axes of body i's joint end."""
     if tree.is_reversed[i] == 0:
         return vector(x)
     return scaled(-1.0, turned(Q, x))
@@ -61,7 +61,7 @@ def of_body(tree, i, Q, x):
 
 @inner
 def of_columns(tree, i, Q, x):
-    """Return a vector of body i relative to its parent as three values of rotation columns."""
+    """Return a vector relative to the parent as three values of rotation columns of body i."""
     if tree.is_reversed[i] == 0:
         return x
     return scaled(-1.0, turned_back(Q, x))
@@ -69,7 +69,7 @@ def of_columns(tree, i, Q, x):
 
 @inner
 def turn_spinning_joint(tree, joints, i):
-    """Write Q of the joint of a body that spins."""
+    """Write the relative rotation Q of the joint of a spinning body."""
     theta, start = vector(joints.x[first_rotation(tree, i) :]), matrix(joints.Q_start[i])
     turn = turned_by_spin(vector(tree.spin_axis[i]), theta)
     if tree.is_reversed[i] == 0:
@@ -80,7 +80,7 @@ def turn_spinning_joint(tree, joints, i):
 
 @inner
 def begin_spin(tree, joints, memory, i, alpha_f, h):
-    """Choose whether the step integrates the spin of body i separately; if so, predict it with a_new = a."""
+    """Decide whether the step integrates the spin of body i separately; if so, predict it with a_new = a."""
     e, k, Q = vector(tree.spin_axis[i]), first_rotation(tree, i), joints.Q_start[i]
     joints.spins[i] = 0
     if dot(e, e) == 0.0:
@@ -103,7 +103,7 @@ def begin_spin(tree, joints, memory, i, alpha_f, h):
 
 @inner
 def change_spin(tree, joints, step, i, by_theta, by_rate, by_acceleration):
-    """Add the correction of the rotation columns of a spinning body to the iterate, by_theta of it to theta."""
+    """Add the correction of a spinning body's rotation columns to the iterate; theta changes by by_theta times it."""
     k, Q = first_rotation(tree, i), joints.Q[i]
     y = of_body(tree, i, Q, step[tree.unknown[k] :])
     omega, alpha = of_body(tree, i, Q, joints.rate[k:]), of_body(tree, i, Q, joints.acceleration[k:])
@@ -124,7 +124,7 @@ def change_spin(tree, joints, step, i, by_theta, by_rate, by_acceleration):
 
 @inner
 def spin_accelerations(tree, joints, memory, i, alpha_m, alpha_f):
-    """Return the algorithmic acceleration of a body that spins before and after the step, in axes that do not spin."""
+    """Return the algorithmic acceleration of a spinning body before and after the step, in axes that do not spin."""
     e, k, Q = vector(tree.spin_axis[i]), first_rotation(tree, i), joints.Q_start[i]
     turn = turn_of_axis(e, of_body(tree, i, Q, joints.rate_start[k:]))
     a = sub(of_body(tree, i, Q, memory.a[tree.slot[tree.unknown[k]] :]), turn)
@@ -137,7 +137,7 @@ def spin_accelerations(tree, joints, memory, i, alpha_m, alpha_f):
 
 @inner
 def spin_jump(tree, joints, memory, i, alpha_m, alpha_f):
-    """Return the change of the algorithmic acceleration of a spinning body in a step, as values of columns."""
+    """Return the change of a spinning body's algorithmic acceleration in a step, as values of columns."""
     e, along = vector(tree.spin_axis[i]), dot(vector(tree.spin_axis[i]), vector(joints.x[first_rotation(tree, i) :]))
     a, after = spin_accelerations(tree, joints, memory, i, alpha_m, alpha_f)
     return of_columns(tree, i, joints.Q[i], turned_about(e, -along, sub(after, a)))
@@ -145,7 +145,7 @@ def spin_jump(tree, joints, memory, i, alpha_m, alpha_f):
 
 @inner
 def put_spin_acceleration(tree, joints, memory, i, alpha_m, alpha_f):
-    """Write the algorithmic acceleration of a body that spins after the step into the memory."""
+    """Write the algorithmic acceleration of a spinning body after the step into the memory."""
     e, k, Q = vector(tree.spin_axis[i]), first_rotation(tree, i), joints.Q[i]
     _, rest = spin_accelerations(tree, joints, memory, i, alpha_m, alpha_f)
     omega, along = of_body(tree, i, Q, joints.rate[k:]), dot(e, vector(joints.x[k:]))
@@ -155,7 +155,7 @@ def put_spin_acceleration(tree, joints, memory, i, alpha_m, alpha_f):
 
 @loops
 def turning_by_columns(tree, joints, i):
-    """Return the rotation of body i for changes of x of its joint columns that are fixed in B, axes of B."""
+    """Return the rotation of body i for changes x of its joint columns fixed in B, axes of B."""
     if joints.spins[i] != 0:
         T = spin_jacobian(vector(tree.spin_axis[i]), vector(joints.x[first_rotation(tree, i) :]))
         if tree.is_reversed[i] == 0:
@@ -171,7 +171,7 @@ def turning_by_columns(tree, joints, i):
 
 @inner
 def spin_variations(tree, joints, i, y, theta, c_m, c_d, c_k):
-    """Return theta_dot and theta_ddot of `kernels.jets` for the change y of unknowns of a spinning body, axes of B.
+    """Return theta_dot, theta_ddot of `kernels.jets` for a change y of a spinning body's unknowns, axes of B.
 
     omega follows c_d y and alpha - w omega × e follows c_m y, both turned on by c_k (e · y) about -e.
     """

@@ -83,7 +83,7 @@ MOST_PATIENCE = 31  # number of steps with their own factors before older factor
 
 @inner
 def begin(model, work, tree, joints, memory):
-    """Set the iterate from the memory; write the motion of the joints at the start of a step if unknown."""
+    """Set the iterate from the memory; compute the joint motion at the start of a step if it is unknown."""
     load_state(work.state, memory)
     if joints.is_known == 0:
         joint_motion(model, work, tree, joints)
@@ -94,7 +94,7 @@ def begin(model, work, tree, joints, memory):
 
 @inner
 def start_here(tree, joints):
-    """Use the motion of the joints as that at the beginning of a step."""
+    """Copy the present joint motion to the beginning of the step."""
     for i in range(tree.parent.shape[0]):
         put(joints.d_start[i], 0, vector(joints.d[i]))
         put_matrix(joints.Q_start[i], matrix(joints.Q[i]))
@@ -105,7 +105,7 @@ def start_here(tree, joints):
 
 @inner
 def resize(model, work, tree, joints, tangent, memory, t, h):
-    """Convert the algorithmic accelerations to steps of size h to t; iterate and joints are those of the memory."""
+    """Convert algorithmic accelerations to a step of size h that ends at t; iterate and joints match the memory."""
     ratio = ratio_of_steps(model, memory, h)
     if ratio == 0.0:
         begin_anew(model, work, tree, joints, tangent, memory, t - h)
@@ -119,7 +119,7 @@ def resize(model, work, tree, joints, tangent, memory, t, h):
 
 @inner
 def begin_anew(model, work, tree, joints, tangent, memory, t):
-    """Use the accelerations of the equations of motion at the state in the memory, if they exist."""
+    """Restart with the accelerations that the equations of motion give at the state in the memory, if they exist."""
     work.state.time = t
     hold_states(model, work, memory)
     if accelerate(model, work, tree, joints, tangent):
@@ -130,7 +130,7 @@ def begin_anew(model, work, tree, joints, tangent, memory, t):
 
 @inner
 def renew(model, work, tree, joints, tangent, c_m, c_d, c_k):
-    """Renew the factors of the Newton matrix, and return whether it is regular.
+    """Renew the factors of the Newton matrix; return whether it is regular.
 
     Exact ones where wrenches are kept or `tangent.exactly` asks for them, else those of `kernels.kept_factors`.
     """
@@ -153,7 +153,7 @@ def renew(model, work, tree, joints, tangent, c_m, c_d, c_k):
 
 @inner
 def correct(model, work, tree, joints, tangent, c_k):
-    """Write the corrections for the residual of the iterate with the factors that `renew` has made."""
+    """Write the corrections for the residual of the iterate, with the factors from `renew`."""
     if tangent.is_exact != 0:
         solve_newton(work, tree, joints, tangent, c_k)
     else:
@@ -162,7 +162,7 @@ def correct(model, work, tree, joints, tangent, c_k):
 
 @inner
 def spins_far(tree, joints):
-    """Whether a body spins too fast in the step for factors without gyroscopic terms."""
+    """Whether a body spins too far in the step for factors without gyroscopic terms."""
     for i in range(joints.spins.shape[0]):
         if joints.spins[i] != 0:
             if abs(dot(vector(tree.spin_axis[i]), vector(joints.x[first_rotation(tree, i) :]))) > FAR_SPIN:
@@ -172,7 +172,7 @@ def spins_far(tree, joints):
 
 @inner
 def turns_too_far(work, tree, joints, length):
-    """Return the first body of a loop that its joint would rotate by more than `MOST_TURN` in the step, or -1.
+    """Return the first body in a loop, or -1, whose joint rotates it by more than `MOST_TURN` in the step.
 
     Where the loop leaves it on the axis of this turn, any turn is followed, and so are those that are prescribed.
     """
@@ -194,7 +194,7 @@ def turns_too_far(work, tree, joints, length):
 
 @inner
 def hold_velocities(model, work, tree, joints, tangent, by_rate, by_acceleration, c_k):
-    """Add the correction of rates required by position constraints to the iterate; return its squared norm.
+    """Add the rate correction that closes position constraints in velocity; return its squared norm.
 
     As `kernels.generalized_alpha.hold_velocities`, of unknowns s_dot by what joints and couplers that are kept hold.
     """
@@ -221,7 +221,7 @@ def hold_velocities(model, work, tree, joints, tangent, by_rate, by_acceleration
 
 @inner
 def turn_at_once(tree, joints, step):
-    """Convert changes of x of columns fixed in B to the rotation of B, as changes of rates do."""
+    """Convert changes x of columns fixed in B to a rotation vector of B, as rates are defined."""
     for i in range(tree.parent.shape[0]):
         change, is_turned = (0.0, 0.0, 0.0), False
         for k in range(tree.column0[i], tree.column0[i + 1]):
@@ -236,7 +236,7 @@ def turn_at_once(tree, joints, step):
 
 @inner
 def change_joints(work, tree, joints, step, by_x, by_rate, by_acceleration):
-    """Add parts of a correction to increments of joints, and to rates and accelerations of all unknowns."""
+    """Add multiples of a correction to joint increments, and to rates and accelerations of all unknowns."""
     for i in range(tree.parent.shape[0]):
         end = tree.column0[i + 1]
         if joints.spins[i] != 0:
@@ -271,7 +271,7 @@ def update(model, work, tree, joints, tangent, by_rate, by_acceleration, c_k):
 
 @inner
 def local_error(model, work, tree, joints, tangent, memory, order, h):
-    """Return the estimated error of the increment of a converged step, as in the absolute method.
+    """Return the estimated error of a converged step's increment, as in the absolute formulation.
 
     Accelerations of bodies are affine in those of the unknowns, so that the change of these in a step, added to them,
     gives that of the bodies; then they are as before.
@@ -318,7 +318,7 @@ def put_acceleration(work, tree, joints, s, value):
 
 @inner
 def accelerations(work, tree, joints, memory, s):
-    """Return the acceleration of an unknown at the iterate and at the beginning of the step."""
+    """Return an unknown's acceleration at the iterate and at the beginning of the step."""
     k = tree.column[s]
     if k >= 0:
         return joints.acceleration[k], joints.acceleration_start[k]
@@ -327,7 +327,7 @@ def accelerations(work, tree, joints, memory, s):
 
 @inner
 def one_step(model, work, memory, tree, joints, tangent, order, h):
-    """Advance the memory by one step, unless its error is above the allowed error.
+    """Advance the memory by one step, unless the estimated error is larger than allowed.
 
     Return (status, body that turns too far, last correction by the allowed one, error; -1 if not estimated). Factors of
     an earlier step serve as long as corrections shrink fast with them; where they do not, the step is begun anew with
@@ -478,7 +478,7 @@ def accept(model, work, memory, tree, joints, h, alpha_m, alpha_f):
 
 @inner
 def put_euler_parameters(R, p):
-    """Write the Euler parameters of a rotation matrix, with the sign nearer to the existing ones."""
+    """Write the Euler parameters of a rotation matrix, with the sign closer to the present values."""
     w, x = quaternion_of(matrix(R))
     along = w * p[0] + dot(x, p[1:])
     scale = (1.0 if along >= 0.0 else -1.0) / math.sqrt(w * w + dot(x, x))
@@ -488,7 +488,7 @@ def put_euler_parameters(R, p):
 
 @inner
 def write_tree_row(model, work, memory, tree, joints, t, rows):
-    """Write the next row of the results, with the reactions of the tree exactly at the state in the memory."""
+    """Write the next result row, with reactions of the tree joints computed at the state in the memory."""
     work.state.time = t
     begin(model, work, tree, joints, memory)
     evaluate_tree(model, work, tree, joints, 1.0)
@@ -499,7 +499,7 @@ def write_tree_row(model, work, memory, tree, joints, t, rows):
 
 @inner
 def try_tree_step(model, work, memory, others, order, t, h):
-    """Advance the memory to t by a step of size h, see `kernels.generalized_alpha.time_loop`."""
+    """Advance the memory by a step of size h to t, see `kernels.generalized_alpha.time_loop`."""
     tree, joints, tangent = others
     begin(model, work, tree, joints, memory)
     if is_resized(model, work, memory, order, h):
@@ -514,7 +514,7 @@ def try_tree_step(model, work, memory, others, order, t, h):
 
 @inner
 def write_next_row(model, work, memory, others, t, rows):
-    """Write the next row of the results.
+    """Write the next result row.
 
     Gaps of loops have rounding errors, like those of all joints in absolute ones.
     """

@@ -1,4 +1,4 @@
-"""The Newton matrix in relative coordinates, exact (docs/relative.md §5).
+"""The exact Newton matrix in relative coordinates (docs/relative.md §5).
 
 With the force F_i of body i (its residual as a spatial vector about O), F the sum over a subtree, J the screw of an
 unknown, residuals are ρ = J · F for columns, and those of modes with the same sums at their markers. Then
@@ -69,7 +69,7 @@ __all__ = [
 
 @inner
 def write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k):
-    """Write jets, derivatives of the bodies, and P, V of the connections that are kept.
+    """Write jets, derivatives of the bodies, and P, V of the connections outside the tree.
 
     `evaluate_tree` has been called for the iterate; wrenches of joints of the tree are taken away.
     """
@@ -103,7 +103,7 @@ def write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k):
 
 @inner
 def of_body(model, work, joints, tangent, i, c_m, c_d, c_k):
-    """Write D, F and the derivatives of the modal residual of body i alone, and H with the columns of its modes.
+    """Write D, F and modal residual derivatives of body i without its subtree, and H with its mode columns.
 
     D and the rows of the modes are those of body_jets.py, and what turns with the body but for `by_turn` and the
     acceleration a, which stay in the ground.
@@ -147,13 +147,13 @@ def of_body(model, work, joints, tangent, i, c_m, c_d, c_k):
 
 @small
 def unit_of(e, first):
-    """Return the part of the unit vector e of a jet from index `first` on."""
+    """Return the component of the unit jet e that begins at index `first`."""
     return 1.0 if e == first else 0.0, 1.0 if e == first + 1 else 0.0, 1.0 if e == first + 2 else 0.0
 
 
 @inner
 def product_of(A, x, out):
-    """Write A x into out."""
+    """Write the product A x into out."""
     for r in range(A.shape[0]):
         total = 0.0
         for k in range(A.shape[1]):
@@ -163,19 +163,19 @@ def product_of(A, x, out):
 
 @inner
 def body_frame(work, tangent, i):
-    """Return axes of body i, and its origin from `origin`."""
+    """Return axes of body i, and the vector to its origin from `origin`."""
     return work.state.R[i], sub(vector(work.state.r[i]), vector(tangent.origin))
 
 
 @inner
 def inner_product(x, y):
-    """Return x · y of vectors of six numbers."""
+    """Return the inner product of two vectors of six numbers."""
     return dot(x, y) + dot(x[3:], y[3:])
 
 
 @inner
 def sum_forces(model, work, tree, tangent, c_k):
-    """Sum F over subtrees; write the forces of bodies by their modes, and add what their screws change by to H."""
+    """Sum F over subtrees; write body forces by modes, and add to H the change of modal screws."""
     for place in range(tree.order.shape[0] - 1, -1, -1):
         i = tree.order[place]
         if tree.parent[i] >= 0:
@@ -198,7 +198,7 @@ def sum_forces(model, work, tree, tangent, c_k):
 
 @inner
 def assemble(model, work, tree, tangent, c_d, c_k):
-    """Write the matrix K of the unknowns and kept wrenches."""
+    """Assemble the matrix K of unknowns and kept wrenches."""
     K, n_s = tangent.K, tree.slot.shape[0]
     K[:, :] = 0.0
     sum_forces(model, work, tree, tangent, c_k)
@@ -216,7 +216,7 @@ def assemble(model, work, tree, tangent, c_d, c_k):
 
 @inner
 def add_jets(tree, tangent, i, s, kind, X):
-    """Add the jets of unknown s at the joint of body i that are of a kind."""
+    """Add the jets of one kind at the joint of body i that belong to unknown s."""
     for j in range(tree.jet0[i], tree.jet0[i + 1]):
         if tree.jet_s[j] == s and tree.jet_kind[j] == kind:
             for e in range(X.shape[0]):
@@ -225,7 +225,7 @@ def add_jets(tree, tangent, i, s, kind, X):
 
 @inner
 def matrix_column(model, work, tree, tangent, s):
-    """Write column s of K: the motion by this unknown outwards, Y of near markers, X of bodies; forces b inwards."""
+    """Write column s of K: motion by this unknown outwards (Y at carriers, X of bodies), then forces b inwards."""
     X, Y, b, n_b, K = tangent.X, tangent.Y, tangent.b, tree.order.shape[0], tangent.K
     for place in range(n_b):
         i = tree.order[place]
@@ -267,7 +267,7 @@ def matrix_column(model, work, tree, tangent, s):
 
 @inner
 def kept_marker(model, work, tree, tangent, m, first, rate):
-    """Add rows and columns of the connection of marker m, whose rows begin at `first`, for motions of the marker."""
+    """Add rows and columns for marker m of a connection outside the tree, whose rows begin at `first`."""
     i, c = model.markers.body[m], model.markers.connection[m]
     p = sub(vector(work.markers.r[m]), vector(tangent.origin))
     v, omega = vector(work.markers.v[m]), vector(work.markers.omega[m])
@@ -317,7 +317,7 @@ def kept_pair(model, work, tangent, m, c, first, s, xi, xi_dot, unit, p, v, omeg
 
 @inner
 def accelerated_marker(model, work, tree, tangent, m, first, c_m, c_d, c_k):
-    """Add the effect of the acceleration of marker m on the rows of its connection, from `first` on."""
+    """Add the effect of marker m's acceleration on the rows of its connection, which begin at `first`."""
     i = model.markers.body[m]
     b = i
     while b >= 0:
@@ -335,7 +335,7 @@ def accelerated_marker(model, work, tree, tangent, m, first, c_m, c_d, c_k):
 
 @inner
 def accelerated_pair(model, work, tangent, m, first, s, jet):
-    """Add P_a times the change of the acceleration of marker m by the jet (xi, xi_dot, xi_ddot) of unknown s.
+    """Add P_a times the acceleration change of marker m by the jet (xi, xi_dot, xi_ddot) of unknown s.
 
     da = xi_ddot_v + xi_ddot_w × p + 2 xi_dot_w × v + xi_w × a
     dalpha = xi_ddot_w + xi_dot_w × omega + xi_w × alpha

@@ -1,4 +1,4 @@
-"""The tree of bodies as a record, and the results of the recursions.
+"""The tree of bodies as a record, and the working arrays of its recursions.
 
 A joint of the tree has marker A and marker B, of which one is on the body (far), the other on its parent (near). Its
 columns, one for each coordinate rate z_dot_k, say how B moves as seen from A (docs/relative.md §2):
@@ -33,68 +33,69 @@ n_k, n_s, n_kept, n_j, n_rows, n_l = (
 class Tree(NamedTuple):
     """Bodies, and the joints between them whose coordinates are unknowns."""
 
-    order: IntArray = integer(n_b)  #: bodies, depth first, each after its parent
-    parent: IntArray = integer(n_b)  #: of each body, -1 for the ground
+    order: IntArray = integer(n_b)  #: bodies in depth-first order, each after its parent
+    parent: IntArray = integer(n_b)  #: parent of each body, -1 for the ground
     joint: IntArray = integer(n_b)  #: connection that carries the body, -1 for a free body
     near: IntArray = integer(n_b)  #: marker on the parent, -1 for the ground frame of a free body
     far: IntArray = integer(n_b)  #: marker on the body, -1 for the frame of a free body
-    is_reversed: IntArray = integer(n_b)  #: whether the parent holds marker B
+    is_reversed: IntArray = integer(n_b)  #: whether marker B of the joint is on the parent
     column0: IntArray = integer(n_b + 1)  #: first column of the joint of each body
     s0: IntArray = integer(n_b + 1)  #: first unknown of each body
-    m0: IntArray = integer(n_b)  #: first of its modes among the unknowns
-    column: IntArray = integer(n_s)  #: of each unknown, -1 for a mode
-    mode: IntArray = integer(n_s)  #: index in q of each unknown, -1 for a coordinate
-    #: index of its algorithmic acceleration among those of the bodies; for a mode its own
+    m0: IntArray = integer(n_b)  #: index of its first mode among the unknowns
+    column: IntArray = integer(n_s)  #: joint column of each unknown, -1 for a mode
+    mode: IntArray = integer(n_s)  #: index of each unknown in q, -1 for a joint coordinate
+    #: index of its algorithmic acceleration in the memory, in which a mode keeps its own place
     slot: IntArray = integer(n_s)
-    tau: Array = real(n_k, 3, unit="1 or m/rad")  #: translation, axes of A
-    alpha: Array = real(n_k, 3)  #: rotation, axes of the side
-    side: IntArray = integer(n_k)  #: 0: fixed in A, 1: fixed in B
-    unknown: IntArray = integer(n_k)  #: number among the unknowns, -1 for a prescribed coordinate
+    tau: Array = real(n_k, 3, unit="1 or m/rad")  #: translation of the column at unit rate, axes of A
+    alpha: Array = real(n_k, 3)  #: rotation of the column at unit rate, axes of A or B
+    side: IntArray = integer(n_k)  #: marker in which the column is fixed, 0: A, 1: B
+    unknown: IntArray = integer(n_k)  #: index among the unknowns, -1 for a prescribed coordinate
     motion: IntArray = integer(n_k)  #: function of time of a prescribed coordinate, -1 for none
     factor: Array = real(n_k)  #: factor from the prescribed function to the coordinate
     row: IntArray = integer(n_k)  #: row of the joint for this coordinate, -1 for none
-    kept: IntArray = integer(n_kept)  #: connections that are not joints of the tree
-    is_kept: IntArray = integer(n_c)  #: whether a connection is among the kept ones
-    kept_row: IntArray = integer(n_w)  #: number of a row among those of kept connections, -1 for others
-    held: IntArray = integer(Size("held"))  #: kept joints and couplers
-    #: axis of symmetry of a body that is free or on a ball joint, axes of its end of the joint; zero for others
+    kept: IntArray = integer(n_kept)  #: connections outside the tree, which remain constraints or forces
+    is_kept: IntArray = integer(n_c)  #: whether a connection is outside the tree
+    #: index of a row among the rows of connections outside the tree, -1 for other rows
+    kept_row: IntArray = integer(n_w)
+    held: IntArray = integer(Size("held"))  #: constraint joints and couplers outside the tree
+    #: symmetry axis of a body that is free or on a ball joint, axes of its joint end; zero for other bodies
     spin_axis: Array = real(n_b, 3)
     #: largest ratio of transverse angular velocity to spin for which the spin is integrated separately
     most_across: Array = real(n_b)
-    loop_body: IntArray = integer(n_l)  #: a body of a loop
-    loop_marker: IntArray = integer(n_l)  #: marker at which the loop leaves it outwards
-    #: first of the motions of a body and its subtree relative to its parent: unknown columns, modes of the parent at
-    #: the near marker, modes of the body at the far marker
+    loop_body: IntArray = integer(n_l)  #: body in a loop
+    loop_marker: IntArray = integer(n_l)  #: marker at which the loop leaves this body outwards
+    #: index of the first jet at a body's joint; jets are motions of the body and its subtree relative to the parent:
+    #: unknown columns, then modes of the parent at the near marker, then modes of the body at the far marker
     jet0: IntArray = integer(n_b + 1)
     jet_kind: IntArray = integer(n_j)  #: COLUMN, NEAR_MODE or FAR_MODE
-    jet_item: IntArray = integer(n_j)  #: number of the column, or of the mode in its body
-    jet_s: IntArray = integer(n_j)  #: number among the unknowns
+    jet_item: IntArray = integer(n_j)  #: index of the column, or of the mode in its body
+    jet_s: IntArray = integer(n_j)  #: index of the unknown
     own_jet: IntArray = integer(n_s)  #: jet of each unknown at the joint of its own body, -1 for none
     l0: IntArray = integer(n_b + 1)  #: index of the matrix of the unknowns of each body in a flat store
-    front0: IntArray = integer(n_b + 1)  #: index of its front in a flat store, see kernels/kept_factors.py
+    front0: IntArray = integer(n_b + 1)  #: index of its frontal matrix in a flat array, see kernels/kept_factors.py
 
 
 @tabled
 class JointWork(NamedTuple):
-    """Joints of the tree in a step; overwritten by every evaluation."""
+    """Motion and forces of the tree joints in a step; overwritten by every evaluation."""
 
-    d: Array = real(n_b, 3, unit="m")  #: from A to B, axes of A
-    Q: Array = real(n_b, 3, 3)  #: A_Aᵀ A_B
-    d_start: Array = real(n_b, 3, unit="m")  #: the same at the beginning of a step
+    d: Array = real(n_b, 3, unit="m")  #: vector from marker A to marker B, axes of A
+    Q: Array = real(n_b, 3, 3)  #: rotation of B relative to A, A_Aᵀ A_B
+    d_start: Array = real(n_b, 3, unit="m")  #: vector d at the beginning of the step
     Q_start: Array = real(n_b, 3, 3)
     x: Array = real(n_k, unit="m or rad")  #: increments of coordinates since the beginning of a step
-    rate: Array = real(n_k, unit="m/s or rad/s")  #: z_dot
-    acceleration: Array = real(n_k, unit="m/s² or rad/s²")  #: z_ddot
-    rate_start: Array = real(n_k, unit="m/s or rad/s")  #: z_dot at the beginning of a step
+    rate: Array = real(n_k, unit="m/s or rad/s")  #: coordinate rates z_dot
+    acceleration: Array = real(n_k, unit="m/s² or rad/s²")  #: coordinate accelerations z_ddot
+    rate_start: Array = real(n_k, unit="m/s or rad/s")  #: coordinate rates z_dot at the beginning of the step
     acceleration_start: Array = real(n_k, unit="m/s² or rad/s²")
     spins: IntArray = integer(n_b)  #: whether the step integrates the spin about the axis of symmetry separately
-    is_known: IntArray = integer()  #: whether the motion at the beginning of a step is that in the memory
-    t: Array = real(n_k, 3)  #: A_A tau, ground axes
-    a: Array = real(n_k, 3)  #: rotation, ground axes
-    near: Array = real(n_b, 12, unit="m/s², rad/s², m/s, rad/s")  #: accelerations and velocities of the marker there
+    is_known: IntArray = integer()  #: whether the joint motion at the beginning of the step agrees with the memory
+    t: Array = real(n_k, 3)  #: translation of the column A_A tau, ground axes
+    a: Array = real(n_k, 3)  #: rotation of the column, ground axes
+    near: Array = real(n_b, 12, unit="m/s², rad/s², m/s, rad/s")  #: accelerations and velocities of the near marker
     force: Array = real(n_b, 6, unit="N, N m")  #: wrench of the joint on its marker B, ground axes
-    residual: Array = real(n_s, unit="N, N m")  #: of the projected equations
-    own: Array = real(Size("n_u"), unit="N, N m")  #: residual of the bodies without the joints of the tree
+    residual: Array = real(n_s, unit="N, N m")  #: residual of the projected equations
+    own: Array = real(Size("n_u"), unit="N, N m")  #: residual of the bodies without wrenches of tree joints
 
 
 @tabled
@@ -102,57 +103,57 @@ class TangentWork(NamedTuple):
     """The Newton matrix in relative coordinates, see kernels/tangent.py; spatial vectors about the point `origin`."""
 
     origin: Array = real(3, unit="m")
-    screw: Array = real(n_j, 6)  #: motion of bodies for a jet with unit rate
-    jet: Array = real(n_j, 18)  #: variations xi, xi_dot, xi_ddot, weighted
-    reach: Array = real(n_j, 12)  #: xi, xi_dot for an increment of the step
-    D: Array = real(n_b, 6, 18)  #: derivative of the force of a body, with its subtree, by jets
-    F: Array = real(n_b, 6, unit="N, N m")  #: force of a body with its subtree
-    modal: Array = real(Size("n_q"), 18)  #: derivative of the modal residual by jets
+    screw: Array = real(n_j, 6)  #: screw: motion of bodies for a unit rate of the jet
+    jet: Array = real(n_j, 18)  #: weighted variations xi, xi_dot, xi_ddot
+    reach: Array = real(n_j, 12)  #: variations xi, xi_dot for an increment in the step
+    D: Array = real(n_b, 6, 18)  #: derivative by jets of the force on a body and its subtree
+    F: Array = real(n_b, 6, unit="N, N m")  #: force on a body and its subtree
+    modal: Array = real(Size("n_q"), 18)  #: derivative by jets of the modal residual
     f: Array = real(6)
     motion: Array = real(12)
-    own: Array = real(18)  #: jet of a mode at a marker of its body
-    C: Array = real(n_rows, n_s)  #: kept rows by unknowns
-    B: Array = real(n_rows, n_s)  #: equations of unknowns by kept wrenches, transposed; then K⁻¹ times them
-    V: Array = real(n_rows, n_rows)  #: kept rows by their wrenches; then the factors of V - C K⁻¹ B
+    own: Array = real(18)  #: jet of a mode at a marker of its own body
+    C: Array = real(n_rows, n_s)  #: derivative of kept rows by unknowns
+    #: transposed derivative of unknowns' equations by kept wrenches; later multiplied by K⁻¹
+    B: Array = real(n_rows, n_s)
+    V: Array = real(n_rows, n_rows)  #: derivative of kept rows by their wrenches; later factors of V - C K⁻¹ B
     V_pivot: IntArray = integer(n_rows)
-    by_mode: Array = real(Size("n_q"), 6)  #: force of a body, with its subtree, by its own modes
-    L: Array = real(Size("numbers of L"))  #: equations by unknowns of each body, then their factors, flat
+    by_mode: Array = real(Size("n_q"), 6)  #: derivative by its own modes of the force on a body and its subtree
+    L: Array = real(Size("numbers of L"))  #: matrix of each body's unknowns, later its factors, flat
     L_pivot: IntArray = integer(n_s)
-    G: Array = real(n_s, 18)  #: unknowns of a body by the jet of its near marker
-    W: Array = real(n_s, 6)  #: force of a subtree by the unknowns of its first body
-    b: Array = real(n_b, 6, unit="N, N m")  #: force of subtrees in a solution
-    #: for kernels/kept_factors.py, in axes of each body about its origin
+    G: Array = real(n_s, 18)  #: derivative of a body's unknowns by the jet of its near marker
+    W: Array = real(n_s, 6)  #: derivative of a subtree's force by the unknowns of its first body
+    b: Array = real(n_b, 6, unit="N, N m")  #: force on each subtree during a solution
+    #: arrays for kernels/kept_factors.py, in axes of each body about its origin
     front: Array = real(Size("numbers of fronts"))  #: matrices of modes, columns and motion, then their factors, flat
     S: Array = real(n_b, 6, Size("n_most"))  #: screws of the modes at the far marker
-    #: screws of the parent's modes at the near marker, minus those at its far marker
+    #: screws of the parent's modes at the near marker, minus screws of the same modes at the parent's far marker
     T: Array = real(n_b, 6, Size("n_most"))
     Z: Array = real(6, Size("n_most"))
-    J: Array = real(n_s, 6)  #: screws of columns
-    P: Array = real(6, 6)  #: force of a subtree by the motion of its carrier
-    z: Array = real(
-        Size("unknowns and motions")
-    )  #: modes, columns and motion of the carrier of a body, one body after the other
+    J: Array = real(n_s, 6)  #: screws of joint columns
+    P: Array = real(6, 6)  #: derivative of a subtree's force by the motion of its carrier
+    z: Array = real(Size("unknowns and motions"))  #: modes, columns and motion of the carrier, one body after the other
     turn: Array = real(n_b, 3, 3)  #: axes of a body in those of its parent
-    shift: Array = real(n_b, 3, unit="m")  #: its origin
+    shift: Array = real(n_b, 3, unit="m")  #: origin of a body in axes of its parent
     is_exact: IntArray = integer()  #: whether the factors are those of the exact matrix
-    is_kept: IntArray = integer()  #: whether the matrices of bodies exist
-    exactly: IntArray = integer()  #: number of remaining steps with exact matrices
+    is_kept: IntArray = integer()  #: whether the reused body matrices exist
+    exactly: IntArray = integer()  #: number of remaining steps that use exact matrices
     #: algorithmic accelerations of the unknowns after the last steps of equal size
     a_last: Array = real(n_s)
     a_before: Array = real(n_s)
     a_first: Array = real(n_s)
-    n_known: IntArray = integer()  #: number of valid ones among the three
-    degree: IntArray = integer()  #: degree of the polynomial through them that would have predicted the last one best
-    X: Array = real(n_b, 18)  #: jets of bodies in a solution; with reused factors their motion, axes of each
-    Y: Array = real(n_b, 18)  #: of what holds them
-    #: number of steps with their own factors after the next step that finds old factors too old
+    n_known: IntArray = integer()  #: number of these three accelerations that are valid
+    #: degree of the extrapolation polynomial that would have predicted the last acceleration best
+    degree: IntArray = integer()
+    X: Array = real(n_b, 18)  #: jets of bodies during a solution; with reused factors their motion in body axes
+    Y: Array = real(n_b, 18)  #: jets of the carriers of bodies during a solution
+    #: number of steps with own factors each, counted from the next step whose old factors are too inaccurate
     patience: IntArray = integer()
-    left: IntArray = integer()  #: of them, still to come
-    mass: Array = real(n_b, 6, 6, unit="kg, kg m, kg m²")  #: of subtrees
-    weight: Array = real(n_s, unit="kg, kg m²")  #: of the norm of corrections
+    left: IntArray = integer()  #: number of these steps that remain
+    mass: Array = real(n_b, 6, 6, unit="kg, kg m, kg m²")  #: inertia of subtrees
+    weight: Array = real(n_s, unit="kg, kg m²")  #: weights of the norm of corrections
     step: Array = real(n_s)  #: right side, then the correction of the unknowns
-    mu: Array = real(n_rows)  #: correction of the kept wrenches, times c_k
-    K: Array = real(Size("n_dense"), Size("n_dense"))  #: [unknowns, kept wrenches], if requested
+    mu: Array = real(n_rows)  #: correction of c_k times the kept wrenches
+    K: Array = real(Size("n_dense"), Size("n_dense"))  #: complete matrix for [unknowns, kept wrenches], if requested
 
 
 def new_joint_work(model: Model, tree: Tree) -> JointWork:
@@ -170,7 +171,7 @@ def new_joint_work(model: Model, tree: Tree) -> JointWork:
 
 
 def new_tangent_work(model: Model, tree: Tree, *, is_dense: bool = False) -> TangentWork:
-    """Return working arrays for the Newton matrix of a tree; is_dense: with space for the complete matrix."""
+    """Return working arrays for the Newton matrix of a tree; is_dense: also for the complete matrix."""
     n_s, n_rows = int(tree.s0[-1]), int((tree.kept_row >= 0).sum())
     sizes = {
         "n_b": len(tree.parent),

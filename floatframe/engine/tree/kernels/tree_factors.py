@@ -1,4 +1,4 @@
-"""Newton's correction in relative coordinates, in time that grows with the number of bodies (docs/relative.md §5).
+"""Newton's correction in relative coordinates, with a cost linear in the number of bodies (docs/relative.md §5).
 
 With Y the jet of the near marker of a joint, x the unknowns of its body (columns, modes), b the force that bodies
 further out bring along and A its derivative by the jet X of the body,
@@ -25,7 +25,7 @@ __all__ = ["factorize_tree", "solve_bordered", "solve_newton", "solve_wrenches"]
 
 @inner
 def factorize_tree(model, work, tree, tangent, c_d, c_k):
-    """Factorise the Newton matrix from the parts of `write_tangent`; return whether it is regular."""
+    """Factorise the Newton matrix from the results of `write_tangent`; return whether it is regular."""
     sum_forces(model, work, tree, tangent, c_k)
     for place in range(tree.order.shape[0] - 1, -1, -1):
         if not factorize_joint(model, work, tree, tangent, tree.order[place], c_d, c_k):
@@ -44,14 +44,14 @@ def factorize_tree(model, work, tree, tangent, c_d, c_k):
 
 @inner
 def add_turning(row, screw, F):
-    """Add (xi × J) · F to a row over jets, xi their first part."""
+    """Add (xi × J) · F to a row over jets, where xi is the first part of each jet."""
     for e in range(6):
         row[e] += turned_power((unit_of(e, 0), unit_of(e, 3)), screw, F)
 
 
 @inner
 def add_power(row, screw, A):
-    """Add J · A to a row over jets, A the derivative of a force by them."""
+    """Add J · A to a row over jets, where A is the derivative of a force by jets."""
     for e in range(18):
         for r in range(6):
             row[e] += screw[r] * A[r, e]
@@ -59,7 +59,7 @@ def add_power(row, screw, A):
 
 @inner
 def factorize_joint(model, work, tree, tangent, i, c_d, c_k):
-    """Eliminate the unknowns of body i, and add the remainder to its parent. Return whether its matrix is regular."""
+    """Eliminate the unknowns of body i and add the remainder to its parent; return whether the block is regular."""
     s0, n_l, m0, q0 = tree.s0[i], tree.s0[i + 1] - tree.s0[i], tree.m0[i], model.bodies.q0[i]
     A, F = tangent.D[i], tangent.F[i]
     H = newton_block(model, work, i)
@@ -111,7 +111,7 @@ def factorize_joint(model, work, tree, tangent, i, c_d, c_k):
 
 @inner
 def turning_far(tree, tangent, i, j, k, L, F):
-    """Add (xi × J) · F of the columns of the joint if J is fixed in the marker on the body."""
+    """Add (xi × J) · F for joint columns if J is fixed in the marker on the body."""
     if tree.side[tree.jet_item[j]] == tree.is_reversed[i]:
         return
     for o in range(tree.jet0[i], tree.jet0[i + 1]):
@@ -121,7 +121,7 @@ def turning_far(tree, tangent, i, j, k, L, F):
 
 @inner
 def add_to_parent(model, work, tree, tangent, i):
-    """Add P of the joint of body i to its parent: to its force, and to the force and equations of its modes."""
+    """Add the remainder P of body i's joint to the force and the modal equations of its parent."""
     parent, P, F = tree.parent[i], tangent.D[i], tangent.F[i]
     q0 = model.bodies.q0[parent]
     H = newton_block(model, work, parent)
@@ -146,7 +146,7 @@ def add_to_parent(model, work, tree, tangent, i):
 
 @inner
 def solve_tree(tree, tangent, x):
-    """Overwrite x, (n_s,), by the solution for the right side in it."""
+    """Overwrite x, (n_s,), which contains the right side, with the solution."""
     b, X = tangent.b, tangent.X
     b[:, :] = 0.0
     for place in range(tree.order.shape[0] - 1, -1, -1):
@@ -189,7 +189,7 @@ def solve_tree(tree, tangent, x):
 
 @inner
 def solve_newton(work, tree, joints, tangent, c_k):
-    """Write the corrections of unknowns into tangent.step, and those of kept wrenches times c_k into tangent.mu."""
+    """Write corrections of unknowns into tangent.step, and of c_k times kept wrenches into tangent.mu."""
     for s in range(tree.slot.shape[0]):
         tangent.step[s] = -c_k * joints.residual[s]
     for k in range(tree.kept_row.shape[0]):
@@ -200,7 +200,7 @@ def solve_newton(work, tree, joints, tangent, c_k):
 
 @inner
 def solve_bordered(tree, tangent):
-    """Overwrite tangent.step and tangent.mu, right sides of unknowns and of kept rows, by the solution."""
+    """Overwrite the right sides tangent.step (unknowns) and tangent.mu (kept rows) with the solution."""
     step, mu = tangent.step, tangent.mu
     solve_tree(tree, tangent, step)
     for r in range(mu.shape[0]):
@@ -211,7 +211,7 @@ def solve_bordered(tree, tangent):
 
 @inner
 def solve_wrenches(tangent):
-    """Overwrite tangent.mu, right sides of rows, by the kept wrenches; add the motion due to them to tangent.step."""
+    """Overwrite the right side tangent.mu with the kept wrenches; add the motion due to them to tangent.step."""
     step, mu = tangent.step, tangent.mu
     if mu.shape[0] == 0:
         return

@@ -1,4 +1,4 @@
-"""Norms in relative coordinates: of corrections by the motion of bodies, of unknowns by the mass that a unit moves.
+"""Norms in relative coordinates: of corrections by body motion, of unknowns by the mass that moves.
 
 Corrections are measured as in absolute coordinates, by how bodies and modes move, so that a tolerance means the same: a
 turn of a joint near the root that those behind it take back is no large one.
@@ -28,7 +28,7 @@ __all__ = ["sizes_of_step", "squared_size", "weigh"]
 
 @inner
 def weigh(model, work, tree, joints, tangent):
-    """Write the weights of the norm of unknowns: the mass moved by a unit of a coordinate, M + c_k K of a mode.
+    """Write the norm weights of the unknowns: mass moved by a unit of a coordinate, M + c_k K of a mode.
 
     Mass m, first moment S and inertia J of subtrees about tangent.origin, ground axes: rows 0, 1 and 3 to 5 of mass.
     """
@@ -60,7 +60,7 @@ def weigh(model, work, tree, joints, tangent):
 
 @inner
 def squared_size(model, work, tree, tangent):
-    """Return the squared norm of the correction in tangent.step by the motion of bodies; weights of `work.solver`."""
+    """Return the squared norm of the correction in tangent.step from body motion; weights of `work.solver`."""
     if tangent.is_exact != 0:
         move_by_screws(work, tree, tangent)
     total, weight, step = 0.0, work.solver.weight, tangent.step
@@ -76,7 +76,7 @@ def squared_size(model, work, tree, tangent):
 
 @inner
 def move_by_screws(work, tree, tangent):
-    """Write how the correction moves each body into tangent.X, in its own axes and about its own origin.
+    """Write the motion of each body for the correction into tangent.X, in body axes about the body origin.
 
     tangent.Y is the same motion about the origin that all bodies share.
     """
@@ -95,7 +95,7 @@ def move_by_screws(work, tree, tangent):
 
 @inner
 def sizes_of_step(model, work, memory, h):
-    """Return the squared size of the accelerations of the iterate, with gravity, and of the displacement in a step."""
+    """Return squared sizes of the iterate's accelerations, including gravity, and of the displacement in a step."""
     size, size_x, mass = 0.0, 0.0, 0.0
     for k in range(memory.u.shape[0]):
         size += work.solver.weight[k] * work.state.u_dot[k] ** 2

@@ -1,1 +1,1 @@
-"""Recursive equations of trees: inverse and forward dynamics, mass matrix and their derivatives, compiled."""
+"""Compiled recursive equations of trees: inverse and forward dynamics, mass matrix, and derivatives."""

@@ -1,4 +1,4 @@
-"""Articulated bodies: M x = b of a tree in time proportional to the number of bodies, with stored factors.
+"""Articulated bodies: solution of M x = b for a tree with stored factors, linear in the number of bodies.
 
 In ground axes, each node about its own origin, S the motion by its rates, H = [[I, ..]] of a flexible body
 (composite.py) with articulated instead of composite bodies in it:
@@ -59,7 +59,7 @@ def less(A, B):
 
 @small
 def inverse(A):
-    """Return the inverse of a matrix, and its determinant."""
+    """Return the inverse and the determinant of a matrix."""
     x, y, z = cross(A[1], A[2]), cross(A[2], A[0]), cross(A[0], A[1])
     d = dot(A[0], x)
     f = 1.0 / d
@@ -68,7 +68,7 @@ def inverse(A):
 
 @loops
 def one_rate(work, k, v, A, B, C):
-    """Eliminate the one rate of a joint; return the remaining blocks, and the inertia along it."""
+    """Eliminate the single rate of a joint; return the remaining blocks and the inertia along the rate."""
     move, w = vector(work.S[v]), vector(work.S[v, 3:])
     f, t = add(turned(A, move), turned(B, w)), add(turned(transposed(B), move), turned(C, w))
     d = dot(move, f) + dot(w, t)
@@ -82,7 +82,7 @@ def one_rate(work, k, v, A, B, C):
 
 @loops
 def three_rates(work, k, v, A, B, C):
-    """Eliminate the three rates of a joint; return the remaining blocks, and the determinant of their inertia."""
+    """Eliminate the three rates of a joint; return the remaining blocks and the determinant of their inertia."""
     L = transposed((vector(work.S[v]), vector(work.S[v + 1]), vector(work.S[v + 2])))
     W = transposed((vector(work.S[v, 3:]), vector(work.S[v + 1, 3:]), vector(work.S[v + 2, 3:])))
     F = matrix_sum(product(A, L), product(B, W))
@@ -98,7 +98,7 @@ def three_rates(work, k, v, A, B, C):
 
 @loops
 def flexible(nodes, work, k):
-    """Eliminate rates and modes of a flexible body; return the remaining blocks, and whether the matrix is regular."""
+    """Eliminate rates and modes of a flexible body; return the remaining blocks and whether the matrix is regular."""
     n, v0, size = nodes.n_q[k], nodes.v0[k], nodes.n_z[k] + nodes.n_q[k]
     H = work.H[nodes.h0[k] : nodes.h0[k + 1]].reshape((6 + n, 6 + n))
     G = work.G[nodes.g0[k] : nodes.g0[k + 1]].reshape((size, size))
@@ -124,14 +124,14 @@ def flexible(nodes, work, k):
 
 @loops
 def top_blocks(H):
-    """Return the blocks of the first six rows and columns of H."""
+    """Return the blocks of the first six rows and columns of a matrix H."""
     B = vector(H[0, 3:]), vector(H[1, 3:]), vector(H[2, 3:])
     return matrix(H), B, (vector(H[3, 3:]), vector(H[4, 3:]), vector(H[5, 3:]))
 
 
 @loops
 def articulate(nodes, work, model, marker_work):
-    """Factorise M of the nodes, placed in the ground; return the node without inertia along its rates, or -1."""
+    """Factorise M for nodes placed in the ground; return the node that has no inertia along its rates, or -1."""
     n_n = nodes.parent.shape[0]
     for k in range(n_n):
         moments_in_ground(nodes, work, model, marker_work, k)
@@ -172,7 +172,7 @@ def articulate(nodes, work, model, marker_work):
 
 @loops
 def local_solve(nodes, work, k, first, size):
-    """Overwrite the right side of the rates of node k by D⁻¹ or G⁻¹ times it."""
+    """Multiply the right side of node k's rates by D⁻¹, or by G⁻¹ for a flexible body."""
     b = work.right[first : first + size]
     if nodes.n_q[k] > 0:
         G = work.G[nodes.g0[k] : nodes.g0[k + 1]].reshape((size, size))
@@ -185,7 +185,7 @@ def local_solve(nodes, work, k, first, size):
 
 @loops
 def solve_articulated(nodes, work):
-    """Overwrite `right`, (n_v,), by M⁻¹ of it."""
+    """Overwrite `right`, (n_v,), with M⁻¹ right."""
     n_n, b = nodes.parent.shape[0], work.right
     for k in range(n_n):
         for j in range(6):
@@ -238,7 +238,7 @@ def solve_articulated(nodes, work):
 
 @loops
 def solve_columns(nodes, work, columns):
-    """Overwrite the rows of columns, (m, n_v), by M⁻¹ of each: right sides in, accelerations out."""
+    """Overwrite each row of columns, (m, n_v), a right side, with its accelerations M⁻¹ right."""
     n = work.right.shape[0]
     for i in range(columns.shape[0]):
         for j in range(n):

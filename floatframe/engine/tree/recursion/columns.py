@@ -1,4 +1,4 @@
-"""Motion of the frames of nodes for unit rates, ground axes, each at its own origin (docs/recursive.md §3).
+"""Frame motion of nodes for unit rates, in ground axes, each at its own origin (docs/recursive.md §3).
 
     V_k = shift(V_parent) + above q_dot of a flexible parent + S z_dot of the joint + S q_dot of its own modes
 
@@ -17,13 +17,13 @@ __all__ = ["motion_in_ground", "rate_columns"]
 
 @small
 def column_of(A, j):
-    """Return column j of a matrix."""
+    """Return column j of a matrix of three rows."""
     return A[0][j], A[1][j], A[2][j]
 
 
 @loops
 def joint_columns(nodes, work, k, arm):
-    """Write S of the rates of a joint; arm: from the origin of its outer frame to that of the node."""
+    """Write S for the rates of a joint; arm: vector from the origin of its outer frame to the origin of the node."""
     kind, v0 = nodes.kind[k], nodes.v0[k]
     R = matrix(work.R_G[k])
     if nodes.own[k] >= 0:
@@ -50,7 +50,7 @@ def joint_columns(nodes, work, k, arm):
 
 @loops
 def put_mode_columns(model, marker_work, m, R, p, sign, out):
-    """Write sign times the motion by each mode at marker m, out (n, 6); R, p: axes and origin of its body."""
+    """Write sign times the motion of each mode at marker m to out, (n, 6); R, p: axes and origin of its body."""
     if m < 0 or model.markers.psi0[m] < 0:
         out[:, :] = 0.0
         return
@@ -61,7 +61,7 @@ def put_mode_columns(model, marker_work, m, R, p, sign, out):
 
 @loops
 def rate_columns(nodes, work, model, marker_work):
-    """Write S and above of all nodes, which are placed in the ground."""
+    """Write S and above of all nodes, which must be placed in the ground."""
     for k in range(nodes.parent.shape[0]):
         n, m, above, arm = nodes.n_q[k], nodes.own[k], nodes.parent[k], (0.0, 0.0, 0.0)
         if n > 0:
@@ -79,7 +79,7 @@ def rate_columns(nodes, work, model, marker_work):
 
 @loops
 def motion_in_ground(nodes, work):
-    """Write the velocity of all nodes, at their origins, from S and above."""
+    """Write the velocity of all nodes at their origins from S and above."""
     for k in range(nodes.parent.shape[0]):
         above, c0 = nodes.parent[k], nodes.c0[k]
         v, w = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Composite bodies: the mass matrix of a tree, and the matrices of flexible bodies including their subtrees.
+"""Composite bodies: mass matrix of a tree, and matrices of flexible bodies with their subtrees.
 
 In ground axes, of each node k about its own origin, p from the origin of the parent:
 
@@ -54,7 +54,7 @@ __all__ = [
 
 @small
 def body_moments(nodes, work, model, marker_work, k):
-    """Return mass, first moment and inertia of the body of node k about its origin, ground axes; zero without one."""
+    """Return mass, first moment and inertia of node k's body about its origin, ground axes; zero if there is none."""
     R, zero = work.R_G[k], (0.0, 0.0, 0.0)
     if nodes.n_q[k] > 0:
         return moments_of_body(model, marker_work, nodes.body[k], R)
@@ -65,7 +65,7 @@ def body_moments(nodes, work, model, marker_work, k):
 
 @loops
 def moments_in_ground(nodes, work, model, marker_work, k):
-    """Write mass, s, J of the body of node k alone, and H if it is flexible; its forces have been evaluated."""
+    """Write mass, s, J of node k's body without its subtree, and H if it is flexible; call after its forces."""
     m, s, J = body_moments(nodes, work, model, marker_work, k)
     work.mass[k] = m
     put(work.s[k], 0, s)
@@ -76,7 +76,7 @@ def moments_in_ground(nodes, work, model, marker_work, k):
 
 @loops
 def flexible_mass(nodes, work, model, marker_work, k):
-    """Write H of the flexible body of node k alone, ground axes."""
+    """Write H of node k's flexible body without its subtree, ground axes."""
     i, n = nodes.body[k], nodes.n_q[k]
     types, t, q0 = model.body_types, model.bodies.kind[i], nodes.q0[k]
     H = work.H[nodes.h0[k] : nodes.h0[k + 1]].reshape((6 + n, 6 + n))
@@ -99,19 +99,19 @@ def flexible_mass(nodes, work, model, marker_work, k):
 
 @small
 def times_inertia(m, s, J, v, w):
-    """Return force and moment for the acceleration v, w of a composite with m, s, J."""
+    """Return force and moment on a composite body (m, s, J) for acceleration v and angular acceleration w."""
     return add(scaled(m, v), cross(w, s)), add(cross(s, v), turned(J, w))
 
 
 @small
 def rigid_blocks(m, s, J):
-    """Return the blocks A, B, C of composite m, s, J: f = A v + B w, t = Bᵀ v + C w."""
+    """Return blocks A, B, C of a composite body (m, s, J), where f = A v + B w and t = Bᵀ v + C w."""
     return ((m, 0.0, 0.0), (0.0, m, 0.0), (0.0, 0.0, m)), tilde(scaled(-1.0, s)), J
 
 
 @loops
 def shifted_blocks(A, B, C, p):
-    """Return the blocks about a point from which p leads to the one before: B - A p~ and C + p~ (B - A p~) - Bᵀ p~."""
+    """Shift blocks A, B, C by p, from new to old point: A, B - A p~, C + p~ (B - A p~) - Bᵀ p~."""
     P = tilde(p)
     B_p = matrix_sum(B, product(A, tilde(scaled(-1.0, p))))
     C_p = matrix_sum(C, matrix_sum(product(P, B_p), product(transposed(B), tilde(scaled(-1.0, p)))))
@@ -120,7 +120,7 @@ def shifted_blocks(A, B, C, p):
 
 @loops
 def add_carried(H, A, B, C, p, above):
-    """Add Jᵀ I J to H of a flexible parent, J = [shift, above], above (n, 6)."""
+    """Add Jᵀ I J to H of a flexible parent, with J = [shift, above] and above (n, 6)."""
     n = above.shape[0]
     A_p, B_p, C_p = shifted_blocks(A, B, C, p)
     add_block(H, 0, 0, A_p)
@@ -141,7 +141,7 @@ def add_carried(H, A, B, C, p, above):
 
 @loops
 def add_to_parent(nodes, work, k):
-    """Add the composite of node k to its parent (1), (2)."""
+    """Add the composite body of node k to its parent (1), (2)."""
     above = nodes.parent[k]
     p = sub(vector(work.r_G[k]), vector(work.r_G[above]))
     m, s, J = work.mass[k], vector(work.s[k]), matrix(work.J[k])
@@ -158,13 +158,13 @@ def add_to_parent(nodes, work, k):
 
 @small
 def along(S, f, t):
-    """Return the generalised force of a wrench along a motion."""
+    """Return the generalised force of a wrench (f, t) along a motion S."""
     return dot(vector(S), f) + dot(vector(S[3:]), t)
 
 
 @loops
 def go_up(nodes, work, M, k, v, f, t):
-    """Write M of rate v of node k with the rates of all nodes above (4)."""
+    """Write the entries of M for rate v of node k and the rates of all nodes above it (4)."""
     S = work.S
     while True:
         above = nodes.parent[k]
@@ -189,7 +189,7 @@ def go_up(nodes, work, M, k, v, f, t):
 
 @loops
 def flexible_column(nodes, work, H, k, j):
-    """Write F = H [S; e] of rate j of a flexible body, joint first, then modes, into `local`, and its wrench into U.
+    """Write F = H [S; e] for rate j of a flexible body (joint rates, then modes) to `local`, its wrench to U.
 
     Return the number of the rate.
     """
@@ -207,13 +207,13 @@ def flexible_column(nodes, work, H, k, j):
 
 @small
 def rate_of(nodes, k, j):
-    """Return the number of rate j of a flexible body, joint first, then modes."""
+    """Return the index of rate j of a flexible body, whose joint rates come before its modes."""
     return nodes.v0[k] + j if j < nodes.n_z[k] else nodes.vq[k] + j - nodes.n_z[k]
 
 
 @loops
 def along_rate(nodes, work, k, i):
-    """Return F, which `flexible_column` has written, along rate i of the same body."""
+    """Return the component of F from `flexible_column` along rate i of the same body."""
     n_z, F = nodes.n_z[k], work.local
     total = along(work.S[rate_of(nodes, k, i)], vector(F), vector(F[3:]))
     return total + F[6 + i - n_z] if i >= n_z else total
@@ -221,7 +221,7 @@ def along_rate(nodes, work, k, i):
 
 @loops
 def flexible_columns(nodes, work, M, k):
-    """Write U of the rates of a flexible body and their part of M (3)."""
+    """Write U for the rates of a flexible body, and its block of M (3)."""
     n, size = nodes.n_q[k], nodes.n_z[k] + nodes.n_q[k]
     H = work.H[nodes.h0[k] : nodes.h0[k + 1]].reshape((6 + n, 6 + n))
     for j in range(size):
@@ -232,7 +232,7 @@ def flexible_columns(nodes, work, M, k):
 
 @loops
 def mass_matrix(nodes, work, M, model, marker_work):
-    """Write the mass matrix; nodes are placed in the ground, flexible bodies evaluated."""
+    """Write the mass matrix; nodes must be placed in the ground, flexible bodies evaluated."""
     n_n, S = nodes.parent.shape[0], work.S
     for k in range(n_n):
         moments_in_ground(nodes, work, model, marker_work, k)
@@ -260,7 +260,7 @@ def mass_matrix(nodes, work, M, model, marker_work):
 
 @loops
 def evaluate_flexible(nodes, model, marker_work):
-    """Write moments and coupling of all flexible bodies at their modal coordinates."""
+    """Write moments and coupling matrices of all flexible bodies at their modal coordinates."""
     for k in range(nodes.parent.shape[0]):
         if nodes.n_q[k] > 0:
             body_forces(model, marker_work, nodes.body[k])

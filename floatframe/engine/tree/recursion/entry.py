@@ -1,4 +1,4 @@
-"""The compiled entry of the recursive equations, and a plain function for each thing it does."""
+"""The compiled entry for the recursive equations, with one plain function for each of its tasks."""
 
 import math
 from dataclasses import dataclass, field
@@ -61,7 +61,7 @@ __all__ = [
 
 @inner
 def set_modes(nodes, work, state):
-    """Extract modal coordinates and rates from positions and rates."""
+    """Copy modal coordinates and their rates from positions and rates."""
     for k in range(nodes.parent.shape[0]):
         for j in range(nodes.n_q[k]):
             state.q[nodes.q0[k] + j] = work.x[nodes.xq[k] + j]
@@ -71,7 +71,7 @@ def set_modes(nodes, work, state):
 
 @inner
 def own_marker(model, marker_work, m):
-    """Write the motion of a marker in its flexible body; return its axes without those of the undeformed marker."""
+    """Write a marker's motion in its flexible body; return its rotation relative to the undeformed marker."""
     work = marker_work.markers
     put(work.rho[m], 0, vector(model.markers.position[m]))
     if model.markers.psi0[m] < 0:
@@ -82,7 +82,7 @@ def own_marker(model, marker_work, m):
 
 @small
 def joint_rotation(nodes, work, k, A):
-    """Return A E of the joint of node k."""
+    """Return A E, the inner frame rotated by the joint of node k."""
     kind = nodes.kind[k]
     if kind == SCREW:
         turn = nodes.turn[k]
@@ -104,7 +104,7 @@ def joint_rotation(nodes, work, k, A):
 
 @small
 def joint_distance(nodes, work, k):
-    """Return d of the joint of node k, inner frame."""
+    """Return the vector d of the joint of node k, inner frame."""
     kind = nodes.kind[k]
     if kind == SCREW:
         return 0.0, 0.0, nodes.slide[k] * work.x[nodes.x0[k]]
@@ -115,7 +115,7 @@ def joint_distance(nodes, work, k):
 
 @loops
 def place_in_parent(nodes, work, model, marker_work):
-    """Write R, p of all nodes, and the markers of flexible bodies."""
+    """Write R, p of all nodes relative to their parents, and the markers of flexible bodies."""
     for k in range(nodes.parent.shape[0]):
         m = nodes.above[k]
         if m >= 0:
@@ -135,7 +135,7 @@ def place_in_parent(nodes, work, model, marker_work):
 
 @loops
 def place_in_ground(nodes, work, marker_work):
-    """Write R_G, r_G of all nodes, whose joints are placed in their parents."""
+    """Write R_G, r_G of all nodes, which are already placed relative to their parents."""
     for k in range(nodes.parent.shape[0]):
         above, m = nodes.parent[k], nodes.own[k]
         R, r = matrix(work.R[k]), vector(work.p[k])
@@ -160,7 +160,7 @@ class Task(NamedTuple):
     """A request to the entry."""
 
     what: IntArray = integer()
-    times: IntArray = integer()  #: number of repetitions, for measurements
+    times: IntArray = integer()  #: number of repetitions, used in measurements
 
 
 as_nodes, as_node_work, as_model = converter(Nodes()), converter(NodeWork()), converter(Model())
@@ -168,7 +168,7 @@ as_work, as_task, as_dense = converter(Work()), converter(Task()), converter(Den
 
 
 def make_entry(digest):
-    """Return the cached entry; the digest of the sources enters its key."""
+    """Return the cached entry; the digest of the sources is part of its key."""
 
     def run(nodes_table, work_table, dense_table, model_table, marker_table, task_table):
         if digest == 0:
@@ -218,7 +218,7 @@ run = make_entry(source_digest(__name__, compiler))
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """The records of a tree."""
+    """The model and working records of a tree."""
 
     nodes: Nodes
     work: NodeWork
@@ -227,7 +227,7 @@ class Prepared:
     task: Task = field(default_factory=lambda: zeros(Task(), {}))
 
     def run(self, what: int, dense: Dense, times: int = 1) -> int:
-        """Execute a request with the numbers in the records; return -1, or the node whose matrix is singular."""
+        """Carry out a task with the numbers in the records; return -1, or the node with a singular matrix."""
         self.task.what[...] = what
         self.task.times[...] = times
         records: Any = (self.nodes, self.work, dense, self.model, self.marker_work, self.task)

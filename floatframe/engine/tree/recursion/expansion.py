@@ -1,4 +1,4 @@
-"""From the tree of a system to nodes: each joint as a chain of elementary ones (docs/recursive.md §1).
+"""Nodes from the tree of a system: each joint becomes a chain of elementary joints (docs/recursive.md §1).
 
 With Q the rotation from marker A to B, Q0 that at zero coordinates, a joint moves B as seen from A by translations
 along axes of A, then rotations about axes of A, then rotations about axes of B: exp(a x) Q0 exp(b y) =
@@ -36,24 +36,25 @@ ZERO = np.zeros(3)
 
 @dataclass(frozen=True, eq=False)
 class Elementary:
-    """One elementary joint of a chain."""
+    """One elementary joint in a chain of them."""
 
     kind: int
-    axes: Array  #: inner frame at zero coordinates, axes of the first marker, (3, 3); a screw about the third
+    #: inner frame at zero coordinates in axes of the first marker, (3, 3); a screw acts along the third axis
+    axes: Array
     slide: float
     turn: float
-    first: int  #: its first column among those of the joint
+    first: int  #: index of its first column in the joint
     is_near: bool = False
 
     def reversed_in(self, Q0: Array) -> "Elementary":
-        """Return it as seen from the other marker."""
+        """Return the same joint from the other marker to this one."""
         near = self.kind == ROTATION and not self.is_near
         return Elementary(self.kind, Q0.T @ self.axes, -self.slide, -self.turn, self.first, near)
 
 
 @dataclass(frozen=True, eq=False)
 class Expansion:
-    """The nodes of a system, and the relation of their numbers to its bodies."""
+    """The nodes of a system, and the correspondence of nodes and bodies."""
 
     nodes: Nodes
     node_of: tuple[int, ...]  #: node that carries each body
@@ -62,7 +63,7 @@ class Expansion:
     z_of: tuple[slice, ...]  #: rates of the joint of each body
     xq_of: tuple[slice, ...]  #: modal coordinates of each body among the positions
     vq_of: tuple[slice, ...]  #: the same among the rates
-    frame_of: tuple[tuple[Array, Array], ...]  #: axes and origin of the node in the undeformed body, (3, 3), (3,)
+    frame_of: tuple[tuple[Array, Array], ...]  #: axes and origin of the node in the undeformed body, (3, 3) and (3,)
     n_x: int
     n_v: int
     system: System
@@ -71,7 +72,7 @@ class Expansion:
 
 
 def zero_rotation(joint: object, A_a: Array, A_b: Array) -> Array:
-    """Return Q0, (3, 3): axes of B in those of A where all coordinates of a joint are zero."""
+    """Return Q0, (3, 3), the axes of B relative to A at zero joint coordinates."""
     if joint is None or isinstance(joint, SphericalJoint):
         return np.eye(3)
     if isinstance(joint, FixedJoint) and joint.rotation is not None:
@@ -94,7 +95,7 @@ def zero_rotation(joint: object, A_a: Array, A_b: Array) -> Array:
 
 
 def chain_of(tree: Tree, body: int, Q0: Array) -> list[Elementary]:
-    """Return the chain from marker A to marker B of the joint that carries a body."""
+    """Return the chain from marker A to marker B of the joint of a body."""
     first, end = int(tree.column0[body]), int(tree.column0[body + 1])
     moves: list[Elementary] = []
     turns_a: list[Elementary] = []
@@ -121,7 +122,7 @@ def chain_of(tree: Tree, body: int, Q0: Array) -> list[Elementary]:
 
 
 def frame_along(axis: Array) -> Array:
-    """Return a right-handed frame whose third axis is that one, (3, 3)."""
+    """Return a right-handed frame whose third axis is the given one, (3, 3)."""
     first, second = normals_of(axis)
     return np.column_stack([first, second, axis])
 
@@ -209,7 +210,7 @@ def expansion_of(system: System) -> Expansion:
 
 
 def starts_of(chain: Sequence[Elementary], x: int, z: int) -> dict[int, tuple[int, int]]:
-    """Return the first position and rate of each elementary joint, by its first column: in the order of columns."""
+    """Return each elementary joint's first position and rate, by its first column."""
     starts = {}
     for each in sorted(chain, key=lambda each: each.first):
         starts[each.first] = (x, z)
@@ -218,7 +219,7 @@ def starts_of(chain: Sequence[Elementary], x: int, z: int) -> dict[int, tuple[in
 
 
 def positions_and_rates(found: SystemTree, model: Model) -> tuple[tuple[slice, ...], ...]:
-    """Return the positions and rates of joints, and those of modes, of each body."""
+    """Return, for each body, positions and rates of its joint and of its modes."""
     tree = found.tree
     x, v = 0, 0
     parts: tuple[list[slice], ...] = ([], [], [], [])
@@ -240,14 +241,14 @@ def is_flexible(model: Model, i: int) -> bool:
 
 
 def marker_place(model: Model, m: int) -> tuple[Array, Array]:
-    """Return axes and position of a marker in its undeformed body; -1: those of the body, or of the ground."""
+    """Return axes and position of a marker in its undeformed body; -1: of the body frame or the ground."""
     if m < 0:
         return np.eye(3), ZERO
     return model.markers.triad[m], model.markers.position[m]
 
 
 def placed_axes(compiled: CompiledSystem, m: int, body: int) -> Array:
-    """Return the assembled axes of a marker, or of a body without a marker, in ground axes, including deformation."""
+    """Return assembled ground axes of a marker, with deformation, or of a body that has no marker."""
     placed, bodies = compiled.placed, compiled.model.bodies
     i = body if m < 0 else int(compiled.model.markers.body[m])
     R = np.eye(3) if i < 0 else rotation_matrix(placed.p[i])
@@ -256,7 +257,7 @@ def placed_axes(compiled: CompiledSystem, m: int, body: int) -> Array:
 
 
 def marker_shape(compiled: CompiledSystem, m: int) -> MarkerShape:
-    """Return a marker of a compiled system in its body; -1: the frame of the body."""
+    """Return a marker of a compiled system relative to its body; -1: the body frame."""
     markers, bodies = compiled.model.markers, compiled.model.bodies
     if m < 0:
         return MarkerShape(ZERO, np.eye(3))
@@ -271,14 +272,14 @@ def marker_shape(compiled: CompiledSystem, m: int) -> MarkerShape:
 
 
 def zero_rotation_of(system: System, compiled: CompiledSystem, tree: Tree, i: int) -> Array:
-    """Return Q0, (3, 3), of the joint that carries body i."""
+    """Return Q0, (3, 3), for the joint of body i."""
     joint = None if tree.joint[i] < 0 else system.joints[tree.joint[i]]
     near, far = placed_axes(compiled, int(tree.near[i]), -1), placed_axes(compiled, int(tree.far[i]), i)
     return zero_rotation(joint, *((far, near) if tree.is_reversed[i] else (near, far)))
 
 
 def carried(model: Model, i: int, F: Array, origin: Array) -> dict:
-    """Return the data of a node for the body that it carries: moments of the undeformed one, F at its origin."""
+    """Return the body data of a node: moments of the undeformed body, in the frame F at its origin."""
     bodies, types = model.bodies, model.body_types
     t = int(bodies.kind[i])
     m, S = float(types.mass[t]), types.S[t]
@@ -293,7 +294,7 @@ def carried(model: Model, i: int, F: Array, origin: Array) -> dict:
 
 
 def positions_of_state(expansion: Expansion, state: State) -> Array:
-    """Return the positions, (n_x,), of a state of the engine; joints are assumed closed."""
+    """Return the positions, (n_x,), for a state of the engine whose joints are assumed closed."""
     compiled, tree = expansion.compiled, expansion.tree.tree
     bodies = compiled.model.bodies
     x = np.zeros(expansion.n_x)
@@ -312,7 +313,7 @@ def positions_of_state(expansion: Expansion, state: State) -> Array:
 
 
 def joint_positions(expansion: Expansion, i: int, d: Array, Q: Array) -> Array:
-    """Return the positions of the joint of body i from d, axes of A, and Q = A_Aᵀ A_B."""
+    """Return the joint positions of body i from d, axes of A, and Q = A_Aᵀ A_B."""
     tree = expansion.tree.tree
     Q0 = zero_rotation_of(expansion.system, expansion.compiled, tree, i)
     chain = chain_of(tree, i, Q0)
@@ -341,5 +342,5 @@ def joint_positions(expansion: Expansion, i: int, d: Array, Q: Array) -> Array:
 
 
 def turn_between(axis: Array, a: Array, b: Array) -> float:
-    """Return the angle about an axis from a to b, both normal to it."""
+    """Return the angle about an axis from a to b, which are both normal to it."""
     return float(np.arctan2(axis @ np.cross(a, b), a @ b))

@@ -1,4 +1,4 @@
-"""Recursive Newton-Euler: generalised forces of a given motion of a tree (docs/recursive.md §2).
+"""Recursive Newton-Euler: generalised forces for a given motion of a tree (docs/recursive.md §2).
 
 In the frame of each node, a the acceleration of its origin minus gravity (that of the ground is -g), no linear
 velocity being needed, and U = alpha~ + omega~ omega~, with which all points of a body have c_ddot = U c:
@@ -43,7 +43,7 @@ __all__ = ["newton_euler"]
 
 @loops
 def add_modal_forces(model, marker_work, m, f, t, sign, out):
-    """Add sign times the modal forces of a wrench on marker m, at its point, axes of its body, to out, (n,)."""
+    """Add sign times the modal forces of a wrench on marker m, body axes at its point, to out, (n,)."""
     o = model.markers.psi0[m]
     if o < 0:
         return
@@ -60,7 +60,7 @@ def add_modal_forces(model, marker_work, m, f, t, sign, out):
 
 @small
 def joint_motion(nodes, work, k, omega, alpha, a):
-    """Return omega, alpha, a including the motion of the joint of node k, outer frame of the joint."""
+    """Return omega, alpha, a after the joint motion of node k, in the outer frame of the joint."""
     kind, v0 = nodes.kind[k], nodes.v0[k]
     if kind == SCREW:
         turn, slide = nodes.turn[k], nodes.slide[k]
@@ -88,7 +88,7 @@ def joint_motion(nodes, work, k, omega, alpha, a):
 
 @small
 def joint_forces(nodes, work, k, f, t):
-    """Write the forces along the rates of the joint of node k for a wrench on its outer frame."""
+    """Write the joint forces along the rates of node k for a wrench on the outer frame."""
     kind, v0 = nodes.kind[k], nodes.v0[k]
     if kind == SCREW:
         work.force[v0] = nodes.slide[k] * f[2] + nodes.turn[k] * t[2]
@@ -102,7 +102,7 @@ def joint_forces(nodes, work, k, f, t):
 
 @small
 def move_node(nodes, work, model, marker_work, k):
-    """Write the motion of node k from that of its parent (1)."""
+    """Write the motion of node k from the motion of its parent (1)."""
     above, R, m_above, m_own = nodes.parent[k], work.R[k], nodes.above[k], nodes.own[k]
     if above < 0:
         omega, alpha, a = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), scaled(-1.0, vector(work.gravity))
@@ -128,7 +128,7 @@ def move_node(nodes, work, model, marker_work, k):
 
 @small
 def rigid_wrench(nodes, work, k):
-    """Return force and moment of the rigid body of node k (2)."""
+    """Return force and moment required by the rigid body of node k (2)."""
     U, P, s, a = work.U_spin[k], nodes.P[k], vector(nodes.s[k]), vector(work.acc[k])
     turning = (
         P[0, 1] * U[2, 0] - P[0, 2] * U[1, 0] + P[1, 2] * (U[2, 2] - U[1, 1]) + P[1, 1] * U[2, 1] - P[2, 2] * U[1, 2],
@@ -140,7 +140,7 @@ def rigid_wrench(nodes, work, k):
 
 @loops
 def flexible_wrench(nodes, work, model, marker_work, k):
-    """Return force and moment of the flexible body of node k (2), and write its modal forces."""
+    """Return force and moment required by the flexible body of node k (2), and write its modal forces."""
     i, u0, state = nodes.body[k], nodes.u0[k], marker_work.state
     put_matrix(state.R[i], unit_matrix())
     put(state.u, u0 + 3, vector(work.omega[k]))
@@ -153,7 +153,7 @@ def flexible_wrench(nodes, work, model, marker_work, k):
 
 @small
 def load_node(nodes, work, model, marker_work, k):
-    """Write the wrench that the body of node k needs (2)."""
+    """Write the wrench required by the body of node k (2)."""
     f, t = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if nodes.n_q[k] > 0:
         f, t = flexible_wrench(nodes, work, model, marker_work, k)
@@ -165,7 +165,7 @@ def load_node(nodes, work, model, marker_work, k):
 
 @small
 def pass_to_parent(nodes, work, model, marker_work, k):
-    """Write the forces along the rates of node k, and add its wrench to that of its parent (3)."""
+    """Write the forces along the rates of node k, and add its wrench to the parent's wrench (3)."""
     residual = marker_work.bodies.residual
     f, t = vector(work.f[k]), vector(work.t[k])
     n, above = nodes.n_q[k], nodes.parent[k]
@@ -194,7 +194,7 @@ def pass_to_parent(nodes, work, model, marker_work, k):
 
 @loops
 def newton_euler(nodes, work, model, marker_work):
-    """Write the generalised forces of the motion in `work`, with reactions at all joints; nodes are already placed."""
+    """Write the generalised forces of the motion in `work` and all joint reactions; nodes are already placed."""
     for k in range(nodes.parent.shape[0]):
         move_node(nodes, work, model, marker_work, k)
         load_node(nodes, work, model, marker_work, k)

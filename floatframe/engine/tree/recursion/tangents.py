@@ -1,4 +1,4 @@
-"""Derivatives of inverse dynamics by positions and rates, recursive and exact (docs/recursive.md §5).
+"""Exact derivatives of inverse dynamics by positions and rates, by recursion (docs/recursive.md §5).
 
 All in ground axes about the origin of the ground. A rate j moves all that hangs at it by S_j. Seen from there (turning
 along), the velocities of all these bodies change by one motion Y_j, and their accelerations A, as spatial ones, by
@@ -57,7 +57,7 @@ __all__ = ["force_tangents"]
 
 @loops
 def node_motion(work, k):
-    """Return V, A of node k."""
+    """Return spatial velocity V and acceleration A of node k."""
     R, r = work.R_G[k], vector(work.r_G[k])
     alpha, a = turned(R, vector(work.alpha[k])), turned(R, vector(work.acc[k]))
     return spatial_motion(r, vector(work.motion[k]), vector(work.motion[k, 3:]), a, alpha)
@@ -65,7 +65,7 @@ def node_motion(work, k):
 
 @loops
 def marker_motion(model, marker_work, m, work, k):
-    """Return V, A of marker m of flexible node k."""
+    """Return spatial velocity V and acceleration A of marker m on flexible node k."""
     R = work.R_G[k]
     omega, alpha, a = vector(work.omega[k]), vector(work.alpha[k]), vector(work.acc[k])
     omega_P, alpha_P, a_P = elastic_carrier(model, marker_work, m, omega, alpha, a)
@@ -77,7 +77,7 @@ def marker_motion(model, marker_work, m, work, k):
 
 @loops
 def inner_motion(nodes, work, model, marker_work, k):
-    """Return V, A of the inner frame of the joint of node k."""
+    """Return spatial velocity V and acceleration A of the inner frame of node k's joint."""
     above, m = nodes.parent[k], nodes.above[k]
     zero = (0.0, 0.0, 0.0)
     if above < 0:
@@ -89,7 +89,7 @@ def inner_motion(nodes, work, model, marker_work, k):
 
 @loops
 def joint_changes(nodes, work, dense, model, marker_work, k):
-    """Write S, Y, X of the rates of a joint (1)."""
+    """Write S, Y, X for the rates of a joint (1)."""
     inner_V, inner_A = inner_motion(nodes, work, model, marker_work, k)
     m, r = nodes.own[k], vector(work.r_G[k])
     outer_V, outer_A = node_motion(work, k)
@@ -110,7 +110,7 @@ def joint_changes(nodes, work, dense, model, marker_work, k):
 
 @loops
 def mode_changes(nodes, work, dense, model, marker_work, k):
-    """Write S, Y, X of the modes of a flexible body by its own marker, and of those of its parent by that above (1)."""
+    """Write S, Y, X for a flexible body's modes at its own marker, and for its parent's modes at marker `above` (1)."""
     first, end = nodes.vq[k], nodes.vq[k] + nodes.n_q[k]
     if end > first:
         put_mode_changes(work, model, marker_work, k, nodes.own[k], -1.0, dense.S[first:end], dense.change[first:end])
@@ -122,7 +122,7 @@ def mode_changes(nodes, work, dense, model, marker_work, k):
 
 @loops
 def put_mode_changes(work, model, marker_work, k, m, sign, out, change):
-    """Write sign times S, (n, 6), and Y, X, (n, 18), of the modes of flexible node k at its marker m, -1: none."""
+    """Write sign times S, (n, 6), and Y, X, (n, 18), for node k's modes at its marker m; m = -1: none."""
     if m < 0 or model.markers.psi0[m] < 0:
         out[:, :] = 0.0
         change[:, :] = 0.0
@@ -141,7 +141,7 @@ def put_mode_changes(work, model, marker_work, k, m, sign, out, change):
 
 @loops
 def body_by_turning(nodes, work, dense, model, marker_work, k):
-    """Write p and Q of the body of node k alone, and the wrench, inertia of its subtree (1)."""
+    """Write p and Q of node k's body without its subtree, and wrench and inertia of its subtree (1)."""
     R, r, zero = work.R_G[k], vector(work.r_G[k]), (0.0, 0.0, 0.0)
     by_modes = zero, (zero, zero, zero)
     if nodes.n_q[k] > 0:
@@ -161,26 +161,26 @@ def body_by_turning(nodes, work, dense, model, marker_work, k):
 
 @small
 def wrench_of(m, s, J, p, Q, x, x_w, y_w):
-    """Return I X + N Y."""
+    """Return the change of a wrench I X + N Y."""
     f, t = times_inertia(m, s, J, x, x_w)
     return add(f, scaled(2.0, cross(y_w, p))), add(t, turned(Q, y_w))
 
 
 @small
 def by_turning(p, Q, v, w):
-    """Return the part of Nᵀ (v, w) along rotations; the part along translations is zero."""
+    """Return the rotation part of Nᵀ (v, w); the translation part is zero."""
     return add(scaled(2.0, cross(p, v)), turned_back(Q, w))
 
 
 @small
 def force_cross(v, w, f, t):
-    """Return (v, w) ×* (f, t): the change of a wrench that moves with it."""
+    """Return the spatial cross product (v, w) ×* (f, t), the change of a wrench that moves along."""
     return cross(w, f), add(cross(w, t), cross(v, f))
 
 
 @loops
 def mode_rows(nodes, work, dense, model, marker_work, k):
-    """Write the rows of the modes of flexible node k for motions of its body alone (2)."""
+    """Write the modal rows of flexible node k for motions of its body alone (2)."""
     vq, R, r, omega = nodes.vq[k], work.R_G[k], vector(work.r_G[k]), vector(work.omega[k])
     v = turned_back(R, work.motion[k])
     for j in range(nodes.n_q[k]):
@@ -192,14 +192,14 @@ def mode_rows(nodes, work, dense, model, marker_work, k):
 
 @small
 def row_times(dense, i, change, first, turning):
-    """Return a_i·X + b_i·Y of a row, X at `first` in a change, Y's rotation at `turning` of it."""
+    """Return a_i·X + b_i·Y for a row; first, turning: indices in a change of X and of the rotation of Y."""
     a, b = dense.row_a[i], vector(dense.row_b[i])
     return along(a, vector(change[first:]), vector(change[first + 3 :])) + dot(b, vector(turning))
 
 
 @small
 def put_rows(dense, k, v, S, m, s, J):
-    """Add the row of a motion S of subtree k to that of rate v (2)."""
+    """Add the row of motion S of subtree k to the row of rate v (2)."""
     move, w = vector(S), vector(S[3:])
     f, t = times_inertia(m, s, J, move, w)
     put_sum(dense.row_a[v], 0, f)
@@ -209,7 +209,7 @@ def put_rows(dense, k, v, S, m, s, J):
 
 @loops
 def change_of_wrench(dense, k, S, change, m, s, J):
-    """Return the wrench of subtree k for S with its Y, X: relative to the ground, for position; for rate (3)."""
+    """Return the wrench change of subtree k for S with Y, X: seen from the ground, by position, by rate (3)."""
     p, Q, f, t = vector(dense.momentum[k]), dense.Q[k], vector(dense.wrench[k]), vector(dense.wrench[k, 3:])
     v, w = vector(S), vector(S[3:])
     f_z, t_z = wrench_of(m, s, J, p, Q, vector(change[6:]), vector(change[9:]), vector(change[3:]))
@@ -220,7 +220,7 @@ def change_of_wrench(dense, k, S, change, m, s, J):
 
 @loops
 def go_up_tangents(nodes, dense, k, v, f_z, t_z, f_d, t_d):
-    """Write both triangles between rate v of node k and the rates of all nodes above."""
+    """Write the entries between rate v of node k and the rates of all nodes above it, in both triangles."""
     S, change, by_z, by_rate = dense.S, dense.change, dense.by_z, dense.by_rate
     while True:
         above = nodes.parent[k]
@@ -244,7 +244,7 @@ def go_up_tangents(nodes, dense, k, v, f_z, t_z, f_d, t_d):
 
 @loops
 def tangent_columns(nodes, work, dense, model, marker_work, k, c_d, c_k, first):
-    """Add the tangent of the equations of flexible body k by its modes (c_k = 1) or their rates (c_d = 1) (4)."""
+    """Add the tangent of flexible body k's equations by its modes (c_k = 1) or modal rates (c_d = 1) (4)."""
     n, vq = nodes.n_q[k], nodes.vq[k]
     H = work.H[nodes.h0[k] : nodes.h0[k + 1]].reshape((6 + n, 6 + n))
     body_tangent(model, marker_work, nodes.body[k], 0.0, c_d, c_k, H, marker_work.bodies.by_turn[: 6 + n])
@@ -261,7 +261,7 @@ def tangent_columns(nodes, work, dense, model, marker_work, k, c_d, c_k, first):
 
 @loops
 def flexible_tangents(nodes, work, dense, model, marker_work, k):
-    """Write the columns of the modes of node k (4), and complete their rows."""
+    """Write the columns of node k's modes (4), and complete the rows."""
     n, vq, v0, n_z, own = nodes.n_q[k], nodes.vq[k], nodes.v0[k], nodes.n_z[k], nodes.own[k]
     tangent_columns(nodes, work, dense, model, marker_work, k, 0.0, 1.0, 0)
     tangent_columns(nodes, work, dense, model, marker_work, k, 1.0, 0.0, 6)
@@ -295,7 +295,7 @@ def flexible_tangents(nodes, work, dense, model, marker_work, k):
 
 @loops
 def joint_tangents(nodes, work, dense, k):
-    """Write rows and columns of the rates of the joint of node k (2), (3)."""
+    """Write rows and columns of the rates of node k's joint (2), (3)."""
     m, s, J = work.mass[k], vector(dense.s[k]), matrix(dense.J[k])
     v0, n_z, n, vq = nodes.v0[k], nodes.n_z[k], nodes.n_q[k], nodes.vq[k]
     for v in range(v0, v0 + n_z):
@@ -317,7 +317,7 @@ def joint_tangents(nodes, work, dense, k):
 
 @loops
 def give_to_flexible_parent(nodes, work, dense, model, marker_work, k):
-    """Add the contribution of subtree k to rows, columns and block of the modes of its parent (2), (4)."""
+    """Add the contribution of subtree k to rows, columns and block of its parent's modes (2), (4)."""
     above, c0 = nodes.parent[k], nodes.c0[k]
     n, vq, R, r = nodes.n_q[above], nodes.vq[above], work.R_G[above], vector(work.r_G[above])
     m, s, J = work.mass[k], vector(dense.s[k]), matrix(dense.J[k])
@@ -338,7 +338,7 @@ def give_to_flexible_parent(nodes, work, dense, model, marker_work, k):
 
 @loops
 def force_tangents(nodes, work, dense, model, marker_work):
-    """Write the derivatives of the forces by positions and rates; inverse dynamics and mass matrix are known."""
+    """Write derivatives of forces by positions and rates; needs inverse dynamics and mass matrix."""
     n_n = nodes.parent.shape[0]
     dense.by_z[:, :] = 0.0
     dense.by_rate[:, :] = 0.0

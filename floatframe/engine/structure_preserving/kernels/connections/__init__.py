@@ -1,1 +1,1 @@
-"""Compiled functions of one connection of each kind over a step: bushings, contacts, couplers, rolling, user forces."""
+"""Compiled functions for one connection over a step: bushings, contacts, couplers, rolling, user forces."""

@@ -1,4 +1,4 @@
-"""Contacts of a sphere on B with a plane or a sphere on A over a step, see the engine's kernels/connections/contact.py.
+"""Contacts of a sphere on B with a plane or sphere on A over a step, see the engine's kernels/connections/contact.py.
 
 The normal force is the discrete derivative of its potential U = k x^(n+1)/(n+1), x the depth, times the factor of
 restitution with the mean rate; friction acts at the point rho = -R_B N of the mean normal against the mean slip V_t:
@@ -33,7 +33,7 @@ POINT = math.sqrt(0.6)  # of Gauss, exact to degree five
 
 @inner
 def mean_force(k, n, x_0, x_1):
-    """Return the change of k x^(n+1)/(n+1) divided by that of the depth, for gaps with these depths."""
+    """Return the change of k x^(n+1)/(n+1) divided by the change of depth, for gaps at both ends of the step."""
     middle, half = 0.5 * (x_0 + x_1), 0.5 * (x_1 - x_0)
     if abs(half) <= ALIKE * middle:
         ends = (middle - POINT * half) ** n + (middle + POINT * half) ** n
@@ -43,7 +43,7 @@ def mean_force(k, n, x_0, x_1):
 
 @inner
 def spring_force(k, n, gap_0, gap_1):
-    """Return f_s."""
+    """Return the mean elastic force f_s of a contact."""
     x_0, x_1 = max(-gap_0, 0.0), max(-gap_1, 0.0)
     if x_0 == 0.0 and x_1 == 0.0:
         return 0.0
@@ -55,14 +55,14 @@ def spring_force(k, n, gap_0, gap_1):
 
 @inner
 def known_speed(model, step, c):
-    """Return the speed of approach v_0 of contact c."""
+    """Return the approach speed v_0 of contact c."""
     known = step.known[model.connections.w0[c] + V_0]
     return known if known > 0.0 else max(-known, model.contacts.slow[model.connections.item[c]])
 
 
 @inner
 def add_normal_force(model, discrete, step, c, f):
-    """Add the loads of a normal force f, whose work is f times the change of the gap; return its mean direction."""
+    """Add the loads of normal force f, whose work is f times the change of gap; return the mean normal."""
     a, b, x = model.connections.a[c], model.connections.b[c], vector(model.rows.x[model.connections.w0[c]])
     if model.contacts.is_sphere[model.connections.item[c]]:
         _, N = span(step, a, b)
@@ -74,7 +74,7 @@ def add_normal_force(model, discrete, step, c, f):
 
 @inner
 def contact_load(model, discrete, step, c):
-    """Add the loads of contact c, and return the work that restitution and friction dissipate."""
+    """Add the loads of contact c, and return the work dissipated by restitution and friction."""
     a, b, i, own = model.connections.a[c], model.connections.b[c], model.connections.item[c], model.contacts
     gap_0, gap_1 = contact_gap(model, step.x_0, step.A_0, c), contact_gap(model, step.x_f, step.A_f, c)
     f_s = spring_force(own.stiffness[i], own.exponent[i], gap_0, gap_1)
@@ -103,7 +103,7 @@ def contact_load(model, discrete, step, c):
 
 @inner
 def speed_of_approach(model, step, c):
-    """Return v_0 for the next step: in contact v_0, otherwise minus the speed at which the gap closes."""
+    """Return v_0 for the next step: unchanged in contact, otherwise the speed at which the gap closes."""
     begin = contact_gap(model, step.x_0, step.A_0, c)
     end = contact_gap(model, step.end.markers.r, step.end.markers.A, c)
     if end >= 0.0:

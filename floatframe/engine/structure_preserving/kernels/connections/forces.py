@@ -68,7 +68,7 @@ __all__ = ["bushing_load", "user_force_load", "user_state_residual"]
 
 @inner
 def axes_change(model, discrete, step, m, mean):
-    """Return the change of the axes of a marker over the step; mean: their mean."""
+    """Return the change of a marker's axes over the step; mean: their mean."""
     rows = transposed(mean)
     x = change(model, discrete, step, m, unit(0), rows[0])
     y = change(model, discrete, step, m, unit(1), rows[1])
@@ -78,13 +78,13 @@ def axes_change(model, discrete, step, m, mean):
 
 @inner
 def mean_axes(step, m):
-    """Return the mean of the axes of a marker."""
+    """Return the mean of a marker's axes."""
     return scaled_matrix(0.5, matrix_sum(matrix(step.A_0[m]), matrix(step.A_f[m])))
 
 
 @inner
 def bushing_load(model, discrete, step, c):
-    """Add the loads of bushing c, and return the work supplied by its tables and dissipated by its damping."""
+    """Add the loads of bushing c; return the work supplied by its tables and dissipated by its damping."""
     a, b, i = model.connections.a[c], model.connections.b[c], model.connections.item[c]
     A, B, d = mean_axes(step, a), mean_axes(step, b), mean_distance(step, a, b)
     s_0 = turned_back(step.A_0[a], sub(vector(step.x_0[b]), vector(step.x_0[a])))
@@ -139,7 +139,7 @@ def bushing_load(model, discrete, step, c):
 
 @inner
 def put_states(model, work, step, c, first, part):
-    """Write the states of user force c after a part of their change over the step into the inputs, from `first` on.
+    """Write the states of user force c, after a fraction of their change in the step, into the inputs from `first` on.
 
     Return the number of inputs.
     """
@@ -153,7 +153,7 @@ def put_states(model, work, step, c, first, part):
 
 @inner
 def user_force_load(model, work, discrete, step, c):
-    """Add the loads of user force c, and return their work."""
+    """Add the loads of user force c, and return the supplied work."""
     i = element_of(model, c)
     first, last = model.elements.coordinate0[i], model.elements.coordinate0[i + 1]
     n, inputs = last - first, work.users.inputs
@@ -178,7 +178,7 @@ def user_force_load(model, work, discrete, step, c):
 
 @inner
 def user_state_residual(model, work, discrete, step, c):
-    """Write the equations of the states of user force c for their changes: dz - h g in the middle of the step."""
+    """Write the residuals dz - h g of the states of user force c, with g in the middle of the step."""
     i, u = element_of(model, c), model.connections.item[c]
     first, last = model.elements.coordinate0[i], model.elements.coordinate0[i + 1]
     n, inputs = last - first, work.users.inputs

@@ -1,4 +1,4 @@
-"""Public elements over a step: their law in the middle of it, and what their potential lacks there.
+"""Public elements over a step: their law at mid-step, corrected so that the work equals the change of potential.
 
 Marker m goes from r_0, A_0 to r_1, A_1 = cay(c) A_0. The law is asked once, at the middle of both places and both
 rotations with the rates of the step, and its wrench acts over the step,
@@ -69,7 +69,7 @@ ALONG, BEGIN, END = range(3)
 
 @inner
 def begin_motion(model, discrete, step, c):
-    """Write positions, axes and rotations of the markers of element c in the middle of the step, or at its start."""
+    """Write positions, axes and rotations of element c's markers at the middle or at the start of the step."""
     a = model.connections.a[c]
     for m in range(a, a + model.laws.head[model.connections.item[c], 0]):
         put(step.d_law[m], 0, vector(step.dx[m]))
@@ -86,7 +86,7 @@ def begin_motion(model, discrete, step, c):
 
 @inner
 def put_middle(step, m, turn, end):
-    """Write the middle of the step of marker m, which turns by a Cayley vector and goes to `end`."""
+    """Write the mid-step pose of marker m, which rotates by the Cayley vector `turn` and moves to `end`."""
     half = scaled(1.0 / (1.0 + math.sqrt(1.0 + 0.25 * dot(turn, turn))), turn)
     put(step.turn[m], 0, turn)
     put(step.r_law[m], 0, scaled(0.5, add(vector(step.x_0[m]), end)))
@@ -95,14 +95,14 @@ def put_middle(step, m, turn, end):
 
 @inner
 def way_turned(Q):
-    """Return the Cayley vector of a rotation."""
+    """Return the Cayley vector of a rotation matrix."""
     trace = Q[0][0] + Q[1][1] + Q[2][2]
     return scaled(2.0 / (1.0 + trace), axial(Q))
 
 
 @inner
 def put_inputs(model, work, discrete, step, c, t, where, s, part):
-    """Write the inputs of the law of element c: markers at a fraction s ALONG the step, or at its BEGIN or END.
+    """Write the inputs of the law of element c for markers at fraction s ALONG the step, or at its BEGIN or END.
 
     part: of the changes of its states.
     """
@@ -146,13 +146,13 @@ def element_gap(model, work, discrete, step, g):
 
 @inner
 def first_row_of_multipliers(model, c):
-    """Return the first multiplier row of element c; these are its last rows."""
+    """Return the first multiplier row of element c; the multiplier rows are its last rows."""
     return model.connections.w0[c + 1] - model.laws.head[model.connections.item[c], 3]
 
 
 @inner
 def potential(model, discrete, step, c, outputs):
-    """Return the declared energy of element c minus its reactions times the held positions."""
+    """Return the declared energy of element c minus the work of its reactions on the constrained positions."""
     i, total = model.connections.item[c], 0.0
     held = 6 * model.laws.head[i, 0] + model.laws.head[i, 2]
     if model.laws.energy[i] >= 0:
@@ -166,7 +166,7 @@ def potential(model, discrete, step, c, outputs):
 
 @inner
 def has_potential(model, c):
-    """Whether element c declares an energy or holds positions."""
+    """Whether element c declares an energy or constrains positions."""
     for row in range(first_row_of_multipliers(model, c), model.connections.w0[c + 1]):
         if model.rows.holds[row] == POSITION:
             return True
@@ -175,7 +175,7 @@ def has_potential(model, c):
 
 @inner
 def is_balanced(n, width, x, outputs):
-    """Whether the wrenches of n markers balance for the inputs x."""
+    """Whether the wrenches of n markers are in equilibrium at the marker positions in the inputs x."""
     force, moment, of_forces, of_moments = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, 0.0
     r_0 = vector(x[1:])
     for m in range(n):
@@ -189,7 +189,7 @@ def is_balanced(n, width, x, outputs):
 
 @inner
 def potential_at(model, work, discrete, step, c, where, s):
-    """Return the potential of element c at a point of the path, and whether its wrenches balance there."""
+    """Return the potential of element c at a point of the path, and whether its wrenches are in equilibrium there."""
     i = model.connections.item[c]
     put_inputs(model, work, discrete, step, c, step.t_force, where, s, 0.5)
     law_call(model, work, i, work.laws.trial)
@@ -199,7 +199,7 @@ def potential_at(model, work, discrete, step, c, where, s):
 
 @inner
 def marker_of_whole(model, c):
-    """Return the first marker of element c with all kinds of loads of the element; -1 for none or one on the ground.
+    """Return the first marker of element c that carries all its kinds of loads; -1 if there is none or it is on ground.
 
     Also whether it acts by moments.
     """
@@ -221,7 +221,7 @@ def marker_of_whole(model, c):
 
 @inner
 def put_ways(model, step, c, balances):
-    """Write forces and moments with the sizes of the motions of the markers of element c."""
+    """Write correction forces and moments of element c, proportional to the motions of its markers."""
     i, a = model.connections.item[c], model.connections.a[c]
     last, square = a + model.laws.head[i, 0], model.laws.length[i] ** 2
     for m in range(a, last):
@@ -269,7 +269,7 @@ def work_along(step, wrench, m):
 
 @inner
 def correct_wrenches(model, work, discrete, step, c):
-    """Add the correction of the work of element c over the step to its wrenches."""
+    """Add to the wrenches of element c the correction that makes their work exact."""
     i, a = model.connections.item[c], model.connections.a[c]
     slope = 0.0
     for p in range(7):
@@ -291,7 +291,7 @@ def correct_wrenches(model, work, discrete, step, c):
 
 @inner
 def add_axes_moment(model, discrete, step, m, M):
-    """Add a moment on a marker, conjugate to the rotation of the marker."""
+    """Add a moment on a marker, conjugate to the marker's rotation."""
     i = model.markers.body[m]
     if i < 0 or step.is_still or not discrete.turns[m]:
         add_moment(model, step, m, M)
@@ -314,14 +314,14 @@ def add_axes_moment(model, discrete, step, m, M):
 
 @inner
 def note(model, work, c):
-    """Record an output that ends the run, and results that are not finite for a finite motion."""
+    """Record an output that ends the run, and non-finite results for a finite motion."""
     note_stops(model, work, model.connections.item[c])
     note_what_is_no_number(model, work, c)
 
 
 @inner
 def element_load(model, work, discrete, step, c):
-    """Add the loads of element c, and return the work that it supplies and dissipates."""
+    """Add the loads of element c; return supplied and dissipated work."""
     i, a = model.connections.item[c], model.connections.a[c]
     head, laws, out = model.laws.head[i], model.laws, work.laws.outputs
     begin_motion(model, discrete, step, c)
@@ -355,7 +355,7 @@ def element_load(model, work, discrete, step, c):
 
 @inner
 def element_residual(model, work, discrete, step, c):
-    """Write the equations of states and multipliers of element c; none while velocities are closed.
+    """Write the residuals of states and multipliers of element c; none while velocities are being closed.
 
     Positions are held at the end of the step, all else in its middle.
     """
@@ -392,7 +392,7 @@ def element_residual(model, work, discrete, step, c):
 
 @inner
 def begin_in_middle(model, discrete, step, c):
-    """Write the motion of the markers of element c from the beginning to the end of the step, in its middle."""
+    """Write the marker motion of element c at mid-step, from the motion between start and end of the step."""
     a = model.connections.a[c]
     for m in range(a, a + model.laws.head[model.connections.item[c], 0]):
         end = vector(step.end.markers.r[m])
