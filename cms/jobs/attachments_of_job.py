@@ -1,4 +1,4 @@
-"""Lines of a job: their mesh, sections, interfaces, and the attachments at their nodes."""
+"""Lines of a job: mesh, sections, interfaces, and attachments at nodes."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +29,7 @@ GENERAL_KEYS = {
 
 
 def frame_mesh(job: Job) -> "LineMesh":
-    """Read the lines of the job: two tables, or the groups of its mesh that have sections."""
+    """Read the lines of the job, from two tables or from the mesh groups that have sections."""
     from fe_models.files.read_mesh import read_line_mesh
     from fe_models.files.tables import read_tables
 
@@ -94,7 +94,7 @@ def attachments_of(job: Job, mesh: "LineMesh | ShellMesh") -> tuple[list[Any], l
             table.stiffness,
             damping=table.damping,
             point=table.point,
-            # the job lists axes as rows; here they are columns
+            # axes are rows in the job, but columns here
             triad=np.eye(3) if table.triad is None else np.array(table.triad).T,
         )
         for name, table in job.springs.items()
@@ -112,7 +112,7 @@ def attachments_of(job: Job, mesh: "LineMesh | ShellMesh") -> tuple[list[Any], l
 
 
 def one_node(mesh: "LineMesh | ShellMesh", where: str, group: str | int) -> int:
-    """Return the node of a number, or of a group with exactly one node; raise `JobError` with the key otherwise."""
+    """Return a node by number, or the only node of a group; otherwise raise `JobError` with the key."""
     if isinstance(group, int):
         rows = np.flatnonzero(mesh.node_numbers == group)
         if len(rows) != 1:
@@ -138,6 +138,6 @@ def frame_interface(name: str, section: Any, mesh: "LineMesh") -> Interface:
     from fe_models.elements.beams.interfaces import line_interface
 
     chosen = selection_of(section)
-    # the job lists axes as rows; here they are columns
+    # axes are rows in the job, but columns here
     triad = None if section.triad is None else np.array(section.triad).T
     return line_interface(mesh, name, chosen, kind=section.kind, reference=section.reference, triad=triad)

@@ -11,7 +11,7 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["PLANES", "SHAPE_KEYS", "BeamSection", "LinkSection", "MassSection", "SpringSection", "TieSection"]
 
-PLANES = {"yz": 0, "zx": 1, "xz": 1, "xy": 2}  #: mesh axis normal to each plane
+PLANES = {"yz": 0, "zx": 1, "xz": 1, "xy": 2}  #: index of the mesh axis normal to each plane
 SHAPE_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "circle": (("radius",), ()),
     "tube": (("radius", "thickness"), ()),
@@ -28,7 +28,7 @@ Pair = tuple[float, float]
 
 
 def numbers(*counts: int) -> Any:
-    """Return the type of a list with one of these numbers of items; integers are accepted."""
+    """Return the type of a list whose length is one of these numbers; integers are accepted."""
 
     def check(value: Any) -> tuple[float, ...]:
         is_list = isinstance(value, list | tuple) and len(value) in counts
@@ -113,7 +113,7 @@ class BeamSection(Table):
 
     @property
     def dimensions(self) -> dict[str, Any]:
-        """The given keys of the shape."""
+        """Given dimensions of the cross-section, by key."""
         keys = (key for group in SHAPE_KEYS[self.shape] for key in group)
         return {key: getattr(self, key) for key in keys if getattr(self, key) is not None}
 
@@ -176,7 +176,7 @@ ON_SOLIDS = {
     "masses": "a mass on a solid or on matrices sits at an interface: remove the tables, reduce with an interface "
     "there, and add it in the system file, [[bodies.NAME.masses]] (with_masses in Python); or add tables "
     "[sections.NAME]",
-}  #: advice for tables that need beams, if there are no beams
+}  #: advice in the error for tables that need beams, if there are none
 
 
 def check_beams(sections: Mapping[str, BeamSection], others: Mapping[str, Any], materials: Mapping[str, Any]) -> None:

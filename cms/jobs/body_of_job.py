@@ -1,4 +1,4 @@
-"""The finite element body of a job: read, checked, assembled, with coupled interfaces."""
+"""Finite element body of a job: reading, checks, assembly, and coupling of the interfaces."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -38,7 +38,7 @@ __all__ = [
 
 
 def body_of_matrices(job: Job, stages: Stages, on_report: Callable[[Any], None] | None = None) -> FEBody:
-    """Read mass and stiffness, and make a body with the interfaces and load cases of the job.
+    """Read mass and stiffness matrices, and return a body with the interfaces and load cases of the job.
 
     An .npz file of this project contains nodes and interfaces. All other files need a deck or a mesh, unless they
     contain node positions. `on_report` is called with the `MatrixReport` before the matrices are checked.
@@ -69,7 +69,7 @@ def body_of_matrices(job: Job, stages: Stages, on_report: Callable[[Any], None] 
 
 
 def body_with_its_interfaces(job: Job, stages: Stages) -> FEBody:
-    """Read a body of bare matrices whose file contains the interfaces."""
+    """Read a body of bare matrices from a file that contains the interfaces."""
     from pathlib import Path
 
     from fe_models.files.matrices.given import body_from_npz
@@ -84,7 +84,7 @@ def body_with_its_interfaces(job: Job, stages: Stages) -> FEBody:
 
 
 def interfaces_on(job: Job, geometry: "Mesh | NodeCloud") -> tuple[Interface, ...]:
-    """Return the interfaces of the job, on a solid mesh or on nodes of unknown elements."""
+    """Return the interfaces of the job, on a solid mesh or on nodes of elements of another program."""
     from fe_models.body.couplings.couplings import check_overlap
     from fe_models.elements.beams.interfaces import node_interface
     from fe_models.meshes.boundary import facet_weights
@@ -98,7 +98,7 @@ def interfaces_on(job: Job, geometry: "Mesh | NodeCloud") -> tuple[Interface, ..
         chosen = selection_of(section)
         facets = selected_facets(geometry, chosen)
         weights = facet_weights(geometry.nodes, facets) if facets else np.ones(len(geometry.nodes))
-        # the job lists axes as rows; here they are columns
+        # axes are rows in the job, but columns here
         triad = None if section.triad is None else np.array(section.triad).T
         interfaces.append(
             node_interface(geometry, name, chosen, section.kind, section.reference, triad, np.maximum(weights, 0.0))
@@ -120,7 +120,7 @@ def body_of_frame(
     *,
     interfaces: tuple[Interface, ...] | None = None,
 ) -> FEBody:
-    """Read and check the lines, and make the body with the sections and attachments of the job.
+    """Read and check the lines, and return the body with sections and attachments of the job.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def body_of_frame(
 
 
 def body_of_mixed(job: Job, stages: Stages, solid: FEBody, solid_mesh: Any, on_report: Any) -> FEBody:
-    """Weld the beams of the job to its solid by the ties, and put its interfaces on both.
+    """Tie the beams of the job to its solid, and put the interfaces on both.
 
     Parameters
     ----------
@@ -221,7 +221,7 @@ def job_body(
     mesh: "Mesh | None" = None,
     ranks: Ranks | None = None,
 ) -> FEBody:
-    """Run a job up to the coupled body: read, check, assemble, and couple the interfaces.
+    """Process a job up to the coupled body: read, check, assemble, and couple the interfaces.
 
     Parameters
     ----------
@@ -240,7 +240,7 @@ def job_body(
 
 
 def coupled_body(job: Job, body: FEBody) -> FEBody:
-    """Couple the interfaces of the body of a job, and make it planar if requested."""
+    """Couple the interfaces of the body of a job, and restrict it to a plane if requested."""
     from cms.modes.centrifugal import CENTRIFUGAL, centrifugal_loads
     from fe_models.body.couplings.couplings import couple
 
@@ -263,7 +263,7 @@ def uncoupled_body(
     mesh: "Mesh | None" = None,
     ranks: Ranks | None = None,
 ) -> FEBody:
-    """Run a job up to the body with uncoupled interfaces, with the requested nodes and points.
+    """Process a job up to the body with uncoupled interfaces, and with the requested nodes and points.
 
     Its source is a deck, a shell, a frame, a solid mesh, or matrices.
     """
@@ -295,7 +295,7 @@ def uncoupled_body(
 
 
 def is_of_mesh(job: Job) -> bool:
-    """Whether the body of a job is made of a solid mesh, possibly with beams tied to it."""
+    """Return whether the body of a job has a solid mesh, possibly with beams tied to it."""
     others = job.body.deck is not None or job.shells or (job.sections and not job.ties)
     return job.body.mesh is not None and not others
 
@@ -303,7 +303,7 @@ def is_of_mesh(job: Job) -> bool:
 def checked_mesh(
     job: Job, stages: Stages, on_report: Callable[[Any], None] | None
 ) -> "tuple[Mesh, FirstOrderError | None]":
-    """Read and check the solid mesh of a job; return it without unused nodes, and its first-order error."""
+    """Read and check the solid mesh of a job; return it without unused nodes, with its first-order error."""
     from fe_models.checks.mesh_report import report_mesh
     from fe_models.meshes.mesh import drop_unused_nodes
 
@@ -333,7 +333,7 @@ def body_of_mesh(
     mesh: "Mesh | None" = None,
     ranks: Ranks | None = None,
 ) -> FEBody:
-    """Read and check the mesh, unless it is given, and assemble it with the materials and interfaces of the job."""
+    """Read and check the mesh unless it is given, and assemble it with materials and interfaces of the job."""
     from fe_models.elements.solids.body import solid_body
 
     first_order = None
@@ -364,7 +364,7 @@ def body_of_mesh(
 
 
 def solid_mesh_of(job: Job) -> "Mesh":
-    """Return the complete solid mesh; faces that interfaces and loads select are groups."""
+    """Return the complete solid mesh; faces selected by interfaces and loads are groups."""
     from fe_models.files.read_mesh import read_mesh
 
     if job.body.mesh is None:

@@ -1,4 +1,4 @@
-"""The body of a whole deck: solids, shells and lines on shared nodes, with attachments and links."""
+"""Body of a complete deck: solids, shells and lines on shared nodes, with attachments and links."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
@@ -32,7 +32,7 @@ NO_NODES = np.zeros(0, dtype=np.int64)
 
 
 def body_of_deck(job: Job, path: Path, stages: Stages, on_report: Callable[[Any], None] | None) -> FEBody:
-    """Read the deck, make a body of each kind of elements, join them, and add loads and interfaces."""
+    """Read the deck, build a body for each kind of elements, join these, and add loads and interfaces."""
     from cms.jobs.beam_tables import PLANES
     from fe_models.assembly.join import join
     from fe_models.files.decks.read_deck import read_deck
@@ -70,10 +70,10 @@ def body_of_deck(job: Job, path: Path, stages: Stages, on_report: Callable[[Any]
 def _parts(
     job: Job, path: Path, raw: "RawMesh", lumped: frozenset[str], on_report: Callable[[Any], None] | None
 ) -> "tuple[list[Part], list[Mesh]]":
-    """Return the bodies of solids, shells, lines and attachments at single nodes; and the meshes of the solids."""
+    """Return bodies of solids, shells, lines and single-node attachments, and the meshes of the solids."""
     from fe_models.assembly.join import Part
 
-    # rows of the deck serve as the node numbers of the parts
+    # row indices of the deck serve as node numbers of the parts
     by_row = replace(raw, node_numbers=np.arange(len(raw.nodes)))
     parts: list[Part] = []
     meshes = []
@@ -96,7 +96,7 @@ def _materials(job: Job) -> "dict[str, AnyMaterial]":
 def _solids(
     job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], None] | None
 ) -> "Iterable[tuple[FEBody, Mesh]]":
-    """Yield one body for each formulation of the solids, and its mesh."""
+    """Yield a body and its mesh for each element formulation of the solids."""
     from fe_models.checks.mesh_report import report_mesh
     from fe_models.elements.solids.body import solid_body
     from fe_models.meshes.cells.raw_mesh import chosen_cells, mesh_from_raw
@@ -138,7 +138,7 @@ def _solids(
 
 
 def _solid_mass(job: Job, of_table: str) -> str:
-    """Return the mass of a table [solids.NAME]; [body] mass may request lumped mass, or none."""
+    """Return the mass option of a table [solids.NAME]; [body] mass may request lumped mass or none."""
     if job.body.mass == "lumped":
         return "lumped"
     return "consistent" if job.body.mass == "consistent" and of_table == "lumped" else of_table
@@ -151,7 +151,7 @@ def _is_linked(job: Job) -> bool:
 def _shells(
     job: Job, path: Path, raw: "RawMesh", is_lumped: bool, on_report: Callable[[Any], None] | None
 ) -> "Iterable[Part]":
-    """Yield a body of the shells, or several if shells lie on the same nodes."""
+    """Yield a body of the shells, or several bodies if shells overlap on the same nodes."""
     from cms.jobs.shell_body import shell_properties_of
     from fe_models.assembly.join import Part
     from fe_models.assembly.lumped import lumped_shells
@@ -190,7 +190,7 @@ def _shells(
 def _layers(
     raw: "RawMesh", where: str, kinds: tuple[str, ...], properties: Mapping[str, Any]
 ) -> list[tuple[str, ...] | None]:
-    """Split the groups into parts without two cells on the same nodes; None: all cells."""
+    """Split the groups into layers without two cells on the same nodes; None stands for all cells."""
     from fe_models.meshes.cells.raw_mesh import groups_apart
 
     if "all" in properties:
@@ -201,14 +201,14 @@ def _layers(
 
 
 def _names(name: str, layers: list[Any]) -> list[str]:
-    """Return a name for each part."""
+    """Return a name for each layer."""
     return [name] if len(layers) == 1 else [f"{name} {k}" for k in range(1, len(layers) + 1)]
 
 
 def _lines(
     job: Job, path: Path, raw: "RawMesh", is_lumped: bool, on_report: Callable[[Any], None] | None
 ) -> "Iterable[Part]":
-    """Yield a body of the beams, or several if beams lie on the same nodes."""
+    """Yield a body of the beams, or several bodies if beams overlap on the same nodes."""
     from cms.jobs.attachments_of_job import properties_of
     from fe_models.assembly.join import Part
     from fe_models.assembly.lumped import lumped_beams
@@ -237,7 +237,7 @@ def _lines(
 
 
 def _rods(job: Job, path: Path, raw: "RawMesh", is_lumped: bool) -> "Iterable[Part]":
-    """Yield a body of the rods, or several if rods lie on the same nodes."""
+    """Yield a body of the rods, or several bodies if rods overlap on the same nodes."""
     from fe_models.assembly.join import Part
     from fe_models.assembly.rods import Rod, rod_body
     from fe_models.meshes.cells.line_cells import line_mesh_from_raw
@@ -258,7 +258,7 @@ def _rods(job: Job, path: Path, raw: "RawMesh", is_lumped: bool) -> "Iterable[Pa
 
 
 def _attached(job: Job, raw: "RawMesh") -> "Part | None":
-    """Return point masses and springs as a body that has only their nodes."""
+    """Return point masses and springs as a body with only their nodes."""
     from fe_models.assembly.join import Part
     from fe_models.elements.beams.attachments import PointMass, Spring
     from fe_models.elements.beams.body import beam_body
@@ -300,7 +300,7 @@ def _attached(job: Job, raw: "RawMesh") -> "Part | None":
 
 
 def _mean_interfaces(job: Job, raw: "RawMesh") -> dict[str, str]:
-    """Return the coupling of each interface whose node is the reference node of a coupling (a mean motion).
+    """Return the coupling for each interface whose node is the reference node of this coupling (a mean motion).
 
     Such a node has no dofs of its own; an interface of kind "distributing" gives it dofs. The coupling must have all
     components and one weight per member, and nothing else may be attached to its node.
@@ -333,7 +333,7 @@ def _mean_interfaces(job: Job, raw: "RawMesh") -> dict[str, str]:
 
 
 def _used_groups(job: Job) -> "list[tuple[str, str | int]]":
-    """Return (table, group of nodes) of everything that is attached to nodes or ties them."""
+    """Return (table, node group) for each attachment and tie."""
     found: list[tuple[str, str | int]] = [(f"masses.{k}", each.node) for k, each in job.masses.items()]
     found += [(f"springs.{k}", group) for k, each in job.springs.items() for group in each.nodes]
     found += [(f"links.{k}", group) for k, each in job.links.items() for group in (each.node, *each.followers)]
@@ -405,7 +405,7 @@ def _load_cases(job: Job, raw: "RawMesh", joined: "Joined", meshes: "list[Mesh]"
 
 
 def _pressure(body: FEBody, joined: "Joined", mesh: "Mesh", name: str, table: Any) -> Any:
-    """Return the load case of a pressure on faces of one of the solids."""
+    """Return the load case of a pressure on faces of one of the solid meshes."""
     from fe_models.body.loads import nodal_load, pressure_load
     from fe_models.meshes.selections import FaceGroup
 
@@ -436,7 +436,7 @@ def _interface(name: str, table: InterfaceSection, raw: "RawMesh", joined: "Join
         raise JobError(f"interfaces.{name}: with a deck, expected nodes = a group of nodes, got {given}")
     nodes = _placed(joined, _group(raw, f"interfaces.{name}.nodes", table.nodes), f"interfaces.{name}")
     points = joined.body.nodes[nodes]
-    # the job lists axes as rows; here they are columns
+    # axes are rows in the job, but columns here
     triad = np.eye(3) if table.triad is None else np.array(table.triad).T
     reference = points.mean(axis=0) if table.reference is None else np.array(table.reference)
     return Interface(name, table.kind, nodes, reference, triad)
@@ -451,7 +451,7 @@ def _placed(joined: "Joined", nodes: IntArray, where: str) -> IntArray:
 
 
 def _group(raw: "RawMesh", where: str, group: str | int) -> IntArray:
-    """Return the rows of a group of nodes, or the row of the node with a number."""
+    """Return the rows of a node group, or the row of the node with this number."""
     if isinstance(group, int):
         numbers = np.zeros(0, np.int64) if raw.node_numbers is None else np.asarray(raw.node_numbers)
         found: IntArray = np.flatnonzero(numbers == group).astype(np.int64)
@@ -477,7 +477,7 @@ def _require_group(raw: "RawMesh", where: str, group: str) -> None:
 
 
 def _require_used_groups(job: Job, raw: "RawMesh", joined: "Joined", *, naming: tuple[str, ...]) -> None:
-    """Raise `JobError` if cells of the deck are in no table, because their mass would be lost silently.
+    """Raise `JobError` if cells of the deck are in no table, because their mass would silently be lost.
 
     naming: kinds of cells that are only names of edges and faces if all their nodes are on the body.
     """

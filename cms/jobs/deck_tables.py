@@ -21,7 +21,7 @@ __all__ = [
     "check_deck",
 ]
 
-DECK_PROGRAMS = ("calculix", "abaqus")  #: whose decks have the same suffix
+DECK_PROGRAMS = ("calculix", "abaqus")  #: programs whose decks have the same suffix
 DECK_MASSES = ("consistent", "lumped", "as the deck")
 Name = Annotated[str, StringConstraints(min_length=1)]
 
@@ -74,7 +74,7 @@ class RodSection(Table):
     area: Annotated[float, Field(gt=0)] = Field(description="a number above 0 [length^2]")
 
 
-SixWeights = tuple[float, float, float, float, float, float]  #: for ux uy uz rx ry rz
+SixWeights = tuple[float, float, float, float, float, float]  #: weights for ux uy uz rx ry rz
 MemberWeight = Annotated[float | SixWeights, BeforeValidator(member_weight, json_schema_input_type=Any)]
 
 

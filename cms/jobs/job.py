@@ -218,7 +218,7 @@ class BodySection(Table):
 
     @property
     def brings_interfaces(self) -> bool:
-        """Whether the matrices are in an .npz file of this project, which has nodes and interfaces."""
+        """Whether the matrices are in an .npz file of this project, which also contains nodes and interfaces."""
         return isinstance(self.matrices, Path) and self.matrices.suffix.lower() == ".npz" and self.geometry is None
 
     @model_validator(mode="after")
@@ -265,7 +265,7 @@ class MeshSizeSection(Table):
 
 
 def check_mesh_size(table: MeshSizeSection | None, mesh: Path | None, *, has_others: bool) -> None:
-    """Raise `ValueError` unless a CAD file has its table, and no other source has one.
+    """Raise `ValueError` unless a CAD file has this table, or if another source has it.
 
     Parameters
     ----------
@@ -370,7 +370,7 @@ class LoadCaseSection(Table):
 
     @property
     def selection(self) -> str | None:
-        """The key of the given selection; None if there is none."""
+        """Key of the given selection; None if there is none."""
         return next((key for key in SELECTIONS if getattr(self, key) is not None), None)
 
     @model_validator(mode="after")
@@ -423,7 +423,7 @@ class Job(Table):
 
     @property
     def materials_of_cells(self) -> dict[str, MaterialSection]:
-        """Materials of solid cells: all, except those that only beam sections use; none for shells."""
+        """Materials for solid cells: all except materials that only beam sections use; none for shells."""
         if self.shells or (self.sections and not self.ties):
             return {}
         named = {section.material for section in self.sections.values()}
@@ -489,7 +489,7 @@ class Job(Table):
         return self._names_of_interfaces()
 
     def _names_of_interfaces(self) -> "Job":
-        """Raise `ValueError` if an interface is named that does not exist."""
+        """Raise `ValueError` if the job refers to an interface that does not exist."""
         brings_interfaces = self.body.brings_interfaces
         for where, name in named_interfaces(self.reduction).items():
             if not brings_interfaces and name not in self.interfaces:

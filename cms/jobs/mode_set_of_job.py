@@ -1,4 +1,4 @@
-"""The mode set that a job requests, with its options as function arguments."""
+"""Mode set that a job requests, with its options as function arguments."""
 
 import logging
 from functools import partial
@@ -26,7 +26,7 @@ COUNT_KEYS = ("n_modes", "cutoff", "verify")  #: keys for the number of modes
 
 
 def job_mode_set(body: FEBody | Families, reduction: ReductionSection) -> ModeSet:
-    """Make the mode set of the table [reduction] for a coupled body.
+    """Compute the mode set that the table [reduction] requests for a coupled body.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def job_mode_set(body: FEBody | Families, reduction: ReductionSection) -> ModeSe
 
 
 def reduction_of(job: Job, body: FEBody) -> ReductionSection:
-    """Return the table [reduction]; for a part of a body with at most as many modes as the part can have.
+    """Return the table [reduction]; for a part of a body, its number of modes is limited to what the part can have.
 
     The jobs of all parts of a body have the same number of modes, but a small part may have fewer interior dofs. Each
     multiplier of a distributing interface reduces them by one.
@@ -78,7 +78,7 @@ def reduction_of(job: Job, body: FEBody) -> ReductionSection:
 
 
 def with_additions(families: Families, reduction: ReductionSection, modes: ModeSet) -> ModeSet:
-    """Reduce interfaces of kind "nodes" to characteristic modes, and add extra columns, as the job requests."""
+    """Replace interface modes by characteristic modes, and add extra columns, as the job requests."""
     if reduction.reduces_interfaces:
         cutoff = None if reduction.interface_cutoff is None else reduction.interface_cutoff * families.body.units.time
         wanted = ModeCount(reduction.interface_modes, cutoff)
@@ -115,14 +115,14 @@ def set_options(body: FEBody, reduction: ReductionSection) -> dict[str, Any]:
 
 
 def load_of(name: str, section: LoadSection) -> InterfaceLoad:
-    """Return the load of one interface."""
+    """Return the neighbour load on one interface."""
     return InterfaceLoad(
         (name,), _matrix(section.mass, section.inertia), _matrix(section.stiffness, section.rotational_stiffness)
     )
 
 
 def neighbour_load(body: FEBody, section: NeighbourSection) -> InterfaceLoad:
-    """Read the neighbour's job, build its body, and condense it to the shared interfaces."""
+    """Build the body of the neighbour's job, and condense it to the shared interfaces."""
     from cms.errors import JobError
     from cms.jobs.body_of_job import job_body
     from cms.jobs.job import read_job

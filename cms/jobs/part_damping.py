@@ -1,4 +1,4 @@
-"""Damping of the parts of a body, with which the body in parts keeps the damping ratios of its modes.
+"""Damping of the parts of a body such that the joined body keeps the damping ratios of its modes.
 
 Ratios need D = M Phi diag(2 zeta omega) Phiᵀ M, which couples nodes of different parts. A part can only damp its own
 strain. Phi_p are the modes of the whole body in part p. H_p = Lambda^-1/2 Phi_pᵀ K_p Phi_p Lambda^-1/2 has the sum 1
@@ -42,55 +42,55 @@ from fe_models.meshes.split import cut_name
 
 __all__ = ["ModeInParts", "PartsDamping", "damping_of_parts"]
 
-BAND = 6.0  #: highest frequency, over the first one of the whole body, up to which modes keep their ratios
-FEWEST_MODES, MOST_MODES = 6, 12  #: smallest and largest number of these modes
-PAIR = 1.01  #: modes whose frequencies differ by less, relative, belong together, as the bending of a square section
-FIXED_MODES = 30  #: modes with fixed cuts of each part
-MOST = 2.0  #: largest damping of the strain of a part, over the largest one that a mode needs
-LEAST = 0.5  #: damping of the strain beside the patterns, over the smallest one that a mode needs
+BAND = 6.0  #: highest frequency, over the first of the whole body, up to which modes keep their damping ratios
+FEWEST_MODES, MOST_MODES = 6, 12  #: smallest and largest number of modes that keep their damping ratios
+PAIR = 1.01  #: frequency ratio below which modes form a pair, such as the bending modes of a square section
+FIXED_MODES = 30  #: number of fixed-cut modes of each part
+MOST = 2.0  #: largest strain damping of a part, over the largest that a mode needs
+LEAST = 0.5  #: strain damping outside the patterns, over the smallest that a mode needs
 EXACT = 1e-4  #: largest relative error of a modal damping
 ROUNDS = 6  #: largest number of corrections by the ratios of the joined body
 STEPS = 3000  #: largest number of gradient steps
-PATIENCE = 300  #: gradient steps after which the error must have fallen by a tenth
-SMALL = 0.01  #: damping of a mode, over the largest one, below which its error is relative to this
-N_RIGID = 6  #: dofs of an interface that can hold a frame
-SAME_MOTION = 1e-8  #: momentum of a rigid-body motion beside those of others, relative
-SAME_STRAIN = 1e-10  #: smallest share of the energy of a pattern in a part, over the largest one
-NO_MASS = 1e-12  #: smallest 1/omega² of a mode, over the largest one
+PATIENCE = 300  #: number of gradient steps in which the error must fall by a tenth
+SMALL = 0.01  #: damping of a mode over the largest one, below which errors are relative to this threshold
+N_RIGID = 6  #: number of interface dofs that can support a frame
+SAME_MOTION = 1e-8  #: momentum of a rigid-body motion over that of others, below which it is dependent
+SAME_STRAIN = 1e-10  #: energy share of a strain pattern in a part over the largest one, below which it is dropped
+NO_MASS = 1e-12  #: 1/omega² of a mode over the largest one, below which the mode has no mass
 
 
 @dataclass(frozen=True)
 class ModeInParts:
-    """A mode of the whole body and its damping in parts."""
+    """Mode of the whole body, and its damping in the joined parts."""
 
-    frequency: float  #: of the body in parts, undamped [1/time]
-    wanted: float  #: damping ratio of the job
+    frequency: float  #: undamped frequency of the joined parts [1/time]
+    wanted: float  #: damping ratio that the job requires
     ratio: float  #: damping ratio of the joined parts
 
 
 @dataclass(frozen=True)
 class PartsDamping:
-    """Damping of each part, and the modes up to `BAND` times the first one, 6 to 12."""
+    """Damping of each part, and the 6 to 12 modes up to `BAND` times the first frequency."""
 
     parts: tuple[StrainDamping, ...]
     modes: tuple[ModeInParts, ...]
-    n_exact: int  #: number of modes, from the first one, whose damping phi_kᵀ D phi_k is that of the job
-    held: str | None  #: interface at which the modes are clamped; None: they are free
+    n_exact: int  #: number of lowest modes with exact damping phi_kᵀ D phi_k
+    held: str | None  #: interface that is fixed in the modes; None: the modes are free
 
 
 @dataclass(frozen=True, eq=False)
 class JoinedParts:
-    """Parts condensed to their cuts and fixed modes, and joined."""
+    """Parts condensed to their cuts and fixed-cut modes, then joined."""
 
-    columns: tuple[Array, ...]  #: displacements of each part, (n_dof, n_p)
-    stiffness: tuple[Array, ...]  #: of each part over its columns, (n_p, n_p)
-    follows: tuple[Array, ...]  #: each part's columns by the coordinates of the joined body, (n_p, n)
-    M: Array  #: of the joined body, (n, n)
-    K: Array  #: (n, n)
-    momenta: Array  #: M times the rigid-body motions, (n, 6); (n, 0) if the body is held
+    columns: tuple[Array, ...]  #: displacement columns of each part, (n_dof, n_p)
+    stiffness: tuple[Array, ...]  #: stiffness of each part over its columns, (n_p, n_p)
+    follows: tuple[Array, ...]  #: columns of each part in coordinates of the joined body, (n_p, n)
+    M: Array  #: mass of the joined body, (n, n)
+    K: Array  #: stiffness of the joined body, (n, n)
+    momenta: Array  #: M times the rigid-body motions, (n, 6); (n, 0) if the body is fixed
 
     def shares(self, p: int, omega: Array, Phi: Array) -> Array:
-        """Return H_p of modes, (k, k); diagonal: share of part p in the strain energy of each mode."""
+        """Return the matrix H_p of modes, (k, k); its diagonal is the strain energy share of part p in each mode."""
         phi = self.follows[p] @ Phi / omega
         return np.asarray(phi.T @ self.stiffness[p] @ phi)
 
@@ -160,24 +160,24 @@ def damping_of_parts(
 
 
 def worst(found: Array, wanted: Array, n: int) -> float:
-    """Return the largest relative error of the first n ratios."""
+    """Return the largest relative error of the first n damping ratios."""
     return float(np.abs(found[:n] - wanted[:n]).max() / wanted[:n].max())
 
 
 def joined_parts(bodies: Sequence[FEBody], held: str | None, solver: str | None) -> JoinedParts:
-    """Condense each part to its cuts, the held interface and its fixed modes, and join the parts at the cuts.
+    """Condense each part to its cuts, fixed interface and fixed-cut modes, and join the parts at the cuts.
 
     The coordinates of the joined body are a basis of the motions that have the same motion of the reference points at
     each cut, and none at the held interface.
     """
     center = np.mean([body.nodes.mean(axis=0) for body in bodies], axis=0)
     columns, stiffness, masses, rigid, omega2 = [], [], [], [], []
-    at: dict[str, list[tuple[int, Array]]] = {}  # parts and motions of their columns, by interface
+    at: dict[str, list[tuple[int, Array]]] = {}  # for each interface, the parts and the motions of their columns
     for p, body in enumerate(bodies):
         wanted = {cut_name(p), cut_name(p + 1), held}
         part = replace(
             body, interfaces=tuple(each for each in body.interfaces if each.name in wanted), load_cases=()
-        )  # other interfaces are ordinary nodes
+        )  # nodes of other interfaces become ordinary nodes
         with Families(part, announce=False, solver=solver) as families:
             fixed = families.fixed_modes(min(FIXED_MODES, n_fixed_modes(part, families.h)))
             V = np.hstack([families.Psi_C, fixed.Phi])
@@ -209,7 +209,7 @@ def joined_parts(bodies: Sequence[FEBody], held: str | None, solver: str | None)
 
 
 def modes_of(joined: JoinedParts) -> tuple[Array, Array]:
-    """Return omega, ascending, (k,), and shapes with Phiᵀ M Phi = 1, (n, k), of the elastic modes with mass.
+    """Return omega, ascending, (k,), and shapes with Phiᵀ M Phi = 1, (n, k), for elastic modes with mass.
 
     They are found among the motions without momentum.
     """
@@ -230,7 +230,7 @@ def dofs_of(interface: Interface) -> IntArray:
 
 
 def n_fixed_modes(body: FEBody, h: IntArray) -> int:
-    """Return the number of modes with mass when the dofs h are held, or a smaller number above `FIXED_MODES`."""
+    """Return the number of modes with mass if the dofs h are fixed, limited to `FIXED_MODES`."""
     i = np.setdiff1d(np.arange(body.n_dof), h)
     n = len(i) - 2 * int((body.dofs[:, 1] == MULTIPLIER).sum())
     mass = body.M.diagonal()[i]
@@ -243,7 +243,7 @@ def n_fixed_modes(body: FEBody, h: IntArray) -> int:
 
 
 def root(H: Array) -> Array:
-    """Return R with Rᵀ R = H, (r, k), without directions of no energy."""
+    """Return R with Rᵀ R = H, (r, k), without directions of zero energy."""
     e, V = la.eigh((H + H.T) / 2)
     some = e > SAME_STRAIN * e[-1]
     return np.asarray(np.sqrt(e[some])[:, None] * V[:, some].T)
@@ -256,7 +256,7 @@ def exact_start(R: Sequence[Array], c: Array) -> list[Array]:
 
 
 def clipped(Y: Array, least: float, most: float) -> Array:
-    """Return the nearest matrix with eigenvalues within the bounds."""
+    """Return the closest matrix with eigenvalues within the bounds."""
     d, Z = np.linalg.eigh((Y + Y.T) / 2)  # scipy's takes three times as long for small matrices
     return np.asarray((Z * np.clip(d, least, most)) @ Z.T)
 
@@ -293,7 +293,7 @@ def fitted(
 
 
 def complex_ratios(omega: Array, D: Array, n: int) -> Array:
-    """Return the damping ratio of the first n modes of x'' + D x' + omega² x = 0, each by its largest share, (n,)."""
+    """Return damping ratios of the first n modes of x'' + D x' + omega² x = 0, identified by largest share, (n,)."""
     k = len(omega)
     s, V = la.eig(np.block([[np.zeros((k, k)), np.diag(omega)], [-np.diag(omega), -D]]))
     shares = np.abs(V[:k]) ** 2 / np.sum(np.abs(V) ** 2, axis=0)

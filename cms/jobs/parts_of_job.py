@@ -27,7 +27,7 @@ __all__ = [
 
 
 def part_of_mesh(part: PartSection, mesh: "AnyMesh") -> "AnyMesh":
-    """Return the part of the mesh that the table [body] part requests."""
+    """Return the part of the mesh that [body] part requests."""
     from fe_models.meshes.split import split_mesh
 
     return split_mesh(mesh, part.of, at=part.at, axis=part.axis).parts[part.number - 1]
@@ -60,13 +60,13 @@ def interface_of(name: str, section: InterfaceSection, mesh: "Mesh") -> Interfac
         "nodes": interfaces.nodes_interface,
     }
     chosen = selection_of(section)
-    # the job lists axes as rows; here they are columns
+    # axes are rows in the job, but columns here
     triad = None if section.triad is None else np.array(section.triad).T
     return makers[section.kind](mesh, name, chosen, reference=section.reference, triad=triad)
 
 
 def selection_of(section: Any) -> Any:
-    """Return the selection of nodes that a table of the job makes by one of its `SELECTIONS`."""
+    """Return the node selection of a table, given by one of the keys `SELECTIONS`."""
     from fe_models.meshes import selections
 
     types = {
@@ -98,7 +98,7 @@ def load_cases_of(
 def load_case_of(
     name: str, section: LoadCaseSection, body: FEBody, mesh: "Mesh | LineMesh | ShellMesh | NodeCloud | None"
 ) -> LoadCase:
-    """Return one load case; the job has already checked that its keys fit its kind."""
+    """Return one load case; the job has already checked that its keys belong to its kind."""
     from fe_models.body import loads
 
     if section.acceleration is not None:
@@ -115,7 +115,7 @@ def load_case_of(
 
 
 def frame_of(job: Job, *, held: bool = False) -> "Frame | HeldFrame":
-    """Return the body frame of the job; a held body has the ground as its frame, and no other may be requested."""
+    """Return the body frame of the job; for a fixed body, only the ground is allowed."""
     from cms.reduction.basis.frames import FRAMES, HeldFrame, NodalFrame
 
     reduction = job.reduction
@@ -132,7 +132,7 @@ def frame_of(job: Job, *, held: bool = False) -> "Frame | HeldFrame":
 
 
 def reduction_options(job: Job, body: FEBody) -> "ReductionOptions":
-    """Return the intended contents of the file of a job.
+    """Return the options that determine the expected content of the modal file.
 
     Parameters
     ----------

@@ -52,7 +52,7 @@ SET_OPTIONS = (
     "workers",
 )  # fmt: skip
 #: keys that belong to some mode sets only
-AUTO = "auto"  #: in place of a number of modes: as few modes as meet `error` over `band`
+AUTO = "auto"  #: text in place of a number of modes: use the fewest modes that meet `error` over `band`
 AUTO_OPTIONS = ("error", "band", "measure")  #: keys that belong to n_modes = "auto"
 
 Name = Annotated[str, StringConstraints(min_length=1)]
@@ -66,7 +66,7 @@ def components(value: Any) -> tuple[str, ...]:
 
 
 def each_once(value: Any, choices: Collection[str], wanted: str, kind: str) -> tuple[str, ...]:
-    """Return one of the choices or a list of them, each once."""
+    """Return one of the choices, or a list of distinct choices."""
     words = [value] if isinstance(value, str) else value
     if not isinstance(words, list | tuple) or not words or len(set(map(str, words))) < len(words):
         raise ValueError(f"expected {wanted}, each once, of {', '.join(choices)}")
@@ -205,7 +205,7 @@ def held_dofs(value: Any) -> tuple[tuple[int | str, int | str], ...]:
 
 
 def is_dof(node: Any, component: Any) -> bool:
-    """Whether the pair is a node index with a component 0 to 5, or a node number with a component name."""
+    """Return whether the pair is a node index with a component 0 to 5, or a node number with a component name."""
     if component in MOTION_COMPONENTS:
         return (type(node) is int and node >= 0) or isinstance(node, str)
     return type(node) is int and type(component) is int and node >= 0 and 0 <= component <= 5
@@ -338,11 +338,11 @@ class ReductionSection(Table):
 
     @property
     def reduces_interfaces(self) -> bool:
-        """Whether interfaces of kind "nodes" get fewer modes."""
+        """Whether interfaces of kind "nodes" keep fewer modes than dofs."""
         return self.interface_modes is not None or self.interface_cutoff is not None
 
     def _options_of_auto(self) -> tuple[str, ...]:
-        """Return the keys that n_modes = "auto" needs; raise `ValueError` if one is missing or needless."""
+        """Raise `ValueError` if a key for n_modes = "auto" is missing or superfluous; return the keys."""
         if self.n_modes == AUTO:
             for key in ("error", "band"):
                 if getattr(self, key) is None:
@@ -399,7 +399,7 @@ def ramp_steps(value: Any) -> tuple[tuple[float, float], ...]:
         isinstance(p, list | tuple)
         and len(p) == 2
         and not any(is_no_number(x) or x < 0 for x in p)
-        and p[1] <= 1  # critical
+        and p[1] <= 1  # at most critical damping
         for p in pairs
     ]
     frequencies = [pair[0] for pair, good in zip(pairs, is_pair, strict=True) if good]
@@ -443,7 +443,7 @@ class DampingSection(Table):
 
     @property
     def damping(self) -> Damping | StrainDamping:
-        """The damping that the table describes."""
+        """Damping object that the table describes."""
         if self.file is not None:
             return read_strain_damping(self.file)
         if self.ratio is not None:

@@ -1,4 +1,4 @@
-"""The body of the shells of a job: triangles and quads, with stiffeners and attachments."""
+"""Body of the shells of a job: triangles and quads, with stiffeners and attachments."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -20,7 +20,7 @@ __all__ = ["body_of_shell", "shell_interface_of", "shell_mesh"]
 
 
 def body_of_shell(job: Job, stages: Stages, on_report: Callable[[Any], None] | None) -> FEBody:
-    """Read and check the mesh, and make the body with the thicknesses, stiffeners and attachments of the job."""
+    """Read and check the mesh, and return the body with thicknesses, stiffeners and attachments of the job."""
     from cms.jobs.attachments_of_job import attachments_of, properties_of
     from cms.jobs.parts_of_job import load_cases_of, part_of_mesh
     from fe_models.checks.shell_report import report_shell
@@ -135,6 +135,6 @@ def shell_interface_of(name: str, section: InterfaceSection, mesh: "ShellMesh") 
     from fe_models.elements.shells.body import shell_interface
 
     chosen = selection_of(section)
-    # the job lists axes as rows; here they are columns
+    # axes are rows in the job, but columns here
     triad = None if section.triad is None else np.array(section.triad).T
     return shell_interface(mesh, name, chosen, kind=section.kind, reference=section.reference, triad=triad)

@@ -1,4 +1,4 @@
-"""Make the acceptance of a body: check it, compare it with its full model or its deck, and state its range of use."""
+"""Acceptance of a body: checks, comparison with its full model or deck, and range of use."""
 
 import os
 import tempfile
@@ -55,12 +55,12 @@ __all__ = ["MODES_BEYOND", "FullModel", "accept_body", "compare_with_model"]
 
 @dataclass(frozen=True)
 class FullModel:
-    """The full model that a body is compared with: a job, or a deck of another program."""
+    """Full model for the comparison with a body: a job, or a deck of another program."""
 
-    job: Path | str | None = None  #: job file; one of our own bodies is compared with its mode set too
-    deck: Path | str | None = None  #: complete deck, read as by `cms job`
-    program: str | None = None  #: whose elements a deck (.inp) has: "calculix" or "abaqus"
-    densities: Mapping[str, float] = field(default_factory=dict)  #: density of materials of the deck that have none
+    job: Path | str | None = None  #: path of the job; a body made by this project is also compared with its mode set
+    deck: Path | str | None = None  #: path of a complete deck, which is read as by `cms job`
+    program: str | None = None  #: program of a deck with suffix .inp: "calculix" or "abaqus"
+    densities: Mapping[str, float] = field(default_factory=dict)  #: densities of materials for which the deck has none
 
     def __post_init__(self) -> None:
         if self.job is not None and self.deck is not None:
@@ -75,7 +75,7 @@ def accept_body(
     most_dofs: int = MOST_DOFS,
     stages: Stages | None = None,
 ) -> Acceptance:
-    """Judge a reduced body, whoever has made it, so that the answer can be signed.
+    """Check a reduced body from any program; the result can be signed.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def accept_body(
 def against_job(
     job: Job, path: Path, reduced: ReducedBody, own: tuple[QualityRecord, ...], band: float | None, stages: Stages
 ) -> tuple[tuple[QualityRecord, ...], str]:
-    """Compare with the full model of a job: with its mode set too where the body was made with it."""
+    """Compare a body with the full model of a job, and with the mode set if the body was made with it."""
     uncoupled = uncoupled_body(job, stages)
     require_same_units(uncoupled, reduced)
     with stages("couple interfaces"):
@@ -165,16 +165,16 @@ def against_job(
 
 
 def is_of_one_model(body: "FEBody", reduced: ReducedBody) -> bool:
-    """Whether a reduced body states that it was made from a model of this size."""
+    """Return whether the provenance of a reduced body states a model of this size."""
     return reduced.provenance.get("full dofs") == str(body.n_dof)
 
 
 def band_record(reduced: ReducedBody, records: tuple[QualityRecord, ...], band: float) -> QualityRecord:
-    """Return whether the body is valid up to the requested frequency [Hz]."""
+    """Return the record that states whether the body is valid up to the requested frequency [Hz]."""
     usable = range_of_use(reduced, records).band
     said = f"asked for {band:.6g} Hz; good for up to {usable.highest:.6g} Hz ({usable.words})"
     data = {"asked_hz": band, "usable_hz": usable.highest}
-    share = band / usable.highest if usable.highest > 0 else np.inf  # NaN: no vibration modes
+    share = band / usable.highest if usable.highest > 0 else np.inf  # NaN if there are no vibration modes
     return judge("band-asked", float(share), said, data)
 
 
@@ -187,7 +187,7 @@ def band_of(reduced: ReducedBody) -> float:
 
 
 def job_of_deck(deck: "Deck", full: FullModel, reduced: ReducedBody, folder: Path) -> Job:
-    """Return the job of a deck in the units of the body; unconverted data are omitted and listed."""
+    """Return the job for a deck in units of the body; unconverted data are omitted and listed."""
     if reduced.units.name not in UNIT_SYSTEMS:
         raise QualityError(
             f"body {reduced.name!r}: is in units {quoted(reduced.units.name)} of its own; convert it (cms frame "
@@ -203,14 +203,14 @@ def job_of_deck(deck: "Deck", full: FullModel, reduced: ReducedBody, folder: Pat
 
 
 def cards_left_out(deck: "Deck") -> tuple[LeftOut, ...]:
-    """Return the ledger of a deck."""
+    """Return the ledger of converted and omitted cards of a deck."""
     return tuple(
         LeftOut(entry.name, entry.count, entry.consequence, entry.is_body) for entry in deck.ledger.entries.values()
     )
 
 
 def left_out_record(left_out: tuple[LeftOut, ...]) -> QualityRecord:
-    """Return the record of the omitted cards of a deck: how many kinds carry mass or stiffness."""
+    """Return the record of the omitted cards of a deck: how many kinds have mass or stiffness."""
     body = [each for each in left_out if each.is_body]
     words = "; ".join(f"{each.count} {each.name}: {each.consequence}" for each in body)
     said = words or f"everything that carries mass or stiffness is taken over; {len(left_out)} kinds of other cards not"
@@ -218,7 +218,7 @@ def left_out_record(left_out: tuple[LeftOut, ...]) -> QualityRecord:
 
 
 def effective_masses(reduced: ReducedBody) -> tuple[EffectiveMass, ...]:
-    """Return the effective masses with one interface held, for each that can be."""
+    """Return the effective masses with one interface fixed, for each interface that can be fixed."""
     if not reduced.n_q:
         return ()
     found = []
@@ -232,7 +232,7 @@ def effective_masses(reduced: ReducedBody) -> tuple[EffectiveMass, ...]:
 
 
 def mesh_error(job: Job | None, most_dofs: int, stages: Stages) -> MeshError:
-    """Estimate the effect of the mesh on the lowest frequencies, if the job allows it."""
+    """Estimate the effect of the mesh size on the lowest frequencies, if the job allows it."""
     if job is None:
         return MeshError("not estimated: no full model was given that could be refined")
     if not most_dofs:
@@ -271,13 +271,13 @@ def mesh_error(job: Job | None, most_dofs: int, stages: Stages) -> MeshError:
 # job, which is more informative (`check_reduction`). Nodes are paired by their positions in mesh coordinates.
 
 
-SAME_PLACE = 1e-5  #: of the size of the body, within which two nodes are the same
-LEAST_NODES = 6  #: in common, to compare shapes
-MODES_BEYOND = 1.2  #: full modes are found up to this multiple of the band
+SAME_PLACE = 1e-5  #: largest distance between nodes at the same position, over the size of the body
+LEAST_NODES = 6  #: smallest number of common nodes for a comparison of shapes
+MODES_BEYOND = 1.2  #: upper frequency of the full modes over that of the band
 
 
 def compare_with_model(body: FEBody, reduced: ReducedBody, *, band: float) -> tuple[QualityRecord, ...]:
-    """Compare a received body with a full model.
+    """Compare a foreign reduced body with a full model.
 
     Parameters
     ----------
@@ -336,7 +336,7 @@ def compare_with_model(body: FEBody, reduced: ReducedBody, *, band: float) -> tu
 
 
 def nodes_in_common(body: FEBody, reduced: ReducedBody) -> tuple[IntArray, IntArray]:
-    """Return nodes of the full model and kept nodes of the reduced body at the same places."""
+    """Return the nodes of the full model and the kept nodes that have the same positions."""
     if not len(reduced.nodes):
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     places = reduced.frame.origin + np.asarray(reduced.nodes) @ reduced.frame.axes.T
@@ -346,6 +346,6 @@ def nodes_in_common(body: FEBody, reduced: ReducedBody) -> tuple[IntArray, IntAr
 
 
 def shapes_in_mesh(reduced: ReducedBody, X: Array) -> Array:
-    """Return translations of the kept nodes, rigid motion included, in mesh axes, (n_kept, 3, k)."""
+    """Return translations of the kept nodes in free modes including rigid motion, mesh axes, (n_kept, 3, k)."""
     moved = rigid_motion_of_points(np.asarray(reduced.nodes), np.zeros(3)) @ X[:6] + reduced.Phi @ X[6:]
     return np.asarray(np.einsum("ab,nbk->nak", reduced.frame.axes, moved))

@@ -1,4 +1,4 @@
-"""The acceptance of a reduced body: all information that is needed before it is approved."""
+"""Acceptance of a reduced body: all information that is needed for its approval."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -28,19 +28,19 @@ VERDICT_WORDS: Mapping[Verdict, str] = {
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A kind of cards of the deck that the full model does not take over."""
+    """Kind of cards of the deck that the full model omits."""
 
     name: str
     count: int
     consequence: str
-    is_body: bool  #: whether it carries mass or stiffness
+    is_body: bool  #: whether the cards have mass or stiffness
 
 
 @dataclass(frozen=True, eq=False)
 class MeshError:
-    """What is known of the error that the mesh makes."""
+    """Estimate of the error due to the mesh."""
 
-    words: str  #: how it was estimated, or why it was not
+    words: str  #: description of the estimate, or the reason why there is none
     estimate: MeshConvergence | MeshRefinement | None = None
 
     @property
@@ -54,25 +54,25 @@ class Acceptance:
     """A body, its origin, every check, and its range of use."""
 
     body: ReducedBody
-    records: tuple[QualityRecord, ...]  #: all checks
+    records: tuple[QualityRecord, ...]  #: records of all checks
     range: RangeOfUse
-    masses: tuple[EffectiveMass, ...]  #: for each interface that can be held
-    compared_with: str  #: description of the full model; "": none was given
+    masses: tuple[EffectiveMass, ...]  #: effective masses for each interface that can be fixed
+    compared_with: str  #: description of the full model; "": no full model was given
     mesh_error: MeshError
-    left_out: tuple[LeftOut, ...] | None  #: of the deck; None: there is no deck
-    file: str = ""  #: the modal file
-    digest: str = ""  #: of its contents
+    left_out: tuple[LeftOut, ...] | None  #: omitted cards of the deck; None: no deck was given
+    file: str = ""  #: path of the modal file
+    digest: str = ""  #: digest of the contents of the file
     sources: tuple[SourceFile, ...] = ()
-    made: str = ""  #: when, ISO 8601 with the zone
+    made: str = ""  #: time of the acceptance, ISO 8601 with time zone
 
     @property
     def verdict(self) -> Verdict:
-        """The worst verdict of all checks."""
+        """Worst verdict of all checks."""
         return worst(self.records)
 
     @property
     def words(self) -> str:
-        """The verdict as text, with its basis."""
+        """Verdict as text, with its basis."""
         counts = {kind: sum(record.verdict == kind for record in self.records) for kind in ("pass", "warn", "fail")}
         said = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
         against = self.compared_with or "no full model: the file was judged by itself"
@@ -124,5 +124,5 @@ def mesh_record(error: MeshError) -> dict[str, Any]:
 
 
 def now() -> str:
-    """Return the time, to the second."""
+    """Return the current time, rounded to seconds."""
     return datetime.now(UTC).astimezone().isoformat(timespec="seconds")

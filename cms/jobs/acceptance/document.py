@@ -1,4 +1,4 @@
-"""The document of an acceptance, and its files."""
+"""Document of an acceptance, and its files."""
 
 import json
 import math
@@ -37,12 +37,12 @@ from fe_models.foundation.paths import replace_files
 __all__ = ["SUFFIXES", "body_picture", "document_of", "mass_chart", "require_suffix", "write_acceptance"]
 
 
-MOST_MODES = 40  #: rows of a table of modes; the JSON file has all
+MOST_MODES = 40  #: largest number of rows in a table of modes; the JSON file has all modes
 SIGNATURES = ("prepared", "checked", "released")
 
 
 def document_of(acceptance: Acceptance) -> Document:
-    """Return the document of an acceptance, pictures drawn."""
+    """Return the document of an acceptance, including pictures."""
     a, u = acceptance, acceptance.body.units
     worst_of = [record for record in a.records if record.verdict in ("fail", "warn")]
     band = a.range.band
@@ -86,7 +86,7 @@ def document_of(acceptance: Acceptance) -> Document:
 
 
 def identity_part(a: Acceptance) -> Section:
-    """What the body is."""
+    """Return the part that identifies the body."""
     body, u = body_record(a.body), a.body.units
     size, inertia = body_size(a.body), f"{u.mass_symbol} {u.length_symbol}²"
     tensor = np.array(body["inertia_about_center_of_mass"])
@@ -117,7 +117,7 @@ def identity_part(a: Acceptance) -> Section:
 
 
 def moments_words(a: Acceptance) -> str:
-    """Return how well the inertia terms are known."""
+    """Return how accurately the inertia terms are known."""
     moments = a.body.moments
     if moments.missing:
         return f"missing: {', '.join(moments.missing)}; to be trusted: {moments.trust}"
@@ -125,7 +125,7 @@ def moments_words(a: Acceptance) -> str:
 
 
 def origin_part(a: Acceptance) -> Section:
-    """Where the body came from."""
+    """Return the part about the origin of the body."""
     rows = [(source.path, source.digest, source.state) for source in a.sources]
     blocks: list[Block] = []
     if a.file:
@@ -141,7 +141,7 @@ def origin_part(a: Acceptance) -> Section:
 
 
 def checks_part(a: Acceptance) -> Section:
-    """Every check."""
+    """Return the part with all checks."""
     order = {"fail": 0, "warn": 1, "pass": 2, "info": 3}
     rows = tuple(
         (record.verdict, record.title, number(record.value), number(record.tolerance), reason_of(record))
@@ -160,7 +160,7 @@ def reason_of(record: QualityRecord) -> str:
 
 
 def modes_part(a: Acceptance) -> Section:
-    """Modes of the file, and the free frequencies compared with those of the full model."""
+    """Return the part with modes of the file, and free frequencies compared with those of the full model."""
     modes = body_record(a.body)["modes"]
     rows = tuple(
         (
@@ -197,7 +197,7 @@ def more_words(n: int) -> str:
 
 
 def interfaces_part(a: Acceptance) -> Section:
-    """Interfaces with the nodes they are made of."""
+    """Return the part with the interfaces and their nodes."""
     size, length = body_size(a.body), a.body.units.length_symbol
     rows = []
     for interface, record in zip(a.body.interfaces, body_record(a.body)["interfaces"], strict=True):
@@ -211,7 +211,7 @@ def interfaces_part(a: Acceptance) -> Section:
 
 
 def mass_part(a: Acceptance) -> Section:
-    """Effective masses with their sums."""
+    """Return the part with effective masses and their sums."""
     if not a.masses:
         words = "No interface can be held and driven, so there is no effective mass."
         return Section("mass", "Effective mass", (Paragraph(words),))
@@ -242,7 +242,7 @@ def mass_table(found: EffectiveMass) -> TextTable:
 
 
 def range_part(a: Acceptance) -> Section:
-    """What the body is good for."""
+    """Return the part about the range of use."""
     r, u = a.range, a.body.units
     blocks: list[Block] = [Paragraph(f"Frequencies: up to {hertz(r.band.highest)} Hz ({r.band.words}).")]
     if r.speed is not None:
@@ -277,7 +277,7 @@ def range_part(a: Acceptance) -> Section:
 
 
 def stiffened_words(r: RangeOfUse) -> str:
-    """Return the limits with geometric stiffness; nothing if the file has none."""
+    """Return the limits with geometric stiffness; an empty text if the file has none."""
     limits = r.stiffened_limits
     if limits is None:
         return ""
@@ -285,12 +285,12 @@ def stiffened_words(r: RangeOfUse) -> str:
 
 
 def magnitude(value: float) -> str:
-    """Return a load; a load that deforms nothing has no limit."""
+    """Return a load as text; a load without deformation has no limit."""
     return f"{value:.3g}" if math.isfinite(value) else "any"
 
 
 def deck_part(a: Acceptance) -> Section:
-    """What the deck has and the model not."""
+    """Return the part about data of the deck that the model omits."""
     if a.left_out is None:
         words = "There is no deck beside the body, so nothing can be said of what was left out of it."
         return Section("deck", "Left out of the deck", (Paragraph(words),), short="Left out")
@@ -307,7 +307,7 @@ def deck_part(a: Acceptance) -> Section:
 
 
 def mesh_part(a: Acceptance) -> Section:
-    """What the mesh costs."""
+    """Return the part about the mesh error."""
     error = a.mesh_error
     blocks: list[Block] = [Paragraph(error.words[0].upper() + error.words[1:] + ".")]
     if error.estimate is not None:
@@ -327,7 +327,7 @@ def number(value: float | None) -> str:
 
 
 def vector(values: Sequence[float] | Iterable[float], scale: float | None = None) -> str:
-    """Return numbers in one line.
+    """Return numbers as one line of text.
 
     Rounding errors relative to the scale (default: the largest number) are printed as 0.
     """
@@ -339,12 +339,12 @@ def vector(values: Sequence[float] | Iterable[float], scale: float | None = None
 # pictures of an acceptance: the body with its interfaces, and sums of effective mass ----------------------------------
 
 
-SIZE = (1280, 640)  #: of the picture of a body [px]
+SIZE = (1280, 640)  #: width and height of the picture of a body [px]
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#56B4E9", "#E69F00", "#CC79A7")
 
 
 def body_picture(body: ReducedBody) -> bytes | None:
-    """Draw the undeformed body with the axes of its interfaces (PNG); None where it has no surface."""
+    """Return a PNG of the undeformed body with the axes of its interfaces; None if it has no surface."""
     if len(body.surface) == 0:
         return None
     on_surface = body.nodes[np.unique(body.surface)]
@@ -365,7 +365,7 @@ def body_picture(body: ReducedBody) -> bytes | None:
 
 
 def mass_chart(found: EffectiveMass) -> Chart:
-    """Return the sum of effective mass over frequency, one line a direction."""
+    """Return the chart of cumulative effective mass over frequency, one line for each direction."""
     frequencies, sums = np.asarray(found.frequencies), 100 * found.cumulative
     last = float(frequencies[-1]) * 1.05 if len(frequencies) else 1.0
     x = np.concatenate([[0.0], frequencies, [last]])
@@ -385,7 +385,7 @@ SUFFIXES = (".pdf", ".html", ".json")
 
 
 def write_acceptance(acceptance: Acceptance, *paths: str | Path) -> None:
-    """Write one or several forms of an acceptance, all complete or none.
+    """Write an acceptance in one or several forms; all files are complete, or none is written.
 
     Raises
     ------

@@ -18,15 +18,15 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class SourceFile:
-    """A file from which the body was made, and its present state."""
+    """Source file of a body, and its current state."""
 
     path: str
-    digest: str  #: on record, sha256
+    digest: str  #: recorded digest, sha256
     state: str  #: "unchanged", "CHANGED since", "not found"
 
 
 def origin_groups(provenance: Mapping[str, str]) -> dict[str, dict[str, str]]:
-    """Return title -> key -> text; digests of files are in the list of files instead."""
+    """Return texts by title and key; digests of files are only in the list of files."""
     groups: dict[str, dict[str, str]] = {title: {} for title in GROUPS}
     for key, words in provenance.items():
         title = next(title for title, starts in GROUPS.items() if key.startswith(starts))
@@ -35,7 +35,7 @@ def origin_groups(provenance: Mapping[str, str]) -> dict[str, dict[str, str]]:
 
 
 def source_files(provenance: Mapping[str, str], folder: Path) -> tuple[SourceFile, ...]:
-    """Return the files with a recorded digest, searched at the recorded path, or in a folder.
+    """Return the files with a recorded digest; they are searched at the recorded path, then in a folder.
 
     A file is on record as "NAME" with "NAME sha256", or as "file PATH" with its digest.
     """

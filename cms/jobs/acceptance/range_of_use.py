@@ -1,4 +1,4 @@
-"""What a reduced body is good for: frequencies, angular speeds, loads and deflections, each by its limit.
+"""Range of use of a reduced body: limits of frequency, angular speed, load and deflection.
 
 Band      by custom the highest vibration mode over 1.5 (`custom_band`); against the full model the highest frequency
           up to which all free frequencies and shapes keep the limits of the quality records
@@ -25,34 +25,34 @@ __all__ = ["LargestLoad", "LargestSpeed", "RangeOfUse", "UsableBand", "custom_ba
 
 @dataclass(frozen=True)
 class UsableBand:
-    """The frequencies a reduced body may be used for."""
+    """Frequency range in which a reduced body is accurate."""
 
-    highest: float  #: [Hz]; NaN: not known
-    words: str  #: how it was found
-    is_compared: bool  #: whether with the full model
+    highest: float  #: highest frequency [Hz]; NaN: unknown
+    words: str  #: description of how the frequency was determined
+    is_compared: bool  #: whether it follows from a comparison with the full model
 
 
 @dataclass(frozen=True)
 class LargestSpeed:
-    """The angular speed up to which the frame may rotate."""
+    """Angular speed up to which the frame may rotate."""
 
-    lowest_held: float  #: lowest frequency with one interface held [Hz]
-    at: str  #: that interface
-    linear: float  #: without geometric stiffness [rad/s]
-    stiffened: float | None  #: with geometric stiffness; None: the file has none
+    lowest_held: float  #: lowest frequency with one interface fixed [Hz]
+    at: str  #: name of this interface
+    linear: float  #: largest speed without geometric stiffness [rad/s]
+    stiffened: float | None  #: largest speed with geometric stiffness [rad/s]; None: the file has none
 
 
 @dataclass(frozen=True)
 class LargestLoad:
-    """The load at one interface, along one axis of B, up to which the frame may be used."""
+    """Largest load at one interface along one axis of B."""
 
     interface: str
-    direction: str  #: "force x" to "moment z", axes of B
+    direction: str  #: direction in axes of B, from "force x" to "moment z"
     unit: str
-    linear: float  #: without geometric stiffness; infinite: no deformation
-    stiffened: float | None  #: with geometric stiffness; None: the file has none
+    linear: float  #: largest load without geometric stiffness; infinite: no deformation
+    stiffened: float | None  #: largest load with geometric stiffness; None: the file has none
     governed_by: str  #: limit that is reached first: "rotation", "change of stiffness" or "nothing"
-    deflection: float  #: largest displacement in B at the load `linear` [length of the body]
+    deflection: float  #: largest displacement in B at the load `linear`, over the body length
 
 
 @dataclass(frozen=True)
@@ -63,8 +63,8 @@ class RangeOfUse:
     #: None: unknown for a held body, without modes or inertia terms, or if no held frequency is above 0
     speed: LargestSpeed | None
     loads: tuple[LargestLoad, ...]  #: three forces and three moments for each interface
-    limits: Limits  #: limits of a linear frame
-    stiffened_limits: Limits | None  #: None: the file has no geometric stiffness
+    limits: Limits  #: limits of the frame without geometric stiffness
+    stiffened_limits: Limits | None  #: limits with geometric stiffness; None: the file has none
 
     def strictest(self) -> tuple[LargestLoad, ...]:
         """Return, for each interface, the directions with the smallest allowed force and moment."""
@@ -91,7 +91,7 @@ def range_of_use(reduced: ReducedBody, records: Sequence[QualityRecord] = ()) ->
 
 
 def usable_frequencies(reduced: ReducedBody, records: Sequence[QualityRecord]) -> UsableBand:
-    """Return the band, from the comparison with the full model if there is one."""
+    """Return the band, from the comparison with the full model if there is one, else the customary band."""
     by_name = {record.name: record for record in records}
     compared, shapes = by_name.get("frequency-error"), by_name.get("mac") or by_name.get("mac-nodal")
     if compared is not None and "full_hz" in compared.data:
@@ -132,7 +132,7 @@ def custom_band(reduced: ReducedBody) -> UsableBand:
 
 
 def largest_speed(reduced: ReducedBody) -> LargestSpeed | None:
-    """Return the angular speed up to which the frame may rotate; None if it is unknown."""
+    """Return the largest angular speed of the frame; None if it is unknown."""
     if reduced.is_held or not reduced.n_q or reduced.moments.missing:
         return None
     found = []
@@ -140,7 +140,7 @@ def largest_speed(reduced: ReducedBody) -> LargestSpeed | None:
         if can_be_held(reduced, interface.name):
             try:
                 frequencies = effective_mass(reduced, interface.name).frequencies
-            except np.linalg.LinAlgError:  # impossible moments, which the records report
+            except np.linalg.LinAlgError:  # other records report impossible moments
                 continue
             if len(frequencies) and frequencies[0] > 0:
                 found.append((float(frequencies[0]), interface.name))
@@ -153,7 +153,7 @@ def largest_speed(reduced: ReducedBody) -> LargestSpeed | None:
 
 
 def largest_loads(reduced: ReducedBody) -> tuple[LargestLoad, ...]:
-    """Return the loads at each interface up to which the frame may be used."""
+    """Return the largest loads at each interface."""
     stiffness = np.diag(reduced.K)
     if not reduced.n_q or not (stiffness > 0).all():
         return ()

@@ -22,11 +22,12 @@ COLLINEAR = 1e-6
 
 @dataclass(frozen=True)
 class JobRequest:
-    """Data that the user adds to a deck."""
+    """Data that the user adds to those of a deck."""
 
-    units: str  #: unit system of the numbers of the deck
-    densities: Mapping[str, float]  #: densities of materials that have none, by material; "" for all such materials
-    leave_out: tuple[str, ...] = ()  #: entries of the ledger with mass or stiffness that are left out intentionally
+    units: str  #: unit system of the numbers in the deck
+    #: densities by material, for materials without density; key "" applies to all of these
+    densities: Mapping[str, float]
+    leave_out: tuple[str, ...] = ()  #: ledger entries with mass or stiffness that the user omits intentionally
     mass: str | None = None  #: "consistent", "lumped" or "as the deck" for all elements; None: the default of jobs
 
 
@@ -97,7 +98,7 @@ def job_text(deck: Deck, request: JobRequest, deck_path: str) -> str:
 
 
 def _note_mass(deck: Deck, mass: str | None) -> None:
-    """Note in the ledger which elements have another mass than the program of the deck gives them."""
+    """Note in the ledger which elements get another kind of mass than in the program of the deck."""
     for kind in ("lines", "shells", "rods"):
         count = len(getattr(deck, kind))
         lumps, is_lumped = kind in deck.lumped, mass == "lumped" or (mass == "as the deck" and kind in deck.lumped)
@@ -110,7 +111,7 @@ def _note_mass(deck: Deck, mass: str | None) -> None:
 
 
 def sections_of(deck: Deck) -> list[SolidSection | ShellSection | LineSection | RodSection]:
-    """Return all sections of a deck."""
+    """Return the sections of all elements of a deck."""
     return [*deck.solids, *deck.shells, *deck.lines, *deck.rods]
 
 
@@ -120,7 +121,7 @@ def materials_in(section: SolidSection | ShellSection | LineSection | RodSection
 
 
 def _materials(deck: Deck, request: JobRequest) -> dict[str, Any]:
-    """Return the materials in use; a missing density is taken from the request.
+    """Return the materials in use; the request supplies missing densities.
 
     Nastran and ANSYS take a missing density as zero. The job does the same if the deck has other masses, such as frames
     of light beams between point masses. If nothing has mass, the user must give the density.
@@ -162,7 +163,7 @@ def _materials(deck: Deck, request: JobRequest) -> dict[str, Any]:
 
 
 def _has_mass(deck: Deck, used: Iterable[str]) -> bool:
-    """Whether anything in the deck has mass: points, other materials, or sections apart from their materials."""
+    """Return whether anything except these materials gives the deck mass: points, other materials, or sections."""
     return (
         any(mass.mass for mass in deck.masses)
         or any(deck.materials[name].density for name in used if name in deck.materials)
@@ -243,7 +244,7 @@ def _attached(deck: Deck) -> dict[str, Any]:
 
 
 def _interface(deck: Deck, support: Support) -> dict[str, Any]:
-    """Return the interface of a support: rigid if all its motions are held, otherwise of kind "nodes"."""
+    """Return the interface of a support: rigid if all motions are fixed, otherwise of kind "nodes"."""
     nodes = deck.mesh.node_sets[support.nodes]
     points = deck.mesh.nodes[nodes]
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
@@ -266,7 +267,7 @@ def _nodes_with_rotations(deck: Deck) -> Any:
 
 
 def _has_cells_without_table(deck: Deck) -> bool:
-    """Whether cells of the deck were left out on request."""
+    """Return whether cells of the deck were omitted on request."""
     groups = {each.group for each in sections_of(deck)}
     faces = {load.faces for load in deck.loads}
     for block in deck.mesh.blocks:

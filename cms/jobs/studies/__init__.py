@@ -1,4 +1,4 @@
-"""Studies that a job file asks for: convergence of the mesh, correlation with a test."""
+"""Studies that a job file requests: mesh convergence, correlation with a test."""
 
 import lazy_loader
 

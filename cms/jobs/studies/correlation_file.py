@@ -30,7 +30,7 @@ from fe_models.meshes.mesh import Mesh
 __all__ = ["CorrelationFile", "CorrelationResult", "read_correlation", "run_correlation"]
 
 METRES = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254}
-OF_MESH = ("body", "mesh_size")  #: tables of a job whose numbers affect its mesh
+OF_MESH = ("body", "mesh_size")  #: tables of a job that affect its mesh
 UNIVERSAL, TABLES = (".unv", ".uff", ".unv55", ".ufb"), (".csv", ".txt")
 Axis = Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
 
@@ -127,16 +127,16 @@ class CorrelationFile(Table):
 
 @dataclass(frozen=True, eq=False)
 class CorrelationResult:
-    """Results of a correlation file."""
+    """Results of a correlation."""
 
-    correlation: Correlation  #: correlation with the original model
+    correlation: Correlation  #: correlation with the model before the update
     update: Update | None
-    damping: tuple[DampingFit, ...]  #: fits to the measured damping ratios; empty: the test has no damping
-    document: dict[str, Any] | None  #: the job with the updated values
+    damping: tuple[DampingFit, ...]  #: fits to the measured damping ratios; empty: the test has no damping ratios
+    document: dict[str, Any] | None  #: the job with updated values; None: no update
 
 
 def read_correlation(path: str | Path) -> CorrelationFile:
-    """Read and check a file; raise `CorrelationError` that lists every problem."""
+    """Read and check a correlation file; raise `CorrelationError` with a list of all problems."""
     path = Path(path)
     return validated(CorrelationFile, read_toml(path, CorrelationError), path, CorrelationError, context=path.parent)
 
@@ -185,7 +185,7 @@ def run_correlation(asked: CorrelationFile, stages: Stages | None = None) -> Cor
 
 
 def body_maker(path: Path, parameters: tuple[Parameter, ...]) -> Callable[[Array], FEBody]:
-    """Return the function from parameter values to the coupled body of the job; the last bodies are cached.
+    """Return a function from parameter values to the coupled body of the job; it caches the last bodies.
 
     A solid mesh is read and checked once, unless a parameter affects the mesh.
     """
@@ -252,7 +252,7 @@ def parameter_of(name: str, table: ParameterTable, content: dict[str, Any], path
 
 
 def damping_of(measured: MeasuredModes, units: Units) -> tuple[DampingFit, ...]:
-    """Return fits to the measured damping if at least two ratios are known, for a job in these units."""
+    """Return damping fits for a job in these units if at least two measured ratios are known."""
     is_known = measured.damping > 0 if measured.damping.size else np.zeros(0, bool)
     if is_known.sum() < 2:
         return ()

@@ -1,4 +1,4 @@
-"""The report of a correlation as a document."""
+"""Report of a correlation as a document."""
 
 from typing import Any
 
@@ -22,9 +22,9 @@ from fe_models.foundation.documents.document import (
 
 __all__ = ["correlation_document"]
 
-GOOD_MAC, POOR_MAC = 0.9, 0.7  #: customary limits of the MAC
+GOOD_MAC, POOR_MAC = 0.9, 0.7  #: customary limits of the MAC: above the first good, below the second poor
 GOOD_ERROR, POOR_ERROR = 0.02, 0.05
-GOOD_CROSS = 0.1  #: customary limit of the largest off-diagonal entry of an orthogonality matrix
+GOOD_CROSS = 0.1  #: customary limit of the largest off-diagonal entry of a cross-orthogonality matrix
 MOST_POINTS = 20
 
 
@@ -76,7 +76,7 @@ def answer(result: CorrelationResult) -> Answer:
 
 
 def graded(value: float, good: float, poor: float, words: str) -> Cell:
-    """Return a number in the colour of its grade; if good < poor, small values are good."""
+    """Return a number in the colour of its grade; small values are good if good < poor."""
     sign = 1.0 if good < poor else -1.0
     kind = "pass" if sign * value <= sign * good else "warn" if sign * value <= sign * poor else "fail"
     return Cell(words, f"n {kind}")
@@ -115,12 +115,12 @@ def pairs_section(result: CorrelationResult) -> Section:
 
 
 def heat(values: Any, across: str, down: str) -> Chart:
-    """Return a matrix from 0 to 1 as a chart."""
+    """Return a matrix with entries from 0 to 1 as a heat map."""
     return Chart(Axis(across), (Axis(down),), (Matrix(np.asarray(values), down, across),), has_legend=False)
 
 
 def mac_section(result: CorrelationResult) -> Section:
-    """Return the section about the MAC before and after the update, and of the test with itself."""
+    """Return the section about the MAC before and after the update, and the MAC of the test with itself."""
     shown = {"mac": ("test and model", result.correlation.mac, "computed mode")}
     if result.update is not None:
         shown["mac-after"] = ("test and updated model", result.update.after.mac, "computed mode")

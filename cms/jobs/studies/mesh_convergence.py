@@ -1,4 +1,4 @@
-"""Difference of the free frequencies of a meshed CAD body from those of the geometry: the same job at two mesh sizes.
+"""Discretisation error of the free frequencies of a CAD body, from the same job with two mesh sizes.
 
 (1) the job is meshed at its own size h and at a coarser one, curvature and least size in proportion;
 (2) both bodies are coupled as the job says, and their lowest elastic frequencies found;
@@ -28,38 +28,38 @@ from fe_models.foundation.stages import Stages
 __all__ = ["ORDER", "MeshConvergence", "mesh_convergence"]
 
 ORDER = 1.0  #: assumed order of convergence of the frequencies
-LEAST_RATIO = 1.05  #: of the sizes that the meshes came out with
+LEAST_RATIO = 1.05  #: smallest ratio of the sizes in the two meshes
 
 
 @dataclass(frozen=True, eq=False)
 class MeshConvergence:
-    """Free frequencies at two mesh sizes, and the estimated error of the finer."""
+    """Free frequencies at two mesh sizes, and the estimated error for the finer mesh."""
 
-    sizes: tuple[float, float]  #: coarse and fine mesh; the fine one is that of the job [length]
-    n_dof: tuple[int, int]  #: of the coupled bodies
-    frequencies: Array  #: at the coarse and the fine size, (2, n) [Hz]
-    first_order: float = 0.0  #: relative error that the report of the fine mesh finds for cells of first order
+    sizes: tuple[float, float]  #: sizes of the coarse and the fine mesh; the fine mesh is that of the job [length]
+    n_dof: tuple[int, int]  #: numbers of dofs of the coupled bodies
+    frequencies: Array  #: frequencies with the coarse and the fine mesh, (2, n) [Hz]
+    first_order: float = 0.0  #: relative error due to first-order cells, from the report of the fine mesh
 
     @property
     def ratio(self) -> float:
-        """Coarse over fine element size, by the numbers of dofs."""
+        """Ratio of coarse to fine element size, from the numbers of dofs."""
         return float((self.n_dof[1] / self.n_dof[0]) ** (1 / 3))
 
     @property
     def change(self) -> Array:
-        """Relative difference of the coarse frequencies from the fine ones, (n,)."""
+        """Coarse frequencies over fine frequencies, minus 1, (n,)."""
         return np.asarray(self.frequencies[0] / self.frequencies[1] - 1)
 
     @property
     def error(self) -> Array:
-        """Estimated relative error of the fine frequencies, (n,), by steps (3) and (4); positive: they lie too high."""
+        """Estimated relative error of the fine frequencies, (n,), by steps (3) and (4); positive: too high."""
         return np.maximum(self.change / (self.ratio**ORDER - 1), self.first_order or -np.inf)
 
 
 def mesh_convergence(
     job: Job | Path | str, *, ratio: float = 1.5, n_modes: int = 10, stages: Stages | None = None
 ) -> MeshConvergence:
-    """Find the free frequencies of a CAD job at its own mesh size and at a coarser one.
+    """Compute the free frequencies of a CAD job at its own mesh size and at a coarser one.
 
     Parameters
     ----------

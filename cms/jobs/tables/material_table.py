@@ -23,7 +23,7 @@ SHEAR = "three numbers above 0, the shear moduli G_12, G_13, G_23, where young h
 
 
 def one_or_three(expected: str, one: Callable[[float], bool], each: Callable[[float], bool]) -> Callable[[Any], Any]:
-    """Return a function that returns one number or three, whose limits `one` and `each` check."""
+    """Return a function that checks one number by `one`, or three numbers by `each`."""
 
     def check(value: Any) -> float | Three:
         if isinstance(value, list | tuple):
@@ -93,7 +93,7 @@ class MaterialSection(Table):
 
 
 def material_of(name: str, table: MaterialSection) -> "AnyMaterial":
-    """Return the material of a table.
+    """Return the material that a table describes.
 
     Raises
     ------
@@ -114,7 +114,7 @@ def material_of(name: str, table: MaterialSection) -> "AnyMaterial":
 
 
 def isotropic_of(name: str, table: MaterialSection, what: str) -> "Material":
-    """Return the isotropic material of a table for `what`, such as beams, which need isotropic materials.
+    """Return the isotropic material of a table; `what` names the elements that need it, for the message.
 
     Raises
     ------
