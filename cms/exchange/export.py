@@ -29,7 +29,7 @@ __all__ = ["WRITERS", "Exported", "export_body"]
 
 OVER_INTERFACES = frozenset(
     {"damping", "rotation", "load cases", "axes in B"}
-)  #: content of all formats with matrices over the interfaces
+)  #: data that all formats with matrices over the interfaces can hold
 WRITERS: dict[str, Writer] = {
     "mbsim": Writer(
         make_mbsim,
@@ -71,23 +71,23 @@ WRITERS: dict[str, Writer] = {
     "vtk": Writer(
         make_vtk, frozenset({"surface", "stress", "axes in the mesh"}), takes_held=True, needs=("modes", "nodes")
     ),
-}  #: by key of `cms.exchange.exporters.formats.FORMATS`
+}  #: writer of each format, by key of `cms.exchange.exporters.formats.FORMATS`
 
 NEEDS = {
     "modes": (lambda body: body.n_q > 0, "has no modes: it is rigid; give the other program its mass and inertia"),
     "nodes": (lambda body: len(body.nodes) > 0, "has no nodes with shapes, of which the format is made"),
     "interfaces": (lambda body: len(body.interfaces) > 0, "has no interfaces, whose motion the format is made of"),
-}  #: test whether the body meets each key of `Writer.needs`, and the text of the error
+}  #: for each key of `Writer.needs`: test of the body, and text of the error
 
 
 @dataclass(frozen=True)
 class Exported:
-    """The written files, and the data that the format could not hold."""
+    """Written files, and the data that the format cannot hold."""
 
     files: tuple[Path, ...]
-    left_out: tuple[str, ...]  #: descriptions of data of the body that the files do not have
+    left_out: tuple[str, ...]  #: descriptions of body data that the files do not contain
     notes: tuple[str, ...]  #: positions of the interfaces, and other facts for the user of the other program
-    units: Units  #: of the numbers in the files
+    units: Units  #: units of the numbers in the files
 
 
 #: formats that are not documented, by their names and those of their programs (docs/formats.md)
@@ -95,7 +95,7 @@ UNDOCUMENTED = {"mnf": "Adams", "adams": "Adams", "fbi": "Simpack", "simpack": "
 
 
 def unknown_format(name: str) -> str:
-    """Return what a message says of a format that is not written here."""
+    """Return the message for a format that this project does not write."""
     program = UNDOCUMENTED.get(name.lower())
     if program is None:
         return f"unknown format {quoted(name)}{nearest(name, WRITERS)}"
@@ -172,7 +172,7 @@ def export_body(
 
 
 def wanted_units(units: Units | str, to: str, writer: Writer) -> Units:
-    """Return the requested unit system; `ExportError` if the other program only accepts another one."""
+    """Return the requested unit system; raise `ExportError` if the other program accepts only another one."""
     system = unit_system(units) if isinstance(units, str) else units
     if writer.units and system.name != writer.units:
         raise ExportError(

@@ -1,4 +1,4 @@
-"""One door for bodies that another program has reduced: formats by suffix and content, one judgement, one error."""
+"""Import of bodies that another program has reduced: formats by suffix and content, the same checks for all."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -82,28 +82,30 @@ FORMATS = (
         "ExtPtfm, FlexASCII", "OpenFAST", "reduced body", (".dat",), reads=True, key="ext_ptfm",
         tried="files of our writer", lost="3C, 4C, 5C; loads that change with time; the place of the node",
     ),
-)  #: one line a format; `cms formats` and docs/formats.md list them  # fmt: skip
+)  #: one line for each format; `cms formats` and docs/formats.md list them  # fmt: skip
 
 
 # import body ----------------------------------------------------------------------------------------------------------
 
 
-HEAD = 4096  #: bytes that identify the format of a file
-Places = Mapping[int, Array]  #: number of a node -> its place
-ForeignFiles = str | Path | Iterable[str | Path] | Mapping[str, str | Path]  #: a file, several, or role -> file
+HEAD = 4096  #: number of bytes at the start of a file that identify its format
+Places = Mapping[int, Array]  #: position of each node, by node number
+#: one file, several files, or the file for each role
+ForeignFiles = str | Path | Iterable[str | Path] | Mapping[str, str | Path]
 
 
 def never(path: Path, head: bytes) -> bool:
-    """Return that no content identifies the format, which must be named."""
+    """Return False, for formats that the content of a file cannot identify and that must be named."""
     return False
 
 
 @dataclass(frozen=True)
 class BodyFormat:
-    """A format of reduced bodies: recognition of its files, and its reader."""
+    """Format of reduced bodies: recognition of its files, and its reader."""
 
-    is_it: Callable[[Path, bytes], bool]  #: by path and head of 4096 bytes of one of the files
-    read: Callable[[Sequence[Path], str, Places], Superelement | ModalBody]  #: files, name of the body, further places
+    is_it: Callable[[Path, bytes], bool]  #: recognises a file by its path and its first 4096 bytes
+    #: reads a body from files, body name, and additional node positions
+    read: Callable[[Sequence[Path], str, Places], Superelement | ModalBody]
 
 
 BODY_FORMATS: dict[str, BodyFormat] = {
@@ -114,7 +116,7 @@ BODY_FORMATS: dict[str, BodyFormat] = {
     "sid_fem": BodyFormat(is_sid_fem, read_sid_fem),
     "sid_fem-fembeam": BodyFormat(never, read_sid_fem_fembeam),
     "ext_ptfm": BodyFormat(is_ext_ptfm, read_ext_ptfm),
-}  #: by the name of `format`; the first that knows a file reads it, other files are matrices (`read_matrices`)
+}  #: format by name; the first that recognises a file reads it, unrecognised files are matrices (`read_matrices`)
 
 
 def import_body(
@@ -199,7 +201,7 @@ def import_body(
         raise
     except MemoryError as error:
         raise ForeignBodyError(f"{paths[0]}: not enough memory to read it") from error
-    except Exception as error:  # one message for any error that a damaged file causes in a parser
+    except Exception as error:  # gives one message for any error of a parser in a damaged file
         raise ForeignBodyError(f"{paths[0]}: could not be read as {key}: {damage(error)}") from error
     if isinstance(body, Superelement):
         return body_of_superelement(body, options)
@@ -208,7 +210,7 @@ def import_body(
 
 
 def paths_of(files: ForeignFiles) -> list[Path]:
-    """Return the paths of files that exist."""
+    """Return the paths as a list, after checking that the files exist."""
     if isinstance(files, Mapping):
         files = list(files.values())
     paths = [Path(files)] if isinstance(files, str | Path) else [Path(path) for path in files]
@@ -236,7 +238,7 @@ def format_of(paths: Sequence[Path]) -> str:
 
 
 def of_matrices(foreign: ForeignMatrices, name: str, places: Places, boundary: Sequence[int] | None) -> Superelement:
-    """Return the superelement of matrices, with the rows of boundary nodes where the files do not list them."""
+    """Return the superelement of matrices; given boundary nodes define the rows if the files do not list them."""
     if boundary is not None:
         n = foreign.n_dof or 0
         if foreign.dofs is not None:
@@ -255,12 +257,12 @@ def of_matrices(foreign: ForeignMatrices, name: str, places: Places, boundary: S
 
 
 def with_names(options: ImportOptions, foreign: ForeignMatrices) -> ImportOptions:
-    """Return the options with the interfaces named in the files, if the user names none."""
+    """Return the options, with the interfaces of the files if the user names none."""
     return options if options.interfaces is not None else replace(options, interfaces=named_interfaces(foreign))
 
 
 def named_interfaces(foreign: ForeignMatrices) -> dict[str, list[int]] | None:
-    """Return the interfaces named with the positions of the nodes, as in our own .mat files."""
+    """Return the node numbers of each interface, if the files name the interface of each node; otherwise None."""
     names = np.asarray(foreign.others.get("interfaces", ()))
     if foreign.node_numbers is None or names.dtype.kind != "U" or names.shape != (len(foreign.node_numbers),):
         return None
@@ -271,7 +273,7 @@ def named_interfaces(foreign: ForeignMatrices) -> dict[str, list[int]] | None:
 
 
 def places_of(nodes: str | Path | Places | None) -> Places:
-    """Return places by the number of the node."""
+    """Return node positions by node number."""
     if nodes is None:
         return {}
     if isinstance(nodes, str | Path):

@@ -64,4 +64,4 @@ FORMATS = (
         "VTU, PVD", "ParaView", "reduced body", (".pvd", ".vtu"), writes=True, key="vtk", tried="pyvista, meshio",
         lost="all but shapes and stress",
     ),
-)  #: one line a format; `cms formats` and docs/formats.md list them  # fmt: skip
+)  #: one line for each format; `cms formats` and docs/formats.md list them  # fmt: skip

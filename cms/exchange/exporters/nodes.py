@@ -10,23 +10,23 @@ from fe_models.meshes.numbering import NONE
 
 __all__ = ["NodeList", "all_nodes", "interface_nodes", "reference_row", "user_numbers"]
 
-MOST = 99_999_999  #: largest number with eight digits, which all formats can hold
+MOST = 99_999_999  #: largest node number: eight digits, which all formats can hold
 
 
 @dataclass(frozen=True, eq=False)
 class NodeList:
-    """Nodes in B, with the motion of each per unit of every mode."""
+    """Nodes in B, with their motion for a unit value of each mode."""
 
-    numbers: IntArray  #: numbers above 0, (n,)
-    positions: Array  #: (n, 3) [m]
-    Phi: Array  #: translation, (n, 3, n_q)
-    Psi: Array  #: rotation, (n, 3, n_q) [1/m]; zero if unknown
-    has_rotation: np.ndarray  #: whether the rotation is known, (n,)
-    of_interface: dict[str, int]  #: row of the reference point of each interface
+    numbers: IntArray  #: positive node numbers, (n,)
+    positions: Array  #: positions, (n, 3) [m]
+    Phi: Array  #: translations, (n, 3, n_q)
+    Psi: Array  #: rotations, (n, 3, n_q) [1/m]; zero if unknown
+    has_rotation: np.ndarray  #: whether the rotation of each node is known, (n,) bool
+    of_interface: dict[str, int]  #: row of the node at the reference point of each interface
     words: tuple[str, ...] = ()  #: notes about the origin of the numbers
 
     def notes(self) -> tuple[str, ...]:
-        """Return 'interface left: node 17' for each interface, and the unknown data of other nodes."""
+        """Return 'interface left: node 17' for each interface, and a note about nodes with unknown rotations."""
         at = (f"interface {name}: node {self.numbers[row]}" for name, row in self.of_interface.items())
         found = (*self.words, *at)
         unknown = int((~self.has_rotation).sum())
@@ -94,7 +94,7 @@ def all_nodes(body: ReducedBody) -> NodeList:
 
 
 def user_numbers(body: ReducedBody, n_more: int = 0, *, most: int = MOST) -> tuple[IntArray, tuple[str, ...]]:
-    """Return numbers of the kept nodes and of n_more points after them, and notes about their origin.
+    """Return numbers for the kept nodes and for n_more further points, and notes about their origin.
 
     These are the user's numbers if each kept node has its own; nodes without one (reference points) follow the largest.
     Otherwise the numbers are 1, 2, ..., and a note says so.
@@ -123,7 +123,7 @@ def user_numbers(body: ReducedBody, n_more: int = 0, *, most: int = MOST) -> tup
 
 
 def reference_row(body: ReducedBody, k: int) -> int | None:
-    """Return the kept node at the reference point of an interface that moves exactly with it; None if there is none."""
+    """Return the row of a kept node that moves as the reference point of an interface; None if there is none."""
     interface = body.interfaces[k]
     if interface.kind == "nodes" and not (len(interface.members) == 1 and interface.has_rotation):
         return None

@@ -14,7 +14,7 @@ from fe_models.foundation.arrays import Array
 __all__ = ["CONTENT", "Request", "Writer", "WrittenFiles", "in_ascii", "left_out"]
 
 OWN_AXES = "axes of the interfaces that are rotated relative to those of the file"
-TURNED = 1e-12  #: difference of a direction cosine that is more than rounding
+TURNED = 1e-12  #: difference between direction cosines, above which it is more than rounding
 
 
 def is_turned(axes: Array) -> bool:
@@ -48,12 +48,12 @@ IN_ASCII = str.maketrans(
 
 @dataclass(frozen=True)
 class Request:
-    """What to write: a body in the requested units, the path, and the source of the body."""
+    """Export request: a body in the requested units, the path, and the source of the body."""
 
     body: ReducedBody
-    path: Path  #: requested file; further files use its stem
-    source: str = ""  #: the modal file, with its digest
-    nodes: str = "default"  #: "interfaces" or "all" of the kept nodes, in formats that allow a choice
+    path: Path  #: requested file; additional files use its stem
+    source: str = ""  #: name and digest of the modal file
+    nodes: str = "default"  #: "interfaces" or "all" kept nodes, in formats that allow a choice
     loads: Mapping[str, float] = field(default_factory=dict)  #: amplitudes of load cases that act permanently
 
     def header(self) -> tuple[str, ...]:
@@ -74,7 +74,7 @@ class Request:
 
 @dataclass(frozen=True)
 class WrittenFiles:
-    """Files as bytes, and notes about them."""
+    """Content of each file as bytes, and notes about the files."""
 
     files: Mapping[Path, bytes]
     notes: tuple[str, ...] = ()
@@ -82,24 +82,24 @@ class WrittenFiles:
 
 @dataclass(frozen=True)
 class Writer:
-    """One format: its function, and the data that it can hold."""
+    """Writer of one format: its function, and the data that the format can hold."""
 
     make: Callable[[Request], WrittenFiles]
-    holds: frozenset[str] = field(default_factory=frozenset)  #: keys of `CONTENT`
-    takes_held: bool = False  #: whether it can describe a body that is held to the ground
+    holds: frozenset[str] = field(default_factory=frozenset)  #: keys of `CONTENT` that the format can hold
+    takes_held: bool = False  #: whether the format can describe a body that is fixed to the ground
     takes_loads: bool = False  #: whether the file can hold constant loads
-    units: str = ""  #: the only unit system that its program accepts; empty: any
+    units: str = ""  #: the only unit system that the program accepts; empty: all systems
     needs: tuple[str, ...] = ()  #: data that a body must have: "nodes", "interfaces"
 
 
 def left_out(body: ReducedBody, holds: Iterable[str]) -> tuple[str, ...]:
-    """Describe the data of a body that a format with this content cannot hold."""
+    """Describe the data of a body that a format cannot hold, given the content that it can hold."""
     held = set(holds)
     return tuple(words for key, (words, has) in CONTENT.items() if key not in held and has(body))
 
 
 def in_ascii(text: str, longest: int = 200) -> str:
-    """Return a text as one line of ASCII, for programs that accept nothing else; letters lose their accents."""
+    """Return a text as one line of ASCII; letters lose their accents."""
     line = " ".join(text.split()).translate(IN_ASCII)
     line = "".join(letter for letter in normalize("NFKD", line) if not combining(letter)).translate(IN_ASCII)
     line = line.encode("ascii", "replace").decode("ascii")
@@ -110,5 +110,5 @@ def own_version() -> str:
     """Return the version of this project."""
     try:
         return metadata.version("floatframe")
-    except metadata.PackageNotFoundError:  # a checkout that is not installed
+    except metadata.PackageNotFoundError:  # the program runs from a checkout that is not installed
         return "(not installed)"

@@ -1,1 +1,1 @@
-"""Bodies reduced by another program, as our reduced bodies; data that they lack are marked as missing."""
+"""Conversion of bodies reduced by another program; data that they lack are marked as missing."""

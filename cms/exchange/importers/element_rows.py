@@ -1,4 +1,4 @@
-"""Forces and stresses of elements in the rows of a superelement from another program, with our names.
+"""Rows for element forces and stresses of a superelement from another program, with names of this project.
 
 Nastran numbers the items of an element force or stress by its output record, in whose order they stand below. Types
 that are not here have a record of several places (beams with stations, shells with corners), or one item that is a
@@ -26,7 +26,7 @@ SHELL = (
     *((name, PER_LENGTH) for name in ("Qx", "Qy")),
 )
 ROD = (("N", FORCE), ("T", MOMENT))
-SCALAR = (11, 12, 13, 14, 20, 21, 22, 23)  #: springs and dampers of one item
+SCALAR = (11, 12, 13, 14, 20, 21, 22, 23)  #: types of springs and dampers that have one item
 TYPE_NAMES = {
     1: "CROD", 2: "CBEAM", 3: "CTUBE", 4: "CSHEAR", 10: "CONROD", 11: "CELAS1", 12: "CELAS2", 13: "CELAS3",
     14: "CELAS4", 20: "CDAMP1", 21: "CDAMP2", 22: "CDAMP3", 23: "CDAMP4", 24: "CVISC", 33: "CQUAD4", 34: "CBAR",
@@ -60,7 +60,7 @@ FORCE_ITEMS: Mapping[int, tuple[tuple[str, Dimensions], ...]] = {
     ),
     74: SHELL,
     102: (*((name, FORCE) for name in ("fx", "fy", "fz")), *((name, MOMENT) for name in ("mx", "my", "mz"))),
-}  #: items of element forces by type, in Nastran's order and signs
+}  #: items of element forces by element type, in the order and with the signs of Nastran
 
 
 @frozen_copies
@@ -69,8 +69,8 @@ class ForeignRows:
     """Named rows over the dofs of a superelement."""
 
     names: tuple[RowName, ...]
-    matrix: Array  #: (n_rows, n_dof)
-    about: str = ""  #: data that must be known of them, for messages
+    matrix: Array  #: factors of the dofs, (n_rows, n_dof)
+    about: str = ""  #: data that are needed to use the rows, for messages
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "matrix", frozen(self.matrix))
@@ -114,7 +114,7 @@ def force_rows(elements: IntArray, matrix: Array) -> tuple[ForeignRows, tuple[st
 
 
 def why_lost(kind: int) -> str:
-    """Return why the rows of a type are not taken."""
+    """Return why the rows of an element type are omitted."""
     if kind in SCALAR:
         return "each is a force or a moment, and the file does not say which"
     return "the order of their forces and moments is not known"
@@ -130,7 +130,7 @@ def stress_rows(elements: IntArray, matrix: Array) -> ForeignRows:
 
 
 def motion_rows(dofs: IntArray, matrix: Array) -> ForeignRows:
-    """Return displacements of nodes, (node number, component 0-5) of each row, (n_rows, 2), basic axes."""
+    """Return displacement rows of nodes in basic axes, from (node number, component 0-5) of each row, (n_rows, 2)."""
     words = ("ux", "uy", "uz", "rx", "ry", "rz")
     names = tuple(
         RowName("displacement", "node", number, str(number), words[c], Dimensions(0, 0 if c >= 3 else 1, 0))

@@ -27,18 +27,19 @@ __all__ = [
     "moments_of_masses",
 ]  # fmt: skip
 
-EXACT = 1e-6  #: difference of the quantities that both routes give, relative to their size, up to which they agree
+EXACT = 1e-6  #: relative difference between quantities from two routes, up to which they agree
 #: the same, beyond which these are two bodies; lumping moves the second moment of a coarse mesh by some per cent
 OTHER_BODY = {"mass": 0.02, "first moment": 0.1, "second moment": 0.1}
 
-Shapes = Callable[[IntArray], Array]  #: (node number, component) rows -> shapes in basic axes, (n_rows, n_q)
+#: function from (node number, component) rows to shapes in basic axes, (n_rows, n_q)
+Shapes = Callable[[IntArray], Array]
 
 
 @presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class FullMass:
-    """The mass matrix of the full model, over dofs that the superelement recovers.
+    """Mass matrix of the full model, over dofs that the superelement can recover.
 
     Parameters
     ----------
@@ -59,7 +60,7 @@ class FullMass:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class NodalMasses:
-    """Point masses at nodes that the superelement recovers, such as its lumped mass.
+    """Point masses at nodes that the superelement can recover, such as a lumped mass matrix.
 
     Parameters
     ----------
@@ -77,7 +78,7 @@ class NodalMasses:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class MeshMass:
-    """The mesh behind the superelement, whose node numbers it recovers, and its density.
+    """Mesh of the original model and its density; the superelement can recover its nodes.
 
     Parameters
     ----------
@@ -95,7 +96,7 @@ Inertia = FullMass | NodalMasses | MeshMass
 
 
 def full_mass_of(foreign: ForeignMatrices) -> FullMass:
-    """Return the full mass of matrices as they were read.
+    """Return the full mass matrix from imported matrices.
 
     Raises
     ------
@@ -114,7 +115,7 @@ def full_mass_of(foreign: ForeignMatrices) -> FullMass:
 def moments_of_masses(
     inertia: Inertia, shapes: Shapes, places: Mapping[int, Array], units: Units, frame: BodyFrame
 ) -> tuple[Moments, str]:
-    """Return all moments of the shapes from the given masses, and a description of these.
+    """Return all moments of the shapes from the given masses, and a description of these masses.
 
     Parameters
     ----------
@@ -157,7 +158,7 @@ def translations_of(numbers: IntArray) -> IntArray:
 def gram_of_full_mass(
     inertia: FullMass, shapes: Shapes, places: Mapping[int, Array], units: Units
 ) -> tuple[Array, bool]:
-    """Return the Gram matrix ∫ a aᵀ of a full mass matrix, in basic axes, and whether it is exact (M is M_s ⊗ 1)."""
+    """Return the Gram matrix ∫ a aᵀ from a full mass matrix, in basic axes, and whether it is exact (M is M_s ⊗ 1)."""
     numbers = np.unique(inertia.dofs[:, 0])
     lost = [int(number) for number in numbers if int(number) not in inertia.places and int(number) not in places]
     if lost:
@@ -173,7 +174,7 @@ def gram_of_full_mass(
 
 
 def gram_of_mesh(inertia: MeshMass, shapes: Shapes, places: Mapping[int, Array], units: Units) -> Array:
-    """Return the Gram matrix ∫ a aᵀ of the elements of a mesh, in basic axes."""
+    """Return the Gram matrix ∫ a aᵀ from the elements of a mesh, in basic axes."""
     mesh = inertia.mesh
     numbers = mesh.node_numbers if len(mesh.node_numbers) else np.arange(len(mesh.nodes))
     common = [k for k, number in enumerate(numbers) if int(number) in places]
@@ -196,7 +197,7 @@ def gram_of_mesh(inertia: MeshMass, shapes: Shapes, places: Mapping[int, Array],
 
 
 def moments_in_frame(gram: Array, frame: BodyFrame, missing: tuple[str, ...] = ()) -> Moments:
-    """Return the moments in B of a Gram matrix ∫ a aᵀ in basic axes about their origin: c_B = axesᵀ (c - origin)."""
+    """Return the moments in B from a Gram matrix ∫ a aᵀ in basic axes about their origin: c_B = axesᵀ (c - origin)."""
     n = (len(gram) - 4) // 3
     L = np.zeros((4 + 3 * n, 4 + 3 * n))
     L[0, 0] = 1.0
@@ -206,9 +207,9 @@ def moments_in_frame(gram: Array, frame: BodyFrame, missing: tuple[str, ...] = (
 
 
 def completed(known: Moments, other: Moments, what: str) -> tuple[Moments, str]:
-    """Return moments with the missing parts from another route, and a description of differences in known parts.
+    """Complete moments with terms from another route, and describe differences in terms that both routes give.
 
-    What a reduced mass matrix says stays as it says it: m, S, R, 1C, 2C, M*.
+    The values from the reduced mass matrix do not change: m, S, R, 1C, 2C, M*.
 
     Raises
     ------

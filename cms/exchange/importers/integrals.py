@@ -1,4 +1,4 @@
-"""Moments of a body from the invariants that other programs write: P from 3C, S_kl from 4C and 5C (theory.md §5)."""
+"""Moments of a body from the invariants in files of other programs: P from 3C, S_kl from 4C and 5C (theory.md §5)."""
 
 import numpy as np
 
@@ -9,8 +9,8 @@ from fe_models.foundation.arrays import Array
 __all__ = ["moments_of_invariants"]
 
 EPSILON = np.cross(np.eye(3)[:, None], np.eye(3)[None])  #: (a × b)_c = EPSILON_abc a_a b_b, (3, 3, 3)
-CONSISTENT = 1e-6  #: difference of two statements of one invariant, of its size, that is digits of a file
-ROUGH = 0.1  #: the same difference, up to which the moment of the mass matrix is used, with a note
+CONSISTENT = 1e-6  #: relative difference between two values of one invariant, up to which it is rounding in the file
+ROUGH = 0.1  #: the same difference, up to which the moment of the mass matrix is used and a note is written
 
 
 def moments_of_invariants(
@@ -26,7 +26,7 @@ def moments_of_invariants(
     C4: Array | None = None,
     C5: Array | None = None,
 ) -> tuple[Moments, tuple[str, ...]]:
-    """Return the moments in a file, and notes on data that it contains twice.
+    """Return the moments in a file, and notes on data that the file contains twice.
 
     (1) R = ½ tr(J0) 1 - J0
     (2) P_k = ½ tr(3C_k) 1 - 3C_kᵀ, its antisymmetric part by 2C
@@ -56,13 +56,13 @@ def moments_of_invariants(
         if value is not None and value.shape != shape:
             raise ForeignBodyError(f"{where}: {name}: expected shape {shape}, got {value.shape}")
     P = np.einsum("abc,ck->abk", EPSILON, C2) / 2
-    if C3 is not None:  # (2)
+    if C3 is not None:  # step (2)
         trace = np.trace(C3, axis1=1, axis2=2) / 2
         whole = np.moveaxis(trace[:, None, None] * np.eye(3) - C3.transpose(0, 2, 1), 0, 2)
         turning = (whole - whole.swapaxes(0, 1)) / 2
         compare(where, notes, "2C and the antisymmetric part of 3C", turning, P, np.abs(whole).max(initial=0.0))
         P = P + (whole + whole.swapaxes(0, 1)) / 2
-    S_kl = np.einsum("ab,kl->abkl", np.eye(3), M) / 3  # (3)
+    S_kl = np.einsum("ab,kl->abkl", np.eye(3), M) / 3  # step (3)
     size = np.abs(M).max(initial=0.0)
     if C4 is not None:
         S_kl -= np.einsum("abc,klc->abkl", EPSILON, C4) / 2
@@ -83,12 +83,12 @@ def moments_of_invariants(
 
 
 def symmetric(S_kl: Array) -> Array:
-    """Return S_ab,kl with S_ba,lk = S_ab,kl, which holds but for the digits of a file."""
+    """Return S_kl symmetrised to S_ba,lk = S_ab,kl, which holds up to rounding in the file."""
     return np.asarray((S_kl + S_kl.transpose(1, 0, 3, 2)) / 2)
 
 
 def compare(where: str, notes: list[str], what: str, found: Array, expected: Array, size: float) -> None:
-    """Add a note where two statements differ by more than digits; `ForeignBodyError` where by more than lumping."""
+    """Compare two values: note differences beyond rounding, raise `ForeignBodyError` if beyond effects of lumping."""
     defect = float(np.abs(found - expected).max(initial=0.0))
     if not defect <= ROUGH * size:
         raise ForeignBodyError(

@@ -1,4 +1,4 @@
-"""A body of a floating frame as other multibody programs write it: modes, matrices, integrals, motion of its nodes."""
+"""Floating-frame body in the form of other multibody programs: modes, matrices, integrals, nodal motion."""
 
 import logging
 from collections.abc import Mapping, Sequence
@@ -36,13 +36,13 @@ __all__ = ["ForeignInterface", "ModalBody", "body_of_modes"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ForeignInterface:
-    """A named place of a foreign body: its nodes, and its motion if the file has it."""
+    """Interface of a foreign body: its nodes, and its motion if the file contains it."""
 
     name: str
-    nodes: IntArray  #: numbers of its nodes, (n,)
-    position: Array | None = None  #: in B, (3,)
-    triad: Array = field(default_factory=lambda: np.eye(3))  #: columns: its axes in B, (3, 3)
-    Psi: Array | None = None  #: translation and rotation for each mode in B, (6, n_q); None: from its nodes
+    nodes: IntArray  #: node numbers, (n,)
+    position: Array | None = None  #: position in B, (3,)
+    triad: Array = field(default_factory=lambda: np.eye(3))  #: axes in B as columns, (3, 3)
+    Psi: Array | None = None  #: translation and rotation in each mode in B, (6, n_q); None: computed from its nodes
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "nodes", frozen(self.nodes, np.int64))
@@ -52,7 +52,7 @@ class ForeignInterface:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError, misfit=ForeignBodyError)
 class ModalBody:
-    """Matrices and integrals over the modes of a foreign body in its own frame B, numbers as its file has them.
+    """Matrices and integrals over the modes of a foreign body in its own frame B, in the units of the file.
 
     Raises
     ------
@@ -64,19 +64,20 @@ class ModalBody:
     M: Annotated[Array, ArrayShape(("n_q", "n_q"))]  #: modal mass
     K: Annotated[Array, ArrayShape(("n_q", "n_q"))]  #: modal stiffness
     D: Annotated[Array | None, ArrayShape(("n_q", "n_q"))]  #: modal damping
-    moments: Moments  #: in B
+    moments: Moments  #: inertia moments in B
     node_numbers: Annotated[IntArray, ArrayShape(("n_nodes",))]
-    nodes: Annotated[Array, ArrayShape(("n_nodes", 3))]  #: undeformed places in B
-    Phi: Annotated[Array, ArrayShape(("n_nodes", 3, "n_q"))]  #: translations of the nodes for each mode
-    #: rotations of the nodes for each mode; None: unknown
+    nodes: Annotated[Array, ArrayShape(("n_nodes", 3))]  #: undeformed node positions in B
+    Phi: Annotated[Array, ArrayShape(("n_nodes", 3, "n_q"))]  #: translations of the nodes in each mode
+    #: rotations of the nodes in each mode; None: unknown
     rotations: Annotated[Array | None, ArrayShape(("n_nodes", 3, "n_q"))] = None
-    #: xx yy zz yz xz xy at the nodes for each mode
+    #: stress xx yy zz yz xz xy at the nodes in each mode
     stress: Annotated[Array | None, ArrayShape(("n_nodes", 6, "n_q"))] = None
-    #: triangles of rows of `nodes`
+    #: triangles as indices of `nodes`
     surface: Annotated[IntArray, ArrayShape((None, 3))] = field(default_factory=lambda: np.zeros((0, 3), np.int64))
-    interfaces: tuple[ForeignInterface, ...] = ()  #: those named in the file
+    interfaces: tuple[ForeignInterface, ...] = ()  #: interfaces named in the file
     load_cases: tuple[ReducedLoadCase, ...] = ()
-    geometric: GeometricStiffness | None = None  #: in mean axes; its interfaces are the nodes, in their order
+    #: geometric stiffness in mean axes; its interfaces are the nodes, in their order
+    geometric: GeometricStiffness | None = None
     program: str = ""
     provenance: Mapping[str, str] = field(default_factory=dict)
 
@@ -117,14 +118,14 @@ class ModalBody:
 
 log = logging.getLogger(__name__)
 
-ONE_BODY = 1e-4  #: difference of M* of the integrals from the modal mass, of its largest entry, that is a wrong order
-MEAN_AXES = 1e-8  #: momentum of a mode, relative to the largest possible for its mass, that is rounding of the file
-NO_ENERGY = 1e-13  #: squared frequency of a mode relative to the largest, up to which it is zero
-FEW = 12  #: nodes with rotations that are interfaces each, where nobody names any
+ONE_BODY = 1e-4  #: difference between M* and modal mass over the largest entry, above which the mode order is wrong
+MEAN_AXES = 1e-8  #: momentum of a mode over the largest possible for its mass, below which it is rounding in the file
+NO_ENERGY = 1e-13  #: squared frequency of a mode over the largest one, up to which it counts as zero
+FEW = 12  #: largest number of nodes with rotations that become interfaces if none are named
 
 
 def body_of_modes(body: ModalBody, options: ImportOptions) -> ReducedBody:
-    """Return a foreign modal body as ours.
+    """Convert a foreign modal body.
 
     (1) the integrals and the modal mass are of one body: M* = M
     (2) K z = omega² M z: M-orthonormal, K-diagonal modes; none of them a rigid-body motion
@@ -208,7 +209,7 @@ def body_of_modes(body: ModalBody, options: ImportOptions) -> ReducedBody:
 
 
 def require_plausible(where: str, reduced: ReducedBody, accept: tuple[str, ...]) -> None:
-    """Raise `ForeignBodyError` if no body in these units has such a size, density or first frequency."""
+    """Raise `ForeignBodyError` if size, density or first frequency is implausible in these units."""
     for is_error, text in unit_findings(reduced):
         if is_error and "units" not in accept:
             raise ForeignBodyError(f'{where}: {text}; name the units of the file, or accept = ["units"] if it is meant')
@@ -259,7 +260,7 @@ def require_one_body(where: str, body: ModalBody) -> None:
 
 
 def momentum_of(moments: Moments) -> float:
-    """Return the largest momentum of a mode relative to the largest possible for its mass; modes have unit mass."""
+    """Return the largest ratio of the momentum of a mode to its upper bound; modes have unit mass."""
     c = moments.center_of_mass
     inertia = np.trace(moments.J0) - 2 * moments.m * float(c @ c)
     angular = moments.C2 - np.cross(c, moments.C1, axis=0)
@@ -276,7 +277,7 @@ def changed(moments: Moments, Z: Array) -> Moments:
 
 
 def interfaces_of(where: str, body: ModalBody, options: ImportOptions) -> Sequence[ForeignInterface]:
-    """Return the interfaces: as requested, as named in the file, or each of a few nodes with rotations."""
+    """Return the interfaces: as requested, as named in the file, or one for each of a few nodes with rotations."""
     if options.interfaces is not None:
         wanted: Mapping[str, Sequence[int]] = options.interfaces
         return [ForeignInterface(name, np.array(numbers, dtype=np.int64)) for name, numbers in wanted.items()]
@@ -291,7 +292,7 @@ def interfaces_of(where: str, body: ModalBody, options: ImportOptions) -> Sequen
 def reduced_interface(
     where: str, body: ModalBody, interface: ForeignInterface, Z: Array, places: Mapping[int, int]
 ) -> ReducedInterface:
-    """Return an interface with the motion in the file, of a node with rotations, or the mean of several nodes."""
+    """Return an interface with its motion from the file, from a node with rotations, or as mean of several nodes."""
     unknown = [int(number) for number in interface.nodes if int(number) not in places]
     if unknown or (not len(interface.nodes) and interface.Psi is None):
         raise ForeignBodyError(
@@ -324,7 +325,7 @@ def reduced_interface(
 
 
 def label_of(names: tuple[str, ...], share: Array) -> str:
-    """Describe the one or two modes of the file that contribute most of a mode's energy."""
+    """Name the one or two modes of the file with the largest energy shares in a mode."""
     order = np.argsort(share)[::-1]
     parts = [order[0]] if share[order[0]] > 0.9 or len(order) < 2 else order[:2]
     return ", ".join(f"{names[k]} ({100 * share[k]:.0f} %)" for k in parts)

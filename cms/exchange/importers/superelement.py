@@ -1,4 +1,4 @@
-"""A superelement of another program: K and M over boundary dofs and modal coordinates, rigid motion inside."""
+"""Superelement of another program: K and M over boundary dofs and modal coordinates, including rigid motion."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,17 +13,17 @@ from fe_models.foundation.records import FrozenMapping, frozen_copies
 
 __all__ = ["RecoveryRows", "Superelement", "superelement_of_matrices"]
 
-LARGEST = 20_000  #: rows of dense matrices that are taken: 3 GB each
-TRIANGLE = 1e-8  #: |A - Aᵀ| over |A| that is rounding
+LARGEST = 20_000  #: largest number of rows of a dense matrix (3 GB each)
+TRIANGLE = 1e-8  #: |A - Aᵀ| over |A| up to which it is rounding
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class RecoveryRows:
-    """Displacement of further nodes by the rows of a superelement: u = matrix @ x."""
+    """Rows that give the displacement of additional nodes from the dofs x of a superelement: u = matrix @ x."""
 
-    dofs: IntArray  #: (node number, component 0-5) of every row, basic axes, (n_rows, 2)
-    matrix: Array  #: (n_rows, n_dof)
+    dofs: IntArray  #: (node number, component 0-5) of each row, basic axes, (n_rows, 2)
+    matrix: Array  #: factors of x, (n_rows, n_dof)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "dofs", frozen(self.dofs, np.int64))
@@ -46,16 +46,16 @@ class Superelement:
     """
 
     name: str
-    K: Array  #: (n_dof, n_dof)
-    M: Array  #: (n_dof, n_dof)
-    dofs: IntArray  #: (node number, component 0-5) of every row; `SCALAR` as component: a modal coordinate, (n_dof, 2)
-    node_numbers: IntArray  #: of `nodes`, (n_nodes,)
-    nodes: Array  #: places in basic axes, (n_nodes, 3)
+    K: Array  #: stiffness, (n_dof, n_dof)
+    M: Array  #: mass, (n_dof, n_dof)
+    dofs: IntArray  #: (node number, component 0-5) of each dof; component `SCALAR` is a modal coordinate, (n_dof, 2)
+    node_numbers: IntArray  #: numbers of `nodes`, (n_nodes,)
+    nodes: Array  #: node positions in basic axes, (n_nodes, 3)
     D: Array | None = None  #: viscous damping, (n_dof, n_dof)
     recovery: RecoveryRows | None = None
-    tables: Mapping[str, ForeignRows] = field(default_factory=dict)  #: further rows by name: forces, stresses
-    loads: Mapping[str, Array] = field(default_factory=dict)  #: name -> forces over the rows, (n_dof,)
-    program: str = ""  #: that wrote the files
+    tables: Mapping[str, ForeignRows] = field(default_factory=dict)  #: additional rows by name: forces, stresses
+    loads: Mapping[str, Array] = field(default_factory=dict)  #: forces of each named load on the dofs, (n_dof,)
+    program: str = ""  #: program that wrote the files
     provenance: Mapping[str, str] = field(default_factory=dict)  #: files, digests, assumptions
 
     def __post_init__(self) -> None:
@@ -106,17 +106,17 @@ class Superelement:
 
     @property
     def is_modal(self) -> np.ndarray:
-        """Which rows are modal coordinates, (n_dof,) bool."""
+        """Whether each row is a modal coordinate, (n_dof,) bool."""
         return np.asarray(self.dofs[:, 1] == SCALAR)
 
     def places(self, numbers: IntArray) -> IntArray:
-        """Return the rows of `nodes` that have these numbers."""
+        """Return the rows of `nodes` with these numbers."""
         order = np.argsort(self.node_numbers)
         return np.asarray(order[np.searchsorted(self.node_numbers[order], numbers)])
 
 
 def checked_matrix(where: str, matrix: Array, n: int) -> Array:
-    """Return a matrix that is square, finite and symmetric to rounding, made symmetric; `ForeignBodyError` if not."""
+    """Return the symmetric part of a matrix; raise `ForeignBodyError` unless it is square, finite and symmetric."""
     if matrix.shape != (n, n):
         raise ForeignBodyError(f"{where}: expected ({n}, {n}), as many rows as dofs, got {matrix.shape}")
     if not np.isfinite(matrix).all():
@@ -146,7 +146,7 @@ def listed(numbers: IntArray, most: int = 6) -> str:
 def superelement_of_matrices(
     foreign: ForeignMatrices, name: str, places: Mapping[int, Array] | None = None
 ) -> Superelement:
-    """Return the superelement of matrices as they were read: rows without place are modal coordinates.
+    """Return the superelement of imported matrices: rows without node position are modal coordinates.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A superelement becomes a reduced body: interfaces of its boundary nodes, rigid motion taken out, modes diagonal."""
+"""Conversion of a superelement to a reduced body: interfaces, removal of rigid motion, diagonal modes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -33,23 +33,25 @@ from fe_models.meshes.numbering import Numbering
 
 __all__ = ["ImportOptions", "body_of_superelement", "fe_body_of_superelement"]
 
-RIGID = 1e-5  #: of the size of a motion: by how much recovered nodes may miss a rigid motion, digits of a file
-UNCOUPLED = 1e-9  #: coupling of modal coordinates and boundary in K, scaled, that is rounding
-ROUNDING = 1e-13  #: stiffness of a boundary dof over the largest entry, that is rounding
+#: largest error of recovered nodes in a rigid motion, over the size of the motion, due to digits of the file
+RIGID = 1e-5
+UNCOUPLED = 1e-9  #: scaled coupling between modal coordinates and boundary in K, below which it is rounding
+ROUNDING = 1e-13  #: stiffness of a boundary dof over the largest entry, below which it is rounding
 COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz")
 
 
 @dataclass(frozen=True, eq=False)
 class ImportOptions:
-    """Data that the files of another program lack, and the requested properties of the body."""
+    """Data that the files of another program lack, and requested properties of the body."""
 
-    units: Units  #: of all numbers of the files
-    interfaces: Mapping[str, Sequence[int]] | None = None  #: name -> boundary nodes; None: each node with six dofs
+    units: Units  #: units of all numbers in the files
+    #: boundary nodes of each interface; None: one interface for each node with six dofs
+    interfaces: Mapping[str, Sequence[int]] | None = None
     inertia: Inertia | None = None  #: inertia that the reduced mass lacks; None: it remains missing
-    frame: Frame | None = None  #: Tisserand by default
-    damping: Damping | None = None  #: in addition to that of the files
+    frame: Frame | None = None  #: body frame; None: Tisserand
+    damping: Damping | None = None  #: damping added to that of the files
     repair_mass: bool = False  #: set slightly negative eigenvalues of the mass to zero
-    accept: tuple[str, ...] = ()  #: findings that are accepted, such as "units"
+    accept: tuple[str, ...] = ()  #: findings that the user accepts, such as "units"
 
 
 def body_of_superelement(element: Superelement, options: ImportOptions) -> ReducedBody:
@@ -67,7 +69,7 @@ def body_of_superelement(element: Superelement, options: ImportOptions) -> Reduc
     BodyError
         If it is held, a mechanism, or its mass is indefinite.
     """
-    body = fe_body_of_superelement(element, options)  # (1)
+    body = fe_body_of_superelement(element, options)  # step (1)
     require_freedom(body, held=False)  # (2)
     require_units(body, accept=options.accept)
     if options.repair_mass:
@@ -75,7 +77,7 @@ def body_of_superelement(element: Superelement, options: ImportOptions) -> Reduc
     else:
         require_positive_mass(body)
     require_rigid_recovery(body, element)
-    modes = ModeSet(  # (3)
+    modes = ModeSet(  # step (3)
         "superelement",
         np.eye(body.n_dof),
         tuple(label_of(node, component, k) for k, (node, component) in enumerate(element.dofs)),
@@ -104,7 +106,7 @@ def body_of_superelement(element: Superelement, options: ImportOptions) -> Reduc
 
 
 def tables_of(element: Superelement, body: FEBody, Phi: Array, reduced: ReducedBody) -> dict[str, RecoveryTable]:
-    """Return the further rows of a superelement over z = (d, theta, q); they are in its span, so nothing is truncated.
+    """Return the additional rows of a superelement over z = (d, theta, q); they are exact in its span.
 
     The files say what x is there, x = T x' with x' the dofs of the body (`static_part`).
     """
@@ -164,7 +166,7 @@ def fe_body_of_superelement(element: Superelement, options: ImportOptions) -> FE
 
 
 def without_rounding(element: Superelement) -> Array:
-    """Return the stiffness with zeros in rows that are rounding alone, as of the one interface of a free body."""
+    """Return the stiffness with zero rows where it is only rounding, such as at the only interface of a free body."""
     K = np.array(element.K)
     length = float(np.linalg.norm(np.ptp(element.nodes, axis=0))) or 1.0
     size = np.where(element.dofs[:, 1] >= 3, length, 1.0)
@@ -175,7 +177,7 @@ def without_rounding(element: Superelement) -> Array:
 
 
 def static_part(element: Superelement, where: str) -> Array:
-    """Return T of x = T x', the identity where the stiffness does not couple modal coordinates to the boundary."""
+    """Return T in x = T x'; it is the identity if the stiffness does not couple modal coordinates to the boundary."""
     q = np.flatnonzero(element.is_modal)
     T = np.eye(len(element.dofs))
     if not len(q):
@@ -197,7 +199,7 @@ def static_part(element: Superelement, where: str) -> Array:
 
 
 def further_rows(element: Superelement, where: str) -> RecoveryRows:
-    """Return the recovery rows of dofs that are not boundary dofs; rows of boundary dofs must equal the dof itself."""
+    """Return the recovery rows of internal dofs; rows of boundary dofs must equal the dof itself."""
     recovery = element.recovery
     assert recovery is not None
     keys, own = pair_keys(recovery.dofs), pair_keys(element.dofs)
@@ -219,7 +221,7 @@ def further_rows(element: Superelement, where: str) -> RecoveryRows:
 
 
 def has_no_rotation(recovery: RecoveryRows) -> np.ndarray:
-    """Whether a row is a rotation of a node whose rotations are all zero: one of solid elements, held by its program.
+    """Return whether a row is a rotation of a node with zero rotations, such as a node of solid elements.
 
     A node that has rotations turns with a rigid motion of the boundary, so that none of its rows is zero.
     """
@@ -231,7 +233,7 @@ def has_no_rotation(recovery: RecoveryRows) -> np.ndarray:
 def interfaces_of(
     body: FEBody, element: Superelement, wanted: Mapping[str, Sequence[int]] | None
 ) -> tuple[Interface, ...]:
-    """Return the interfaces of boundary nodes, coupled.
+    """Return the interfaces of boundary nodes, already coupled.
 
     By default each node with six dofs is one, named "node 11", and nodes with translations are together one,
     "boundary". Each boundary dof has to be in one: what is in none could not be joined, nor be told from a mode.
@@ -271,7 +273,7 @@ def interfaces_of(
 
 
 def require_rigid_recovery(body: FEBody, element: Superelement) -> None:
-    """Raise `ForeignBodyError` unless recovered nodes follow a rigid motion of the boundary."""
+    """Raise `ForeignBodyError` unless recovered nodes move rigidly when the boundary moves rigidly."""
     assert body.recovery is not None
     center = body.nodes.mean(axis=0)
     length = body.length
@@ -291,12 +293,12 @@ def require_rigid_recovery(body: FEBody, element: Superelement) -> None:
 
 
 def known_moments(body: FEBody, Phi: Array, M: Array, frame: BodyFrame) -> Moments:
-    """Return the moments that follow from a reduced mass matrix: m, S, R, 1C, 2C and M*, in the frame B."""
+    """Return the moments in B that follow from a reduced mass matrix: m, S, R, 1C, 2C and M*."""
     axes = np.kron(np.eye(2), frame.axes)
     Psi_R = rigid_motion_of_dofs(body.nodes, body.dofs, frame.origin) @ axes
     M_Psi_R = body.M @ Psi_R
     rigid_mass = Psi_R.T @ M_Psi_R
-    J, lower = rigid_mass[3:, 3:], rigid_mass[:3, 3:]  # lower: -S~
+    J, lower = rigid_mass[3:, 3:], rigid_mass[:3, 3:]  # lower block: -S~
     S = np.array([lower[1, 2] - lower[2, 1], lower[2, 0] - lower[0, 2], lower[0, 1] - lower[1, 0]]) / 2
     Y = M_Psi_R.T @ Phi
     epsilon = np.cross(np.eye(3)[:, None], np.eye(3)[None])
@@ -313,14 +315,14 @@ def known_moments(body: FEBody, Phi: Array, M: Array, frame: BodyFrame) -> Momen
 
 @dataclass(frozen=True, eq=False)
 class RecoveredShapes:
-    """Shapes of a superelement at any dofs that it recovers, in basic axes."""
+    """Shapes of a superelement at all dofs that it can recover, in basic axes."""
 
     body: FEBody
     element: Superelement
-    Phi: Array  #: over the dofs of the body, without rigid motion, (n_dof, n_q)
+    Phi: Array  #: shapes over the dofs of the body, without rigid motion, (n_dof, n_q)
 
     def __call__(self, dofs: IntArray) -> Array:
-        """Return the rows of dofs (node number, component), (n, n_q); `ForeignBodyError` where one is not known."""
+        """Return the shapes at dofs (node number, component), (n, n_q); raise `ForeignBodyError` for unknown dofs."""
         assert self.body.recovery is not None
         known = self.body.recovery.dofs
         keys = pair_keys(np.stack([self.element.node_numbers[known[:, 0]], known[:, 1]], axis=1))
@@ -339,5 +341,5 @@ class RecoveredShapes:
 
 
 def label_of(node: int, component: int, k: int) -> str:
-    """Return the label of a row as a column of a mode set."""
+    """Return the label of a dof as a column of a mode set."""
     return f"boundary {node} {COMPONENTS[component]}" if component >= 0 else f"modal coordinate {k + 1}"

@@ -21,7 +21,7 @@ __all__ = ["is_ext_ptfm", "make_ext_ptfm", "read_ext_ptfm"]
 # OpenFAST's ExtPtfm: a superelement with one interface node and its fixed-interface modes (format FlexASCII).
 
 
-LAST_TIME = 10000.0  #: the loads are constant from zero to this time [s]
+LAST_TIME = 10000.0  #: end of the time range in which the loads are constant, from zero [s]
 
 
 def make_ext_ptfm(request: Request) -> WrittenFiles:
@@ -59,7 +59,7 @@ def make_ext_ptfm(request: Request) -> WrittenFiles:
 
 
 def load_of(model: InterfaceModel, wanted: Mapping[str, float]) -> Array:
-    """Return the sum of load cases, each times its amplitude, (n,)."""
+    """Return the sum of the load cases, each multiplied by its amplitude, (n,)."""
     f = np.zeros(len(model.K))
     names = [case.name for case in model.body.load_cases]
     for name, amplitude in wanted.items():
@@ -93,7 +93,7 @@ def lines_of(model: InterfaceModel, f: Array, request: Request) -> Iterator[str]
 
 
 def row_of(values: Array) -> str:
-    """Return numbers on one line, in full precision."""
+    """Return a line with numbers in full precision."""
     return " ".join(f"{value:24.16e}" for value in np.asarray(values).tolist())
 
 
@@ -106,12 +106,12 @@ MATRICES = {"M": "Mass", "K": "Stiffness", "D": "Damping"}
 
 
 def is_ext_ptfm(path: Path, head: bytes) -> bool:
-    """Whether a file is text of the format FlexASCII."""
+    """Return whether a file is text in the format FlexASCII."""
     return b"!Mass Matrix" in head or b"!Flex 5 format" in head
 
 
 def read_ext_ptfm(files: Sequence[Path], name: str, places: Mapping[int, Array]) -> Superelement:
-    """Read a superelement: six dofs of its interface node, number 1, then modes; loads that do not change as "static".
+    """Read a superelement: six dofs of interface node 1, then modes; constant loads form the load case "static".
 
     The place of the node is not in the file: it is that of node 1 in `places`, the origin where none is given.
 
@@ -153,7 +153,7 @@ def read_ext_ptfm(files: Sequence[Path], name: str, places: Mapping[int, Array])
 
 
 def matrix_after(path: Path, lines: list[str], word: str) -> Array | None:
-    """Return the matrix below its heading, None if it does not exist."""
+    """Return the matrix below its heading; None if the heading is missing."""
     starts = [k for k, line in enumerate(lines) if line.startswith(f"!{word} Matrix")]
     if not starts:
         return None
@@ -173,7 +173,7 @@ def matrix_after(path: Path, lines: list[str], word: str) -> Array | None:
 
 
 def static_load(path: Path, lines: list[str], n: int) -> tuple[dict[str, Array], list[str]]:
-    """Return the loads as a load case where they do not change with time, and a note where they do."""
+    """Return the loads as a load case if they are constant in time, otherwise a note."""
     starts = [k for k, line in enumerate(lines) if line.startswith("!Loading")]
     if not starts:
         return {}, []
@@ -188,7 +188,7 @@ def static_load(path: Path, lines: list[str], n: int) -> tuple[dict[str, Array],
 
 
 def numbers_of(path: Path, line: int, text: str) -> list[float]:
-    """Return the numbers of a line."""
+    """Return the numbers in a line."""
     try:
         return [float(word.replace("D", "E")) for word in text.split()]
     except ValueError as error:

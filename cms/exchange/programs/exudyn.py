@@ -24,8 +24,8 @@ __all__ = ["is_exudyn", "make_exudyn", "read_exudyn"]
 
 #: angular velocity in the script, relative to the lowest frequency; multiplied by 1, 2, 3 for the three axes
 SPEED = 0.05
-BENT = 0.01  #: initial displacement in the script, relative to the size of the body
-FILE_VERSION = 1  #: version of the archive, as exudyn 1.9 to 1.13 write it
+BENT = 0.01  #: initial displacement in the script over the size of the body
+FILE_VERSION = 1  #: version of the archive in exudyn 1.9 to 1.13
 
 
 def make_exudyn(request: Request) -> WrittenFiles:
@@ -53,7 +53,7 @@ def archive_of(body: ReducedBody) -> dict[str, Any]:
     if body.stress is not None:  # rows are nodes; columns are six components of the first mode, six of the second, ...
         rows = np.asarray(body.stress).transpose(0, 2, 1).reshape(len(body.nodes), 6 * n)
         stress = {"matrix": rows, "outputVariableType": "OutputVariableType.StressLocal"}
-    post = np.empty((), dtype=object)  # a dict, which exudyn extracts with .item()
+    post = np.empty((), dtype=object)  # exudyn extracts this dict with .item()
     post[()] = stress
     ours: dict[str, Any] = {
         "floatframe_damping": body.D,
@@ -101,12 +101,12 @@ def references(body: ReducedBody) -> list[int | None]:
 
 
 def side_by_side(matrices: Array) -> Array:
-    """Return matrices (n, 3, 3) side by side, (3, 3 n)."""
+    """Return matrices (n, 3, 3) as one matrix (3, 3 n), side by side."""
     return np.asarray(matrices).transpose(1, 0, 2).reshape(3, -1)
 
 
 def members_words(interface: Any) -> str:
-    """Describe the object to which the script attaches a marker of an interface."""
+    """Describe to which object the script attaches the marker of an interface."""
     return f"marker of {len(interface.members)} mesh nodes"
 
 
@@ -215,7 +215,7 @@ if __name__ == "__main__":
 
 
 def script_of(request: Request, archive: Path) -> str:
-    """Return the script."""
+    """Return the text of the script."""
     body = request.body
     names = [interface.name for interface in body.interfaces]
     slowest = body.frequencies[np.isfinite(body.frequencies) & (body.frequencies > 0)].min(initial=np.inf)
@@ -237,11 +237,11 @@ NEEDED = (
     "modeBasis", "massMatrixReduced", "stiffnessMatrixReduced", "xRef", "inertiaLocal", "totalMass", "chiU",
     "mPhitTPsi", "mXRefTildePsi", "mXRefTildePsiTilde", "mPsiTildePsi", "mPsiTildePsiTilde",
 )  # fmt: skip
-LARGEST = 1_000_000_000  #: bytes of an array that are taken
+LARGEST = 1_000_000_000  #: largest size of an array that is read [bytes]
 
 
 def is_exudyn(path: Path, head: bytes) -> bool:
-    """Whether a file is an archive with the arrays of a reduced body of Exudyn."""
+    """Return whether a file is an archive with the arrays of a reduced body of Exudyn."""
     if path.suffix.lower() != ".npz" or not zipfile.is_zipfile(path):
         return False
     with zipfile.ZipFile(path) as archive:
@@ -249,7 +249,7 @@ def is_exudyn(path: Path, head: bytes) -> bool:
 
 
 def read_exudyn(files: Sequence[Path], name: str, places: Mapping[int, Array]) -> ModalBody:
-    """Read a reduced body of Exudyn; nodes are numbered from 0, as there. Pickled objects are never opened.
+    """Read a reduced body of Exudyn; node numbers begin at 0 as in Exudyn. Pickled objects are never opened.
 
     mPhitTPsi = 1C, mXRefTildePsi = -2C, mXRefTildePsiTilde = [3C_k], mPsiTildePsi = 4C, mPsiTildePsiTilde = 5C
 

@@ -21,10 +21,10 @@ __all__ = ["make_abaqus", "make_mat5", "make_mat73", "make_matrix_market", "make
 # Abaqus: a superelement as a linear user element, the text form of substructures --------------------------------------
 
 
-FIRST_MODE = 1000001  #: number of the node whose dof 1 is the first mode
+FIRST_MODE = 1000001  #: number of the node whose dof 1 is the coordinate of the first mode
 #: distance between a kept node and a boundary node, relative to the body size, below which they coincide
 SAME_PLACE = 1e-9
-PER_LINE = 4  #: matrix entries per line
+PER_LINE = 4  #: number of matrix entries per line
 
 
 def make_abaqus(request: Request) -> WrittenFiles:
@@ -44,7 +44,7 @@ def make_abaqus(request: Request) -> WrittenFiles:
 
 
 def in_mesh(body: ReducedBody, node: BoundaryNode) -> str:
-    """Return text with the node of the user's mesh at a boundary node: a member of its interface, if there is one."""
+    """Return a text that names the mesh node at a boundary node: a member of its interface, if there is one."""
     interface = next(each for each in body.interfaces if each.name == node.interface)
     place = body.frame.axes.T @ (node.position - body.frame.origin)
     members = interface.members
@@ -57,7 +57,7 @@ def in_mesh(body: ReducedBody, node: BoundaryNode) -> str:
 
 
 def lines_of(model: InterfaceModel) -> Iterator[str]:
-    """Yield the deck after its comments."""
+    """Yield the lines of the deck after its comments."""
     numbers = [k + 1 for k in range(len(model.nodes))] + [FIRST_MODE + k for k in range(model.n_modes)]
     components = [[int(c) + 1 for c in node.components] for node in model.nodes] + [[1]] * model.n_modes
     places = [node.position for node in model.nodes] + [np.zeros(3)] * model.n_modes
@@ -69,7 +69,7 @@ def lines_of(model: InterfaceModel) -> Iterator[str]:
     for first in range(0, len(numbers), 10):
         yield "** " + ", ".join(str(number) for number in numbers[first : first + 10])
     for k, own in enumerate(components):
-        if k == 0 or own != components[k - 1]:  # a line holds for its node and all following nodes
+        if k == 0 or own != components[k - 1]:  # the line applies to its node and all following nodes
             yield ", ".join(str(word) for word in (own if k == 0 else [k + 1, *own]))
     for kind, matrix in {"STIFFNESS": model.K, "MASS": model.M, "VISCOUS DAMPING": model.D}.items():
         if np.any(matrix):
@@ -83,7 +83,7 @@ def lines_of(model: InterfaceModel) -> Iterator[str]:
 
 
 def triangle(matrix: Array) -> Iterator[str]:
-    """Yield the upper triangle column by column, in full precision."""
+    """Yield the entries of the upper triangle column by column, in full precision."""
     entries = matrix.T[np.tril_indices(len(matrix))].tolist()
     for first in range(0, len(entries), PER_LINE):
         yield ", ".join(f"{value:.16e}" for value in entries[first : first + PER_LINE])
@@ -96,8 +96,8 @@ def triangle(matrix: Array) -> Iterator[str]:
 # MATLAB: matrices of a body over its interfaces in .mat files of version 5 or 7.3, and Simscape's flexible solid.
 
 
-TEXT_OF_HEADER = 116  #: bytes of text at the beginning of every .mat file
-USER_BLOCK = 512  #: bytes before HDF5 in version 7.3, which hold the header
+TEXT_OF_HEADER = 116  #: length of the text at the start of every .mat file [bytes]
+USER_BLOCK = 512  #: length of the header block before HDF5 in version 7.3 [bytes]
 
 
 def make_mat5(request: Request) -> WrittenFiles:
@@ -159,7 +159,7 @@ def variables(model: InterfaceModel, request: Request) -> dict[str, Any]:
 
 
 def notes_of(model: InterfaceModel) -> tuple[str, ...]:
-    """Return a description of the rows."""
+    """Return the description of the matrix rows."""
     found = [
         f"interface {node.interface}: rows {node.first + 1} to {node.first + len(node.components)}"
         for node in model.nodes
@@ -177,7 +177,7 @@ def rows_of_text(lines: Any) -> np.ndarray:
 
 
 def mat5(values: Mapping[str, Any], request: Request) -> bytes:
-    """Return the file; its header has no date, so that equal bodies give equal bytes."""
+    """Return the file; its header has no date, so that equal bodies give identical files."""
     from scipy.io import savemat
 
     image = io.BytesIO()
@@ -234,7 +234,7 @@ def make_matrix_market(request: Request) -> WrittenFiles:
 
 
 def text_of(matrix: Array, comment: str, symmetry: str) -> bytes:
-    """Return a file in coordinate format, in full precision."""
+    """Return a matrix as text in coordinate format, in full precision."""
     from scipy.io import mmwrite
 
     image = io.BytesIO()

@@ -103,7 +103,7 @@ def lines_of(body: ReducedBody, nodes: NodeList, header: Iterable[str]) -> Itera
 
 
 def stiffening_records(body: ReducedBody) -> Array:
-    """Return the matrices of record group 19 in their order, (12 + 6 n_interfaces, n_q, n_q)."""
+    """Return the matrices of record group 19, in its order, (12 + 6 n_interfaces, n_q, n_q)."""
     assert body.geometric is not None
     twice = np.array([1.0, 1, 1, 2, 2, 2])[:, None, None]
     K = body.geometric
@@ -118,7 +118,7 @@ def group(number: int, name: str) -> Iterator[str]:
 
 
 def rows(matrix: Array) -> Iterator[str]:
-    """Yield the rows of a matrix in full precision."""
+    """Yield the rows of a matrix as text in full precision."""
     for row in np.asarray(matrix).tolist():
         yield " ".join(f"{value:.17e}" for value in row)
 
@@ -130,7 +130,7 @@ GROUP = re.compile(r"\*\*\s*RECORD GROUP\s+(\d+)", re.IGNORECASE)
 
 
 def is_mbdyn(path: Path, head: bytes) -> bool:
-    """Whether a file is text with the record groups of MBDyn."""
+    """Return whether a file is text with the record groups of MBDyn."""
     return path.suffix.lower() == ".fem" and GROUP.search(head.decode("ascii", "replace")) is not None
 
 
@@ -256,7 +256,7 @@ def stress_stiffening(path: Path, words: list[str], n_nodes: int, n: int) -> Geo
 
 
 def groups_of(path: Path) -> dict[int, list[str]]:
-    """Return the words of each record group, without comments."""
+    """Return the words of each record group of a file, without comments."""
     groups: dict[int, list[str]] = {}
     words: list[str] | None = None
     for line in path.read_text(encoding="ascii", errors="replace").splitlines():
@@ -272,7 +272,7 @@ def groups_of(path: Path) -> dict[int, list[str]]:
 
 
 def whole(path: Path, word: str, where: str = "") -> int:
-    """Return a whole number."""
+    """Return the integer that a word represents."""
     try:
         return int(word)
     except ValueError:
@@ -281,7 +281,7 @@ def whole(path: Path, word: str, where: str = "") -> int:
 
 
 def moments_of_lumps(lumps: Array, nodes: Array, Phi: Array, rotations: Array, M: Array) -> Moments:
-    """Return the moments of lumped masses (m, m, m, Jx, Jy, Jz at each node), M* replaced by the modal mass.
+    """Return the moments of lumped masses (m, m, m, Jx, Jy, Jz at each node); M* is replaced by the modal mass.
 
     A moment of inertia J adds ∑_f E_ff a_f a_fᵀ with a_f = [0, e_f, theta × e_f] and E = ½ tr(J) 1 - J.
     """

@@ -21,8 +21,9 @@ __all__ = ["STRESS_ORDER", "is_mbsim", "make_mbsim", "read_mbsim"]
 # the input of MBSim's ExternalFlexibleFfrBody: one HDF5 file of mass integrals and nodal shapes -----------------------
 
 
-STRESS_ORDER = [0, 1, 2, 5, 3, 4]  #: xx yy zz xy yz zx as indices into our xx yy zz yz xz xy
-UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  #: (a, b) of the blocks of int phi_a phi_b
+#: stress components xx yy zz xy yz zx as indices into xx yy zz yz xz xy of this project
+STRESS_ORDER = [0, 1, 2, 5, 3, 4]
+UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  #: index pairs (a, b) of the blocks ∫ phi_a phi_b
 
 
 def make_mbsim(request: Request) -> WrittenFiles:
@@ -76,13 +77,14 @@ def datasets(body: ReducedBody) -> dict[str, Array]:
 
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
-READ_STRESS_ORDER = [0, 1, 2, 4, 5, 3]  #: our xx yy zz yz xz xy, from xx yy zz xy yz zx
-DENSEST = 1100  #: largest number of bytes that one byte of a compressed file can represent
+#: stress components xx yy zz yz xz xy as indices into xx yy zz xy yz zx of the file
+READ_STRESS_ORDER = [0, 1, 2, 4, 5, 3]
+DENSEST = 1100  #: largest compression ratio of a file
 NEEDED = ("mass", "position integral", "position position integral", "shape function integral", "stiffness matrix")
 
 
 def is_mbsim(path: Path, head: bytes) -> bool:
-    """Whether a file is HDF5 with the datasets of MBSim."""
+    """Return whether a file is HDF5 with the datasets of MBSim."""
     if not head.startswith(SIGNATURE):
         return False
     import h5py
@@ -90,12 +92,12 @@ def is_mbsim(path: Path, head: bytes) -> bool:
     try:
         with h5py.File(path, "r") as file:
             return all(name in file for name in NEEDED[1:4])
-    except (OSError, RuntimeError):  # the second of damaged tables inside
+    except (OSError, RuntimeError):  # RuntimeError comes from damaged internal tables
         return False
 
 
 def read_mbsim(files: Sequence[Path], name: str, places: Mapping[int, Array]) -> ModalBody:
-    """Read a body of MBSim; names and shapes of the datasets in docs/formats.md.
+    """Read a body of MBSim; docs/formats.md lists names and shapes of the datasets.
 
     Raises
     ------
@@ -115,7 +117,7 @@ def read_mbsim(files: Sequence[Path], name: str, places: Mapping[int, Array]) ->
 
 
 def body_of_file(file: Any, path: Path, name: str) -> ModalBody:
-    """Return the body of an open file."""
+    """Return the body in an open file."""
     if "stiffness matrix" not in file:
         raise ForeignBodyError(f"{path}: dataset 'stiffness matrix' is missing")
     shape = file["stiffness matrix"].shape
@@ -176,7 +178,7 @@ def body_of_file(file: Any, path: Path, name: str) -> ModalBody:
 
 
 def triangles_of(indices: IntArray, n_nodes: int) -> IntArray:
-    """Return the triangles of faces as indices of nodes, each face ended by -1; others are cut into triangles."""
+    """Return triangles of node indices from faces that each end with -1; larger faces are divided into triangles."""
     triangles, face = [], []
     for index in indices.tolist():
         if index >= 0:

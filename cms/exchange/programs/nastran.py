@@ -21,9 +21,9 @@ __all__ = ["is_nastran", "make_dmig", "make_op4", "nastran_superelement", "read_
 # Nastran: a superelement as OUTPUT4 matrices with bulk data, or as DMIG cards -----------------------------------------
 
 
-FIRST_SCALAR = 1000001  #: number of the SPOINT of the first mode
-FIRST_NODE = 2000001  #: number of the first kept node, for recovery
-SYMMETRIC, RECTANGULAR, DOUBLE = 6, 9, 2  #: IFO and TIN of DMIG
+FIRST_SCALAR = 1000001  #: number of the SPOINT for the coordinate of the first mode
+FIRST_NODE = 2000001  #: number of the first kept node, for the recovery
+SYMMETRIC, RECTANGULAR, DOUBLE = 6, 9, 2  #: codes IFO and TIN of DMIG
 
 
 def make_op4(request: Request) -> WrittenFiles:
@@ -80,25 +80,25 @@ def comments(request: Request) -> list[str]:
 
 
 def load_notes(model: InterfaceModel, name: str) -> list[str]:
-    """Return notes that assign columns to load cases."""
+    """Return notes that name the load case of each column."""
     return [f"load case {case.name}: column {k + 1} of {name}" for k, case in enumerate(model.body.load_cases)]
 
 
 def dofs_of(model: InterfaceModel) -> list[tuple[int, int]]:
-    """Return (grid, component from 1) of every row; (scalar point, 0) for modes."""
+    """Return (grid, component counted from 1) of each row; (scalar point, 0) for modes."""
     nodes = [(k + 1, int(c) + 1) for k, node in enumerate(model.nodes) for c in node.components]
     return nodes + [(FIRST_SCALAR + k, 0) for k in range(model.n_modes)]
 
 
 def grid_lines(model: InterfaceModel) -> Iterator[str]:
-    """Yield the GRIDs of the interfaces in the basic system; missing dofs are permanent constraints."""
+    """Yield the GRIDs of the interfaces in basic axes; missing dofs become permanent constraints."""
     for k, node in enumerate(model.nodes):
         held = "".join(str(c + 1) for c in range(6) if c not in node.components)
         yield from grid(k + 1, node.position, held)
 
 
 def grid(number: int, position: Array, held: str = "") -> Iterator[str]:
-    """Yield a GRID in large fields."""
+    """Yield a GRID card in large-field format."""
     x, y, z = (real(value) for value in position)
     yield f"{'GRID*':8}{number:16d}{'':16}{x}{y}"
     yield f"{'*':8}{z}{'':16}{held:>16}" if held else f"{'*':8}{z}"
@@ -112,7 +112,7 @@ def spoint_lines(model: InterfaceModel) -> Iterator[str]:
 
 
 def superelement_lines(model: InterfaceModel) -> Iterator[str]:
-    """Yield the superelement part: order of rows (EXTRN), grids, analysis set, scalar points."""
+    """Yield the bulk data of the superelement: order of rows (EXTRN), grids, analysis set, scalar points."""
     nodes = [(k + 1, "".join(str(c + 1) for c in node.components)) for k, node in enumerate(model.nodes)]
     pairs = nodes + [(FIRST_SCALAR + k, "0") for k in range(model.n_modes)]
     yield "BEGIN SUPER        1"
@@ -128,7 +128,7 @@ def superelement_lines(model: InterfaceModel) -> Iterator[str]:
 
 
 def recovery_numbers(model: InterfaceModel) -> tuple[IntArray, tuple[str, ...]]:
-    """Return the GRIDs of the kept nodes, and a note about them: mesh numbers, or numbers from `FIRST_NODE` on.
+    """Return GRID numbers of the kept nodes, and a note: they are mesh numbers, or begin at `FIRST_NODE`.
 
     They must differ from the numbers of the interfaces, 1, 2, ..., and from the SPOINTs of the modes.
     """
@@ -143,12 +143,12 @@ def recovery_numbers(model: InterfaceModel) -> tuple[IntArray, tuple[str, ...]]:
 
 
 def six_rows(model: InterfaceModel) -> Array:
-    """Return translations and rotations of the kept nodes in mesh axes for each row, (6 n_kept, n)."""
+    """Return translations and rotations of the kept nodes in mesh axes for a unit value of each row, (6 n_kept, n)."""
     body = model.body
     n = len(body.nodes)
     nodes = all_nodes(body)
     rotation = nodes.Psi[:n]
-    if not body.is_held:  # a rigid rotation changes every node that has a rotation
+    if not body.is_held:  # a rigid rotation rotates every node that has rotations
         rigid = np.zeros((n, 3, 6))
         rigid[nodes.has_rotation[:n], :, 3:] = np.eye(3)
         rotation = np.concatenate([rigid, rotation], axis=2)
@@ -157,7 +157,7 @@ def six_rows(model: InterfaceModel) -> Array:
 
 
 def recovery_table(numbers: IntArray, n_columns: int) -> Iterator[str]:
-    """Yield the table TUG1: head, columns, and the first of six rows of MUG1 for each kept node by number."""
+    """Yield the table TUG1: head, columns, and for each kept node the first of its six rows in MUG1."""
     n_nodes = len(numbers)
     yield from continued("DTI", [f"{word:<8}" for word in ("TUG1", 0, 6 * n_nodes, n_columns, 32767, 0, 7, 0)])
     yield from continued("", [f"{word:<8}" for word in ("", "PHIP", 7, "", "", "REAL", "", 1, "ENDREC")][1:])
@@ -169,7 +169,7 @@ def recovery_table(numbers: IntArray, n_columns: int) -> Iterator[str]:
 
 
 def assembly_lines(model: InterfaceModel) -> Iterator[str]:
-    """Yield the part for the assembly run: the superelement, and its points with their numbers in the assembly."""
+    """Yield the bulk data of the assembly run: the superelement, and the numbers of its points in the assembly."""
     numbers = [k + 1 for k in range(len(model.nodes))] + [FIRST_SCALAR + k for k in range(model.n_modes)]
     yield "SEBULK         1  EXTOP4          MANUAL                       1"
     yield "SECONCT        1       0              NO"
@@ -187,7 +187,7 @@ def continued(card: str, words: list[str]) -> Iterator[str]:
 
 
 def aset_lines(pairs: Iterable[tuple[int, str]]) -> Iterator[str]:
-    """Yield the analysis set, four points on a card."""
+    """Yield the cards of the analysis set, with four points on each card."""
     words = [f"{number:8d}{components:>8}" for number, components in pairs]
     for k in range(0, len(words), 4):
         yield f"{'ASET':8}" + "".join(words[k : k + 4])
@@ -196,7 +196,7 @@ def aset_lines(pairs: Iterable[tuple[int, str]]) -> Iterator[str]:
 def dmig_lines(
     name: str, matrix: Array, rows: list[tuple[int, int]], columns: list[tuple[int, int]], form: int
 ) -> Iterator[str]:
-    """Yield a matrix: one triangle if it is symmetric; the columns of a rectangular matrix are (number, 0)."""
+    """Yield a DMIG matrix: one triangle if it is symmetric; columns of a rectangular matrix are (number, 0)."""
     n_col = f"{len(columns):8d}" if form == RECTANGULAR else f"{'':8}"
     yield f"{'DMIG':8}{name:8}{0:8d}{form:8d}{DOUBLE:8d}{0:8d}{'':16}{n_col}".rstrip()
     for j, (point, component) in enumerate(columns):
@@ -209,7 +209,7 @@ def dmig_lines(
 
 
 def real(value: float, letter: str = "E") -> str:
-    """Return a number in 16 columns, with as many digits as fit.
+    """Return a number in a field of 16 columns, with as many digits as fit.
 
     Raises
     ------
@@ -226,11 +226,11 @@ def real(value: float, letter: str = "E") -> str:
 # external superelements of Nastran: the record of their files as a superelement of ours -------------------------------
 
 
-COMPANIONS = (".pch", ".asm")  #: text files of an external superelement with the same name as its .op4
+COMPANIONS = (".pch", ".asm")  #: suffixes of the text files of an external superelement with the same name as its .op4
 
 
 def is_nastran(path: Path, head: bytes) -> bool:
-    """Whether a file belongs to an external superelement: its cards, or matrices with such cards in the same folder."""
+    """Return whether a file belongs to an external superelement: by its cards, or by cards in the same folder."""
     suffix = path.suffix.lower()
     if suffix in COMPANIONS:
         return any(word in head.upper() for word in (b"EXT. SUPERELEMENT", b"EXTRN", b"SEBULK", b"BEGIN SUPER"))
@@ -241,14 +241,14 @@ def is_nastran(path: Path, head: bytes) -> bool:
 
 
 def read_nastran(files: Iterable[Path], name: str, places: Mapping[int, Array] | None = None) -> Superelement:
-    """Read an external superelement of Nastran (.op4 with .pch or .asm, and bulk data for nodes of the recovery)."""
+    """Read an external superelement of Nastran: .op4 with .pch or .asm, and bulk data for recovered nodes."""
     return nastran_superelement(read_superelement(list(files)), name, places)
 
 
 def nastran_superelement(
     raw: NastranSuperelement, name: str, places: Mapping[int, Array] | None = None
 ) -> Superelement:
-    """Return a superelement from the files; grid points without position are omitted from the recovery, with a note."""
+    """Return the superelement in the files; grid points without position are omitted from the recovery, with a note."""
     positions = {**{int(k): np.asarray(x, dtype=float) for k, x in (places or {}).items()}, **raw.positions}
     notes = list(raw.notes)
     recovery = None

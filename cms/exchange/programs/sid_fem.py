@@ -15,15 +15,16 @@ __all__ = ["DIALECTS", "Dialect", "Taylor", "make_sid_fem", "terms_of"]
 
 #: values of `structure`; unit (4) and one triangle (2) are not used, because readers interpret them differently
 DIAGONAL, GENERAL, EMPTY = 1, 3, 0
-LONGEST_COMMENT = 200  #: largest length of a comment; readers have line buffers of various sizes
-SPIN_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))  #: omega_a omega_b for the columns of Oe
+LONGEST_COMMENT = 200  #: largest length of a comment; line buffers of readers differ
+#: index pairs (a, b) of omega_a omega_b for the columns of Oe
+SPIN_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 
 
 @dataclass(frozen=True)
 class Dialect:
-    """Order of indices that a group of programs expects."""
+    """Order of indices in the files of a group of programs."""
 
-    words: str  #: text on the first line of the file
+    words: str  #: text for the first line of the file
     column_last: bool  #: True: m1(row, q, column); False: m1(row, column, q)
     j_is_matrix: bool  #: True: J is (3, 3); False: (6, 1): xx, yy, zz, xy, xz, yz
 
@@ -31,19 +32,20 @@ class Dialect:
 DIALECTS = {
     "sid_fem": Dialect("m1=row,q,col J=6x1 Ge=3k+axis", True, False),
     "sid_fem-fembeam": Dialect("m1=row,col,q J=3x3 Ge=3k+axis", False, True),
-}  #: by key of the format
+}  #: dialect of each format
 
 
 @dataclass(frozen=True, eq=False)
 class Taylor:
-    """A matrix m0 + sum_l q_l m1_l."""
+    """Taylor series of a matrix, m0 + Σ_l q_l m1_l."""
 
-    m0: Array  #: (n_row, n_col)
-    m1: Array = field(default_factory=lambda: np.zeros(0))  #: (n_row, n_col, n_q); empty for a series of order 0
+    m0: Array  #: constant term, (n_row, n_col)
+    #: linear terms, (n_row, n_col, n_q); empty for a series of order 0
+    m1: Array = field(default_factory=lambda: np.zeros(0))
 
 
 def make_sid_fem(request: Request, *, dialect: str) -> WrittenFiles:
-    """Return the file; its nodes are the interfaces, unless all nodes are requested."""
+    """Return the file; its nodes are the interfaces, unless the request includes all nodes."""
     body, order = request.body, DIALECTS[dialect]
     nodes = interface_nodes(body) if request.nodes != "all" else all_nodes(body)
     lines = list(lines_of(body, nodes, order))
@@ -76,7 +78,7 @@ def terms_of(body: ReducedBody) -> dict[str, Taylor]:
         pairs = [(a, b)] if a == b else [(a, b), (b, a)]
         Oe0[:, column] = -sum(C3[:, i, j] for i, j in pairs)
         Oe1[:, column] = -sum(D1[:, i, j] for i, j in pairs)
-        if K is not None:  # the columns xz and zx are the same
+        if K is not None:  # columns xz and zx are equal
             Oe1[:, column] += len(pairs) * K.spin[column]
     return {
         "mdCM": Taylor(moments.S[:, None], moments.C1[:, None, :]),
@@ -94,7 +96,7 @@ def terms_of(body: ReducedBody) -> dict[str, Taylor]:
 
 
 def lines_of(body: ReducedBody, nodes: NodeList, order: Dialect) -> Iterator[str]:
-    """Yield the lines after the first."""
+    """Yield the lines after the first line."""
     yield " part"
     yield entry(6, "new modal", "")
     yield f"{'':11}refmod"

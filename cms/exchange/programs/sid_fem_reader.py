@@ -17,30 +17,31 @@ __all__ = ["Taylor", "is_sid_fem", "read_sid_fem", "read_sid_fem_fembeam", "seri
 
 TERMS = ("mdCM", "J", "Ct", "Cr", "Me", "Gr", "Ge", "Oe", "ksigma", "Ke", "De")
 NODE_TERMS = ("origin", "phi", "psi", "AP", "sigma")
-LARGEST = 50_000_000  #: numbers of a series that are taken
-SAME = 1e-6  #: difference of two statements of one thing, of its size, that is digits of a file
-SPIN_COLUMNS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))  #: omega_a omega_b of the columns of Oe
-DIAGONAL, SYMMETRIC, UNIT = 1, 2, 4  #: of `structure`
+LARGEST = 50_000_000  #: largest number of entries of a series that is read
+SAME = 1e-6  #: relative difference between two values of one quantity, up to which it is rounding in the file
+#: index pairs (a, b) of omega_a omega_b for the columns of Oe
+SPIN_COLUMNS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
+DIAGONAL, SYMMETRIC, UNIT = 1, 2, 4  #: values of `structure`
 
 
 @dataclass
 class Taylor:
-    """A series as in the file: sizes, and entries by their indices."""
+    """Taylor series in the file: sizes, and entries by their indices."""
 
     line: int
-    sizes: dict[str, int] = field(default_factory=dict)  #: order, nrow, ncol, nq, nqn, structure
+    sizes: dict[str, int] = field(default_factory=dict)  #: values of order, nrow, ncol, nq, nqn, structure
     m0: dict[tuple[int, int], float] = field(default_factory=dict)
     m1: dict[tuple[int, int, int], float] = field(default_factory=dict)
 
 
 def is_sid_fem(path: Path, head: bytes) -> bool:
-    """Whether a file is text that begins a part with a modal section."""
+    """Return whether a file is text that begins a part with a modal section."""
     text = head.decode("ascii", "replace")
     return bool(re.match(r"\s*\d+\s*\d+", text)) and "part" in text and "new modal" in text
 
 
 def read_sid_fem(files: Sequence[Path], name: str, places: Mapping[int, Array]) -> ModalBody:
-    """Read standard input data in either index order, m1(row, q, column) or m1(row, column, q), found from the indices.
+    """Read standard input data; the indices show whether the order is m1(row, q, column) or m1(row, column, q).
 
     Raises
     ------
@@ -52,12 +53,12 @@ def read_sid_fem(files: Sequence[Path], name: str, places: Mapping[int, Array]) 
 
 
 def read_sid_fem_fembeam(files: Sequence[Path], name: str, places: Mapping[int, Array]) -> ModalBody:
-    """Read standard input data whose index order is known to be m1(row, column, q); errors as `read_sid_fem`."""
+    """Read standard input data in the index order m1(row, column, q); errors as in `read_sid_fem`."""
     return read_in_order(files, name, False)
 
 
 def read_in_order(files: Sequence[Path], name: str, q_second: bool | None) -> ModalBody:
-    """Read a file.
+    """Read a file in a given index order.
 
     (1) mass, mdCM0 = S, Ct0 = 1Cᵀ, Cr0 = 2Cᵀ, J0, Me, Ke, De
     (2) 3C: symmetric part J1_k / 2, else that of Gr0 = [2 3C_k]
@@ -93,11 +94,11 @@ def read_in_order(files: Sequence[Path], name: str, q_second: bool | None) -> Mo
         return values_of(path, key, terms, 1, (*shape, n), second)
 
     notes = [f"index order of the file: m1({'row, q, column' if second else 'row, column, q'})"]
-    M, C1, C2 = m0("Me", n, n), m0("Ct", n, 3).T, m0("Cr", n, 3).T  # (1)
+    M, C1, C2 = m0("Me", n, n), m0("Ct", n, 3).T, m0("Cr", n, 3).T  # step (1)
     is_column = terms["J"].sizes.get("ncol") == 1 if "J" in terms else False
     J0 = square(m0("J", 6, 1)[:, 0]) if is_column else m0("J", 3, 3)
     J1 = m1("J", 6, 1) if is_column else m1("J", 3, 3)
-    C3 = None  # (2)
+    C3 = None  # step (2)
     even = None if J1 is None else (square(J1[:, 0]) if is_column else J1) / 2
     if even is None and "Gr" in terms:
         C3 = m0("Gr", 3, 3 * n).reshape(3, n, 3).transpose(1, 0, 2) / 2
@@ -178,7 +179,7 @@ def stiffening_of(
 
 
 def gyroscopic(path: Path, Ge: Array | None, Cr1: Array | None, notes: list[str]) -> Array | None:
-    """Return 4C from Ge, in the order of columns that the part of Cr1 antisymmetric in two modes confirms."""
+    """Return 4C from Ge; the part of Cr1 antisymmetric in two modes decides the order of columns."""
     of_Cr = None
     if Cr1 is not None:  # Cr1_ka,l = 4C_kl,a + symmetric
         of_Cr = ((Cr1 - Cr1.transpose(2, 1, 0)) / 2).transpose(0, 2, 1)
@@ -204,7 +205,7 @@ def gyroscopic(path: Path, Ge: Array | None, Cr1: Array | None, notes: list[str]
 
 
 def series_of(path: Path, text: list[str]) -> tuple[str, dict[str, Taylor], dict[int, dict[str, Taylor]], float | None]:
-    """Return the comment of the first line, the series of the body, those of each node, and the mass."""
+    """Return comment of the first line, series of the body, series of each node, and mass."""
     header = text[0].partition(":")[2].strip() if text else ""
     terms: dict[str, Taylor] = {}
     nodes: dict[int, dict[str, Taylor]] = {}
@@ -242,7 +243,7 @@ def series_of(path: Path, text: list[str]) -> tuple[str, dict[str, Taylor], dict
 
 
 def put(where: str, term: Taylor, key: str, value: str) -> None:
-    """Take an entry of a series: a size, m0(i, j) or m1(i, j, k)."""
+    """Store an entry of a series: a size, m0(i, j) or m1(i, j, k)."""
     found = re.fullmatch(r"m([01n])\s*\(([\s\d,]+)\)", key)
     if found is None:
         term.sizes[key] = whole(where, value)
@@ -257,7 +258,7 @@ def put(where: str, term: Taylor, key: str, value: str) -> None:
 
 
 def order_of(path: Path, terms: list[Taylor], n: int, first: str) -> bool | None:
-    """Return whether m1 is (row, q, column), by indices that fit only one order and by the word of the first line."""
+    """Return whether m1 has the order (row, q, column), from indices that fit only one order and the first line."""
     q_second = any(entry[1] >= term.sizes.get("ncol", 0) for term in terms for entry in term.m1)
     q_third = any(entry[2] >= term.sizes.get("ncol", 0) for term in terms for entry in term.m1)
     if q_second and q_third:
@@ -268,7 +269,7 @@ def order_of(path: Path, terms: list[Taylor], n: int, first: str) -> bool | None
     if said:
         return said[1].startswith("q")
     if n == 1 or not any(term.m1 for term in terms):
-        return True  # one index is always 1: both orders agree, or there is no first order
+        return True  # one index is always 1, so both orders agree, or there are no first-order terms
     return None
 
 
@@ -303,13 +304,13 @@ def values_of(
 
 
 def square(column: Array) -> Array:
-    """Return (3, 3, ...) of the tensor components xx, yy, zz, xy, xz, yz, (6, ...)."""
+    """Return the matrix, (3, 3, ...), with tensor components xx, yy, zz, xy, xz, yz, (6, ...)."""
     xx, yy, zz, xy, xz, yz = column
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def whole(where: str, word: str) -> int:
-    """Return a whole number."""
+    """Return the integer that a word represents."""
     try:
         return int(word)
     except ValueError:
@@ -317,7 +318,7 @@ def whole(where: str, word: str) -> int:
 
 
 def real(where: str, word: str) -> float:
-    """Return a number with the exponent letter E or D of Fortran."""
+    """Return the number that a word with exponent letter E or D represents."""
     try:
         return float(word.replace("D", "E").replace("d", "e"))
     except ValueError:

@@ -15,9 +15,10 @@ from fe_models.foundation.arrays import Array, IntArray
 __all__ = ["make_vtk", "numbers_of_cells", "numbers_of_nodes"]
 
 
-LARGEST = 0.05  #: displacement of a drawn mode relative to the size of the body
-STRESS_ORDER = [0, 1, 2, 5, 3, 4]  #: xx yy zz xy yz xz as indices into our xx yy zz yz xz xy
-TRIANGLE, VERTEX = 5, 1  #: codes of cell types
+LARGEST = 0.05  #: largest displacement of a drawn mode over the size of the body
+#: stress components xx yy zz xy yz xz as indices into xx yy zz yz xz xy of this project
+STRESS_ORDER = [0, 1, 2, 5, 3, 4]
+TRIANGLE, VERTEX = 5, 1  #: VTK codes of the cell types
 KINDS = {"f": ("Float64", "<f8"), "i": ("Int64", "<i8"), "u": ("UInt8", "u1")}
 
 
@@ -49,7 +50,7 @@ def make_vtk(request: Request) -> WrittenFiles:
 
 
 def stress_fields(body: ReducedBody, k: int, q: float) -> dict[str, Array]:
-    """Return stress tensor (mesh axes, order of VTK) and von Mises stress at the nodes, if the body knows them."""
+    """Return stress tensor (mesh axes, order of VTK) and von Mises stress at the nodes, if the body has stress."""
     if body.stress is None:
         return {}
     from cms.reduction.basis.stress_modes import turned_stress
@@ -59,13 +60,13 @@ def stress_fields(body: ReducedBody, k: int, q: float) -> dict[str, Array]:
 
 
 def numbers_of_nodes(body: ReducedBody) -> dict[str, IntArray]:
-    """Return the user's numbers of the kept nodes, -1 for none, and their instances."""
+    """Return the user's numbers of the kept nodes (-1 if there is none), and their instances."""
     arrays = {"node": body.numbering.nodes, "node instance": body.numbering.node_instance}
     return {name: numbers for name, numbers in arrays.items() if numbers.size}
 
 
 def numbers_of_cells(body: ReducedBody) -> dict[str, IntArray]:
-    """Return the user's numbers of the elements of the triangles, -1 for none, and their instances."""
+    """Return the user's numbers of the elements behind the triangles (-1 if there is none), and their instances."""
     if not len(body.surface):
         return {}
     arrays = {"element": body.numbering.elements, "element instance": body.numbering.element_instance}
@@ -100,7 +101,7 @@ def unstructured_grid(
 
 
 def data_array(name: str, values: np.ndarray, *, tuples: bool = False) -> str:
-    """Return a data array: its length in bytes and its numbers, both in base64."""
+    """Return a data array as base64: its length in bytes, then its numbers."""
     array = np.asarray(values)
     word, dtype = KINDS[array.dtype.kind]
     data = np.ascontiguousarray(array, dtype=dtype).tobytes()
