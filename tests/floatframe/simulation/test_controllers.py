@@ -166,6 +166,13 @@ def test_two_controllers_of_different_periods_act_on_their_own_forces():
     assert len(motion.controller("pid").t) == 30
 
 
+@pytest.mark.parametrize("period", [0.02, 0.03])
+def test_companions_of_a_run_cross_the_jumps_of_outputs(period):
+    """Torques that turn round every two or three steps: the run is exact, and its companions find no error."""
+    swap = pid(period=period, inputs="pin.angle", state=None, function=lambda t, x: 8.0 * (-1.0) ** round(t / period))
+    assert integrate(rotor(swap), GeneralizedAlpha(), 2.0, 0.01, watch="tell").validity == ()
+
+
 def test_a_coarse_run_under_a_controller_is_still_watched():
     """A swinging pendulum in steps of a fifth of its period, under a controller that changes its motor little."""
     body = RigidBody("hub", 2.0, np.diag([0.01, 0.01, 0.01]), center_of_mass=(0.2, 0, 0), position=PLACE)
