@@ -34,7 +34,7 @@ __all__ = [
     "trapezoidal",
 ]
 
-#: schemes by their names in a system file
+#: integrators by their names in a system file
 INTEGRATORS: dict[str, Callable[..., Integrator]] = {
     "generalized-alpha": GeneralizedAlpha,
     "hht": hht,
@@ -46,7 +46,7 @@ INTEGRATORS: dict[str, Callable[..., Integrator]] = {
     "ida": Ida,
 }
 
-#: their classes by their names in a results file
+#: classes of the integrators by their names in a results file
 CLASSES = {
     cls.__name__: cls
     for cls in (
@@ -56,7 +56,7 @@ CLASSES = {
 
 
 def made_integrator(chosen: Integrator | type[Integrator] | str) -> Integrator:
-    """Return an integrator from an object, or with its defaults from a class or its name in a system file.
+    """Return an integrator; a class, or its name in a system file, gives one with default parameters.
 
     Raises
     ------
@@ -75,10 +75,10 @@ def made_integrator(chosen: Integrator | type[Integrator] | str) -> Integrator:
 
 
 def has_second_order(integrator: Integrator) -> bool:
-    """Whether the error of a method falls with the square of its step."""
+    """Whether the error of a method is proportional to the square of its step size."""
     return not isinstance(integrator, Ida | RelativeOde)
 
 
 def has_fixed_steps(integrator: Integrator) -> bool:
-    """Whether a method takes steps of the given size."""
+    """Whether a method takes steps of the given size rather than choosing its own."""
     return has_second_order(integrator) and getattr(integrator, "error_tolerance", None) is None

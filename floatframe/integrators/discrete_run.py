@@ -28,23 +28,23 @@ __all__ = ["DiscreteScheme", "check_options"]
 
 
 class DiscreteScheme(Integrator):
-    """A scheme that steps from bodies to bodies."""
+    """A structure-preserving scheme whose steps advance the bodies."""
 
     tolerance: float
     max_iterations: int
 
     @property
     def equations(self) -> int:
-        """Kind of equations: `CONSERVING` or `VARIATIONAL`."""
+        """Kind of scheme: `CONSERVING` or `VARIATIONAL`."""
         raise NotImplementedError
 
     @property
     def damping(self) -> float:
-        """Spectral radius of modes far above 1/h; 1 without dissipation."""
+        """Spectral radius for modes with frequencies far above 1/h; 1 without dissipation."""
         return 1.0
 
     def start(self, system: System, t: float, state: State | None = None, before: Memory | None = None) -> Memory:
-        """Return the memory at the beginning, from a consistent state.
+        """Return the memory at the start, for a consistent state near the given one.
 
         `a` holds the multipliers: of joints zero, of equations of elements those that fulfil them there.
         """
@@ -54,7 +54,7 @@ class DiscreteScheme(Integrator):
         return memory.changed(a=np.where(is_of_law, memory.w[held], 0.0))
 
     def observe(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
-        """Return the results at a state, with accelerations and reactions of the equations of motion."""
+        """Return the results at a state, with accelerations and reactions from the equations of motion."""
         compiled = compiled_system(system)
         work.state.time[...] = t
         work.state.w_start[:] = memory.w
@@ -68,7 +68,7 @@ class DiscreteScheme(Integrator):
     def advance(
         self, system: System, memory: Memory, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
     ) -> tuple[Memory, Rows, int, Failure | None]:
-        """Advance by n_steps of size h, the first of them number `first` from t0; see `Integrator`."""
+        """Advance by n_steps of size h, beginning with step `first` counted from t0; see `Integrator`."""
         from floatframe.engine.kernels.generalized_alpha import NO_ACCELERATION
         from floatframe.engine.structure_preserving.kernels.steps import discrete_kernels
 
@@ -98,7 +98,7 @@ class DiscreteScheme(Integrator):
 def explained(
     compiled: CompiledSystem, work: Work, outcome: Outcome, max_iterations: int, least: float
 ) -> Failure | None:
-    """Return the reason of a failed step; None if none failed."""
+    """Return the reason why a step failed; None if no step failed."""
     from floatframe.engine.kernels.generalized_alpha import DONE, NO_ACCELERATION, SINGULAR
 
     if outcome.status == DONE:
@@ -116,7 +116,7 @@ def explained(
 
 
 def check_options(scheme: DiscreteScheme) -> None:
-    """Raise `ModelError` if tolerance or number of iterations is impossible."""
+    """Raise `ModelError` if the tolerance or the number of iterations is invalid."""
     name = type(scheme).__name__
     if not 0.0 < scheme.tolerance < 1.0:
         raise ModelError(f"{name}: tolerance: expected 0 < tolerance < 1, got {scheme.tolerance}")

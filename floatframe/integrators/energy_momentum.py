@@ -1,4 +1,4 @@
-"""Schemes that conserve energy and momentum in steps of any size, or let energy only decrease.
+"""Schemes that conserve energy and momentum for steps of any size, or never increase the energy.
 
 Evaluated in `floatframe.engine.structure_preserving.kernels.steps`.
 """
@@ -16,7 +16,7 @@ __all__ = ["EnergyDecaying", "EnergyMomentum"]
 @dataclass(frozen=True)
 @checked_fields(ModelError)
 class EnergyMomentum(DiscreteScheme):
-    """Energy, linear and angular momentum to the tolerance of Newton's method, second order [1]_ [2]_ [3]_.
+    """Second-order scheme that conserves energy and momenta to the tolerance of Newton's method [1]_ [2]_ [3]_.
 
     In coordinates of the centre of mass (`structure_preserving.kernels.bodies`), with ' at the end of a step and
     mean(...) for mean values over it:
@@ -58,7 +58,7 @@ class EnergyMomentum(DiscreteScheme):
 
     @property
     def equations(self) -> int:
-        """Kind of equations: `CONSERVING`."""
+        """Kind of scheme: `CONSERVING`."""
         return CONSERVING
 
 
@@ -106,10 +106,10 @@ class EnergyDecaying(DiscreteScheme):
 
     @property
     def equations(self) -> int:
-        """Kind of equations: `CONSERVING`."""
+        """Kind of scheme: `CONSERVING`."""
         return CONSERVING
 
     @property
     def damping(self) -> float:
-        """Spectral radius of modes far above 1/h."""
+        """Spectral radius for modes with frequencies far above 1/h."""
         return self.rho_inf

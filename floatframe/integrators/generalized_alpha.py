@@ -46,7 +46,7 @@ from floatframe.model.system import System
 
 __all__ = ["GeneralizedAlpha", "hht", "newmark", "trapezoidal"]
 
-LONGER = 1 + 1e-6  #: ratio below which two step sizes count as equal
+LONGER = 1 + 1e-6  #: ratio of two step sizes below which they count as equal
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ class GeneralizedAlpha(Integrator):
 
     @property
     def coefficients(self) -> tuple[float, float, float, float]:
-        """alpha_m, alpha_f, beta, gamma."""
+        """Coefficients alpha_m, alpha_f, beta and gamma of the method."""
         if self.parameters is not None:
             return self.parameters
         rho = self.rho_inf
@@ -146,7 +146,7 @@ class GeneralizedAlpha(Integrator):
         return alpha_m, alpha_f, 0.25 * (gamma + 0.5) ** 2, gamma
 
     def after_jump(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
-        """Return the memory after a jump of forces at t, and the results there.
+        """Return the memory after forces have jumped at t, and the results there.
 
         The state stays; u_dot and a change by what the filter of `start.step_filter` with s = 1 lets of the jump.
         """
@@ -159,7 +159,7 @@ class GeneralizedAlpha(Integrator):
     def jump(
         self, compiled: CompiledSystem, memory: Memory, t: float, may: NDArray[np.bool_] | None = None
     ) -> tuple[Memory, Array]:
-        """Return the memory with u_dot and w after a jump of forces at t, with the change of u_dot filtered.
+        """Return the memory with u_dot and w after forces have jumped at t; the change of u_dot is filtered.
 
         may: as of `spin_at`.
         """
@@ -175,7 +175,7 @@ class GeneralizedAlpha(Integrator):
     def advance(
         self, system: System, memory: Memory, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
     ) -> tuple[Memory, Rows, int, Failure | None]:
-        """Advance by n_steps of size h, the first of them number `first` from t0; see `integrator.Integrator`.
+        """Advance by n_steps of size h, beginning with step `first` counted from t0; see `integrator.Integrator`.
 
         `work` holds the factors of the last Newton matrix, which serve until they are too old.
         """
@@ -191,7 +191,7 @@ class GeneralizedAlpha(Integrator):
         return after, rows, outcome.n_steps, failure
 
     def numbers(self, compiled: CompiledSystem, h: float) -> dict[str, float]:
-        """Return the numbers of the method for steps of size h, by their names in an order of the kernels."""
+        """Return the parameters for steps of size h, by the names of the fields of `Order` in the kernels."""
         return dict(zip(("alpha_m", "alpha_f", "beta", "gamma"), self.coefficients, strict=True)) | {
             "tolerance": self.tolerance,
             "max_iterations": self.max_iterations,
@@ -202,14 +202,14 @@ class GeneralizedAlpha(Integrator):
         }
 
     def least_step(self, h: float, compiled: CompiledSystem) -> float:
-        """Return the smallest part of a divided step of size h; 0 if it may not be divided."""
+        """Return the smallest size of a divided step of size h; 0 if steps may not be divided."""
         if self.h_min is not None:
             return min(self.h_min, h)
         is_fixed = self.error_tolerance is None and not has_divided_steps(compiled.model)
         return 0.0 if is_fixed else LEAST_STEP * h
 
     def spin_at(self, compiled: CompiledSystem, memory: Memory, may: NDArray[np.bool_] | None = None) -> Spin | None:
-        """Return the bodies whose spin the next step takes by itself, of those that may, (n_b,), None for all."""
+        """Return the bodies whose spin the next step integrates separately; may, (n_b,): candidates, None for all."""
         return spin_of(compiled, consistent_of(memory), may) if self.stabilized else None
 
     def filter_at(
@@ -223,7 +223,7 @@ class GeneralizedAlpha(Integrator):
         spin: Spin | None,
         work: Work | None = None,
     ) -> StepFilter | None:
-        """Return the filter of `start.step_filter` for steps of size h; full: with s = 1; None for s = 0."""
+        """Return the filter of `initial_conditions.step_filter` for step size h; full: with s = 1; None if s = 0."""
         _, _, beta, gamma = self.coefficients
         s = 1.0 if full else min(gamma - 0.5, 1.0)
         if s <= 0.0:
@@ -234,12 +234,12 @@ class GeneralizedAlpha(Integrator):
     def filtered(
         self, compiled: CompiledSystem, memory: Memory, h: float, t: float, *, full: bool, spin: Spin | None
     ) -> Beginning:
-        """Return the initial accelerations of a motion and their rates, from the filter of `filter_at`."""
+        """Return the initial accelerations of a motion and their rates after the filter from `filter_at`."""
         z = self.filter_at(compiled, memory, h, t, full=full, spin=spin)
         return beginning_of(compiled, consistent_of(memory), t, h, z, spin=spin)
 
     def first_step(self, compiled: CompiledSystem, memory: Memory, h: float, t: float, spin: Spin | None) -> float:
-        """Return the size of the first step: allowed by its estimated error, and an equal part of h."""
+        """Return the size of the first step, an equal part of h for which the estimated error is allowed."""
         if self.error_tolerance is None:
             return h
         model = compiled.model
@@ -252,7 +252,7 @@ class GeneralizedAlpha(Integrator):
         return h / ceil(h / max(0.5 * fitting, self.least_step(h, compiled), 1e-3 * h) * (1 - 1e-9))
 
     def prepared(self, system: System, memory: Memory, h: float, t: float) -> Memory:
-        """Return the memory with its algorithmic accelerations for steps of size h from t.
+        """Return the memory with algorithmic accelerations for steps of size h that begin at t.
 
         At the start, and where longer steps follow: as `start.step_filter` says. Shorter steps: a nearer to u_dot.
         """
@@ -280,7 +280,7 @@ class GeneralizedAlpha(Integrator):
         return memory.changed(state=state, u_dot=u_dot, a=a, h=h, h_next=h)
 
     def explain(self, system: System, work: Work, outcome: Outcome, u: Array, h: float) -> Failure:
-        """Return the reason of a failed step of size h that began with velocities u, (n_u,)."""
+        """Return the reason why a step of size h failed that began with velocities u, (n_u,)."""
         from floatframe.engine.kernels.generalized_alpha import (
             INACCURATE,
             SINGULAR_BODY,
@@ -335,7 +335,7 @@ class GeneralizedAlpha(Integrator):
 
 
 def newmark(beta: float = 0.25, gamma: float = 0.5, **options: float) -> GeneralizedAlpha:
-    """Return the method of Newmark [1]_: alpha_m = alpha_f = 0; second order only for gamma = 1/2.
+    """Return the Newmark method [1]_, with alpha_m = alpha_f = 0; second order only for gamma = 1/2.
 
     Parameters
     ----------
@@ -355,7 +355,7 @@ def newmark(beta: float = 0.25, gamma: float = 0.5, **options: float) -> General
 
 
 def trapezoidal(**options: float) -> GeneralizedAlpha:
-    """Return the trapezoidal rule, `newmark(1/4, 1/2)`: no numerical damping at all.
+    """Return the trapezoidal rule `newmark(1/4, 1/2)`, which has no numerical damping.
 
     In linear systems without joints it keeps the energy; reactions of joints oscillate by O(h) for good.
 
@@ -368,7 +368,7 @@ def trapezoidal(**options: float) -> GeneralizedAlpha:
 
 
 def hht(alpha: float = -0.1, **options: float) -> GeneralizedAlpha:
-    """Return the method of Hilber, Hughes and Taylor [1]_: alpha_m = 0, alpha_f = -alpha, second order.
+    """Return the method of Hilber, Hughes and Taylor [1]_, with alpha_m = 0 and alpha_f = -alpha.
 
     Parameters
     ----------
@@ -388,7 +388,7 @@ def hht(alpha: float = -0.1, **options: float) -> GeneralizedAlpha:
 
 
 def mass_weights(model: Model) -> Array:
-    """Return mass, inertia and modal masses of all velocities, (n_u,)."""
+    """Return masses, moments of inertia and modal masses for all velocities, (n_u,)."""
     result = np.zeros(int(model.bodies.u0[-1]))
     for i, t in enumerate(model.bodies.kind):
         parts = [np.full(3, model.body_types.mass[t]), np.diag(model.body_types.J0[t]), modal_diagonals(model, i, MASS)]
@@ -397,7 +397,7 @@ def mass_weights(model: Model) -> Array:
 
 
 def words_of_turn(compiled: CompiledSystem, work: Work, body: int) -> str:
-    """Return the message that a body rotates too far in a step."""
+    """Return the message about a body that rotates too far in a step."""
     from floatframe.engine.kernels.generalized_alpha import MOST_TURN
 
     turn = float(np.linalg.norm(work.state.theta[body]))
@@ -408,7 +408,7 @@ def words_of_turn(compiled: CompiledSystem, work: Work, body: int) -> str:
 
 
 def words_of_fast_turn(compiled: CompiledSystem, u: Array, h: float) -> str:
-    """Name the body that turns furthest in a step of size h with velocities u, if by more than `MOST_TURN`."""
+    """Return a message about the body that rotates furthest in a step, if by more than `MOST_TURN`; u: velocities."""
     from floatframe.engine.kernels.generalized_alpha import MOST_TURN
 
     first = compiled.model.bodies.u0[:-1]
@@ -420,11 +420,11 @@ def words_of_fast_turn(compiled: CompiledSystem, u: Array, h: float) -> str:
 
 
 def rows_closed_by_positions(model: Model, stabilized: bool) -> NDArray[np.bool_]:
-    """Return which rows hold positions, but no velocities after a step, (n_w,): stabilised, those of elements alone."""
+    """Return which rows constrain positions but not velocities, (n_w,); if stabilised, only those of elements."""
     is_stabilized = np.repeat(np.isin(model.connections.law, (JOINT, COUPLER)), model.connections.size)
     return is_held_position(model.rows.kind) & ~(is_stabilized & stabilized)
 
 
 def consistent_of(memory: Memory) -> ConsistentState:
-    """Return the state in a memory with its accelerations and wrenches."""
+    """Return the state in a memory together with its accelerations and wrenches."""
     return ConsistentState(memory.state, memory.u_dot, memory.w)

@@ -1,4 +1,4 @@
-"""SUNDIALS IDA on the index-reduced equations: a method of another kind, for cross-checks.
+"""SUNDIALS IDA for the index-reduced equations, an independent method for comparisons.
 
 Evaluated in `floatframe.engine.kernels.evaluation`.
 """
@@ -37,7 +37,7 @@ from floatframe.model.system import System
 
 __all__ = ["Ida"]
 
-MOST_STEPS = 100_000  #: between two outputs
+MOST_STEPS = 100_000  #: largest number of solver steps between two outputs
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Ida(Integrator):
                 raise ModelError(f"Ida: {name}: expected a number between 0 and 1, got {getattr(self, name)}")
 
     def start(self, system: System, t: float, state: State | None = None, before: Memory | None = None) -> Memory:
-        """Return the memory at the beginning, from a consistent state."""
+        """Return the memory at the start, for a consistent state near the given one."""
         solver_class()
         compiled = compiled_system(system)
         for c, name in enumerate(compiled.connection_names):
@@ -92,7 +92,7 @@ class Ida(Integrator):
     def advance(
         self, system: System, memory: Memory, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
     ) -> tuple[Memory, Rows, int, Failure | None]:
-        """Advance by n_steps output times, the first of them number `first` from t0; see `integrator.Integrator`."""
+        """Advance by n_steps output times, beginning with step `first` counted from t0; see `integrator.Integrator`."""
         made = Motion(compiled_system(system), t0 + h * first, memory)
         times: Array = t0 + h * np.arange(first, first + n_steps + 1, dtype=float)
         memory, rows, n_good, failure, _ = observed_outputs(
@@ -101,7 +101,7 @@ class Ida(Integrator):
         return memory.changed(n_iterations=memory.n_iterations + made.n_evaluations), joined_rows(rows), n_good, failure
 
     def outputs(self, made: "Motion", times: Array, memory: Memory) -> Iterator[tuple[float, State, Array, Array]]:
-        """Yield time, state, u_dot and w at each time but the first."""
+        """Yield time, state, u_dot and w at all times except the first."""
         compiled, own = made.compiled, made.work
         solution = self.solved_past_contacts if has_gaps(compiled) else self.solved
         reached, message = solution(made, times, flattened(memory.state))
@@ -119,7 +119,7 @@ class Ida(Integrator):
         raise ModelError(made.problem or message)
 
     def solved(self, made: "Motion", t: Array, y_0: Array) -> tuple[list[tuple[float, Array]], str]:
-        """Return times and y at all times but the first, as far as the solver gets, and its message."""
+        """Return the times and y that the solver reached, except the first, and its message."""
         solver = self.solver(made)
         # with two times, every step is returned
         asked = t if len(t) > 2 else np.array([t[0], 0.5 * (t[0] + t[1]), t[1]])
@@ -128,7 +128,7 @@ class Ida(Integrator):
         return list(reached)[len(asked) - len(t) + 1 :], solution.message
 
     def solved_past_contacts(self, made: "Motion", t: Array, y_0: Array) -> tuple[list[tuple[float, Array]], str]:
-        """Return the same for a system with contacts, step by step, so that none of them is missed."""
+        """Return the same for a system with contacts, step by step, so that no short contact is missed."""
         compiled, work = made.compiled, new_work(made.compiled.model)
 
         def gaps(at: float, y: Array) -> Array:
@@ -159,14 +159,14 @@ class Ida(Integrator):
         return reached, ""
 
     def solver(self, made: "Motion", **options: float) -> Any:
-        """Return a solver of the residual of a motion."""
+        """Return a solver for the residual of a motion."""
         return solver_class()(
             made.residual, rtol=self.rtol, atol=self.atol, max_num_steps=MOST_STEPS, linsolver="dense", **options
         )
 
 
 def solver_class():
-    """Return the class of the solver; `ModelError` naming the extra if it is not installed."""
+    """Return the class of the solver; `ModelError` states the extra to install if it is missing."""
     try:
         from sksundae.ida import IDA
     except ImportError as error:
@@ -177,12 +177,12 @@ def solver_class():
 
 
 def flattened(state: State) -> Array:
-    """Return (r, p, q, u) as one vector."""
+    """Return (r, p, q, u) of a state as one vector."""
     return np.concatenate([state.r.ravel(), state.p.ravel(), state.q, state.u])
 
 
 def state_of(compiled: CompiledSystem, y: Array) -> State:
-    """Return the state of a vector, with normalised Euler parameters."""
+    """Return the state in a vector y, with normalised Euler parameters."""
     n_b, n_q = len(compiled.model.bodies.kind), int(compiled.model.bodies.q0[-1])
     r, p, q, u = np.split(np.array(y), [3 * n_b, 7 * n_b, 7 * n_b + n_q])
     p = p.reshape(n_b, 4)
@@ -190,20 +190,20 @@ def state_of(compiled: CompiledSystem, y: Array) -> State:
 
 
 class Motion:
-    """The rates of a system, with a count; errors are stored, because they cannot pass through the solver."""
+    """Rates of a system with a count of evaluations; errors are stored, because they cannot pass through the solver."""
 
     def __init__(self, compiled: CompiledSystem, t: float, memory: Memory) -> None:
         self.compiled, self.work = compiled, new_work(compiled.model)
-        self.rotations = FollowedRotations(compiled.model, self.work, t, memory)  #: of bushings
+        self.rotations = FollowedRotations(compiled.model, self.work, t, memory)  #: counted rotations of bushings
         self.n_evaluations, self.problem = 0, ""
 
     def accelerations(self, t: float, state: State) -> tuple[Array, Array]:
-        """Return accelerations and wrenches at a state."""
+        """Return accelerations and wrenches for a state at time t."""
         found = solve_accelerations(self.compiled, self.work, state)
         return solve_accelerations(self.compiled, self.work, state) if self.rotations.has_changed(t) else found
 
     def rates(self, t: float, y: Array) -> Array:
-        """Return y'."""
+        """Return the rate y' of y."""
         model = self.compiled.model
         state = state_of(self.compiled, y)
         self.work.state.time[...] = t
@@ -216,7 +216,7 @@ class Motion:
         return np.concatenate([*r_dot, *p_dot, *q_dot, u_dot])
 
     def residual(self, t: float, y: Array, y_dot: Array, result: Array) -> None:
-        """Write y' minus the rates at y."""
+        """Write the residual, y_dot minus the rate at y."""
         try:
             result[:] = y_dot - self.rates(t, y)
         except (FloatframeError, RuntimeError, ValueError) as error:

@@ -1,4 +1,4 @@
-"""What integrators share: their protocol, the reason of a failed step, functions that make one memory of another."""
+"""Common parts of the integrators: their protocol, the reason for a failed step, conversions between memories."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -38,22 +38,22 @@ __all__ = [
     "with_angles",
 ]
 
-LEAST_STEP = 1e-6  #: fraction of the largest step, for steps that may be divided without a given smallest step
+LEAST_STEP = 1e-6  #: smallest part of the largest step, for divided steps without a given minimum
 
 
 @dataclass(frozen=True)
 class Failure:
-    """Reason of a failed step."""
+    """Reason why a step failed."""
 
     words: str
-    residual: float  #: last correction relative to the allowed one
+    residual: float  #: last Newton correction relative to the allowed correction
 
 
 class Integrator(Protocol):
-    """A method with its parameters: a frozen dataclass of plain numbers, all that changes in the memory."""
+    """A method with its parameters: a frozen dataclass of plain numbers; everything that changes is in the memory."""
 
     def start(self, system: System, t: float, state: State | None = None, before: Memory | None = None) -> Memory:
-        """Return the memory at the beginning: the consistent state and its accelerations.
+        """Return the memory at the start: the consistent state and its accelerations.
 
         Counted angles, angles of couplers and states of user forces go on from those of a memory `before`.
         """
@@ -62,14 +62,14 @@ class Integrator(Protocol):
         return with_angles(system, t, memory_at(made.state, made.u_dot, made.w), before, state)
 
     def after_jump(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
-        """Return the memory after a jump of forces at t, and the results there.
+        """Return the memory after forces have jumped at t, and the results there.
 
         Positions and velocities are continuous.
         """
         return started_anew(self, system, t, memory, work)
 
     def step(self, system: System, t: float, h: float, memory: Memory) -> Memory:
-        """Return the memory one step of size h later; `ConvergenceError` if it fails."""
+        """Return the memory after one step of size h; `ConvergenceError` if it fails."""
         work = new_work(compiled_system(system).model)
         after, _, _, failure = self.advance(system, memory, work, t0=t, h=h, first=0, n_steps=1, every=2)
         if failure is not None:
@@ -84,7 +84,7 @@ class Integrator(Protocol):
     def advance(
         self, system: System, memory: Memory, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
     ) -> tuple[Memory, Rows, int, Failure | None]:
-        """Advance by n_steps of size h, the first with the number `first` from t0, with a row after every `every`-th.
+        """Advance by n_steps of size h, beginning with step `first` counted from t0; write a row every `every` steps.
 
         Returns
         -------
@@ -96,13 +96,13 @@ class Integrator(Protocol):
 
 
 def started_anew(method: Integrator, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
-    """Return the memory of a motion that begins at t in the state of another memory, and the results there."""
+    """Return the memory of a motion that starts at t from the state in another memory, and the results there."""
     fresh = method.start(system, t, state_of_file(compiled_system(system), memory.state), before=memory)
     return method.observe(system, t, counted_on(fresh, memory), work)
 
 
 def counted_on(fresh: Memory, memory: Memory) -> Memory:
-    """Return the memory of a new start with work and counts of the previous one."""
+    """Return the memory of a new start with work and counters continued from the previous memory."""
     return fresh.changed(
         work=memory.work,
         n_iterations=memory.n_iterations,
@@ -124,7 +124,7 @@ def one_by_one(
     n_steps: int,
     every: int,
 ) -> tuple[Memory, list[Rows], int, Failure | None]:
-    """Advance as `Integrator.advance`, step by step: memory, rows, number of good steps, reason of failure."""
+    """Advance step by step as `Integrator.advance` does: return memory, rows, number of successful steps, failure."""
     rows: list[Rows] = []
     for k in range(n_steps):
         memory, row, n_good, failure = method.advance(
@@ -137,7 +137,7 @@ def one_by_one(
 
 
 def memory_of_past(work: Work, end: Memory, k: int) -> Memory:
-    """Return the memory after step k, from 0, of a call of `advance` that led to the memory `end`."""
+    """Return the memory after step k, counted from 0, of a call of `advance` that ended with the memory `end`."""
     memory = Memory._make(np.array(array[k]) for array in work.past.memory)
     return memory._replace(a=memory.a[: len(end.a)])
 
@@ -145,7 +145,7 @@ def memory_of_past(work: Work, end: Memory, k: int) -> Memory:
 def with_angles(
     system: System, t: float, memory: Memory, before: Memory | None = None, state: State | None = None
 ) -> Memory:
-    """Return the memory at the start of a motion with its angles counted.
+    """Return the memory at the start of a motion with its counted angles.
 
     They go on from those of a memory before, else from the motions that prescribe them, from the state that a motion
     begins with, or between -pi and pi.
@@ -162,7 +162,7 @@ def with_angles(
 
 
 def turned_on(system: System, memory: Memory, h: float) -> Memory:
-    """Return the memory with its angles advanced by a step of size h to its state; none if none are counted."""
+    """Return the memory with its counted angles advanced to its state over a step of size h."""
     from floatframe.engine.kernels.entry import count_angles
 
     if not len(memory.angle):
@@ -175,7 +175,7 @@ def turned_on(system: System, memory: Memory, h: float) -> Memory:
 def coasted(
     method: Integrator, system: System, t: float, size: float, memory: Memory, work: Work
 ) -> tuple[Memory, Rows]:
-    """Return the memory so shortly after t that a step would be only rounding, from its rates, and the results."""
+    """Return memory and results extrapolated from rates to a time so close to t that a step would be only rounding."""
     compiled = compiled_system(system)
     state = displaced(compiled.model, memory.state, size * memory.state.u)
     w, rows = memory.w.copy(), compiled.model.states.row
@@ -186,21 +186,21 @@ def coasted(
 
 
 class FollowedRotations:
-    """Counted rotations of bushings for a method with its own steps; they are set in the iterate."""
+    """Counted rotations of bushings for a method with its own steps; they are written into the iterate."""
 
     def __init__(self, model: Model, work: Work, t: float, memory: Memory) -> None:
-        """Begin with the state of a motion at time t."""
+        """Begin to count from the state of a motion at time t."""
         self.angles, self.u0, self.state = model.angles, model.bodies.u0, work.state
         self.first = np.flatnonzero(model.angles.part == 0)
         self.begin(t, memory.angle, memory.angle_rate)
 
     def begin(self, t: float, angle: Array, rate: Array) -> None:
-        """Set the rotations at time t, from which counting continues."""
+        """Set the rotations at time t, from which they are counted further."""
         self.t, self.angle, self.rate = t, angle.copy(), rate.copy()
         self.state.angle[: len(angle)] = angle
 
     def has_changed(self, t: float) -> bool:
-        """Set the rotations of the iterate at time t.
+        """Update the rotations in the iterate for time t.
 
         Return whether they differ by full turns from those used before.
         """
@@ -221,11 +221,11 @@ class FollowedRotations:
         return changed
 
     def in_ground(self, i: int, x: Array) -> Array:
-        """Return directions of body i, -1 for the ground, in ground axes."""
+        """Return directions fixed in body i (-1: ground) in ground axes."""
         return x if i < 0 else np.asarray(self.state.R[i] @ x)
 
     def spin(self, i: int) -> Array:
-        """Return the angular velocity of body i in ground axes."""
+        """Return the angular velocity of body i (-1: ground) in ground axes."""
         return np.zeros(3) if i < 0 else np.asarray(self.state.R[i] @ self.state.u[self.u0[i] + 3 : self.u0[i] + 6])
 
 
@@ -233,7 +233,7 @@ def observed_outputs(
     outputs: Iterable[tuple[float, State, Array, Array]], name: str, system: System, memory: Memory, work: Work, *,
     h: float, first: int, every: int,
 ) -> tuple[Memory, list[Rows], int, Failure | None, bool]:  # fmt: skip
-    """Return memory, rows, number of good outputs, reason of failure, and whether an element ended the run.
+    """Return memory, rows, number of successful outputs, failure, and whether an element ended the run.
 
     Work and dissipation are summed by the trapezoidal rule.
 
@@ -271,14 +271,14 @@ def observed(system: System, t: float, memory: Memory, work: Work) -> tuple[Memo
 
 
 def joined_rows(parts: Sequence[Rows]) -> Rows:
-    """Return rows of results one after the other."""
+    """Return consecutive parts of the results as one."""
     return parts[0] if len(parts) == 1 else Rows(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 
 def failure_of_element(
     compiled: CompiledSystem, work: Work, outcome: Outcome, least: float, smaller: str
 ) -> Failure | None:
-    """Return the reason of a failed step that an element or a contact gives, whatever the method; else None.
+    """Return the reason for a failed step that an element or contact gives, for any method; None if there is none.
 
     least: the smallest step; smaller: what may be given to have shorter ones.
     """
@@ -304,6 +304,6 @@ def failure_of_element(
 
 
 def has_divided_steps(model: Model) -> bool:
-    """Whether fixed steps of a system may be divided: if contacts close, or dry friction comes to rest."""
+    """Whether fixed steps may be divided, because contacts close or dry friction comes to rest."""
     forces = model.joint_forces
     return len(model.gaps.connection) > 0 or bool((forces.friction > 0).any() or (forces.coefficient > 0).any())

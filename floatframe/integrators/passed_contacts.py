@@ -1,4 +1,4 @@
-"""Contacts that a solver with its own steps misses: open at both ends of a step, closed between them.
+"""Contacts that a solver with its own steps misses: open at both ends of a step, but closed between them.
 
 An error estimate knows only what the solver has evaluated. The cubic through the ends of a step and their rates shows
 the rest: where a gap is closed within the step alone, the solver goes anew to just before it, then in steps that end
@@ -15,22 +15,22 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["Stretch", "stretches_of_passed_contact"]
 
-PARTS = 5  #: fractions of a step at which gaps are evaluated
-WITHIN = 4  #: number of steps within a missed contact
-TOLERANCE = 1e-9  #: depth relative to the change of the gap in the step, below which it is no contact
+PARTS = 5  #: number of points in a step at which gaps are evaluated
+WITHIN = 4  #: number of steps that resolve a missed contact
+TOLERANCE = 1e-9  #: depth, relative to the change of the gap in the step, below which the contact is ignored
 
 
 class Stretch(NamedTuple):
-    """A part of a motion that a solver computes with its own steps."""
+    """A part of a motion for which a solver chooses its own steps."""
 
-    end: float  #: [s]
-    most: float = np.inf  #: its longest step [s]
+    end: float  #: end of the part [s]
+    most: float = np.inf  #: longest allowed step of the solver [s]
 
 
 def stretches_of_passed_contact(
     gaps: Callable[[float, Array], Array], t_0: float, t_1: float, y: Array, rates: Array
 ) -> list[Stretch]:
-    """Return the parts up to and through the first contact within a step from t_0 to t_1; none without a contact.
+    """Return the parts before and through the first contact in a step from t_0 to t_1; empty if there is none.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The generalized-alpha method in relative coordinates: joints and modes, with constraints only for closed loops.
+"""The generalized-alpha method in relative coordinates: joints and modes; only closed loops need constraints.
 
 Evaluated in `floatframe.engine.tree.kernels.steps`.
 """
@@ -32,13 +32,13 @@ from floatframe.model.system import System
 
 __all__ = ["RelativeGeneralizedAlpha", "in_formulation"]
 
-NEAR_BY = 1e-3  #: fraction of a step for the difference that gives the rates of accelerations
+NEAR_BY = 1e-3  #: difference step for rates of accelerations, as a fraction of the time step
 
 
 @dataclass(frozen=True)
 @checked_fields(ModelError)
 class RelativeGeneralizedAlpha(Integrator):
-    """Generalized-alpha in the coordinates of joints and modes (docs/relative.md §6), otherwise as `GeneralizedAlpha`.
+    """Generalized-alpha in coordinates of joints and modes (docs/relative.md §6), otherwise as `GeneralizedAlpha`.
 
     (1) predict: a_new = a for every unknown s = (z, q)
     (2) Newton on  rho(s, s_dot, s_ddot, w) = 0, g = 0  over the increment x of the step, where rho is the residual
@@ -86,7 +86,7 @@ class RelativeGeneralizedAlpha(Integrator):
         return GeneralizedAlpha(**asdict(self))
 
     def after_jump(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
-        """Return the memory after a jump of forces at t, and the results there; as `GeneralizedAlpha`."""
+        """Return the memory after forces have jumped at t, and the results there; as `GeneralizedAlpha`."""
         if memory.h == 0.0:
             return started_anew(self, system, t, memory, work)
         compiled, tree = compiled_system(system), tree_of(system).tree
@@ -110,7 +110,7 @@ class RelativeGeneralizedAlpha(Integrator):
     def advance(
         self, system: System, memory: Memory, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
     ) -> tuple[Memory, Rows, int, Failure | None]:
-        """Advance by n_steps of size h, the first of them number `first` from t0; see `integrator.Integrator`."""
+        """Advance by n_steps of size h, beginning with step `first` counted from t0; see `integrator.Integrator`."""
         from floatframe.engine.tree.kernels.entry import joint_kernels
 
         compiled, tree = compiled_system(system), tree_of(system).tree
@@ -129,7 +129,7 @@ class RelativeGeneralizedAlpha(Integrator):
         return after, rows, outcome.n_steps, self.explain(system, work, outcome, after.u, h)
 
     def prepared(self, system: System, memory: Memory, h: float, t: float) -> Memory:
-        """Return the memory with algorithmic accelerations of the unknowns for steps of size h from t.
+        """Return the memory with algorithmic accelerations of the unknowns for steps of size h that begin at t.
 
         At the start, and where longer steps follow: as `start.step_filter` says, in the coordinates of the joints.
         """
@@ -154,7 +154,7 @@ class RelativeGeneralizedAlpha(Integrator):
         return memory.changed(u_dot=u_dot, a=a, h=h, h_next=h)
 
     def explain(self, system: System, work: Work, outcome: Outcome, u: Array, h: float) -> Failure | None:
-        """Return the reason of a failed step of size h that began with velocities u, (n_u,); None if none failed."""
+        """Return the reason why a step of size h failed that began with velocities u, (n_u,); None if none failed."""
         from floatframe.engine.kernels.generalized_alpha import SINGULAR, TURNED
 
         if outcome[0] == 0:
@@ -177,7 +177,7 @@ class RelativeGeneralizedAlpha(Integrator):
 
 
 def in_formulation(integrator: Integrator, formulation: str | None) -> Integrator:
-    """Return the method in a formulation by its name, "absolute" or "relative"; None: unchanged.
+    """Return the method in the formulation "absolute" or "relative"; None leaves it unchanged.
 
     Raises
     ------
@@ -200,19 +200,19 @@ def in_formulation(integrator: Integrator, formulation: str | None) -> Integrato
 
 @dataclass(eq=False)
 class Kept:
-    """Data that belong to working arrays, and the memory at the end of their last steps."""
+    """Data that belong to working arrays, and the memory at the end of the last steps computed with them."""
 
     joints: JointWork
     tangent: TangentWork
     after: Memory | None = None
 
 
-#: by the identity of an array of the working arrays, with whose lifetime they end
+#: by the identity of an array of the working arrays; an entry is removed when that array is freed
 KEPT: dict[int, Kept] = {}
 
 
 def kept_of(work: Work, model: Model, tree: Tree) -> Kept:
-    """Return the data of working arrays: factors of the Newton matrix, as `work.solver` has the absolute ones."""
+    """Return the data that belong to working arrays: factors of the Newton matrix in relative coordinates."""
     key = id(work.solver.pivot)
     if key not in KEPT:
         KEPT[key] = Kept(new_joint_work(model, tree), new_tangent_work(model, tree))
@@ -222,7 +222,7 @@ def kept_of(work: Work, model: Model, tree: Tree) -> Kept:
 
 
 def joint_iterate(compiled: CompiledSystem, tree: Tree, state: State, u_dot: Array) -> tuple[Work, JointWork]:
-    """Return working arrays with the motion of the joints at a state."""
+    """Return working arrays with the joint motion at a state."""
     from floatframe.engine.tree.kernels.entry import motion_of_joints
 
     work, joints = new_work(compiled.model), new_joint_work(compiled.model, tree)
@@ -232,7 +232,7 @@ def joint_iterate(compiled: CompiledSystem, tree: Tree, state: State, u_dot: Arr
 
 
 def in_slots(tree: Tree, joints: JointWork, of_bodies: Array, of_columns: Array) -> Array:
-    """Return values of all unknowns at their indices, (n_u,), zero elsewhere."""
+    """Return values of all unknowns at their positions in the memory, (n_u,), with zeros elsewhere."""
     result = np.zeros_like(of_bodies)
     is_mode = tree.mode >= 0
     result[tree.slot[is_mode]] = of_bodies[tree.slot[is_mode]]
@@ -248,7 +248,7 @@ def may_spin(tree: Tree) -> NDArray[np.bool_]:
 def joint_accelerations(
     compiled: CompiledSystem, tree: Tree, memory: Memory, begun: Beginning, h: float, spin: Spin | None
 ) -> tuple[Array, Array]:
-    """Return the initial s_ddot and its rate at the indices of the unknowns, (n_u,).
+    """Return the initial s_ddot and its rate at the positions of the unknowns in the memory, (n_u,).
 
     spin: bodies that spin by themselves, whose rates are those of s_ddot without the turn of their axes, in axes that
     do not spin.
@@ -287,7 +287,7 @@ def shifted(
     t: float,
     rows: NDArray[np.bool_],
 ) -> Memory:
-    """Return the memory with velocities changed by O(h²), so that x = h s_dot + h² way closes some of the kept rows.
+    """Return the memory with velocities changed by O(h²), so that the first step closes some of the kept rows.
 
     G ds = -g(after)/h with the matrix of a step, M + gamma h D + beta h² K, as (3) of `start.step_filter`.
     """

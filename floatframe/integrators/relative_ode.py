@@ -1,4 +1,4 @@
-"""SciPy's stiff solvers on the independent coordinates of joints and modes.
+"""SciPy's ODE solvers for the independent coordinates of joints and modes.
 
 Evaluated in `floatframe.engine.tree.kernels.accelerations`.
 """
@@ -43,12 +43,12 @@ from floatframe.model.system import System
 __all__ = ["METHODS", "Partition", "RelativeOde", "partition_of"]
 
 
-METHODS = ("BDF", "Radau", "LSODA", "DOP853", "RK45")  #: of SciPy
-TURN = 2.0  #: rad: a rotation vector longer than this is restarted from zero
-CLOSED = 1e-13  #: tolerance of lengths and angles when closing loops at each evaluation
-MOST = 20  #: iterations
-COUNTED = 0.1  #: absolute tolerance of coordinates that only determine the turn of an angle
-SETTLED = 1e-12  #: tolerance of the last change of reactions and similar unknowns, relative to the largest
+METHODS = ("BDF", "Radau", "LSODA", "DOP853", "RK45")  #: SciPy methods that may be chosen
+TURN = 2.0  #: length of a rotation vector [rad] above which it is restarted from zero
+CLOSED = 1e-13  #: tolerance for lengths and angles when loops are closed in each evaluation
+MOST = 20  #: largest number of iterations
+COUNTED = 0.1  #: absolute tolerance of coordinates that only count the turns of an angle
+SETTLED = 1e-12  #: tolerance for the last change of reactions and other implicit unknowns, relative to the largest
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class RelativeOde(Integrator):
                 raise ModelError(f"RelativeOde: {name}: expected a number between 0 and 1, got {getattr(self, name)}")
 
     def start(self, system: System, t: float, state: State | None = None, before: Memory | None = None) -> Memory:
-        """Return the memory at the beginning, from a consistent state."""
+        """Return the memory at the start, for a consistent state near the given one."""
         compiled = compiled_system(system)
         for each in compiled.laws:
             if each.law.accelerations:
@@ -103,7 +103,7 @@ class RelativeOde(Integrator):
     def advance(
         self, system: System, memory: Memory, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
     ) -> tuple[Memory, Rows, int, Failure | None]:
-        """Advance by n_steps output times, the first of them number `first` from t0; see `integrator.Integrator`."""
+        """Advance by n_steps output times, beginning with step `first` counted from t0; see `integrator.Integrator`."""
         times: Array = t0 + h * np.arange(first, first + n_steps + 1, dtype=float)
         motion = Motion(system, memory, float(times[0]))
         memory, rows, n_good, failure, has_stopped = observed_outputs(
@@ -120,7 +120,7 @@ class RelativeOde(Integrator):
 
 
 class Motion:
-    """A system along a motion: y = (independent x, independent rates, states, counted coordinates) and its rates."""
+    """Right side of y' for a system, y = (independent x, independent rates, states, counted coordinates)."""
 
     def __init__(self, system: System, memory: Memory, t: float) -> None:
         state, w = memory.state, memory.w
@@ -141,7 +141,8 @@ class Motion:
         self.p = state.p
         states = self.model.states
         self.n_states, self.own = len(states.row), np.concatenate([states.row, self.model.coordinates.row])
-        self.z, self.w = w[self.own].copy(), w.copy()  #: states, counted coordinates; unknowns of the last evaluation
+        #: states and counted coordinates, and all connection unknowns, of the last evaluation
+        self.z, self.w = w[self.own].copy(), w.copy()
         self.z_size = np.concatenate([states.size, np.full(len(self.own) - self.n_states, np.inf)])
         self.work.states.kappa[:], self.work.states.rho[...] = 0.0, 1.0
         own_equations = any(each.law.multipliers for each in self.compiled.laws)
@@ -150,7 +151,7 @@ class Motion:
         self.begin(state, t)
 
     def begin(self, state: State, t: float) -> None:
-        """Start the increments at a state, and choose the independent coordinates there."""
+        """Set the increments to zero at a state, and choose the independent coordinates there."""
         from floatframe.engine.tree.kernels.entry import motion_of_joints
 
         set_iterate(self.work, state)
@@ -165,17 +166,17 @@ class Motion:
         self.of_rates = partition_of(C[self.held], tuple(self.names[k] for k in self.held), sizes)
 
     def sizes(self) -> Array:
-        """Return typical sizes of coordinates: the length of the system, or a radian."""
+        """Typical sizes of coordinates: the system length, or one radian."""
         units = np.array([self.compiled.length if each.unit == "m" else 1.0 for each in self.parts.columns] or [1.0])
         return np.where(self.is_mode, 1.0, units[np.maximum(self.tree.column, 0)])
 
     def values(self, of_bodies: Array, of_columns: Array) -> Array:
-        """Return values of all unknowns, (n_s,)."""
+        """Return the values of all unknowns, (n_s,)."""
         columns = np.append(of_columns, 0.0)[self.tree.column]
         return np.where(self.is_mode, of_bodies[self.tree.slot], columns)
 
     def put(self, t: float, x: Array, rates: Array) -> None:
-        """Write increments and rates; prescribed ones follow their functions."""
+        """Write increments and rates; prescribed coordinates follow their functions."""
         tree, joints, state = self.tree, self.joints, self.work.state
         state.time[...] = t
         state.w[:] = 0.0
@@ -194,7 +195,7 @@ class Motion:
         state.u_dot[tree.slot[modes]] = 0.0
 
     def constrain(self, t: float, x: Array, rates: Array, *, by_increments: bool) -> None:
-        """Write the constraints, their rates and C."""
+        """Write the constraints, their rates and their Jacobian C."""
         from floatframe.engine.tree.kernels.entry import constraints
 
         self.put(t, x, rates)
@@ -202,7 +203,7 @@ class Motion:
         raise_errors_of(self.compiled.callbacks)
 
     def closed_at(self, t: float, y: Array) -> tuple[Array, Array]:
-        """(2): return increments and rates of all unknowns from the independent ones."""
+        """(2): return increments and rates of all unknowns for given independent ones."""
         places, speeds = self.of_places, self.of_rates
         n, m = len(places.independent), len(y) - len(self.own)
         x, rates, self.z = self.x.copy(), np.zeros_like(self.x), y[m:].copy()
@@ -231,7 +232,7 @@ class Motion:
         return x, rates
 
     def derivative(self, t: float, y: Array) -> Array:
-        """Return y'."""
+        """Return the rate y' of y."""
         x, rates = self.closed_at(t, y)
         accelerations = self.accelerations(t, x, rates)
         x_dot = rates.copy()
@@ -241,7 +242,7 @@ class Motion:
         return np.concatenate([x_dot[self.of_places.independent], accelerations[self.of_rates.independent], z_dot])
 
     def accelerations(self, t: float, x: Array, rates: Array) -> Array:
-        """(3): return accelerations of all unknowns; bodies and wrenches are written."""
+        """(3): return accelerations of all unknowns; the motion of bodies and the wrenches are written."""
         from floatframe.engine.tree.kernels.entry import accelerations
 
         self.n_evaluations += 1
@@ -278,7 +279,7 @@ class Motion:
         return found
 
     def outputs(self, method: RelativeOde, times: Array) -> Iterator[tuple[float, State, Array, Array]]:
-        """Yield time, state, u_dot and w at each time but the first."""
+        """Yield time, state, u_dot and w at all times except the first."""
         from scipy.integrate import solve_ivp
 
         k, stretches = 1, [Stretch(times[-1])]
@@ -314,7 +315,7 @@ class Motion:
                 self.begin(state, t)
 
     def before_contact(self, solution: Any, work: Work) -> tuple[float, Array, list[Stretch]]:
-        """Return time, y and the next parts of the motion at a step that misses a contact; the end if none does."""
+        """Return time, y and the next parts of the motion at a step that misses a contact; if none does, at the end."""
 
         def gaps(t: float, y: Array) -> Array:
             state, _, w = self.state_at(t, y)
@@ -330,7 +331,7 @@ class Motion:
         return end, solution.sol(end), []
 
     def events(self) -> Sequence[Callable[[float, Array], float]]:
-        """Return functions of (t, y) that end a part of the motion where they pass zero."""
+        """Return functions of (t, y) that end a part of the motion when they cross zero."""
 
         def far(t: float, y: Array) -> float:
             x, _ = self.closed_at(t, y)
@@ -347,7 +348,7 @@ class Motion:
         return chosen
 
     def state_at(self, t: float, y: Array) -> tuple[State, Array, Array]:
-        """Return state, accelerations and wrenches at a solution, reactions of the tree included."""
+        """Return state, accelerations and wrenches, including tree reactions, for a solution y."""
         from floatframe.engine.tree.kernels.entry import projected
 
         x, rates = self.closed_at(t, y)
@@ -361,7 +362,7 @@ class Motion:
 
 
 def groups_of(parts: SystemTree) -> list[Array]:
-    """Return the unknowns of each rotation group, three numbers each."""
+    """Return the three unknowns of each rotation group."""
     tree = parts.tree
     groups = []
     for i in range(len(tree.parent)):
@@ -382,30 +383,30 @@ def groups_of(parts: SystemTree) -> list[Array]:
 # docs/relative.md §7.
 
 
-RANK = 1e-9  #: ratio to the largest pivot below which a pivot is zero
-WORSE = 1e3  #: growth of the solution above which a partition is renewed
+RANK = 1e-9  #: ratio to the largest pivot below which a pivot counts as zero
+WORSE = 1e3  #: growth of the solution above which a new partition is chosen
 
 
 @dataclass(frozen=True, eq=False)
 class Partition:
     """The partition into dependent and independent coordinates."""
 
-    dependent: IntArray  #: (n_c,)
-    independent: IntArray  #: (n - n_c,)
-    #: largest change of a dependent coordinate by an independent one when the partition was made, at least 1
+    dependent: IntArray  #: indices of the dependent coordinates, (n_c,)
+    independent: IntArray  #: indices of the independent coordinates, (n - n_c,)
+    #: largest derivative of a dependent by an independent coordinate at the time of partition, at least 1
     growth: float
 
     def solved(self, C: Array, right: Array) -> Array:
-        """Return the dependent coordinates y of C_d y = right."""
+        """Return the solution y of C_d y = right for the dependent coordinates."""
         return np.asarray(lu_solve(lu_factor(C[:, self.dependent]), right)) if len(self.dependent) else np.zeros(0)
 
     def is_worn(self, C: Array) -> bool:
-        """Whether dependent coordinates now change much more with the others than when the partition was made."""
+        """Whether dependent coordinates now depend much more strongly on the others than at the time of partition."""
         return bool(len(self.dependent)) and growth(C, self.dependent, self.independent) > WORSE * self.growth
 
 
 def growth(C: Array, dependent: IntArray, independent: IntArray) -> float:
-    """Return the largest number of C_d⁻¹ C_i, at least 1; infinite where C_d is singular."""
+    """Return the largest entry of C_d⁻¹ C_i, at least 1; infinite if C_d is singular."""
     if not len(dependent) or not len(independent):
         return 1.0
     try:
@@ -415,7 +416,7 @@ def growth(C: Array, dependent: IntArray, independent: IntArray) -> float:
 
 
 def partition_of(C: Array, names: tuple[str, ...], sizes: Array) -> Partition:
-    """Return the partition of coordinates for the constraints C, (n_c, n).
+    """Return the partition of coordinates for the constraint Jacobian C, (n_c, n).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What integrators of ordinary differential equations cannot follow: forces that depend on more than the present."""
+"""Forces that depend on the past, which integrators of ordinary differential equations cannot compute."""
 
 from floatframe.engine.compiling.system import CompiledSystem
 from floatframe.engine.kernels.model import CONTACT

@@ -1,4 +1,4 @@
-"""A variational integrator: the motion that makes the sum of discrete Lagrangians stationary.
+"""A variational integrator, whose motion makes the sum of discrete Lagrangians stationary.
 
 Evaluated in `floatframe.engine.structure_preserving.kernels.steps`.
 """
@@ -19,7 +19,7 @@ __all__ = ["Variational"]
 @dataclass(frozen=True)
 @checked_fields(ModelError)
 class Variational(DiscreteScheme):
-    """Symplectic, momentum exact, energy bounded without drift, joints closed in positions and velocities, order two.
+    """Symplectic scheme of order two: exact momenta, bounded energy error, joints closed in positions and velocities.
 
     Coordinates of the centre of mass c, R_GB, q (`structure_preserving.kernels.bodies`). Between two configurations
     with R' = R cay(theta), by the midpoint rule in q and the trapezoidal rule in the potential V of gravity and
@@ -59,7 +59,7 @@ class Variational(DiscreteScheme):
         check_options(self)
 
     def start(self, system: System, t: float, state: State | None = None, before: Memory | None = None) -> Memory:
-        """Return the memory at the beginning, from a consistent state."""
+        """Return the memory at the start, for a consistent state near the given one."""
         for force in system.forces:
             if getattr(force, "friction_coefficient", 0.0) > 0:
                 raise ModelError(
@@ -70,5 +70,5 @@ class Variational(DiscreteScheme):
 
     @property
     def equations(self) -> int:
-        """Kind of equations: `VARIATIONAL`."""
+        """Kind of scheme: `VARIATIONAL`."""
         return VARIATIONAL
