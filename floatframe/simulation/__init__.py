@@ -1,1 +1,1 @@
-"""The time loop (`integrate`), and what it calls: events, restart, and the watches over steps and linear frames."""
+"""The time loop (`integrate`) with its events, its restart, and the checks of step size and linear frames."""

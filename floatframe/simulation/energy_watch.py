@@ -1,4 +1,4 @@
-"""Energy balance of a run, row by row: the energy that its time steps have added or removed.
+"""Energy balance of a run from its result rows: the energy that the time steps have added or removed.
 
 The balance is total energy - work of forces + dissipated energy, less its value at the start.
 
@@ -34,44 +34,46 @@ from floatframe.simulation.step_watch import FIRST_VERDICT
 
 __all__ = ["EnergyWatch"]
 
-GAIN_LIMIT = 0.05  #: gain relative to the energy in motion above which a run reports it
-STOP_LIMIT = 0.5  #: gain above which a run stops
-LOSS_LIMIT = 0.1  #: loss relative to the energy in motion above which a run reports it
-STEADY = 0.05  #: relative change of the work of dampers between two intervals up to which their velocities are resolved
-MOST_WAITING = 400  #: rows are collected until they are as many as those before, but at most this number
+GAIN_LIMIT = 0.05  #: energy gain, relative to the energy in motion, above which a run reports it
+STOP_LIMIT = 0.5  #: energy gain, relative to the energy in motion, above which a run stops
+LOSS_LIMIT = 0.1  #: energy loss, relative to the energy in motion, above which a run reports it
+#: relative change of the dampers' work between two intervals up to which their velocities count as resolved
+STEADY = 0.05
+MOST_WAITING = 400  #: limit of collected rows; below it, as many rows are collected as were assessed before
 ADVICE = {
     "energy": "take a shorter step, the scheme energy-momentum or relative coordinates",
     "damping": "take a step that resolves the fast vibrations, less numerical damping (rho_inf nearer to 1), or start "
     "without these vibrations",
-}  #: remedy by the kind of the note
-REST = 1e-12  #: motion in a step over the length of the system that rounding gives to springs of 1000 rad a step
-ROUNDING = 8 * np.finfo(float).eps  #: of a number
+}  #: remedy for each kind of note
+#: displacement in a step, over the length of the system, caused by rounding in springs of 1000 rad per step
+REST = 1e-12
+ROUNDING = 8 * np.finfo(float).eps  #: relative rounding error of a number
 
 
 @dataclass
 class EnergyWatch:
-    """The energy that the steps of a run have added to its motion, from its rows of results."""
+    """The energy that the time steps of a run have added to its motion, computed from result rows."""
 
-    every: int  #: steps between rows
+    every: int  #: number of steps between rows
     h: float  #: step size [s]
-    n_seen: int = 0  #: rows after the first one
-    last: Array | None = None  #: energy, work given and taken at the last row, (3,)
-    change: Array | None = None  #: work in the previous interval, (2,)
+    n_seen: int = 0  #: number of assessed rows after the first one
+    last: Array | None = None  #: energy, supplied work and dissipated work at the last row, (3,)
+    change: Array | None = None  #: supplied and dissipated work in the previous interval, (2,)
     potential: Array | None = None  #: smallest and largest potential of gravity
     gain: float = 0.0  #: energy that the steps have added
-    unsure: float = 0.0  #: its error due to the integration of work
-    unresolved: float = 0.0  #: further error due to the work of unresolved dampers
+    unsure: float = 0.0  #: error of `gain` due to the integration of work
+    unresolved: float = 0.0  #: additional error of `gain` due to the work of unresolved dampers
     taken: float = 0.0  #: work of dampers
     scale: float = 0.0  #: largest energy in motion
-    noise: float = 0.0  #: of the energy, due to rounding
+    noise: float = 0.0  #: rounding error of the energy
     waiting: list[Rows] = field(default_factory=list)  #: rows that are not yet assessed
-    notes: dict[str, ValidityNote] = field(default_factory=dict)  #: by kind
-    is_beyond: bool = False  #: whether the run has to stop
+    notes: dict[str, ValidityNote] = field(default_factory=dict)  #: notes by their kind
+    is_beyond: bool = False  #: whether the run must stop
 
     def observe(
         self, system: System, rows: Rows, *, is_switched: bool, is_last: bool = False
     ) -> tuple[ValidityNote, ...]:
-        """Take rows of results and return the new notes. is_switched: the acting forces differ in these rows.
+        """Take result rows and return new notes; is_switched: other forces act in these rows.
 
         The first steps, in which little moves yet, are judged at the end of a run alone (is_last). Rows are judged
         together: a look at a few costs as much as one at many.
@@ -86,14 +88,14 @@ class EnergyWatch:
         return (*notes, *self.judge(system, rows, is_switched=is_switched, is_last=is_last))
 
     def flush(self, system: System) -> tuple[ValidityNote, ...]:
-        """Assess the collected rows and return the new notes."""
+        """Assess the collected rows and return new notes."""
         if not self.waiting:
             return ()
         rows, self.waiting = joined_rows(self.waiting), []
         return self.judge(system, rows, is_switched=False, is_last=False)
 
     def judge(self, system: System, rows: Rows, *, is_switched: bool, is_last: bool) -> tuple[ValidityNote, ...]:
-        """Take rows of results and return the new notes."""
+        """Assess result rows and return new notes; is_switched: other forces act in these rows."""
         d = rows.diagnostics
         energy = d[:, KINETIC] + d[:, STRAIN] + d[:, SPRINGS] + d[:, GRAVITATION]
         now = np.stack([energy, d[:, WORK_GIVEN], d[:, WORK_TAKEN]], axis=1)
@@ -136,7 +138,7 @@ class EnergyWatch:
         return tuple(note for note in new if note is not None)
 
     def noted(self, system: System, rows: Rows, kind: str, share: Array, limit: float) -> ValidityNote | None:
-        """Store the largest share at the times of rows, (n_t,), if it is above a limit.
+        """Store the largest share at the times of the rows, (n_t,), if it is above a limit.
 
         Return the note if it is new.
         """
@@ -153,15 +155,15 @@ class EnergyWatch:
         return self.notes[kind]
 
     def passed_on(self) -> dict[str, list[float]]:
-        """Return what a run that continues this one in time has to know; no rows may be waiting."""
+        """Return the data that a continuing run needs; no rows may be waiting."""
         return {"energy": [self.gain, self.unsure, self.unresolved, self.taken, self.scale, self.noise]}
 
     def continue_from(self, watched: Mapping[str, Any]) -> None:
-        """Add to the errors of the run that this one continues."""
+        """Add the errors of the previous run, which this run continues."""
         self.gain, self.unsure, self.unresolved, self.taken, self.scale, self.noise = watched["energy"]
 
     def record(self) -> dict[str, Array]:
-        """Return the data to resume from, by name; no rows may be waiting."""
+        """Return the data for a resumed run by name; no rows may be waiting."""
         if self.last is None or self.potential is None:
             return {}
         change = np.full(2, np.nan) if self.change is None else self.change
@@ -169,7 +171,7 @@ class EnergyWatch:
         return {"energy_sums": np.concatenate([sums, self.last, change, self.potential])}
 
     def restore(self, record: Mapping[str, Array], notes: tuple[ValidityNote, ...]) -> None:
-        """Resume from a record and the notes of the completed part."""
+        """Restore the data of an interrupted run from its record and notes."""
         if "energy_sums" not in record:
             return
         numbers = np.array(record["energy_sums"], dtype=float)
@@ -181,7 +183,7 @@ class EnergyWatch:
         self.notes = {note.kind: note for note in notes if note.kind in ADVICE}
 
     def measured(self, d: Array) -> Array:
-        """Return the largest energy in motion up to the times of rows, (n_t,)."""
+        """Return the largest energy in motion up to each row, (n_t,)."""
         low, high = np.minimum.accumulate(d[:, GRAVITATION]), np.maximum.accumulate(d[:, GRAVITATION])
         if self.potential is not None:
             low, high = np.minimum(low, self.potential[0]), np.maximum(high, self.potential[1])
@@ -191,7 +193,7 @@ class EnergyWatch:
 
 
 def rounding_energies(system: System, rows: Rows, h: float) -> Array:
-    """Return the possible change of the energy of rows by rounding in steps of size h, (n_t,)."""
+    """Return the possible energy error of each row due to rounding in steps of size h, (n_t,)."""
     compiled = compiled_system(system)
     model = compiled.model
     mass = model.body_types.mass[model.bodies.kind]
@@ -201,7 +203,7 @@ def rounding_energies(system: System, rows: Rows, h: float) -> Array:
 
 
 def kinetic_energies(system: System, u: Array) -> Array:
-    """Return the kinetic energy of each body as if its mass were about its origin, (n_b,)."""
+    """Return the kinetic energy of each body, (n_b,), as if its centre of mass were at its origin."""
     model = compiled_system(system).model
     u0, kind = model.bodies.u0[:-1], model.bodies.kind
     v, omega = u[u0[:, None] + np.arange(3)], u[u0[:, None] + np.arange(3, 6)]

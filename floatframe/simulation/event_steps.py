@@ -1,4 +1,4 @@
-"""Time steps with event location.
+"""Time steps in which events are located.
 
 The compiled loop takes a block of steps and keeps the memory after each. Then the watched values are computed for the
 whole block at once. If a value passes its level within a step, trial steps of other sizes from the memory before that
@@ -52,77 +52,81 @@ from floatframe.simulation.switch_events import SwitchEvent, beyond_zero, sign_o
 
 __all__ = ["EventWatch"]
 
-BLOCK = 400  #: most steps of a block; blocks end at multiples of this step number
-STANDS = 1e-9  #: change of a watched value in a step, over its level and largest value, below which it is constant
-SHORT = 1e-7  #: part of a step that is extrapolated after an event: accelerations of such a step would be rounding
-MOST_NUMBERS = 2**23  #: most numbers in the results of a block
-SHUT = 1e-6  #: largest gap that a coupler or an element closes when it engages, over `gap_sizes`
-MOST_MADE = 8  #: most switched systems that are cached
-MOST_IN_A_STEP = 100  #: most events in one step; with more, events switch each other without end
+BLOCK = 400  #: largest number of steps in a block; blocks end at multiples of it
+#: change of a watched value in a step, relative to its level and largest value, below which it is constant
+STANDS = 1e-9
+#: fraction of a step that is extrapolated after an event, because such a short step would consist of rounding
+SHORT = 1e-7
+MOST_NUMBERS = 2**23  #: largest count of numbers in the results of a block
+SHUT = 1e-6  #: largest gap, relative to `gap_sizes`, that a coupler or an element closes when it is engaged
+MOST_MADE = 8  #: largest number of switched systems that are cached
+MOST_IN_A_STEP = 100  #: largest number of events in one step; above it, events switch each other on and off without end
 
 
 class Ended(NamedTuple):
-    """The end of a step."""
+    """The result at the end of a step."""
 
-    memory: Callable[[], Memory]  #: returns the memory
-    row: Rows | None  #: results; None: not written
+    memory: Callable[[], Memory]  #: function that returns the memory
+    row: Rows | None  #: result row; None if it was not written
     values: Array  #: watched values of the events, (n_events,)
 
 
 class Place(NamedTuple):
     """The location of event j within a step."""
 
-    part: float  #: time from the start of the step over the step size
+    part: float  #: time since the start of the step, as a fraction of the step size
     j: int
     memory: Memory
     row: Rows
-    failure: Failure | None  #: of the trial step to this location
+    failure: Failure | None  #: failure of the trial step to this location, or None
 
 
 def same(memory: Memory) -> Memory:
-    """Return a memory: the memory of an `Ended` whose memory exists already."""
+    """Return the memory unchanged; used when the memory of an `Ended` exists already."""
     return memory
 
 
 def past_rows(work: Work, n_steps: int, t0: float, h: float, first: int) -> Rows:
-    """Return rows with only the times and the kept angles after each of n_steps."""
+    """Return rows that contain only the times and the stored angles after each of n_steps steps."""
     empty = Rows(*(np.zeros(0) for _ in Rows._fields))
     times: Array = t0 + h * np.arange(first + 1, first + n_steps + 1, dtype=float)
     return empty._replace(t=times, angle=work.past.memory.angle[:n_steps])
 
 
 def one_of(rows: Rows, k: int) -> Rows:
-    """Return row k of several rows of results."""
+    """Return row k of the results as a record with one row."""
     return Rows(*(array[k : k + 1] for array in rows))
 
 
 @dataclass
 class EventWatch:
-    """The events of a run: watched values, switched parts, stops at their limits, and the events so far."""
+    """The events of a run: watched values, switched parts, stops at their limits, and past events."""
 
-    full: System  #: the system with all forces
+    full: System  #: the system with all forces switched on
     head: Head
-    system: System = field(init=False)  #: the system as switched
-    #: cache of switched systems by what is off and what is held
+    system: System = field(init=False)  #: the system with the present switches
+    #: cache of switched systems, by the names of parts that are off and by held values
     made: dict[tuple, System] = field(init=False, default_factory=dict)
-    events: tuple[Event, ...] = field(init=False)  #: events of the system, of its stops, of switching functions
+    events: tuple[Event, ...] = field(init=False)  #: events of the system, of its stops and of its switching functions
     off: frozenset[str] = field(init=False)  #: names of forces, couplers and elements that are off
-    caught: dict[str, float] = field(default_factory=dict)  #: values held by engaged couplers
-    resting: dict[str, str] = field(default_factory=dict)  #: side of the limit at which a coupler rests
-    signs: dict[str, int] = field(default_factory=dict)  #: current signs of switching functions, by event
-    values: Array = field(init=False)  #: watched values at the last time, angles unwrapped, (n_events,)
+    caught: dict[str, float] = field(default_factory=dict)  #: values at which engaged couplers are held
+    #: limit, "lower" or "upper", at which each stopped coupler rests
+    resting: dict[str, str] = field(default_factory=dict)
+    signs: dict[str, int] = field(default_factory=dict)  #: present sign of each switching function, by event
+    #: watched values at the last time, with angles counted through full turns, (n_events,)
+    values: Array = field(init=False)
     row: Rows | None = field(init=False, default=None)  #: results at the last time, if sensors need them
-    #: the last two measured rows, each with its copy in the frames of result files
+    #: the last two measured rows, each with a copy in the body frames of result files
     told: tuple[tuple[Rows, Rows], ...] = field(init=False, default=())
     happened: list[dict[str, Any]] = field(default_factory=list)
     recorded: list[Rows] = field(default_factory=list)  #: results at events since the last call of `taken`
     has_stopped: bool = False
-    #: function of rows of results that gives the watched value of an event; None: a sensor measures it
+    #: function that computes the watched value of an event from result rows; None if a sensor is needed
     direct: list[Callable[[Rows], Array] | None] = field(init=False)
-    due: int = -1  #: number of a step that contains an event
+    due: int = -1  #: number of the next step that contains an event, -1 if unknown
     trial: tuple[System, Work] | None = field(init=False, default=None)  #: working arrays of trial steps
-    calm: int = BLOCK  #: most steps of the next block: few after an event that changed the motion, as others may follow
-    changed: int = 0  #: number of steps at the end of the last step with such an event
+    calm: int = BLOCK  #: largest size of the next block, which is small after an event that changed the motion
+    changed: int = 0  #: number of the step at whose end the motion was last changed by an event
 
     def __post_init__(self) -> None:
         require_events(self.full)
@@ -135,7 +139,7 @@ class EventWatch:
         self.direct = [None if own else direct_values(self.full, each) for each, own in each_event]
 
     def copied(self) -> "EventWatch":
-        """Return a copy for a companion run with other steps; both share the cache of switched systems."""
+        """Return a copy for a companion run with another step size; both share the cache of switched systems."""
         other = copy(self)
         other.caught, other.resting, other.signs = dict(self.caught), dict(self.resting), dict(self.signs)
         other.values, other.happened, other.recorded = self.values.copy(), list(self.happened), []
@@ -143,7 +147,7 @@ class EventWatch:
         return other
 
     def switch(self, off: frozenset[str]) -> None:
-        """Switch exactly these names off; keep the values held by couplers and stops."""
+        """Switch off exactly these names, and keep the values of couplers and stops."""
         self.off = off
         self.caught = {name: value for name, value in self.caught.items() if name not in off}
         limits = {coupler.name: coupler.limits for coupler in self.full.couplers}
@@ -157,7 +161,7 @@ class EventWatch:
         self.system = self.made[key]
 
     def begin(self, row: Rows) -> None:
-        """Take the results at the time where the steps start or resume."""
+        """Take the result row at the time at which the steps start or resume."""
         is_first = self.row is None
         self.row = row
         if is_first and not self.happened:
@@ -169,7 +173,7 @@ class EventWatch:
             self.take_inside()
 
     def measured(self, *rows: Rows) -> Array:
-        """Return the watched values at the times of rows of results, (n_times, n_events)."""
+        """Return the watched values for result rows, (n_times, n_events)."""
         compiled = compiled_system(self.full)
         motion, columns = None, []
         for event, direct in zip(self.events, self.direct, strict=True):
@@ -197,7 +201,7 @@ class EventWatch:
         return values
 
     def in_files(self, row: Rows) -> Rows:
-        """Return results in the frames of result files; single rows are cached, as the next step needs them again."""
+        """Return result rows in the body frames of result files; single rows are cached for the next step."""
         for known, told in self.told:
             if known is row:
                 return told
@@ -207,7 +211,7 @@ class EventWatch:
         return told
 
     def values_after(self, row: Rows) -> Array:
-        """Return the watched values of a later row, (n_events,)."""
+        """Return the watched values of a later result row, (n_events,)."""
         if self.is_direct:
             return np.asarray(self.measured(row)[0])
         assert self.row is not None
@@ -215,11 +219,11 @@ class EventWatch:
 
     @property
     def is_direct(self) -> bool:
-        """Whether no sensor is needed for the watched values."""
+        """Whether the watched values can be computed without sensors."""
         return None not in self.direct
 
     def happens(self, event: Event, before: float, after: float) -> bool:
-        """Whether an event happens from one value to the next.
+        """Whether an event happens between two watched values.
 
         An event that would switch nothing does not happen if only rounding passes its level: a latched value stays.
         """
@@ -231,28 +235,28 @@ class EventWatch:
         return changes or not only_switches or abs(after - before) > STANDS * size
 
     def near_levels(self, values: Array) -> IntArray:
-        """Return the steps in which a value, (n_times, n_events), is not clearly on one side of its level."""
+        """Return the steps in which a value, (n_times, n_events), is close to its level or passes it."""
         beyond = values - np.array([event.level_passed for event in self.events])
         return np.flatnonzero(~(beyond[1:] * beyond[:-1] > 0.0).all(axis=1))
 
     def any_happens(self, before: Array, after: Array) -> bool:
-        """Whether any event happens between two sets of values, (n_events,)."""
+        """Whether any event happens between two sets of watched values, (n_events,)."""
         each = zip(self.events, before, after, strict=True)
         return any(self.happens(event, float(first), float(then)) for event, first, then in each)
 
     def new_work(self) -> Work:
-        """Return working arrays for the system as switched, with space for the memories of a block."""
+        """Return working arrays for the system with the present switches, with space for the memories of a block."""
         return new_work(compiled_system(self.system).model, min(BLOCK, self.longest))
 
     @property
     def longest(self) -> int:
-        """Most steps of a block, limited by the computer's memory for its results."""
+        """Largest number of steps in a block, limited by the memory that its results need."""
         state = compiled_system(self.full).placed
         numbers = 8 * state.r.size + 5 * len(state.u) + len(compiled_system(self.full).owners)
         return max(1, MOST_NUMBERS // (numbers + 1))
 
     def trial_work(self) -> Work:
-        """Return working arrays of trial steps, so that the arrays of the run keep their factors."""
+        """Return working arrays for trial steps, which leave the factors of the run unchanged."""
         if self.trial is None or self.trial[0] is not self.system:
             self.trial = self.system, new_work(compiled_system(self.system).model)
         return self.trial[1]
@@ -261,7 +265,7 @@ class EventWatch:
         self, integrator: Integrator, memory: Memory, work: Work, *, t0: float, h: float, first: int, n_steps: int,
         every: int,
     ) -> tuple[Memory, Rows, Work, int, Failure | None]:  # fmt: skip
-        """Take a block of up to n_steps steps of size h, the first of them number `first` from t0.
+        """Take a block of up to n_steps steps of size h, beginning with step `first` counted from t0.
 
         Return the memory, the results after every `every`-th step (and at a stop), working arrays, the number of steps
         that are done, and why the next one failed, if it did.
@@ -333,7 +337,7 @@ class EventWatch:
         return memory, self.due_of(rows, first, every // every_row), work, n_good, failure
 
     def due_of(self, rows: Rows, first: int, every: int) -> Rows:
-        """Select every `every`-th of the results after steps from `first` on, and the one at a stop."""
+        """Return the results after every `every`-th step, counted from `first`, and the result at a stop."""
         if every == 1:
             return rows
         is_due = (first + 1 + np.arange(len(rows.t))) % every == 0
@@ -344,7 +348,7 @@ class EventWatch:
     def step(
         self, integrator: Integrator, memory: Memory, work: Work, *, t0: float, h: float, k: int
     ) -> tuple[Memory, Rows, Work, Failure | None]:
-        """Take step k of size h from t0 + k h, with the events in it; return the results at its end, or at the stop."""
+        """Take step k of size h from t0 + k h with its events; return the results at its end or at a stop."""
         after, row, _, failure = integrator.advance(self.system, memory, work, t0=t0, h=h, first=k, n_steps=1, every=1)
         if failure is not None:
             return memory, row, work, failure
@@ -433,7 +437,7 @@ class EventWatch:
     def begun_anew(
         self, integrator: Integrator, system: System, memory: Memory, state: State | None, row: Rows, t: float
     ) -> tuple[Memory, Rows, Work]:
-        """Return memory, results and working arrays of the motion after an event at t.
+        """Return memory, results and working arrays for the motion after an event at t.
 
         system: as switched before t. state: of the engine, with other velocities; None: that of the memory. The method
         restarts if velocities or constraints have changed; it continues if only forces have. The energy that springs
@@ -455,7 +459,7 @@ class EventWatch:
         return memory.changed(work=work_done + change), row, work
 
     def engage(self, event: Event, memory: Memory, t: float) -> State | None:
-        """Apply the switches of an event; return the engine state with other velocities after it, None: unchanged."""
+        """Apply the switches of an event; return the engine state after a velocity jump, None if there is none."""
         compiled = compiled_system(self.full)
         couplers = {coupler.name: coupler for coupler in self.full.couplers}
         engaged = [name for name in event.switch_on if name in couplers and name in self.off]
@@ -491,7 +495,7 @@ class EventWatch:
         return hit.state
 
     def strike(self, memory: Memory, event: StopEvent, t: float, h: float) -> State | None:
-        """Handle a coupler that reaches or leaves its limit; return the engine state with other velocities after it."""
+        """Handle a coupler that reaches or leaves its limit; return the engine state after a velocity jump, or None."""
         self.add(event, t)
         happened = self.happened[-1]
         if event.side == "release":
@@ -523,7 +527,7 @@ class EventWatch:
         return hit.state
 
     def take_inside(self) -> None:
-        """Move values at limits on which nothing rests just inside, so that the next passage is an event.
+        """Move values at limits without contact just inside, so that the next passage is an event.
 
         Values of switching functions move to the side of their current sign likewise.
         """
@@ -539,13 +543,13 @@ class EventWatch:
                               "switch_off": list(event.switch_off)})  # fmt: skip
 
     def note(self, place: "Place", t: float) -> None:
-        """Record the results of a trial step to an event that does not change the motion."""
+        """Store the results of a trial step to an event that does not change the motion."""
         event = self.events[place.j]
         self.add(event, t if event.at is None else event.at)
         self.recorded.append(place.row if event.at is None else place.row._replace(t=np.array([event.at])))
 
     def taken(self) -> list[Rows]:
-        """Return the results recorded at events since the last call."""
+        """Return the results stored at events since the last call."""
         rows, self.recorded = self.recorded, []
         return rows
 
@@ -553,7 +557,7 @@ class EventWatch:
         self, integrator: Integrator, begin: Memory, ended: "Ended", t: float, size: float, j: int,
         neighbours: tuple[int, Array] | None,
     ) -> "Place":  # fmt: skip
-        """Locate event j in a step of size `size` from t; return the place just after it.
+        """Locate event j in a step of size `size` from t; return the location just after the event.
 
         Each trial is one step from the start of the given step to the trial place.
         """
@@ -595,13 +599,13 @@ class EventWatch:
         return at(passage(beyond, sign * first, max(sign * last, 0.0), event.tolerance, guess))
 
     def record(self) -> dict[str, Array]:
-        """Return the data to resume from, by name."""
+        """Return the data for a resumed run by name."""
         names = ("happened", "caught", "resting", "signs", "calm", "changed", "due")
         words = json.dumps({"off": sorted(self.off)} | {name: getattr(self, name) for name in names})
         return {"event_values": self.values, "events": np.frombuffer(words.encode(), dtype=np.uint8)}
 
     def restore(self, record: Mapping[str, Array]) -> None:
-        """Resume from a record."""
+        """Restore the data of an interrupted run."""
         data = json.loads(np.asarray(record["events"], dtype=np.uint8).tobytes().decode())
         self.caught, self.resting, self.signs = (data.get(name, {}) for name in ("caught", "resting", "signs"))
         self.calm = data.get("calm", BLOCK)
@@ -612,12 +616,12 @@ class EventWatch:
 
 
 def holds_alike(a: System, b: System) -> bool:
-    """Whether two switched systems constrain the same positions and velocities."""
+    """Whether two switched systems have the same position and velocity constraints."""
     return np.array_equal(compiled_system(a).model.rows.kind, compiled_system(b).model.rows.kind)
 
 
 def require_shut(event: Event, placed: PlacedLaw, gap: Array, t: float, sizes: Array) -> None:
-    """Raise `ModelError` if an element that is switched on constrains a position that the motion does not have."""
+    """Raise `ModelError` if an element that is switched on constrains a position that the bodies do not have."""
     for name, row, holds in zip(placed.law.multipliers, placed.multipliers, placed.law.holds, strict=True):
         if holds == POSITION and abs(gap[row]) > SHUT * sizes[row]:
             raise ModelError(

@@ -1,4 +1,4 @@
-"""Events: actions of a run when a sensor or joint coordinate passes a level, or at a given time.
+"""Events: actions of a run at the passage of a sensor or joint coordinate through a level, or at a given time.
 
 Event("caught", "hinge.angle", level=np.pi / 2, direction="rising", stop=True)
 Event("release", "drop", column="y", level=0.2, direction="falling", switch_off=("rope",))
@@ -38,8 +38,8 @@ __all__ = [
 
 DIRECTIONS = {"rising": 1, "falling": -1, "both": 0}
 
-#: the same force without any load, which keeps its place in the system; a force with no functions at all is refused,
-#: hence the zero functions
+#: force functions of zero that replace a force but keep its place in the system; a force without functions would be
+#: rejected
 SILENT: dict[type, dict[str, Any]] = {
     PointForce: {"force": np.zeros(3), "torque": np.zeros(3)},
     SpringDamper: {"stiffness": 0.0, "damping": 0.0, "preload": 0.0, "characteristic": constant(0.0)},
@@ -65,7 +65,7 @@ SILENT: dict[type, dict[str, Any]] = {
 @dataclass(frozen=True)
 @checked_fields(ModelError)
 class Event:
-    """Actions when a measured value passes a level, or at a given time.
+    """Actions that are taken when a measured value passes a level, or at a given time.
 
     The time where a value passes its level is found to `tolerance` by steps of other sizes. A force or an element is
     off at the start if the first event that names it switches it on; a coupler (a latch, a clutch) if it is not
@@ -116,7 +116,7 @@ class Event:
 
     @property
     def level_passed(self) -> float:
-        """The level of the watched quantity, or the time."""
+        """The level of the watched quantity, or the time of the event."""
         return self.level if self.at is None else self.at
 
     def __post_init__(self) -> None:
@@ -145,7 +145,7 @@ class Event:
             )
 
     def happens(self, before: float, after: float) -> bool:
-        """Whether the value (for an event at a time: the time) passes the level from one value to the next."""
+        """Whether the value, or the time, passes the level from `before` to `after`."""
         if self.at is not None:
             return before < self.at <= after
         a, b = before - self.level, after - self.level
@@ -154,7 +154,7 @@ class Event:
 
 
 def require_events(system: System) -> None:
-    """Raise `ModelError` if an event watches or switches what does not exist, or cannot be switched."""
+    """Raise `ModelError` if an event watches or switches an unknown part, or one that cannot be switched."""
     forces = {getattr(force, "name", ""): force for force in system.forces}
     elements = {element.name for element in system.elements}
     couplers = {coupler.name: coupler for coupler in system.couplers}
@@ -180,7 +180,7 @@ def require_events(system: System) -> None:
 
 
 def require_switched(where: str, coupler: CoordinateCoupler, *, is_first_on: bool) -> None:
-    """Raise `ModelError` if events cannot switch a coupler, or if it waits for one without declaring it."""
+    """Raise `ModelError` if events cannot switch a coupler, or if a coupler waits for an event without declaring it."""
     if coupler.limits is not None:
         raise ModelError(
             f"{where}: coupler {coupler.name!r} has limits and is switched by them alone; take another coupler for the "
@@ -193,12 +193,12 @@ def require_switched(where: str, coupler: CoordinateCoupler, *, is_first_on: boo
 
 
 def events_of(system: System) -> tuple[Event, ...]:
-    """Return the events of a system, and those of its elements."""
+    """Return the events of a system, then those of its elements."""
     return cast(tuple[Event, ...], (*system.events, *(event for each in system.elements for event in each.events())))
 
 
 def has_events(system: System) -> bool:
-    """Whether anything may be switched during a motion: by events, by stops that are hit, by laws with switches."""
+    """Whether anything may be switched in a motion: by events, by stops of couplers, or by switching functions."""
     return (
         bool(events_of(system))
         or any(coupler.limits is not None for coupler in system.couplers)
@@ -208,7 +208,7 @@ def has_events(system: System) -> bool:
 
 
 def require_times_of_events(system: System, t_start: float) -> None:
-    """Raise `ModelError` if an event would happen before the run."""
+    """Raise `ModelError` if the time of an event is before the start of the run."""
     for event in events_of(system):
         if event.at is not None and event.at <= t_start:
             words = f"expected a time after the start of the run, {t_start:g}, got {event.at:g}"
@@ -216,7 +216,7 @@ def require_times_of_events(system: System, t_start: float) -> None:
 
 
 def switched(system: System, off: frozenset[str], held: Mapping[str, float]) -> System:
-    """Return the system with these forces at zero, couplers not engaged, elements off, and the same columns of results.
+    """Return the system with these forces zero, couplers released, elements off, and unchanged columns of results.
 
     held: what couplers that have been switched on hold, by name.
     """

@@ -1,4 +1,4 @@
-"""Functions of time of forces whose numbers are written between steps; nothing is compiled again."""
+"""Functions of time in forces whose values are written between steps without a new compilation."""
 
 from collections.abc import Iterator
 
@@ -13,7 +13,7 @@ __all__ = ["force_numbers", "write_function"]
 
 
 def force_numbers(system: System, compiled: CompiledSystem, names: set[str]) -> list[int]:
-    """Return the numbers of the functions that are factors or motors of forces of these names."""
+    """Return the numbers of the functions that are factors or motor forces of the named forces."""
     model, found = compiled.model, []
     for kind, factors in ((PointForce, model.loads.factor), (BodyLoad, model.body_loads.factor)):
         forces = [force for force in system.forces if isinstance(force, kind)]
@@ -22,7 +22,7 @@ def force_numbers(system: System, compiled: CompiledSystem, names: set[str]) -> 
 
 
 def motors_of(system: System, compiled: CompiledSystem, names: set[str]) -> Iterator[int]:
-    """Yield the functions of motors by name of the force; forces of a row are in the order of the system."""
+    """Yield the name of each force with a motor and the motor function, in the order of the system for each row."""
     model = compiled.model
     for k, (owner, coordinate) in enumerate(zip(compiled.owners, compiled.coordinates, strict=True)):
         forces = [
@@ -37,7 +37,7 @@ def motors_of(system: System, compiled: CompiledSystem, names: set[str]) -> Iter
 
 
 def write_function(compiled: CompiledSystem, number: int, begin: float, coefficients: Array) -> None:
-    """Convert a function of one piece to Σ_k c_k (t - begin)^k, with up to six coefficients."""
+    """Set a function to one piece, Σ_k c_k (t - begin)^k, with up to six coefficients."""
     functions = compiled.model.functions
     piece = int(functions.piece0[number])
     row = np.zeros(functions.piece.shape[1])

@@ -1,4 +1,4 @@
-"""A motion on one page: start, then steps in compiled batches, which are observed and written.
+"""Computation of a motion: start, then steps in compiled batches, which are checked and written.
 
     (1) start       bodies made consistent; memory of the integrator and results at the start    `Integrator.start`
     (2) step        a batch of steps in one compiled call, cut where laws jump and events happen  `next_steps`
@@ -61,14 +61,15 @@ __all__ = ["Progress", "integrate", "resume"]
 log = logging.getLogger(__name__)
 
 BATCH_STEPS = 400  #: steps per call of the compiled loop
-FIRST_STEPS = 100  #: number of steps of a run in which a failure may be due to the start of its drives
-LOOK_ROWS, LOOK_SECONDS = 1000, 0.2  #: rows of results are checked after this number, or after this time
-SEGMENT_SECONDS = 2.0  #: a segment of the results is closed after this time
-TIMES = ("t_start", "t_end", "h", "output_every")  #: attributes of the run in the head
-MOST_STEPS = 1e12  #: of a run: months of computing
-MOST_OF_RUN = 0.5  #: share of a run above which calls of a Python function are a warning
-LONG_CALLS = 1.0  #: time that such calls take at least [s]
-SAME_TIME = 1e-6  #: fraction of a step by which a run may begin apart from the end of the one that it continues
+FIRST_STEPS = 100  #: number of first steps in which a failure may be caused by the start of prescribed motions
+LOOK_ROWS, LOOK_SECONDS = 1000, 0.2  #: result rows are checked after this number of rows, or after this time
+SEGMENT_SECONDS = 2.0  #: time after which a segment of the results file is closed
+TIMES = ("t_start", "t_end", "h", "output_every")  #: attributes of the run in the head of the results
+MOST_STEPS = 1e12  #: largest number of steps of a run, which would take months
+MOST_OF_RUN = 0.5  #: fraction of the computing time above which calls of a Python function give a warning
+LONG_CALLS = 1.0  #: shortest computing time of such calls for a warning [s]
+#: allowed time difference between the start of a run and the end of the run that it continues, as a fraction of a step
+SAME_TIME = 1e-6
 
 
 @dataclass(frozen=True)
@@ -228,7 +229,7 @@ def integrate(
 
 
 def require_no_units(system: System) -> None:
-    """Raise `ModelError` if a system has units of other programs, which a plain run would omit."""
+    """Raise `ModelError` if a system has units of other programs, which a run without them would ignore."""
     if system.fmus:
         names = ", ".join(unit.name for unit in system.fmus)
         raise ModelError(
@@ -238,7 +239,7 @@ def require_no_units(system: System) -> None:
 
 
 def number_of_steps(t_start: float, t_end: float, h: float) -> int:
-    """Return how many steps lead from t_start to t_end; `ModelError` if no computer would take them."""
+    """Return the number of steps from t_start to t_end; `ModelError` if it is too large for any computer."""
     wanted = (t_end - t_start) / h
     if not wanted <= MOST_STEPS:
         raise ModelError(
@@ -249,7 +250,7 @@ def number_of_steps(t_start: float, t_end: float, h: float) -> int:
 
 
 def require_sensors(system: System, head: Head, rows: Rows) -> None:
-    """Raise `ModelError` or `ResultsError` before the run if a sensor of the system cannot measure its start."""
+    """Raise `ModelError` or `ResultsError` before the run if a sensor cannot measure the initial state."""
     if system.sensors:
         told = rows_of_file(compiled_system(system), rows)
         measured(system, Trajectory(head, MemorySource(joint_rows(system, [told])), is_complete=False))
@@ -261,7 +262,7 @@ def resume(
     *,
     progress: Callable[[Progress], None] | None = None,
 ) -> Motion:
-    """Resume an interrupted run, with the same motion bit for bit as without interruption.
+    """Resume an interrupted run; the motion is bitwise the same as without the interruption.
 
     Parameters
     ----------
@@ -320,7 +321,7 @@ def resume(
 
 @dataclass
 class Run:
-    """One motion being computed, and the destination of its results."""
+    """A motion that is being computed, and the destination of its results."""
 
     system: System
     integrator: Integrator
@@ -331,23 +332,23 @@ class Run:
     n_total: int
     output_every: int
     writer: ResultsWriter | None
-    notes: tuple[ValidityNote, ...] = ()  #: notes known before, or of the completed part
+    notes: tuple[ValidityNote, ...] = ()  #: notes known before the run, or of its completed part
     kept: list[Rows] = field(default_factory=list)
-    seconds_before: float = 0.0  #: time that the run took before its interruption
+    seconds_before: float = 0.0  #: computing time before an interruption
     began: float = field(default_factory=time.perf_counter)
     events: EventWatch | None = None
     sampling: Sampling | None = None
-    words_of_start: Callable[[], str] = lambda: ""  #: possible cause if the first steps fail
-    jumps: dict[int, list[float]] = field(init=False)  #: times of jumps by step, from `advance` on
-    work: Work = field(init=False)  #: working arrays of the kernels, from `begin` on
+    words_of_start: Callable[[], str] = lambda: ""  #: returns the possible cause of a failure in the first steps
+    jumps: dict[int, list[float]] = field(init=False)  #: times of force jumps by step; set by `advance`
+    work: Work = field(init=False)  #: working arrays of the kernels; set by `begin`
 
     @property
     def seconds(self) -> float:
-        """Time the run has taken so far [s]."""
+        """Computing time of the run so far [s]."""
         return self.seconds_before + time.perf_counter() - self.began
 
     def record(self, memory: Memory, n_done: int) -> dict[str, np.ndarray]:
-        """Return the data to resume from here."""
+        """Return the data to resume the run from its present state."""
         self.report(*self.energy.flush(self.system))
         events = {} if self.events is None else self.events.record()
         watches = self.steps.record() | self.energy.record()
@@ -355,11 +356,11 @@ class Run:
         return restart_record(memory, n_done) | {"seconds": np.array(self.seconds)} | events | watches | samples
 
     def record_where_due(self, memory: Memory, n_done: int) -> dict[str, np.ndarray] | None:
-        """Return the data to resume from here, None if a run cannot be resumed here."""
+        """Return the data to resume the run here, or None if runs cannot be resumed after this step."""
         return self.record(memory, n_done) if self.writer is not None and n_done % RESTART_STEPS == 0 else None
 
     def summary(self, memory: Memory) -> dict[str, Any]:
-        """Return the counts and times of the run, and its events."""
+        """Return the counters and computing times of the run, and its events."""
         events = {} if self.events is None else {"events": self.events.happened}
         samples = {} if self.sampling is None else {"controllers": self.sampling.summary()}
         return (
@@ -371,7 +372,7 @@ class Run:
         )
 
     def continue_from(self, state: State | None) -> None:
-        """Add the errors of the run that reached this state where this run continues it in time."""
+        """Add the errors of the run that ended at this state, if the present run continues it in time."""
         if state is None:
             return
         self.steps.is_piece = True
@@ -382,7 +383,7 @@ class Run:
             self.energy.continue_from(watched)
 
     def watched(self) -> dict[str, dict[str, Any]]:
-        """Return the errors up to the end of the run, for one that continues it."""
+        """Return the errors up to the end of the run, for a run that continues it."""
         if self.watching == "off":
             return {}
         t = self.t_start + self.n_total * self.h
@@ -401,14 +402,14 @@ class Run:
         self.waiting: list[Rows] = []
 
     def keep(self, rows: Rows) -> None:
-        """Take rows of results, which wait for others: a look at a few costs as much as one at a thousand."""
+        """Collect result rows, because one check of many rows costs as much as a check of a few."""
         if len(rows.t):
             self.waiting.append(rows)
         if sum(len(each.t) for each in self.waiting) >= LOOK_ROWS or time.monotonic() - self.looked > LOOK_SECONDS:
             self.look()
 
     def look(self) -> None:
-        """Pass on the collected rows; report if a body leaves the range of its linear frame."""
+        """Write and check the collected rows; report a body that leaves the range of its linear frame."""
         self.looked = time.monotonic()
         if self.writer is not None:
             self.writer.validity = notes_to_json(self.watch.notes)
@@ -425,7 +426,7 @@ class Run:
             self.writer.append(told)
 
     def report(self, *new: ValidityNote | None) -> None:
-        """Store the notes of the watches of steps and energy, and log new ones."""
+        """Store the notes about step size and energy, and log new ones."""
         found = [] if self.steps.note is None else [self.steps.note]
         for each in (*found, *self.energy.notes.values()):
             self.watch.found[each.key] = each
@@ -433,14 +434,14 @@ class Run:
             log.warning("system %r: %s", self.system.name, note.words)
 
     def close_segment(self, record: dict[str, np.ndarray] | None = None) -> None:
-        """Close a segment of the results, if they go to a file, with a record to resume from."""
+        """Close a segment of the results, if they are written to a file, with the data to resume from."""
         self.look()
         self.closed = time.monotonic()
         if self.writer is not None:
             self.writer.close_segment(record)
 
     def begin(self, memory: Memory, n_done: int) -> tuple[Memory, Rows]:
-        """Observe the motion from where the run begins or goes on: the iterate of the first step, and its results."""
+        """Evaluate the motion at the start or continuation of the run; store the iterate and the first results."""
         self.work = new_work(compiled_system(self.acting).model) if self.events is None else self.events.new_work()
         memory, rows = self.integrator.observe(self.acting, self.t_start + n_done * self.h, memory, self.work)
         if self.events is not None:
@@ -455,7 +456,7 @@ class Run:
         progress: Callable[[Progress], None] | None,
         raise_if_interrupted: Callable[[], None],
     ) -> Motion:
-        """Take the remaining steps, in batches that end where a run can be resumed; return the motion."""
+        """Take the remaining steps in batches that end where a run can be resumed; return the motion."""
         self.jumps = self.steps.jumps = jumps_of_steps(self.system, self.t_start, self.h, self.n_total)
         laws = LawWatch(self.system, self.t_start, self.h, self.jumps, n_done)
         n_told = n_done  # steps at the last progress
@@ -499,7 +500,7 @@ class Run:
         return self.finished(memory)
 
     def step(self, memory: Memory, first: int, n_left: int, batch_steps: int) -> "Batch":
-        """Take a batch of steps: at most `n_left`, up to where the watch looks, the run ends, or factors are renewed.
+        """Take at most `n_left` steps, up to the next check, the end of the run, or new factors.
 
         The watch divides batches of `batch_steps`, and leaves their ends.
         """
@@ -537,7 +538,7 @@ class Run:
         return replace(batch, end=end, rows=rows)
 
     def observe(self, batch: "Batch", laws: LawWatch) -> None:
-        """Show a batch to the watches, and report what they find."""
+        """Pass a batch to the checks and report their notes."""
         is_last = batch.n_done >= self.n_total or batch.failure is not None or batch.has_stopped
         if self.watching != "off":
             found = self.energy.observe(self.system, batch.rows, is_switched=batch.is_switched, is_last=is_last)
@@ -559,18 +560,18 @@ class Run:
                 log.warning("system %r: %s", self.system.name, words)
 
     def progress(self, memory: Memory, n_done: int) -> Progress:
-        """Return where the run is."""
+        """Return the progress of the run."""
         t, counts = self.t_start + n_done * self.h, (int(memory.n_iterations), self.watch.notes, int(memory.n_rejected))
         return Progress(t, self.t_end, n_done, self.n_total, *counts)
 
     @property
     def is_beyond(self) -> bool:
-        """Whether half of the energy comes from the steps, and the run is to stop there."""
+        """Whether half of the energy comes from time steps, so that the run must stop."""
         return self.watching == "stop" and self.energy.is_beyond
 
     @property
     def acting(self) -> System:
-        """The system as currently switched."""
+        """The system with its present switches."""
         return self.system if self.events is None else self.events.system
 
     @property
@@ -579,12 +580,12 @@ class Run:
         return 0 if self.events is None else len(self.events.happened)
 
     def close_segment_when_due(self) -> None:
-        """Close a segment of the results without a record to resume from, if the last one is old enough."""
+        """Close a segment of the results without data to resume from, if the last segment is old enough."""
         if time.monotonic() - self.closed > SEGMENT_SECONDS:
             self.close_segment()
 
     def report_costs(self) -> None:
-        """Log whether functions of users were compiled, and what their calls cost; a warning where it is the most."""
+        """Log whether user functions were compiled and how long their calls took; warn if they dominate the time."""
         forces = [force.name for force in self.system.forces if isinstance(force, UserForce) and force.function]
         for callback in compiled_system(self.acting).callbacks:
             if callback.name in [f"force {name!r}" for name in forces]:
@@ -594,7 +595,7 @@ class Run:
             log.info("%s", each.cost_words())
 
     def finished(self, memory: Memory) -> Motion:
-        """Return the motion, whose steps have all been stored."""
+        """Return the motion after all its steps have been stored."""
         self.look()
         self.report_costs()
         if self.writer is None:
@@ -607,26 +608,26 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Steps of a run that were taken together."""
+    """Steps of a run that were taken in one call."""
 
-    first: int  #: steps that were done before
-    n_good: int  #: of them, that succeeded
+    first: int  #: number of steps done before the batch
+    n_good: int  #: number of successful steps in the batch
     begin: Memory
     end: Memory
-    rows: Rows  #: results of the output times and events in it
-    failure: Failure | None  #: why the next step could not be made
-    events_before: EventWatch | None  #: a copy from before it, where the watch begins a companion there
-    is_switched: bool  #: whether events happened in it
-    has_stopped: bool  #: whether one of them ended the run
+    rows: Rows  #: results at output times and events in the batch
+    failure: Failure | None  #: reason why the next step failed, or None
+    events_before: EventWatch | None  #: copy of the events before the batch, if a companion run begins there
+    is_switched: bool  #: whether events happened in the batch
+    has_stopped: bool  #: whether an event ended the run
 
     @property
     def n_done(self) -> int:
-        """Number of steps done after it."""
+        """Number of steps done after the batch."""
         return self.first + self.n_good
 
 
 def in_order(parts: list[Rows]) -> Rows:
-    """Return rows of results in the order of time; of two at one time, that of the earlier part first."""
+    """Return result rows in ascending time; at equal times the row of the earlier part comes first."""
     if len(parts) == 1:
         return parts[0]
     rows = joined_rows(parts)
@@ -635,7 +636,7 @@ def in_order(parts: list[Rows]) -> Rows:
 
 
 def stopped(run: Run, failure: Failure, t: float, state: State) -> ConvergenceError:
-    """Return the error of a failed step, with the motion so far."""
+    """Return the error for a failed step, with the motion so far."""
     words = f"system {run.system.name!r}: the step of {run.h:g} from t = {t:.9g} failed: {failure.words}"
     advice = step_advice(run.system, run.h)
     if advice is not None:
@@ -648,7 +649,7 @@ def stopped(run: Run, failure: Failure, t: float, state: State) -> ConvergenceEr
 
 
 def energetic(run: Run, t: float) -> ConvergenceError:
-    """Return the error of a run that ends because its steps add energy, with the motion so far."""
+    """Return the error for a run that ends because its steps add energy, with the motion so far."""
     words = (
         f"system {run.system.name!r}: stopped at t = {t:.9g} with steps of {run.h:g}: "
         f"{run.energy.notes['energy'].words}; "
@@ -659,7 +660,7 @@ def energetic(run: Run, t: float) -> ConvergenceError:
 
 
 def motion_so_far(run: Run) -> tuple[Motion, str]:
-    """Return the motion of a run that ends early, and its location for messages; "" if it is in memory."""
+    """Return the motion of a run that ends early, and the location of its file for messages ("" if in memory)."""
     if run.writer is None:
         arrays = MemorySource(joint_rows(run.system, run.kept))
         return Motion(run.head, arrays, is_complete=False, validity=run.watch.notes, known=run.system), ""

@@ -1,4 +1,4 @@
-"""Steps across times at which a force jumps: one step ends there and the next begins there, so that no impulse is lost.
+"""Steps at force jumps: one step ends at the jump and the next step begins there, so that no impulse is lost.
 
 A method of steps takes a force from both ends of a step; a jump between them, or at one of them, would count for too
 much or too little of the step (an error of the impulse of order h). So the step is cut just before the jump, and the
@@ -24,17 +24,17 @@ from floatframe.simulation.event_steps import EventWatch
 
 __all__ = ["jump_times", "jumps_by_step", "jumps_of_steps", "next_steps"]
 
-PER_STEP = 4  #: points in a step between which expressions of t are compared
-MOST_PLACES = 1_000_000  #: in a run
-N_PARTS = 10  #: largest number of halvings of a step after a jump to which states respond faster
-#: ratios: of the change predicted by the rate of a state at the jump to its change in the step; and to its size
+PER_STEP = 4  #: number of points in a step between which expressions of t are compared
+MOST_PLACES = 1_000_000  #: largest number of points of comparison in a run
+N_PARTS = 10  #: largest number of halvings of a step after a jump, for states with fast response
+#: ratios that require halving: change predicted by the state's rate to its change in the step, and to its size
 FOLLOWED, FELT = 2.0, 0.05
-STEEP = 1.5  #: growth of an expression at half the distance from a pole
-SHORT = 1e-9  #: fraction of a step: gap left before a jump, and remainder that counts as zero
+STEEP = 1.5  #: growth of an expression at half the distance that indicates a pole
+SHORT = 1e-9  #: smallest time before a jump and smallest remainder of a step, as fractions of a step
 
 
 def jump_times(system: System, t_start: float, h: float, n_steps: int) -> list[float]:
-    """Return the times after the start of a run, up to its end, at which a force or law jumps, in ascending order.
+    """Return the ascending times after the start of a run, up to its end, at which a force or law jumps.
 
     (1) jumps of the values of functions of time
     (2) switches of expressions, found between places in the steps
@@ -55,7 +55,7 @@ def jump_times(system: System, t_start: float, h: float, n_steps: int) -> list[f
 
 
 def require_bounded(where: str, values: Sequence[OfTime], times: Sequence[float], short: float) -> None:
-    """Raise `ModelError` if an expression has a pole at a jump: near it, its value halves with twice the distance."""
+    """Raise `ModelError` if an expression has a pole at a jump, shown by its growth at half the distance."""
     for value in values:
         for t in times:
             for side in (-short, short):
@@ -69,13 +69,13 @@ def require_bounded(where: str, values: Sequence[OfTime], times: Sequence[float]
 
 
 def jumps_of_steps(system: System, t_start: float, h: float, n_steps: int) -> dict[int, list[float]]:
-    """Return the times of jumps in each step k, after t_start + k h and up to t_start + (k + 1) h inclusive."""
+    """Return the jump times for each step k, after t_start + k h and up to t_start + (k + 1) h inclusive."""
     jumps = jumps_by_step(jump_times(system, t_start, h, n_steps), t_start, h)
     return {k: times for k, times in jumps.items() if k < n_steps}
 
 
 def jumps_by_step(times: list[float], t0: float, h: float) -> dict[int, list[float]]:
-    """Return the times of jumps after t0 by the step k in which each lies, from t0 + k h to t0 + (k + 1) h."""
+    """Return the jump times after t0 by the step k that contains them, from t0 + k h to t0 + (k + 1) h."""
     found: dict[int, list[float]] = {}
     for t in times:
         k = max(ceil((t - t0) / h - SHORT) - 1, 0)  # next to t0: the motion restarts at once
@@ -97,7 +97,7 @@ def next_steps(
     jumps: dict[int, list[float]],
     events: EventWatch | None = None,
 ) -> tuple[Memory, Rows, Work, int, Failure | None]:
-    """Take steps of size h, the first with number `first` from t0: the one with the next jumps, or those before it.
+    """Take steps of size h, beginning with step `first` counted from t0: the step with the next jumps or those before.
 
     Return the memory after them, the results after every `every`-th (and at a stop), how many steps are done, at most
     n_steps, and why the next one failed, if it did. jumps: times by step. system: as events have switched it.
@@ -130,7 +130,7 @@ def over_jumps(
     jumps: list[float],
     events: EventWatch | None = None,
 ) -> tuple[Memory, Rows, Work, Failure | None]:
-    """Take a step of size h from t, divided at jumps; return the memory and the results at its end, or at a stop."""
+    """Take a step of size h from t, divided at jumps; return memory and results at its end, or at a stop."""
     where, end, begin = t, t + h, memory
     rows: Rows | None = None
     is_after = False  # a jump
@@ -165,7 +165,7 @@ def over_jumps(
 
 
 def n_settling_parts(integrator: Integrator, system: System, memory: Memory, work: Work, t: float, size: float) -> int:
-    """Return how often a step of this size after a jump is halved at its beginning.
+    """Return the number of times that a step after a jump is halved at its beginning.
 
     A step is tried: a state whose rate at its beginning would lead much further than the step does settles in less.
     """

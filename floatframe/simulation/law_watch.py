@@ -1,4 +1,4 @@
-"""Users' functions with undeclared dependence on time: values at ends and middles of steps are compared.
+"""Check for undeclared time dependence of user functions, by their values at the ends and middles of steps.
 
 Functions of time in fields, expressions and `knots` say where a law jumps, and steps end there. What else a function of
 a user does with the time is not known. After some steps it is asked at their ends and middles with the motion as it is
@@ -25,32 +25,32 @@ from floatframe.simulation.switch_events import unknowns_of_force
 
 __all__ = ["LawWatch"]
 
-N_STEPS = 100  #: smallest number of steps that are checked together
-FAR = 0.05  #: allowed difference of a middle from the mean of the ends, relative to the largest value
-OWN = "floatframe."  #: modules of elements that declare their dependence on time
+N_STEPS = 100  #: smallest number of steps in one check
+FAR = 0.05  #: allowed difference between a middle value and the mean of the end values, relative to the largest value
+OWN = "floatframe."  #: prefix of modules whose elements declare their time dependence
 LAW, FORCE = (ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * n) for n in (4, 2))
 
 
 @dataclass
 class AskedLaw:
-    """A function of a user: its inputs for a motion, and its values for inputs."""
+    """A user function, with functions that return its inputs for a motion and its values for inputs."""
 
     where: str
     callback: Callback
-    inputs: Callable[[Memory, Work], Array]  #: with the time first
-    ask: Callable[[Array, Array], Array]  #: values at times for inputs, (n_t, n_out)
+    inputs: Callable[[Memory, Work], Array]  #: returns the inputs, time first
+    ask: Callable[[Array, Array], Array]  #: returns the values at given times for the inputs, (n_t, n_out)
     is_told: bool = False
 
 
 @dataclass
 class LawWatch:
-    """The functions of users of a system, over the steps of a run from t_start."""
+    """The user functions of a system, checked in the steps of a run that starts at t_start."""
 
     system: System
     t_start: float
     h: float
-    cut: Collection[int]  #: steps with a declared jump
-    n_seen: int = 0  #: number of checked steps
+    cut: Collection[int]  #: steps with a declared jump, which are not checked
+    n_seen: int = 0  #: number of steps checked so far
     laws: list[AskedLaw] = field(init=False)
     work: Work | None = field(init=False, default=None)
 
@@ -58,7 +58,7 @@ class LawWatch:
         self.laws = list(asked_laws(self.system, compiled_system(self.system)))
 
     def observe(self, memory: Memory, n_done: int, *, is_last: bool) -> list[str]:
-        """Check the steps since the last check, with the motion after the last of them; return new messages."""
+        """Check the steps since the last check, up to the given memory; return new messages."""
         if all(law.is_told for law in self.laws) or (n_done - self.n_seen < N_STEPS and not is_last):
             return []
         first, self.n_seen = self.n_seen, n_done
@@ -90,7 +90,7 @@ class LawWatch:
 
 
 def asked_laws(system: System, compiled: CompiledSystem) -> Iterator[AskedLaw]:
-    """Yield the functions of user forces, and the laws of elements of users."""
+    """Yield the functions of user forces and the laws of the user's own elements."""
     callbacks = iter(compiled.callbacks)
     for u, force in enumerate(force for force in system.forces if isinstance(force, UserForce)):
         if force.function is not None:
@@ -101,7 +101,7 @@ def asked_laws(system: System, compiled: CompiledSystem) -> Iterator[AskedLaw]:
 
 
 def asked_force(where: str, compiled: CompiledSystem, u: int, i: int, callback: Callback) -> AskedLaw:
-    """Return the function of user force u, element i among couplers and user forces."""
+    """Return the function of user force u, which is element i among couplers and user forces."""
     n_out = int(compiled.model.users.n_forces[u] + compiled.model.users.n_states[u])
     unknowns = unknowns_of_force(compiled, u, i)
     function = FORCE(callback.address)
@@ -118,7 +118,7 @@ def asked_force(where: str, compiled: CompiledSystem, u: int, i: int, callback: 
 
 
 def asked_element(where: str, compiled: CompiledSystem, i: int, placed: PlacedLaw) -> AskedLaw:
-    """Return the law of an element."""
+    """Return the law of an element as a checked function."""
     model = compiled.model
     first, n = int(model.connections.a[placed.connection]), len(placed.markers)
     function, head, data = LAW(placed.value.address), np.array(placed.head, np.int64), np.array(placed.law.data)

@@ -1,4 +1,4 @@
-"""What a motion says about itself: the head of its results, and its datasets where it is held in memory."""
+"""The description of a motion in its results: the head, and the datasets of a motion in memory."""
 
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
@@ -21,14 +21,14 @@ __all__ = ["head_of", "joint_rows"]
 
 
 def joint_rows(system: System, kept: list[Rows]) -> dict[str, np.ndarray]:
-    """Return the datasets of a motion in memory."""
+    """Return the datasets of a motion that is kept in memory."""
     arrays = arrays_of(kept)
     arrays["drift"] = arrays["drift"][:, : len(compiled_system(system).joint_names)]
     return arrays
 
 
 def head_of(system: System, integrator: Integrator, t_start: float, t_end: float, h: float, every: int) -> Head:
-    """Return the head of the results of a run."""
+    """Return the head for the results of a run."""
     compiled = compiled_system(system)
     entries = []
     sources = [body.source if isinstance(body, FlexibleBody) else "" for body in system.bodies]
@@ -78,7 +78,7 @@ def head_of(system: System, integrator: Integrator, t_start: float, t_end: float
 
 
 def digest_of(source: str) -> str:
-    """Return the digest of a modal file, "" for a body made in memory."""
+    """Return the digest of a modal file, or "" for a body that was created in memory."""
     if not source:
         return ""
     from cms.body.modal_file.file import digest

@@ -1,4 +1,4 @@
-"""Passages of watched values: the values at rows of results, and the time in a step at which one passes its level.
+"""Passage of watched values through a level: values for result rows, and the time of passage in a step.
 
 Values come from sensors, or directly from a column of the rows. The time comes from a bracketed secant method with a
 good initial guess.
@@ -21,11 +21,11 @@ from floatframe.simulation.events import Event
 
 __all__ = ["MOST_NEIGHBOURS", "direct_values", "expected_passage", "passage"]
 
-MOST_NEIGHBOURS = 3  #: number of values on either side of a passage that determine the guess
+MOST_NEIGHBOURS = 3  #: number of values on either side of a passage that determine the first guess
 MOST_EVALUATIONS = 200
 PATIENCE = 3  #: number of evaluations after which a bracket that has not halved is bisected
-ALIKE = 0.01  #: relative difference of two successive slopes below which the slope is known
-SURE = 0.97  #: factor on the tolerance with a known slope
+ALIKE = 0.01  #: relative difference of two successive slopes below which the slope counts as known
+SURE = 0.97  #: factor on the tolerance when the slope is known
 EQUAL = 1e-12
 POLISHED = 1e-13  #: tolerance of the guess, as a fraction of a step
 
@@ -33,7 +33,7 @@ Values = Callable[[Rows], Array]
 
 
 def direct_values(system: System, event: Event) -> Values | None:
-    """Return a function from rows of results to the watched value of an event, (n_times,); None if a sensor is needed.
+    """Return the function from result rows to the watched values of an event, (n_times,); None if it needs a sensor.
 
     The value is a time, or an angle of a joint between rigid bodies, which every run counts. It agrees with that of the
     sensor to rounding.
@@ -47,7 +47,7 @@ def direct_values(system: System, event: Event) -> Values | None:
 
 
 def counted_angle_of(system: System, sensor: CoordinateSensor) -> Values | None:
-    """Return the angle of a joint as counted by the run; None if it is not counted."""
+    """Return the angle of a joint as the run counts it; None if it is not counted."""
     joint = next(each for each in system.joints if each.name == sensor.joint)
     if isinstance(joint, SlidingJoint):
         return None
@@ -62,7 +62,7 @@ def counted_angle_of(system: System, sensor: CoordinateSensor) -> Values | None:
 
 
 def expected_passage(places: Sequence[float], values: Sequence[float]) -> tuple[float, float]:
-    """Return the zero between 0 and 1 of the polynomial through values at given points, and its slope there.
+    """Return the zero in (0, 1) of the polynomial through values at given points, and its slope there.
 
     Both 0 and 1 are among the places, with values of different signs; Newton's divided differences, Newton's method in
     a bracket.
@@ -96,7 +96,7 @@ def expected_passage(places: Sequence[float], values: Sequence[float]) -> tuple[
 def passage(
     beyond: Callable[[float], float], before: float, after: float, tolerance: float, guess: tuple[float, float]
 ) -> float:
-    """Return the first multiple of the tolerance, at most 1, at which a function that was negative is not negative.
+    """Return the first multiple of the tolerance, at most 1, at which a function is no longer negative.
 
     (1) x is where the zero is expected, a multiple of the tolerance; f = beyond(x) bounds the bracket,
         f(low) < 0 <= f(high)

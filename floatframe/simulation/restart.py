@@ -1,4 +1,4 @@
-"""Restart records: the complete memory of an integrator, stored with the results to resume an interrupted run.
+"""Restart records: the memory of an integrator, stored with the results to resume an interrupted run.
 
 A record belongs to a step whose number is a multiple of `RESTART_STEPS`. There every run makes its Newton factors
 anew, so that a resumed run takes the same steps as one that was never interrupted, bit for bit.
@@ -27,12 +27,12 @@ STATE = ("r", "p", "q", "u")
 
 
 def restart_record(memory: Memory, n_done: int) -> dict[str, Array]:
-    """Return the memory of the integrator after n_done steps as arrays by name."""
+    """Return the memory of the integrator after n_done steps as named arrays."""
     return memory._asdict() | {"n_done": np.array(n_done)}
 
 
 def memory_of_record(record: Mapping[str, Array], system: System) -> tuple[Memory, int]:
-    """Return the memory of the integrator and the number of steps done; `ResultsError` if it is of another system."""
+    """Return the integrator's memory and the number of steps done; `ResultsError` if the system differs."""
     compiled = compiled_system(system)
     n_w = int(compiled.model.connections.w0[-1])
     expected = memory_at(compiled.placed, compiled.placed.u, np.zeros(n_w), n_angles=len(compiled.model.angles.sign))
@@ -46,7 +46,7 @@ def memory_of_record(record: Mapping[str, Array], system: System) -> tuple[Memor
 
 
 def system_digest(system: System, integrator: Integrator) -> str:
-    """Return the sha256 of everything that determines the motion: compiled system, start, method and parameters."""
+    """Return the sha256 of all data that determine a motion: compiled system, start, method and parameters."""
     parameters = asdict(integrator)  # type: ignore[call-overload]
     digest = hashlib.sha256(repr((type(integrator).__name__, parameters)).encode())
     if events_of(system):

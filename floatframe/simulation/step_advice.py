@@ -1,4 +1,4 @@
-"""Which modes, supplies, loads, drives and knots of tables a step size resolves, with numbers."""
+"""The modes, supplies, loads, prescribed motions and table points that a step size resolves, with numbers."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,24 +15,25 @@ from floatframe.simulation.jumps import jump_times
 
 __all__ = ["StepAdvice", "frequency_words", "knot_words", "step_advice"]
 
-FOLLOWED = 20.0  #: steps per period with which generalized-alpha resolves a mode within about 1 % of its period
-N_PLACES = 2000  #: number of times in a run at which changing frequencies are evaluated
-ON_A_STEP = 1e-6  #: fraction of a step by which a knot may differ from its end
-SEEN = 2.0  #: steps per period below which a mode is not visible in the results
+FOLLOWED = 20.0  #: steps per period at which generalized-alpha reproduces the period of a mode within about 1 %
+N_PLACES = 2000  #: number of times in a run at which varying frequencies are evaluated
+#: distance of a table point from the end of a step, as a fraction of the step, up to which they coincide
+ON_A_STEP = 1e-6
+SEEN = 2.0  #: steps per period below which a mode cannot be seen in the results
 
 
 @dataclass(frozen=True)
 class StepAdvice:
-    """Modes of bodies compared with a step size; frequencies are those of the body alone, in its frame."""
+    """Modes of bodies compared with a step size; frequencies are those of the single bodies in their frames."""
 
     h: float  #: step size [s]
-    n_modes: int  #: modes with mass and stiffness, of all bodies
-    n_followed: int  #: number of modes with 20 steps per period or more
-    n_unseen: int  #: with less than two
-    slowest: float  #: frequency [Hz]
-    fastest: float  #: frequency [Hz]
+    n_modes: int  #: number of modes with mass and stiffness in all bodies
+    n_followed: int  #: number of modes with at least 20 steps per period
+    n_unseen: int  #: number of modes with less than two steps per period
+    slowest: float  #: lowest frequency [Hz]
+    fastest: float  #: highest frequency [Hz]
     fastest_body: str
-    fastest_mode: int  #: of that body, from 1
+    fastest_mode: int  #: number of the fastest mode in its body, from 1
 
     @property
     def h_slowest(self) -> float:
@@ -46,7 +47,7 @@ class StepAdvice:
 
     @property
     def words(self) -> str:
-        """Return one sentence on what the step size resolves, and which step sizes resolve more."""
+        """Return one sentence on the modes that the step size resolves, and on the step sizes that resolve more."""
         return (
             f"h = {self.h:.3g} follows {self.n_followed} of {self.n_modes} modes ({FOLLOWED:g} steps in a period); the "
             f"fastest, mode {self.fastest_mode} of body {self.fastest_body!r}, has {1 / (self.h * self.fastest):.2g} "
@@ -56,7 +57,7 @@ class StepAdvice:
 
 
 def step_advice(system: System, h: float) -> StepAdvice | None:
-    """Return what a step size resolves of the modes; None for a system without modes."""
+    """Return the modes that a step size resolves; None for a system without modes."""
     model = compiled_system(system).model
     frequencies, owners = [], []
     for i, name in enumerate(compiled_system(system).body_names):
@@ -83,7 +84,7 @@ def step_advice(system: System, h: float) -> StepAdvice | None:
 def frequency_words(
     system: System, t_start: float, h: float, n_steps: int, *, has_steps_of_one_size: bool = True
 ) -> tuple[str, ...]:
-    """Return a message on supplies, loads and drives whose frequency the steps of a run do not resolve.
+    """Return a message about supplies, loads and prescribed motions with frequencies that the steps do not resolve.
 
     A method that controls its steps is told of those alone of which it may see nothing: two steps in a period.
     """
@@ -99,7 +100,7 @@ def frequency_words(
 
 
 def highest_frequencies(system: System, t: Array) -> Iterator[tuple[str, float]]:
-    """Yield the highest frequencies of functions of time in a run at times t, (n_t,), and their places [1/s].
+    """Yield the highest frequencies of functions of time at times t, (n_t,) [1/s], with their paths in the system.
 
     Sines in functions of time, in expressions of time alone, and what elements say by `frequencies`.
     """
@@ -118,7 +119,7 @@ def highest_frequencies(system: System, t: Array) -> Iterator[tuple[str, float]]
 
 
 def knot_words(system: System, t_start: float, h: float, n_steps: int) -> tuple[str, ...]:
-    """Return messages about table data that the steps of a run miss.
+    """Return messages about table points between which the steps of a run are too long.
 
     (1) Several knots in one step: what lies between them is not seen. Where a force jumps a step ends.
     (2) A jump of a driven acceleration inside a step: the step takes it for a ramp. Jumps at the ends of steps are met.

@@ -69,68 +69,71 @@ __all__ = ["FIRST_VERDICT", "WATCHES", "StepWatch"]
 
 #: "stop": end a run that gains half of its energy from its steps; "tell": only report; "off": do not watch
 WATCHES = ("stop", "tell", "off")
-COMPANION_STEPS = 400  #: steps that companions cover
-LONG_RUN = 1000  #: number of steps above which companions may cover fewer
-LEAST_COMPANION_STEPS = 64  #: steps that companions of long runs cover at least
-SMALL_SHARE = 0.05  #: share of the limit that the extrapolated error must not exceed for a companion to end early
-FIRST_CHECK = 4  #: steps before the first comparison, and at least between two comparisons
-CHECK_INTERVAL = 8  #: in short runs, a comparison follows after 1/8 of the steps that the companion has covered
-MOST_BETWEEN_CHECKS = 128  #: most steps between two comparisons in long runs
-WINDOW = 4  #: steps of a window, an even number
-WINDOW_GROWTH = 4  #: growth of the distance between windows
-MOST_BETWEEN_WINDOWS = 16380  #: most steps between two windows
-FIRST_VERDICT = 20  #: no verdict before this step: the motion is too short yet to relate errors to it
+COMPANION_STEPS = 400  #: number of steps that companions cover
+LONG_RUN = 1000  #: number of steps of a run above which companions may cover fewer
+LEAST_COMPANION_STEPS = 64  #: smallest number of steps that companions cover in long runs
+SMALL_SHARE = 0.05  #: fraction of the error limit below which an extrapolated error lets a companion end early
+FIRST_CHECK = 4  #: number of steps before the first comparison, and smallest number between two comparisons
+CHECK_INTERVAL = 8  #: divisor of the number of covered steps that gives the steps between comparisons in short runs
+MOST_BETWEEN_CHECKS = 128  #: largest number of steps between two comparisons in long runs
+WINDOW = 4  #: number of steps in a window, which must be even
+WINDOW_GROWTH = 4  #: factor by which the distance between windows grows
+MOST_BETWEEN_WINDOWS = 16380  #: largest number of steps between two windows
+FIRST_VERDICT = 20  #: number of steps before the first verdict, because a shorter motion gives errors no scale
 STEP_LIMIT = 0.03  #: relative error above which a run is reported
-#: the same for runs of less than `FIRST_CHECK` steps, and of less than `FIRST_VERDICT` from a state of unknown past
+#: the same limit for runs shorter than `FIRST_CHECK` steps, or than `FIRST_VERDICT` from a state with unknown history
 SHORT_LIMIT = 0.01
-REST_LENGTH = 1e-7  #: displacement over the length of the system below which the system is at rest
+REST_LENGTH = 1e-7  #: displacement, relative to the length of the system, below which the system is at rest
 REST_ANGLE = 1e-6  #: rotation below which the system is at rest [rad]
-#: rotation with its error below which errors of rotation do not count in a motion as long as the system [rad]
+#: rotation plus its error below which rotation errors are ignored in a motion as long as the system [rad]
 SMALL_TURN = 1e-3
-FAR_TURN = 1.0  #: rotation of a flexible body in a step above which double steps say nothing [rad]
-LIGHT = 0.9  #: rho_inf at least of companions with half steps from the start of a run
-FULL_TURN = 3.0  #: rotation above which errors are relative to a whole turn [rad]
-SCREEN = 0.25  #: share of the limit above which half steps decide: double steps may be outside the asymptotic range
+FAR_TURN = 1.0  #: rotation of a flexible body in a step above which double steps give no estimate [rad]
+LIGHT = 0.9  #: smallest rho_inf of companions with half steps that begin with the run
+FULL_TURN = 3.0  #: rotation above which rotation errors are relative to a full turn [rad]
+#: fraction of the limit above which half steps decide, because double steps may be outside the asymptotic range
+SCREEN = 0.25
 AIM = 0.2  #: share of the limit that the recommended step would reach
-DOUBLES, HALVES, QUARTERS = 2.0, 0.5, 0.25  #: step size of a companion over that of the run
-ERROR_SHARE = {ratio: 1 / (1 - ratio**2) for ratio in (DOUBLES, HALVES, QUARTERS)}  #: error over the difference
-ORDINARY = (1 / 6, 3 / 8)  #: ratios of the differences by half and by double steps of about second order (1/4)
-MOST_RATIO = 2 / 3  #: largest ratio of the differences by half and by double steps from which an error is estimated
-UNKNOWN_RATIO = 1 / 2  #: the ratio where double steps fail, that of errors of first order
+DOUBLES, HALVES, QUARTERS = 2.0, 0.5, 0.25  #: step size of a companion relative to the run
+#: factor from the difference of run and companion to the error of the run
+ERROR_SHARE = {ratio: 1 / (1 - ratio**2) for ratio in (DOUBLES, HALVES, QUARTERS)}
+#: range of the ratio of differences, half to double steps, that counts as second order (exactly: 1/4)
+ORDINARY = (1 / 6, 3 / 8)
+MOST_RATIO = 2 / 3  #: largest ratio of differences, half to double steps, from which an error is estimated
+UNKNOWN_RATIO = 1 / 2  #: ratio used if double steps fail, which belongs to errors of first order
 
 
-#: of a record
+#: counters that a record contains
 COUNTS = ("next_window", "window_distance", "n_watched", "n_companion_steps", "companions_done", "n_before", "is_piece",
           "ratio")  # fmt: skip
 
 
 @dataclass
 class Companion:
-    """The same motion with another step size, from a memory of the run on."""
+    """The motion with another step size, started from a memory of the run."""
 
     integrator: Integrator
-    begin: Memory  #: memory of the run from which it started
-    start: int  #: number of run steps before it started
-    ratio: float  #: its step size over that of the run
-    at: int  #: number of run steps that it has reached
-    memory: Memory  #: its memory
-    work: Work  #: its working arrays
-    error: Array  #: error of positions and rotations of the run at the last comparison, (n_b, 2, 3)
-    before: int  #: number of run steps at the comparison before
-    error_before: Array  #: error at the comparison before, (n_b, 2, 3)
-    peak: Array  #: largest error of position and rotation, (n_b, 2)
+    begin: Memory  #: memory of the run from which the companion started
+    start: int  #: number of run steps before the companion started
+    ratio: float  #: step size of the companion relative to the run
+    at: int  #: number of run steps that the companion has reached
+    memory: Memory  #: memory of the companion
+    work: Work  #: working arrays of the companion
+    error: Array  #: position and rotation errors of the run at the last comparison, (n_b, 2, 3)
+    before: int  #: number of run steps at the previous comparison
+    error_before: Array  #: error at the previous comparison, (n_b, 2, 3)
+    peak: Array  #: largest position and rotation errors so far, (n_b, 2)
     run: Memory  #: memory of the run at the last comparison
-    error_at_begin: Array  #: error of position and rotation where it started, (n_b, 2)
-    events: EventWatch | None  #: its events
-    events_at_begin: EventWatch | None  #: events of the run where it started
-    share: float  #: error of the run over the difference
+    error_at_begin: Array  #: position and rotation errors of the run where the companion started, (n_b, 2)
+    events: EventWatch | None  #: events of the companion
+    events_at_begin: EventWatch | None  #: events of the run where the companion started
+    share: float  #: factor from the difference of run and companion to the error of the run
 
     @classmethod
     def begun(
         cls, integrator: Integrator, memory: Memory, work: Work, start: int, ratio: float, h: float = 0.0,
         events: EventWatch | None = None, is_light: bool = False,
     ) -> "Companion":  # fmt: skip
-        """Return a companion that starts from the memory of the run after `start` steps.
+        """Return a companion that starts from the run's memory after `start` steps.
 
         h: fixed step size of the run; the step then grows to that of the companion without a new start. 0: not fixed.
         events: those of the run after `start` steps, if it has any; the companion gets a copy with working arrays.
@@ -152,7 +155,7 @@ class Companion:
         )
 
     def begin_apart(self, system: System, t: float, error: Array) -> None:
-        """Begin as far from the run as if the error of the run at t were found by this companion; see `error_of`."""
+        """Shift the start by the error of the run at t, as if this companion had found it; see `error_of`."""
         apart = moved(self.begin, -error / self.share)
         acting = system if self.events is None else self.events.system
         self.memory, _ = started_anew(self.integrator, acting, t, apart, self.work)
@@ -162,7 +165,7 @@ class Companion:
     def follow(
         self, system: System, end: Memory, last: int, t0: float, h: float, jumps: Mapping[int, list[float]]
     ) -> bool:
-        """Advance to run step `last` and compare with the memory `end` of the run; return whether the steps converged.
+        """Advance to run step `last` and compare with the run's memory `end`; return whether the steps converged.
 
         jumps: times at which forces jump, by run step.
         """
@@ -187,16 +190,16 @@ class Companion:
         return True
 
     def last_error(self) -> Array:
-        """Return the error of the state of the run at the last comparison; see `error_of`."""
+        """Return the error of the run's state at the last comparison; see `error_of`."""
         return np.asarray(self.share * error_of(self.run, self.memory))
 
     @property
     def is_light(self) -> bool:
-        """Whether it has less numerical damping than the run."""
+        """Whether the companion has less numerical damping than the run."""
         return self.share != ERROR_SHARE[self.ratio]
 
     def speeds(self, h: float) -> Array:
-        """Return the mean speed errors between the last two comparisons, (n_b, 2)."""
+        """Return the mean errors of speed between the last two comparisons, (n_b, 2)."""
         return lengths(self.error - self.error_before) / (h * max(1, self.at - self.before))
 
 
@@ -208,25 +211,26 @@ class StepWatch:
     n_total: int  #: number of steps of the run
     is_on: bool = True
     n_before: int = 0  #: number of steps of earlier runs that this one continues
-    is_piece: bool = False  #: whether it starts from a state whose errors are unknown
-    #: error of position and rotation in the first step, or in one with a jump, not yet added, (n_b, 2)
+    is_piece: bool = False  #: whether the run starts from a state with unknown errors
+    #: position and rotation errors of the first step, or of a step with a jump, that are not yet summed, (n_b, 2)
     first_error: Array | float = 0.0
-    error: Array | None = None  #: error of the state where the run begins, not in `total`; see `error_of`
+    error: Array | None = None  #: error of the initial state of the run, not included in `total`; see `error_of`
     n_companion_steps: int = 0  #: number of steps that companions have covered
-    companions_done: bool = False  #: whether only windows follow
+    companions_done: bool = False  #: whether only windows follow, without companions
     companion: Companion | None = None
-    coarse: Companion | None = None  #: with twice as long steps, or four times, beside a companion with short ones
-    coarse_fails: bool = False  #: whether these cannot follow the motion
-    ratio: float = DOUBLES  #: step size that companions begin with, over that of the run
+    coarse: Companion | None = None  #: companion with double or fourfold step size, beside a companion with short steps
+    coarse_fails: bool = False  #: whether the coarse companion cannot compute the motion
+    ratio: float = DOUBLES  #: initial step size of companions relative to the run
     next_window: int = 0  #: step at which the next window starts
     window_distance: int = 0  #: number of steps between the last window and the next
-    n_watched: int = 0  #: number of steps with summed errors
-    #: error per step in the last companion or window: of position and rotation, and of their speeds, (n_b, 2, 2)
+    n_watched: int = 0  #: number of steps whose errors are summed
+    #: errors per step in the last companion or window: position and rotation, and their speeds, (n_b, 2, 2)
     error_per_step: Array | None = None
-    total: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))  #: sum of errors, likewise, (n_b, 2, 2)
-    #: error of the last state, and `total` without it, where a companion reached the end of the run
+    #: sum of the errors of position and rotation, and of their speeds, (n_b, 2, 2)
+    total: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))
+    #: error of the last state, and `total` without it, if a companion reached the end of the run
     at_end: tuple[Array, Array] | None = None
-    initial_state: State | None = None  #: state at the start
+    initial_state: State | None = None  #: state at the start of the run
     #: largest displacement and rotation of any body, and twice the largest speeds, (2, 2)
     size: Array = field(default_factory=lambda: np.zeros((2, 2)))
     turn: Array = field(default_factory=lambda: np.zeros(0))  #: largest rotation of each body in a step, (n_b,) [rad]
@@ -243,7 +247,7 @@ class StepWatch:
         self.initial_state, self.total, self.turn = state, np.zeros((n, 2, 2)), np.zeros(n)
 
     def passed_on(self) -> dict[str, list[float]]:
-        """Return what a run that continues this one in time has to know."""
+        """Return the data that a run which continues this one needs."""
         if not self.is_on or self.initial_state is None:
             return {}
         first, error, total = self.initial_state, np.zeros(0), self.total
@@ -254,7 +258,7 @@ class StepWatch:
         return {name: [float(x) for x in array.ravel()] for name, array in arrays.items()}
 
     def continue_from(self, watched: Mapping[str, Any]) -> None:
-        """Judge the run and the one that it continues as one motion."""
+        """Assess the run together with the run that it continues as one motion."""
         self.n_before, self.is_piece = int(watched["n_steps"]), False
         if not self.is_on or "errors" not in watched:
             return
@@ -270,7 +274,7 @@ class StepWatch:
                 self.add_error_at_begin()
 
     def add_error_at_begin(self) -> None:
-        """Add the error of the state where the run begins to the sum."""
+        """Add the error of the initial state to the sum."""
         assert self.error is not None
         total = self.total.copy()
         total[:, :, 0] += lengths(self.error[: 6 * len(total)].reshape(-1, 2, 3))
@@ -278,32 +282,32 @@ class StepWatch:
 
     @property
     def limit(self) -> float:
-        """Relative error above which the run is reported."""
+        """Relative error above which a note about the run is made."""
         is_short = self.n_before + self.n_total < (FIRST_VERDICT if self.is_piece else FIRST_CHECK)
         return SHORT_LIMIT if is_short else STEP_LIMIT
 
     def is_judged(self, n_done: int) -> bool:
-        """Whether the motion up to step n_done is long enough to relate errors to it."""
+        """Whether the motion up to step n_done is long enough for relative errors."""
         return self.n_before + n_done >= FIRST_VERDICT
 
     @property
     def is_long(self) -> bool:
-        """Whether companions cover only a part of the first steps."""
+        """Whether companions cover only part of the first steps, because the run is long."""
         return self.n_total > LONG_RUN
 
     @property
     def has_companion(self) -> bool:
-        """Whether the next steps are covered by a companion."""
+        """Whether a companion covers the next steps."""
         return self.is_on and not self.companions_done
 
     def is_window(self, n_done: int) -> bool:
-        """Whether the step after n_done belongs to a window. No window contains a restart."""
+        """Whether the step after n_done belongs to a window; windows do not contain restart points."""
         if self.has_companion or not self.is_on or n_done < self.next_window:
             return False
         return bool(self.open_window) or n_done % RESTART_STEPS <= RESTART_STEPS - WINDOW
 
     def room(self, n_done: int, most: int) -> int:
-        """Return how many steps to take at once after n_done: to a comparison, half a window, or the next window."""
+        """Return the number of steps after n_done up to the next comparison, half window or window."""
         if self.has_companion:
             if n_done < 2:
                 return 1 if n_done == 0 else FIRST_CHECK - 1
@@ -322,14 +326,14 @@ class StepWatch:
         return min(most, self.next_window - n_done) if self.is_on and n_done < self.next_window else most
 
     def is_comparable(self, n_done: int) -> bool:
-        """Whether a step of the companion ends with step n_done of the run."""
+        """Whether a step of the companion ends together with step n_done of the run."""
         return self.companion is None or self.companion.ratio < 1.0 or (n_done - self.companion.start) % 2 == 0
 
     def take(
         self, system: System, begin: Memory, end: Memory, *, t0: float, h: float, first: int, n_steps: int,
         events: EventWatch | None = None, is_cut: bool = False,
     ) -> ValidityNote | None:  # fmt: skip
-        """Take the memories before and after n_steps steps of the run; return the note if it is new.
+        """Take the memories before and after n_steps steps of the run; return a note if it is new.
 
         events: those of the run before these steps; needed if a companion starts with them. is_cut: whether a force
         jumps or an event switches something within these steps.
@@ -357,11 +361,11 @@ class StepWatch:
         return self.close_window(system, end, last, t0, h)
 
     def follows_jump(self, n_done: int) -> bool:
-        """Return whether a force jumps in the step after n_done, or in or at the end of the one before."""
+        """Whether a force jumps in the step after n_done, or in the step before it, or between them."""
         return n_done in self.jumps or n_done - 1 in self.jumps
 
     def may_err_at_once(self, system: System, begin: Memory, end: Memory, h: float) -> bool:
-        """Return whether the first step alone may have an error that counts, from the change of accelerations in it.
+        """Whether the first step alone may have a relevant error, judged by its change of accelerations.
 
         Where they change by c, places are in doubt by up to h² c/2. What a step does not resolve changes them fully.
         """
@@ -371,7 +375,7 @@ class StepWatch:
         return bool((h**2 / 2 * change > SCREEN * self.limit * way).any())
 
     def skip(self, h: float) -> None:
-        """Close the companion and the window before a step that fails or in which an event ends the run."""
+        """Close companion and window before a step that fails or in which an event ends the run."""
         self.open_window = []
         self.close_companion(h)
 
@@ -379,7 +383,7 @@ class StepWatch:
         self, system: System, begin: Memory, end: Memory, t0: float, h: float, first: int, last: int,
         events: EventWatch | None,
     ) -> ValidityNote | None:  # fmt: skip
-        """Compare the run after step `last` with the companion; return the note if it is new."""
+        """Compare the run after step `last` with the companion; return a note if it is new."""
         if self.companion is None:
             self.add_unwatched_steps(first, self.error_per_step)
             is_fixed = not has_divided_steps(compiled_system(system).model) and has_fixed_steps(self.integrator)
@@ -419,12 +423,12 @@ class StepWatch:
         return note
 
     def turns_far(self, system: System) -> bool:
-        """Return whether a flexible body has turned by more than `FAR_TURN` in a step."""
+        """Whether a flexible body has rotated by more than `FAR_TURN` in a step."""
         is_flexible = np.diff(compiled_system(system).model.bodies.q0) > 0
         return bool((self.turn[is_flexible] > FAR_TURN).any())
 
     def follow(self, system: System, other: Companion, end: Memory, last: int, t0: float, h: float) -> bool:
-        """Advance the companions to run step `last`, replace those that fail; return whether the steps converged."""
+        """Advance the companions to run step `last` and replace failed ones; return whether the steps converged."""
         is_far = self.turns_far(system)
         is_good = not (is_far and other.ratio == DOUBLES) and other.follow(system, end, last, t0, h, self.jumps)
         if self.coarse is not None and (last - other.start) % 2 == 0:
@@ -445,7 +449,7 @@ class StepWatch:
         return is_good
 
     def refined(self, system: System, t0: float, coarse: Companion) -> Companion:
-        """Replace a companion by one with shorter steps from the same start; the other one goes on beside it."""
+        """Start a companion with shorter steps from the same start; the present one continues beside it."""
         self.coarse, self.kept_work = coarse, None  # each has its own working arrays
         self.ratio = HALVES if coarse.ratio == DOUBLES else QUARTERS
         is_light = coarse.ratio == DOUBLES or coarse.is_light
@@ -453,7 +457,7 @@ class StepWatch:
         return self.companion
 
     def is_doubtful(self, system: System, halves: Companion) -> bool:
-        """Return whether the error by half steps counts beside the limit, and is not of second order."""
+        """Whether the error from half steps is relevant compared with the limit, but not of second order."""
         if halves.ratio != HALVES:
             return False
         found = halves.peak * by_observed_order(halves, self.coarse, self.coarse_fails)
@@ -466,7 +470,7 @@ class StepWatch:
     def with_steps(
         self, ratio: float, system: System, t0: float, other: Companion, *, is_light: bool = True
     ) -> Companion:
-        """Return a companion with steps of so much of those of the run, that starts where another one started.
+        """Return a companion with the given step size ratio that starts where another companion started.
 
         is_light: with little numerical damping at the start of a run; a memory of the run has that of its method.
         """
@@ -476,7 +480,7 @@ class StepWatch:
         ))  # fmt: skip
 
     def moved_companion(self, system: System, t0: float, other: Companion) -> Companion:
-        """Return a companion that begins with the error of the run, where it starts at the beginning."""
+        """Return a companion whose start includes the error of the run, if it starts at the beginning of the run."""
         if self.error is not None and other.start == 0:
             try:
                 other.begin_apart(system, t0, self.error)
@@ -485,7 +489,7 @@ class StepWatch:
         return other
 
     def close_companion(self, h: float) -> Array | None:
-        """Remove the companion, and add the error that it has found; return this error, None if there is none."""
+        """Remove the companion and add its error to the sum; return the error, or None if there is none."""
         other, self.companion = self.companion, None
         coarse, self.coarse = self.coarse, None
         if other is None or other.at == other.start:  # what the first step alone has found counts nevertheless
@@ -506,7 +510,7 @@ class StepWatch:
         return found
 
     def add_unwatched_steps(self, step: int, rate: Array | None) -> None:
-        """Add the error of the steps before `step` that nothing has covered, from an error per step."""
+        """Add the error of the steps before `step` that no companion or window covered, from an error per step."""
         if rate is not None:
             self.total = self.total + max(0, step - self.n_watched) * rate
         self.n_watched = max(step, self.n_watched)
@@ -518,7 +522,7 @@ class StepWatch:
         return self.kept_work[1]
 
     def close_window(self, system: System, end: Memory, last: int, t0: float, h: float) -> ValidityNote | None:
-        """Repeat the window up to the memory `end` with half steps; return the note if it is new."""
+        """Repeat the window up to the memory `end` with half steps; return a note if it is new."""
         (start, before), (middle, half) = self.open_window
         self.open_window = []
         self.window_distance = min(WINDOW_GROWTH * self.window_distance, MOST_BETWEEN_WINDOWS)
@@ -538,7 +542,7 @@ class StepWatch:
         return self.new_note(system, t0 + last * h, h) if self.is_judged(last) else None
 
     def update_size(self, half: State, end: State, seconds: float) -> None:
-        """Update the largest displacements, rotations and speeds by two states that are so many seconds apart."""
+        """Update the largest displacements, rotations and speeds from two states that are `seconds` apart."""
         assert self.initial_state is not None
         way = lengths(difference(end, self.initial_state)).max(axis=0)
         if way[1] > FULL_TURN:
@@ -547,7 +551,7 @@ class StepWatch:
         self.size = np.maximum(self.size, np.stack([way, 2 * speed], axis=1))
 
     def conclude(self, system: System, end: Memory, n_done: int, t0: float, h: float) -> ValidityNote | None:
-        """Add the errors up to the end of the run; return the note if it is new."""
+        """Add the errors up to the end of the run; return a note if it is new."""
         if self.open_window and self.open_window[1][0] == n_done:
             note = self.close_window(system, end, n_done, t0, h)
             if note is not None:
@@ -567,7 +571,7 @@ class StepWatch:
         return self.new_note(system, t0 + n_done * h, h)
 
     def relative_errors(self, system: System, found: Array | None = None) -> Array:
-        """Return the relative errors of position and rotation of each body, with those of a companion, (n_b, 2)."""
+        """Return the relative position and rotation errors of each body, including those of a companion, (n_b, 2)."""
         compiled = compiled_system(system)
         least = np.array([REST_LENGTH * compiled.length, REST_ANGLE])
         size, total = self.size.copy(), self.total
@@ -582,7 +586,7 @@ class StepWatch:
         return np.where(moves, np.linalg.norm(parts, axis=2), 0.0)
 
     def new_note(self, system: System, t: float, h: float) -> ValidityNote | None:
-        """Update the note with the error so far; return it if it is new."""
+        """Update the note with the present error; return it if it is new."""
         companion = self.companion
         if companion is not None and companion.ratio == DOUBLES:
             return None
@@ -611,7 +615,7 @@ class StepWatch:
         return self.note
 
     def record(self) -> dict[str, Array]:
-        """Return the data to resume from, by name; nothing if the watch is off."""
+        """Return the data for a resumed run by name; nothing if the watch is off."""
         if not self.is_on or self.initial_state is None:
             return {}
         rate = np.full_like(self.total, np.nan) if self.error_per_step is None else self.error_per_step
@@ -623,7 +627,7 @@ class StepWatch:
         }  # fmt: skip
 
     def restore(self, record: Mapping[str, Array], notes: tuple[ValidityNote, ...]) -> None:
-        """Resume from a record and the notes of the run so far."""
+        """Restore the data of an interrupted run from its record and notes."""
         if not self.is_on:
             return
         try:
@@ -642,7 +646,7 @@ class StepWatch:
 
 
 def integrator_of(integrator: Integrator, ratio: float) -> Integrator:
-    """Return the method for steps of another size; ratio: this size over that of the given method."""
+    """Return the method for another step size; ratio: new step size over the original one."""
     tolerance = getattr(integrator, "error_tolerance", None)
     if tolerance is None:
         return integrator
@@ -650,7 +654,7 @@ def integrator_of(integrator: Integrator, ratio: float) -> Integrator:
 
 
 def lighter(integrator: Integrator, ratio: float) -> tuple[Integrator, float]:
-    """Return the method with the numerical damping of `LIGHT` where that is less, and its share in the error.
+    """Return the method with less numerical damping if its own exceeds that of `LIGHT`, and its error factor.
 
     The phase error of generalized-alpha in a period is c(rho_inf) (omega h)², c as below.
     """
@@ -664,14 +668,14 @@ def lighter(integrator: Integrator, ratio: float) -> tuple[Integrator, float]:
 
 
 def ratio_of_differences(other: Companion, coarse: Companion) -> Array:
-    """Return how much more steps are changed by going on to shorter ones than by going to the coarse ones, (n_b, 2)."""
+    """Return the further change by finer steps divided by the change by the coarse steps, (n_b, 2)."""
     fine, before = other.peak / abs(other.share), coarse.peak / abs(coarse.share)
     more = fine - before if coarse.ratio < 1.0 else fine
     return np.asarray(np.maximum(more, 0.0) / np.where(before > 0.0, before, np.inf))
 
 
 def by_observed_order(other: Companion, coarse: Companion | None, coarse_fails: bool) -> Array:
-    """Return by how much the errors that a companion finds are larger where they are not of second order, (n_b, 2).
+    """Return the factor by which errors exceed the second-order estimate of a companion, (n_b, 2).
 
     Changes of a run to shorter and shorter steps that fall by a ratio x go on by x/(1 - x) times the last.
     Where double steps fail, the order is unknown, and the first is assumed.
@@ -689,25 +693,25 @@ def by_observed_order(other: Companion, coarse: Companion | None, coarse_fails: 
 
 
 def lengths(vectors: Array) -> Array:
-    """Return the lengths of vectors in the last axis."""
+    """Return the lengths of vectors along the last axis."""
     return np.sqrt((vectors**2).sum(axis=-1))
 
 
 def difference(state: State, other: State) -> Array:
-    """Return the differences of places and the rotation vectors between orientations, (n_b, 2, 3) [m, rad]."""
+    """Return differences of positions and rotation vectors between orientations, (n_b, 2, 3) [m, rad]."""
     apart = np.empty((len(state.r), 2, 3))
     apart[:, 0], apart[:, 1] = state.r - other.r, rotations_between(state.p, other.p)
     return apart
 
 
 def error_of(memory: Memory, other: Memory) -> Array:
-    """Return the difference of two states: of places and orientations (n_b, 2, 3), modal coordinates and velocities."""
+    """Return the difference of two states: positions and orientations (n_b, 2, 3), modal coordinates, velocities."""
     apart = difference(memory.state, other.state)
     return np.concatenate([apart.ravel(), memory.q - other.q, memory.u - other.u])
 
 
 def moved(memory: Memory, apart: Array) -> Memory:
-    """Return the memory whose state differs by so much; see `error_of`."""
+    """Return the memory with its state changed by a difference; see `error_of`."""
     n_b, n_q = len(memory.r), len(memory.q)
     of_bodies, q, u = np.split(apart, [6 * n_b, 6 * n_b + n_q])
     way, theta = of_bodies.reshape(n_b, 2, 3).transpose(1, 0, 2)
@@ -716,6 +720,6 @@ def moved(memory: Memory, apart: Array) -> Memory:
 
 
 def turns_in_a_step(system: System, state: State, h: float) -> Array:
-    """Return how far each body turns in a step of size h, (n_b,) [rad]."""
+    """Return the rotation of each body in a step of size h, (n_b,) [rad]."""
     u0 = compiled_system(system).model.bodies.u0[:-1]
     return h * np.linalg.norm(state.u[u0[:, None] + np.arange(3, 6)], axis=1)

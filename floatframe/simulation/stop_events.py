@@ -1,4 +1,4 @@
-"""Events of stops: couplers with limits that are hit, hold while they are pressed, and release."""
+"""Events of stops: a coupler hits a limit, is held there while it is pressed against it, and is released."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -25,21 +25,21 @@ __all__ = [
     "sum_size",
 ]
 
-INWARD = {"lower": 1.0, "upper": -1.0}  #: sign of the force of a stop along its coordinate
-#: allowed distance beyond a stop at the start of a motion, relative to the size of the sum or of the limit
+INWARD = {"lower": 1.0, "upper": -1.0}  #: sign of the stop force along the coordinate for each limit
+#: allowed distance beyond a stop at the start of a motion, relative to the size of the coordinate sum or of the limit
 BEYOND = 1e-9
 
 
 @dataclass(frozen=True)
 class StopEvent(Event):
-    """A coupler reaches one of its limits, or is no longer pressed against it."""
+    """A coupler reaches one of its limits, or is no longer pressed against the limit."""
 
     coupler: str = ""
     side: str = ""  #: "lower", "upper" or "release"
 
     @property
     def is_active(self) -> bool:
-        """Always."""
+        """Whether the event changes the motion, which a stop always does."""
         return True
 
 
@@ -62,7 +62,7 @@ def stop_events(system: System) -> tuple[StopEvent, ...]:
 
 
 def sum_rows(compiled: CompiledSystem, name: str) -> tuple[IntArray, Array, int]:
-    """Return the coordinate rows of a coupler, their coefficients, and the row of its multiplier."""
+    """Return the coordinate rows of a coupler with their coefficients, and the row of its multiplier."""
     model = compiled.model
     k = compiled.element_names.index(name)
     places = slice(int(model.elements.coordinate0[k]), int(model.elements.coordinate0[k + 1]))
@@ -70,18 +70,18 @@ def sum_rows(compiled: CompiledSystem, name: str) -> tuple[IntArray, Array, int]
 
 
 def coupled_sum(compiled: CompiledSystem, name: str, w: Array) -> float:
-    """Return the sum of a coupler from the unknowns of connections, (n_w,)."""
+    """Return the coordinate sum of a coupler from the connection unknowns w, (n_w,)."""
     rows, factors, _ = sum_rows(compiled, name)
     return float(factors @ w[rows])
 
 
 def sum_size(compiled: CompiledSystem, name: str) -> float:
-    """Return the size of the sum of a coupler: of its terms for the length of the system, and a radian."""
+    """Return the size of a coupler's coordinate sum, with the system length or one radian for each coordinate."""
     return float(compiled.gap_sizes[sum_rows(compiled, name)[2]])
 
 
 def stop_values(compiled: CompiledSystem, event: StopEvent, resting: Mapping[str, str], rows: Sequence[Rows]) -> Array:
-    """Return the watched value of a stop event at the times of rows of results, (n_times,).
+    """Return the watched value of a stop event for result rows, (n_times,).
 
     A limit on which the sum rests is not reached again; one on which it does not rest cannot let go.
     """
@@ -98,7 +98,7 @@ def stop_values(compiled: CompiledSystem, event: StopEvent, resting: Mapping[str
 
 
 def require_within_limits(compiled: CompiledSystem, events: Sequence[Event], values: Array) -> None:
-    """Raise `ModelError` if a motion begins beyond a stop."""
+    """Raise `ModelError` if a coupler is beyond a stop at the start of a motion."""
     for event, value in zip(events, values, strict=True):
         if isinstance(event, StopEvent) and event.side in INWARD:
             beyond = -INWARD[event.side] * (value - event.level)
@@ -110,7 +110,7 @@ def require_within_limits(compiled: CompiledSystem, events: Sequence[Event], val
 
 
 def require_off_stops(system: System, w: Array) -> None:
-    """Raise `ModelError` if an equilibrium with unknowns w, (n_w,), found without stops, lies beyond one."""
+    """Raise `ModelError` if an equilibrium found without stops is beyond one; w: unknowns of connections, (n_w,)."""
     compiled = compiled_system(system)
     for event in stop_events(system):
         if event.side in INWARD:
@@ -125,7 +125,7 @@ def require_off_stops(system: System, w: Array) -> None:
 
 
 def just_inside(event: StopEvent, value: float) -> float:
-    """Return a value that can reach the limit again: one at or beyond it becomes the last number within it."""
+    """Return a value that can reach the limit: a value at or beyond it becomes the nearest number inside."""
     inward = INWARD[event.side]
     if inward * (value - event.level) > 0.0:
         return value

@@ -1,4 +1,4 @@
-"""Switching functions: a law jumps when one passes zero; its sign is constant in every step.
+"""Switching functions: a law jumps at their zeros; their signs are constant within a step.
 
 A step that ends beyond the zero with the sign of its beginning finds a smooth motion, so that the time of the zero is
 found by steps of other sizes, as that of an event. There the sign changes, and the motion goes on with the
@@ -30,12 +30,12 @@ __all__ = ["HeldSigns", "SwitchEvent", "beyond_zero", "sign_of", "switch_events"
 class SwitchEvent(Event):
     """A switching function passes zero."""
 
-    #: its values for rows of results, (n_times,); None: an output of an element, which a sensor measures
+    #: returns the values for result rows, (n_times,); None for an element output, which a sensor measures
     values: Callable[[Sequence[Rows]], Array] | None = None
 
     @property
     def is_active(self) -> bool:
-        """Always."""
+        """Whether the event changes the motion, which a switch always does."""
         return True
 
 
@@ -59,7 +59,7 @@ def switch_events(system: System) -> tuple[SwitchEvent, ...]:
 
 
 def values_of_tape(tape: Tape, functions: Sequence[TimeFunction], unknowns: IntArray, rows: Sequence[Rows]) -> Array:
-    """Return a switching function of a user force, of time and unknowns, for rows, (n_times,)."""
+    """Return the values of a user force's switching function for result rows, (n_times,)."""
     t, w = (np.concatenate([getattr(row, name) for row in rows]) for name in ("t", "w"))
     columns = w[:, unknowns].T
     inputs = {0: np.asarray} | {1 + k: partial(column_at, column) for k, column in enumerate(columns)}
@@ -70,12 +70,12 @@ def values_of_tape(tape: Tape, functions: Sequence[TimeFunction], unknowns: IntA
 
 
 def column_at(column: Array, t: Array) -> Array:
-    """Return the known inputs at the times t."""
+    """Return the known inputs at times t."""
     return column
 
 
 def unknowns_of_force(compiled: CompiledSystem, u: int, i: int) -> IntArray:
-    """Return the unknowns that user force u uses, element i among couplers and user forces: values, rates, states."""
+    """Return the numbers of the unknowns that user force u uses, which is element i: values, rates, states."""
     users, elements = compiled.model.users, compiled.model.elements
     rows = compiled.model.coordinates.row[elements.coordinate0[i] : elements.coordinate0[i + 1]]
     states = int(elements.core[i]) + int(users.n_forces[u]) + 3 * np.arange(int(users.n_states[u]))
@@ -83,7 +83,7 @@ def unknowns_of_force(compiled: CompiledSystem, u: int, i: int) -> IntArray:
 
 
 def with_signs(system: System, signs: Mapping[str, int]) -> System:
-    """Return a system whose switching functions have constant signs, given by the names of their events."""
+    """Return a system whose switching functions have constant signs, given by event name."""
     if not signs:
         return system
     forces = []
@@ -100,12 +100,12 @@ def with_signs(system: System, signs: Mapping[str, int]) -> System:
 
 
 def sign_of(value: float) -> int:
-    """Return the sign of a switching function: 1 at zero and above, else -1."""
+    """Return the sign of a switching function: 1 if it is not negative, else -1."""
     return -1 if value < 0.0 else 1
 
 
 def beyond_zero(value: float, sign: int) -> float:
-    """Return a value on the side of a sign: one on the other side becomes the first number there."""
+    """Return a value with the given sign; a value with the other sign becomes the first number on this side."""
     return value if sign * value > 0.0 else float(np.nextafter(0.0, sign))
 
 
@@ -114,11 +114,11 @@ def beyond_zero(value: float, sign: int) -> float:
 
 @dataclass(frozen=True, eq=False)
 class HeldSigns(ElementProxy):
-    """Replaces an element; its law uses given signs."""
+    """An element whose law uses given signs of its switching functions."""
 
     signs: Sequence[int]  #: sign of its switching functions, 1 or -1
 
     def law(self, placed: Placed) -> ElementLaw:
-        """Return its law with these signs."""
+        """Return the law of the element with these signs."""
         law = self.element.law(placed)
         return replace(law, data=[*law.data, *map(float, self.signs)], switches=())

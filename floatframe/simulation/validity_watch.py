@@ -1,4 +1,4 @@
-"""Watch over a motion, row by row: whether every flexible body stays in the range of its linear frame.
+"""Check that every flexible body stays in the range of its linear frame, for each result row.
 
 The stiffness of a body under its loads is K + Σ lambda_j K_j, with the amplitudes lambda of the unit loads (theory.md
 §7): acceleration of the frame origin minus gravity, angular acceleration, products of the angular velocity, wrenches on
@@ -45,35 +45,36 @@ from floatframe.results.validity import ValidityNote
 __all__ = ["ANGLES_LIMIT", "ValidityWatch", "angle_measures"]
 
 
-MOST_CONVERTED = 80  #: number of modes of a body whose rotations relative to mean axes are computed
+MOST_CONVERTED = 80  #: largest number of modes of a body whose rotations relative to mean axes are computed
 ADVICE = {
     "angles": "limit large rotations to one axis, or use a joint for large rotations and a bearing for a shaft",
     "tilt": "use a joint for large rotations",
 }
-N_INERTIAL = 12  #: amplitudes of inertial loads: 3 accelerations, 3 angular accelerations, 6 products
+N_INERTIAL = 12  #: number of inertial loads: 3 accelerations, 3 angular accelerations, 6 products of angular velocities
 
 
 @dataclass(eq=False)
 class Watched:
-    """Constants of one flexible body."""
+    """Constants of one flexible body for the check."""
 
     index: int
     body: FlexibleBody
     limits: Limits
-    frequency: float  #: lowest angular frequency with one of its joints held, or free [rad/s]
-    Psi_r: Array  #: rotations of the interfaces by q, (3 n, n_q)
-    scaled: Array  #: K^(-1/2) K_j K^(-1/2) of all unit loads, (n_loads, n_q²); no rows if K is singular
-    norms: Array  #: their largest |eigenvalue|, (n_loads,)
-    by_mean_axes: Array | None = None  #: rotations of the interfaces relative to mean axes by q, computed on request
+    frequency: float  #: lowest angular frequency with one of its joints fixed, or free [rad/s]
+    Psi_r: Array  #: rotation shapes of the interfaces, (3 n, n_q)
+    #: geometric stiffness K^(-1/2) K_j K^(-1/2) of all unit loads, (n_loads, n_q²); no rows if K is singular
+    scaled: Array
+    norms: Array  #: largest |eigenvalue| of each geometric stiffness, (n_loads,)
+    by_mean_axes: Array | None = None  #: rotation shapes of the interfaces relative to mean axes, computed on request
     wrenches: list[Wrench] = field(default_factory=list)
     loads: list[Load] = field(default_factory=list)
 
 
 class ValidityWatch:
-    """The notes of a motion; `observe` takes its rows in order."""
+    """Checks a motion, whose result rows `observe` takes in order, and stores notes."""
 
     def __init__(self, system: System, notes: tuple[ValidityNote, ...] = ()) -> None:
-        """Begin with a system, and the notes of the completed part of the motion."""
+        """Begin with the notes of the completed part of the motion."""
         self.system = system
         self.found = {note.key: note for note in notes}
         elastic = [
@@ -88,11 +89,11 @@ class ValidityWatch:
 
     @property
     def notes(self) -> tuple[ValidityNote, ...]:
-        """Findings, in the order of time."""
+        """Notes so far, ordered by time."""
         return tuple(sorted(self.found.values(), key=lambda note: note.t_first))
 
     def observe(self, rows: Rows) -> tuple[ValidityNote, ...]:
-        """Take rows of results and return the new notes."""
+        """Take result rows and return new notes."""
         if len(rows.t) == 0:
             return ()
         told = rows_of_file(compiled_system(self.system), rows)
@@ -124,7 +125,7 @@ class ValidityWatch:
         return tuple(new)
 
     def observe_angles(self, rows: Rows) -> list[ValidityNote]:
-        """Take rows of results and return new notes about the angles of bushings and bearings."""
+        """Take result rows and return new notes about the angles of bushings and bearings."""
         new = []
         for where, kind, measure in self.angles:
             values = measure(rows)
@@ -141,7 +142,7 @@ class ValidityWatch:
         return new
 
     def measures(self, part: Watched, rows: Rows, told: Rows) -> list[tuple[str, Array]]:
-        """Return the compared quantities for the rows of the engine, in the frames of the files, (n_t,).
+        """Return the checked quantities for engine rows, in the body frames of the files, (n_t,).
 
         A rotation is that against the frame in which the engine moves the body, a load that of the frame of its file.
         """
@@ -161,12 +162,12 @@ class ValidityWatch:
         return found
 
     def coordinates(self, part: Watched, rows: Rows) -> Array:
-        """Return the modal coordinates of a body over the rows, (n_t, n_q)."""
+        """Return the modal coordinates of a body for the rows, (n_t, n_q)."""
         q0 = int(compiled_system(self.system).model.bodies.q0[part.index])
         return rows.q[:, q0 : q0 + part.body.reduced.n_q]
 
     def load_measure(self, part: Watched, rows: Rows, i: int, u0: int) -> Array:
-        """Return the change of the stiffness by the loads; -1 in rows without evaluation."""
+        """Return the relative stiffness change due to loads, (n_t,); -1 for rows without evaluation."""
         R, omega = rotation_matrix(rows.p[:, i]), rows.u[:, u0 + 3 : u0 + 6]
         lam = np.zeros((len(rows.t), len(part.norms)))
         acceleration = rows.u_dot[:, u0 : u0 + 3] - compiled_system(self.system).model.gravity
@@ -197,7 +198,7 @@ class ValidityWatch:
 
 
 def in_mean_axes(part: Watched, q: Array) -> float:
-    """Return the largest rotation of an interface relative to mean axes at coordinates (n_t, n_q) [rad]; -1: unknown.
+    """Return the largest interface rotation relative to mean axes for q, (n_t, n_q) [rad]; -1: unknown.
 
     Not known where the body has mean axes already, has many modes (the way there takes long), or cannot go there.
     """
@@ -222,7 +223,7 @@ def is_elastic(body: FlexibleBody) -> bool:
 
 
 def held_frequencies(compiled: CompiledSystem, bodies: list[int]) -> list[float]:
-    """Return the lowest angular frequency above zero of bodies with one joint held, over all joints [rad/s].
+    """Return the lowest positive angular frequency of each body with one joint fixed, over all joints [rad/s].
 
     What a joint holds stands still then, so that a body that is clamped by one of its joints has the frequency of a
     cantilever whatever the frame of its file; a body without joints has that of the free body. None above zero: inf.
@@ -247,7 +248,7 @@ def held_frequencies(compiled: CompiledSystem, bodies: list[int]) -> list[float]
 
 
 def lowest_frequency(M: Array, K: Array, G: Array) -> float:
-    """Return the lowest angular frequency above zero of motions with G x = 0; motions of a rigid body come first in x.
+    """Return the lowest positive angular frequency of motions with G x = 0; rigid motions come first in x.
 
     The pencil (M, K + s M) has no singular side: its eigenvalues are 1/(omega² + s), the largest of them those of the
     rigid-body motions that G leaves free. All motions are scaled to a mass of 1, or those of modes without mass to the
@@ -270,7 +271,7 @@ def lowest_frequency(M: Array, K: Array, G: Array) -> float:
 
 
 def watched(index: int, body: FlexibleBody, frequency: float) -> Watched:
-    """Return the constants of a body before the motion."""
+    """Return the constants of a body for the check."""
     reduced = body.reduced
     turning = [np.asarray(interface.Psi[3:]) for interface in body.moved.interfaces if interface.has_rotation]
     scaled, norms = scaled_unit_loads(reduced)
@@ -288,7 +289,7 @@ def watched(index: int, body: FlexibleBody, frequency: float) -> Watched:
 
 
 def scaled_unit_loads(reduced: ReducedBody) -> tuple[Array, Array]:
-    """Return K^(-1/2) K_j K^(-1/2) of all unit loads, (n_loads, n_q²), and their norms; empty if K is singular."""
+    """Return K^(-1/2) K_j K^(-1/2) for all unit loads, (n_loads, n_q²), with norms; empty if K is singular."""
     n, geometric = reduced.n_q, reduced.geometric
     values, vectors = la.eigh(reduced.K)
     if not values[0] > 0:
@@ -307,7 +308,7 @@ def scaled_unit_loads(reduced: ReducedBody) -> tuple[Array, Array]:
 
 
 def estimated_interface_loads(reduced: ReducedBody) -> Array:
-    """Return an estimate of the matrices of unit wrenches at interfaces, (n_interfaces, 6, n, n), for a body without.
+    """Return estimated matrices for unit interface wrenches, (n_interfaces, 6, n, n), for a body without them.
 
     A force N along the line e of length l from the centre of mass to an interface does the work -N l/2 times the mean
     square of the slopes between them. Half the square of the slope at the interface is that of a half sine.
@@ -333,13 +334,13 @@ def estimated_interface_loads(reduced: ReducedBody) -> Array:
 # Public elements say themselves how far their angles are beyond small ones (`Element.small_angles`).
 
 
-ANGLES_LIMIT = 0.05  #: relative difference of the angle from another definition that is allowed
+ANGLES_LIMIT = 0.05  #: allowed relative difference between rotation vector and Cardan angles
 
 Measure = Callable[[Rows], Array]
 
 
 def angle_measures(system: System) -> Iterator[tuple[str, str, Measure]]:
-    """Yield name and kind ("angles" or "tilt") of each bushing and bearing with angles, and the deviation.
+    """Yield name, kind ("angles" or "tilt") and deviation of each bushing and bearing with angles.
 
     Each measure is a function of rows of results, (n_t,).
     """
@@ -357,7 +358,7 @@ def angle_measures(system: System) -> Iterator[tuple[str, str, Measure]]:
 
 
 def apart_from_cardan(a: MarkerData, b: MarkerData, k: int, rows: Rows) -> Array:
-    """Return the relative difference of the rotation vector of marker b relative to a from Cardan angles, (n_t,).
+    """Return the relative difference between rotation vector and Cardan angles of b relative to a, (n_t,).
 
     k: where its components begin in the counted angles, -1 where they are not.
     """
@@ -372,12 +373,12 @@ def apart_from_cardan(a: MarkerData, b: MarkerData, k: int, rows: Rows) -> Array
 
 
 def of_element(beyond: Callable[[Array], Array], markers: tuple[MarkerData, ...], rows: Rows) -> Array:
-    """Return the value that an element declares for its angles (`Element.small_angles`), (n_t,)."""
+    """Return the value that an element declares for its angles (`Element.small_angles`), for each row, (n_t,)."""
     return beyond(np.stack([rotation_matrix(orientations_of(marker, rows)) for marker in markers], axis=1))
 
 
 def orientations_of(marker: MarkerData, rows: Rows) -> Array:
-    """Return the Euler parameters of the axes of a marker on the undeformed body, (n_t, 4)."""
+    """Return the Euler parameters of a marker's axes on the undeformed body, (n_t, 4)."""
     p = euler_parameters(np.asarray(marker.shape.triad))
     if marker.body < 0:
         return np.broadcast_to(p, (len(rows.t), 4))
