@@ -7,9 +7,10 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["elastic_eigenvectors", "turn_to_diagonal"]
 
-INDEPENDENT = 1e-14  #: smallest eigenvalue of the norm of a pencil, scaled to a unit diagonal
+INDEPENDENT = 1e-14  #: smallest eigenvalue of the norm W, scaled to a unit diagonal, of an independent direction
 MASSLESS = 1e-12  #: modal mass times omega_1² of a shape of unit W-length, below which the shape is static
-BAND = 1e6  #: ratio of omega² within a band of step (4); rounding of its stiffest mode is 1e-10 of its softest one
+#: largest ratio of omega² within a band in step (4); stiff modes cause a rounding error of 1e-10 in the softest
+BAND = 1e6
 
 
 def elastic_eigenvectors(G_K: Array, G_M: Array, omega2_1: float) -> tuple[Array, Array]:
@@ -57,7 +58,7 @@ def elastic_eigenvectors(G_K: Array, G_M: Array, omega2_1: float) -> tuple[Array
 
 
 def turn_to_diagonal(G_K: Array) -> Array:
-    """Return the orthogonal matrix that makes a nearly diagonal, ascending stiffness diagonal, band by band, (k, k).
+    """Return an orthogonal matrix, (k, k), that diagonalises a nearly diagonal, ascending stiffness, band by band.
 
     The first band of a second pass is narrower, for close modes on the two sides of a border of the first pass.
     """

@@ -25,20 +25,22 @@ __all__ = [
     "orthonormal_basis", "within",
 ]  # fmt: skip
 
-RANK_TOLERANCE = 1e-10  #: remainder of a unit column below which it is redundant (docs/theory.md §3)
-ROUNDING_MARGIN = 30.0  #: factor on the rounding error of a column in the W-norm, if this exceeds the tolerance
+#: remainder of a unit column outside the span, below which the column is redundant (docs/theory.md §3)
+RANK_TOLERANCE = 1e-10
+#: factor on the rounding error of a column in the W-norm, for rounding errors above the tolerance
+ROUNDING_MARGIN = 30.0
 TRUSTED_PIVOT = 1e-4  #: remainder above which a pivoted Cholesky of the Gram matrix is trusted
 TRUSTED_CONDITION = 1e4  #: condition number of the Gram matrix of unit columns, below which one Cholesky step suffices
-PRODUCT_BYTES = 128e6  #: memory for products with K or M
+PRODUCT_BYTES = 128e6  #: size of products with K or M in memory at a time [bytes]
 
 
 @dataclass(eq=False)
 class DisplacementColumns:
-    """Displacement columns with their products and their origin; each block is a tall, thin matrix."""
+    """Tall, thin block of displacement columns with their products with K and M, and their origin."""
 
-    X: Array  #: (n_dof, k)
-    KX: Array  #: (n_dof, k)
-    MX: Array  #: (n_dof, k)
+    X: Array  #: displacement columns, (n_dof, k)
+    KX: Array  #: K X, (n_dof, k)
+    MX: Array  #: M X, (n_dof, k)
     T: Array  #: coefficients over the columns of the mode set, (n_columns, k)
 
     def __matmul__(self, Z: Array) -> "DisplacementColumns":
@@ -48,7 +50,7 @@ class DisplacementColumns:
         return DisplacementColumns(self.X[:, index], self.KX[:, index], self.MX[:, index], self.T[:, index])
 
     def beside(self, other: "DisplacementColumns") -> "DisplacementColumns":
-        """Return both blocks side by side."""
+        """Return both blocks of columns side by side."""
         return DisplacementColumns(*(beside(getattr(self, a), getattr(other, a)) for a in ("X", "KX", "MX", "T")))
 
     def inner(self, other: "DisplacementColumns", omega2: float) -> Array:
@@ -58,23 +60,23 @@ class DisplacementColumns:
 
 @dataclass(frozen=True, eq=False)
 class Products:
-    """Products of displacement columns with the stiffness and the mass of a body, a few columns at a time."""
+    """Products of displacement columns with the stiffness and mass of a body, in blocks of columns."""
 
     K: SymmetricProduct
     M: SymmetricProduct
 
     @classmethod
     def of_body(cls, body: FEBody) -> "Products":
-        """Return the products with the matrices of a body."""
+        """Return the products for the matrices of a body."""
         return cls(SymmetricProduct(body.K), SymmetricProduct(body.M))
 
     def beside(self, X: Array) -> DisplacementColumns:
-        """Return columns with their products, (n_dof, k)."""
+        """Return the columns together with their products, (n_dof, k)."""
         return DisplacementColumns(X, self.K @ X, self.M @ X, np.eye(X.shape[1]))
 
 
 def gram_in_blocks(X: Array, A: SymmetricProduct) -> Array:
-    """Return Xᵀ A X, (k, k), for symmetric A: one half of it, from blocks of A X that are not all held."""
+    """Return Xᵀ A X, (k, k), for symmetric A: one half is computed, from blocks of A X that are freed after use."""
     n, k = X.shape
     width = max(16, int(PRODUCT_BYTES / (8 * max(n, 1))))
     G = np.zeros((k, k))
@@ -91,12 +93,12 @@ def gram_in_blocks(X: Array, A: SymmetricProduct) -> Array:
 class Basis:
     """W-orthonormal columns Q = X Z that span a mode set."""
 
-    X: Array  #: (n_dof, l)
-    Z: Array  #: (l, k)
+    X: Array  #: columns from which Q is combined, (n_dof, l)
+    Z: Array  #: coefficients of Q over X, (l, k)
     T: Array  #: coefficients of Q over the columns of the mode set, (n_columns, k)
     G_K: Array  #: Qᵀ K Q, (k, k)
     G_M: Array  #: Qᵀ M Q, (k, k)
-    is_formed: bool = True  #: False: X are the columns of the mode set themselves, which must not be changed
+    is_formed: bool = True  #: False: X are the columns of the mode set themselves, which must not change
 
     def inner(self, F: Array) -> Array:
         """Return Qᵀ F, (k, n)."""
@@ -107,7 +109,7 @@ class Basis:
         return combine(self.X, self.Z @ C)
 
     def columns(self, products: Products) -> DisplacementColumns:
-        """Return Q with its products, (n_dof, k)."""
+        """Return the columns of Q with their products, (n_dof, k)."""
         Q = products.beside(self.combine(np.eye(self.Z.shape[1])))
         Q.T = self.T
         return Q
@@ -178,7 +180,7 @@ def independent_basis(
     tolerance = np.maximum(RANK_TOLERANCE, ROUNDING_MARGIN * noise / size)
     # tall arrays are not changed: lengths and pivot order go into the small matrices
     W = (G_K + omega2 * G_M)[np.ix_(index, index)] / np.outer(size, size)
-    taken, left, factor = _pivoted(W)  # (1)
+    taken, left, factor = _pivoted(W)  # step (1)
     Z = np.zeros((V.shape[1], len(taken)))
     Z[index[taken]] = factor / size[taken, None]
     if not len(left) and np.linalg.cond(W) < TRUSTED_CONDITION:  # (2)
@@ -191,7 +193,7 @@ def independent_basis(
     rest.T[index[left], np.arange(len(left))] = 1 / size[left]
     index, tolerance, remainder = index[left], tolerance[left], np.ones(len(left))
     while len(index):  # (4)
-        for _ in range(2):  # twice is enough
+        for _ in range(2):  # two passes suffice
             C = basis.inner(rest.KX + omega2 * rest.MX)
             T = rest.T - basis.T @ C
             # computed anew, because the difference lost its leading digits
@@ -216,20 +218,20 @@ def independent_basis(
 
 
 def _no_columns(V: Array) -> Basis:
-    """Return an empty basis, for columns that are zero or rounding."""
+    """Return an empty basis, used if all columns are zero or rounding."""
     none = np.zeros((0, 0))
     return Basis(V, np.zeros((V.shape[1], 0)), np.zeros((V.shape[1], 0)), none, none, is_formed=False)
 
 
 def _pivoted(W: Array) -> tuple[IntArray, IntArray, Array]:
-    """Return the columns that a pivoted Cholesky of a Gram matrix selects, the others, and the inverse factor."""
+    """Return the columns chosen by pivoted Cholesky of a Gram matrix, the other columns, and the inverse factor."""
     factor, pivots, rank, _ = dpstrf((W + W.T) / 2, tol=TRUSTED_PIVOT**2, lower=0)
     U = np.triu(factor[:rank, :rank])
     return pivots[:rank] - 1, pivots[rank:] - 1, la.solve_triangular(U, np.eye(rank))
 
 
 def orthonormal_basis(Q: Array, T: Array, products: Products, omega2: float) -> Basis:
-    """Make nearly W-orthonormal columns W-orthonormal to rounding, and return them as a basis."""
+    """Orthonormalise nearly W-orthonormal columns to rounding, and return them as a basis."""
     G_K, G_M = gram_in_blocks(Q, products.K), gram_in_blocks(Q, products.M)
     Z = la.solve_triangular(la.cholesky(G_K + omega2 * G_M), np.eye(len(G_K)))
     return Basis(Q, Z, T @ Z, within(G_K, Z), within(G_M, Z))
@@ -242,7 +244,7 @@ def within(G: Array, Z: Array) -> Array:
 
 
 def _length(columns: DisplacementColumns, omega2: float) -> Array:
-    """Return the W-length of every column, (k,)."""
+    """Return the W-norm of each column, (k,)."""
     stiff = dots(columns.X, columns.KX)
     return np.sqrt(np.maximum(stiff + omega2 * dots(columns.X, columns.MX), 0.0))
 
@@ -252,7 +254,7 @@ def _unit(columns: DisplacementColumns, size: Array) -> DisplacementColumns:
 
 
 def _orthonormalized(products: Products, new: DisplacementColumns, omega2: float) -> DisplacementColumns:
-    """Make the columns W-orthonormal once more, with recomputed products, because the first step lost digits."""
+    """Orthonormalise the columns in the W-norm again, with recomputed products, because the first pass lost digits."""
     fresh = products.beside(new.X)
     fresh.T = new.T
     G = fresh.inner(fresh, omega2)

@@ -1,4 +1,4 @@
-"""Solutions with factors of SciPy's `lu_factor` that several threads may share."""
+"""Solutions with factors from SciPy's `lu_factor`, safe for several threads with common factors."""
 
 import numpy as np
 from scipy.linalg.lapack import dgetrs
@@ -9,7 +9,7 @@ __all__ = ["solve_factored"]
 
 
 def solve_factored(factors: tuple[Array, IntArray], right: Array, *, is_transposed: bool = False) -> Array:
-    """Return x of A x = right, or of Aᵀ x = right, without changing the factors.
+    """Return x that satisfies A x = right, or Aᵀ x = right, without changing the factors.
 
     SciPy adds 1 to the pivots in place for LAPACK, which counts from 1, and subtracts it again after the solution.
     LAPACK runs without the interpreter's lock, so another thread may meet shifted pivots: each solution has its own

@@ -36,11 +36,11 @@ __all__ = ["Peak", "ReductionShape", "columns_within", "peak_of", "solver_within
 
 log = logging.getLogger(__name__)
 
-PERMUTED = 12.0  #: bytes per entry of the lower triangle in the new order
-TALL = 6.2  #: number of arrays with all columns that are held in the third stage
-SQUARES = 54.0  #: number of (c, c) matrices held if the columns are on disk: Gram matrices, moments, invariants
-SLICES = 4e8  #: bytes of slices and products held in that case
-ON_DISK = 6.0  #: largest number of arrays with all columns on disk
+PERMUTED = 12.0  #: bytes per entry of the reordered lower triangle
+TALL = 6.2  #: number of arrays over all dofs and columns in memory in the third stage
+SQUARES = 54.0  #: number of (c, c) matrices in memory if the columns are on disk: Gram matrices, moments, invariants
+SLICES = 4e8  #: size of slices and products in memory if the columns are on disk [bytes]
+ON_DISK = 6.0  #: largest number of arrays over all dofs and columns on disk
 
 
 @dataclass(frozen=True)
@@ -50,13 +50,13 @@ class ReductionShape:
     n_dof: int
     n_columns: int  #: number of columns of the mode set
     n_modes: int  #: number of vibration modes among them
-    held: float  #: memory of the process with the coupled body [bytes]
+    held: float  #: memory of the process that includes the coupled body [bytes]
     to_disk: bool = False  #: whether the columns are on disk
 
 
 @dataclass(frozen=True)
 class Peak:
-    """Peaks of memory of the three stages [bytes]."""
+    """Peak memory of each of the three stages [bytes]."""
 
     factorisation: float
     modes: float
@@ -106,7 +106,7 @@ def reduction_peak(shape: ReductionShape) -> float:
 
 
 def columns_within(budget: float, shape: ReductionShape) -> ReductionShape:
-    """Return the shape with its columns on disk if they do not fit in memory but fit better there; log this."""
+    """Return the shape, with columns on disk if they fit only there; the log mentions this."""
     stored = replace(shape, to_disk=True)
     if reduction_peak(shape) <= budget or reduction_peak(stored) >= reduction_peak(shape):
         return shape
@@ -121,7 +121,7 @@ def columns_within(budget: float, shape: ReductionShape) -> ReductionShape:
 
 
 def solver_within(budget: float, shape: ReductionShape) -> Solver:
-    """Return the solver of a reduction that may take `budget` bytes, including everything the process holds.
+    """Return the solver for a reduction within `budget` bytes, which include all memory of the process.
 
     Its `factor` raises `MemoryBudgetError` before any factorisation if the factor fits neither in memory nor on disk.
     """
@@ -151,7 +151,7 @@ def solver_within(budget: float, shape: ReductionShape) -> Solver:
 
 
 def refusal(budget: float, inside: Peak, outside: Peak) -> str:
-    """Return the message on the missing memory or disk space, and on possible remedies."""
+    """Return the message about missing memory or disk space, with possible remedies."""
     stages = {
         "the factorisation": (outside.factorisation, "fewer dofs (a coarser mesh), or cms split"),
         "the modes": (outside.modes, "fewer modes, or fewer columns (interface_modes for interfaces of many nodes)"),
@@ -165,5 +165,5 @@ def refusal(budget: float, inside: Peak, outside: Peak) -> str:
 
 
 def gigabytes(size: float) -> str:
-    """Return a size as text."""
+    """Return a size in gigabytes as text."""
     return f"{size / 1e9:.3g} GB" if size >= 1e9 else f"{np.ceil(size / 1e6):.0f} MB"

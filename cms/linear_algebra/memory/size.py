@@ -11,7 +11,8 @@ UNITS = {
     "": 1.0, "B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12, "KiB": 2.0**10, "MiB": 2.0**20, "GiB": 2.0**30,
     "TiB": 2.0**40,
 }  # fmt: skip
-LEAST = 5e7  #: bytes; a smaller size is probably a wrong unit, because Python alone needs more
+#: smallest plausible size [bytes]; a smaller size is probably in a wrong unit, because Python alone needs more
+LEAST = 5e7
 
 
 def memory_bytes(text: str | float) -> float:
@@ -42,7 +43,7 @@ def memory_bytes(text: str | float) -> float:
 
 
 def resident_bytes() -> float:
-    """Return the current memory of this process [bytes]; the peak memory if the system does not report the current."""
+    """Return the current memory of this process [bytes]; its peak memory if the current one is unknown."""
     try:
         with open("/proc/self/statm") as file:
             pages = int(file.read().split()[1])
@@ -53,6 +54,6 @@ def resident_bytes() -> float:
         pass
     try:
         import resource
-    except ImportError:  # Windows
+    except ImportError:  # the module is missing on Windows
         return 3e8
     return float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss) * (1 if sys.platform == "darwin" else 1024)

@@ -28,18 +28,18 @@ __all__ = ["EigenResult", "FactorMismatchError", "eigenmodes", "no_modes", "orie
 
 
 SMALL = 300  #: number of dofs up to which dense matrices are faster
-LARGEST_DENSE = 3000  #: number of dofs up to which dense matrices are affordable, if many of the modes are wanted
-SHIFT = 1e-6  #: shift for a free body, relative to the median of K_kk / M_kk; near its first elastic omega²
-SHIFT_SMALL = 1e-4  #: the same for a dense pencil with few dofs
-ZERO = 1e-13  #: omega² relative to that median below which it is rounding of K: a rigid-body mode
-TIGHTEST, LOOSEST = 1e-13, 0.1  #: tightest tolerance that rounding allows, and loosest tolerance that is meaningful
-MISMATCH = 1e-3  #: defect of K x = omega² M x that a factorisation of another matrix explains, or rounding of K
+LARGEST_DENSE = 3000  #: number of dofs up to which dense matrices are affordable if many of the modes are wanted
+SHIFT = 1e-6  #: shift for a free body over the median of K_kk / M_kk; near the first elastic omega²
+SHIFT_SMALL = 1e-4  #: the same for a small dense pencil
+ZERO = 1e-13  #: omega² over that median, below which it is rounding of K: a rigid-body mode
+TIGHTEST, LOOSEST = 1e-13, 0.1  #: range of tolerances between rounding and uselessness
+MISMATCH = 1e-3  #: relative residual of K x = omega² M x, above which the factorised matrix is not K - sigma M
 MOST_PROOFS = 3
-GAP = 1e-4  #: relative gap between two values of omega² in which modes can be counted
+GAP = 1e-4  #: relative gap between two values of omega² that is sufficient for counting modes
 
 
 class FactorMismatchError(EigenError):
-    """The modes that a factorisation gives are not those of K and M."""
+    """The modes from a factorisation are not those of K and M."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,18 +47,19 @@ class FactorMismatchError(EigenError):
 class EigenResult:
     """Modes by ascending frequency, M-orthonormal."""
 
-    omega2: Annotated[Array, ArrayShape(("n_modes",))]  #: [1/s²]; exactly 0 for rigid-body modes
-    frequencies: Annotated[Array, ArrayShape(("n_modes",))]  #: [Hz]
-    Phi: Annotated[Array, ArrayShape((None, "n_modes"))]  #: `SpreadColumns` if the body is distributed
+    #: squared angular frequencies [1/s²]; exactly 0 for rigid-body modes
+    omega2: Annotated[Array, ArrayShape(("n_modes",))]
+    frequencies: Annotated[Array, ArrayShape(("n_modes",))]  #: natural frequencies [Hz]
+    Phi: Annotated[Array, ArrayShape((None, "n_modes"))]  #: mode shapes; `SpreadColumns` if the body is distributed
     #: |x - (omega² - sigma) (K - sigma M)⁻¹ M x|_M of x before its last inverse iteration; NaN: not measured
     residuals: Annotated[Array, ArrayShape(("n_modes",), has_nan=True)]
-    n_solves: int  #: number of columns solved
-    method: str  #: solver and its settings
-    is_proven: bool  #: whether the inertia of a second factorisation proved that no mode was missed
+    n_solves: int  #: number of solved right-hand sides
+    method: str  #: name and settings of the solver
+    is_proven: bool  #: whether the inertia of a second factorisation confirmed that no mode is missing
 
 
 def no_modes(n_dof: int) -> EigenResult:
-    """Return an empty result, for a request of no modes."""
+    """Return a result without modes."""
     none: Array = np.zeros(0)
     return EigenResult(none, none, np.zeros((n_dof, 0)), none, 0, "none asked for", is_proven=False)
 
@@ -169,7 +170,7 @@ def eigenmodes(
             space.close()
         stays = space is not None and space.has_rows_of(K)
         Phi = columns if stays else of_this_process(columns)
-        del columns  # before the space is closed, when ranks drop data without references
+        del columns  # before the space is closed, where ranks drop data without references
         Phi = combine(Phi, orientation(Phi, omega2)[:, :k], order="C")
     omega2 = omega2[:k]
     _require_match(K, M, Phi, omega2, shift, tolerance)
@@ -191,7 +192,7 @@ def frequency_scale(K: Matrix, M: Matrix) -> float:
 def _proven_modes(
     K: Matrix, M: Matrix, search: KrylovSearch | DenseSearch | SlepcSearch, modes: Modes, wanted: ModeCount
 ) -> Modes:
-    """Return the modes when their number agrees with the inertia; search for more modes while it is larger."""
+    """Return the modes once the inertia confirms their number; search for more modes while it is larger."""
     operator = search.operator
     for _ in range(MOST_PROOFS):
         last, sigma = counting_shift(modes.omega2, modes.n_wanted, wanted, operator.shift)
@@ -210,8 +211,8 @@ def _proven_modes(
 
 
 def counting_shift(omega2: Array, k: int, wanted: ModeCount, shift: float) -> tuple[int, float]:
-    """Return the number of modes below a shift, and the shift, in a gap at or after the last wanted mode."""
-    levels = np.concatenate([[shift], omega2])  # levels[j] is mode j, counted from 1
+    """Return the number of modes below a shift, and the shift, which lies in a gap after the last wanted mode."""
+    levels = np.concatenate([[shift], omega2])  # levels[j] is omega² of mode j, counted from 1
     for j in range(k, len(omega2)):
         low, high = levels[j], levels[j + 1]
         if high - low > GAP * (high - shift):
@@ -229,7 +230,7 @@ def _factorize_shifted(K: Matrix, M: Matrix, sigma: float, solver: str | Solver 
 
 
 def _count_below(K: Matrix, M: Matrix, sigma: float, at_shift: Inverse) -> int:
-    """Count modes between the shift and sigma by Sylvester's law: each adds one negative eigenvalue of K - sigma M."""
+    """Count the modes between the shift and sigma by Sylvester's law: the negative eigenvalues of K - sigma M."""
     with _factorize_shifted(K, M, sigma, at_shift.solver) as factorization:
         inertia = factorization.inertia
     if inertia.n_zero or at_shift.inertia.n_zero:
@@ -241,7 +242,7 @@ def _count_below(K: Matrix, M: Matrix, sigma: float, at_shift: Inverse) -> int:
 
 
 def _require_match(K: Matrix, M: Matrix, Phi: Array, omega2: Array, shift: float, tolerance: float) -> None:
-    """Check K x = omega² M x for one random combination; the iteration itself uses K only through its factorisation."""
+    """Check K x = omega² M x for a random combination of modes; the iteration used only the factorisation of K."""
     if not len(omega2):
         return
     signs = np.random.default_rng(0).choice([-1.0, 1.0], size=len(omega2)) / np.sqrt(omega2 - shift)
@@ -264,11 +265,11 @@ def _hertz(omega2: float) -> float:
 # unique choice among equivalent bases: signs of modes, and directions within multiple frequencies ---------------------
 
 
-MULTIPLE = 1e-10  #: relative gap of omega² below which modes count as one multiple mode
+MULTIPLE = 1e-10  #: relative gap of omega² below which modes form one multiple mode
 
 
 def orientation(Phi: Any, omega2: Array) -> Array:
-    """Return the orthogonal matrix Z, (k, k), that transforms modes to their standard basis Phi @ Z.
+    """Return the orthogonal matrix Z, (k, k), that transforms modes Phi to their standard basis Phi Z.
 
     Within a group of modes with equal frequency, any rotation is equally valid, and rounding decides. The length of a
     row of the group does not depend on the rotation. Therefore (1) the longest row is rotated to (+, 0, 0, …), (2) the
@@ -314,7 +315,7 @@ def _standard_rotation(group: Array) -> Array:
 
 
 def turn_in_place(Phi: Any, turn: Array) -> None:
-    """Replace Phi, (n, k), by Phi turn, (k, k); modes of which only the sign changes are not mixed with others."""
+    """Replace Phi, (n, k), by Phi turn, (k, k); modes that change only their sign are not combined with others."""
     if (far := elsewhere(Phi)) is not None:
         far.on_rows(turn_in_place, Phi, turn)
         return

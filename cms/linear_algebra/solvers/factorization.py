@@ -1,4 +1,4 @@
-"""Factorise a large symmetric matrix once, solve for many columns."""
+"""Factorisation of a large symmetric matrix, for solutions with many right-hand sides."""
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -27,19 +27,20 @@ __all__ = [
     "shifted_matrix",
 ]
 
-SINGULAR = 1e-3  #: relative residual after two solves; a regular matrix with condition number 1e12 leaves 1e-4
+#: relative residual after two solves, above which a matrix is singular; condition number 1e12 causes 1e-4
+SINGULAR = 1e-3
 
 #: a sparse matrix, or a block of one that is only formed while its entries are needed
 Matrix: TypeAlias = sp.csc_array | PrincipalBlock
 
 
 def matrix_of(A: Matrix) -> sp.csc_array:
-    """Return the matrix; a block is formed."""
+    """Return the matrix; if it is a block, compute it."""
     return principal_block(A.A, A.index) if isinstance(A, PrincipalBlock) else sp.csc_array(whole_matrix(A))
 
 
 def shifted_matrix(K: Matrix, M: Matrix, sigma: float) -> Matrix:
-    """Return K - sigma M, (n, n), distributed if the blocks are; otherwise a sparse matrix."""
+    """Return K - sigma M, (n, n): distributed if the blocks are, otherwise sparse."""
     if isinstance(K, PrincipalBlock) and isinstance(M, PrincipalBlock) and K.index is M.index:
         if isinstance(K.A, SpreadMatrix) and isinstance(M.A, SpreadMatrix):
             return PrincipalBlock(spread_sum(K.A, M.A, -sigma), K.index)
@@ -48,7 +49,7 @@ def shifted_matrix(K: Matrix, M: Matrix, sigma: float) -> Matrix:
 
 @dataclass(frozen=True)
 class Inertia:
-    """Numbers of negative and positive eigenvalues; certain only if no pivot was zero to rounding."""
+    """Number of negative and positive eigenvalues; certain only if no pivot is zero to rounding."""
 
     n_negative: int
     #: number of pivots that are zero to rounding; they are counted in the other numbers with a guessed sign
@@ -57,7 +58,7 @@ class Inertia:
 
 
 class EmptyFactor:
-    """The factor of a matrix without rows, the interior of a body with all dofs on interfaces."""
+    """Factor of a matrix without rows: the interior of a body whose dofs are all on interfaces."""
 
     n = n_factor_entries = n_negative = n_perturbed = n_positive = 0
     description = "nothing to factorise"
@@ -66,22 +67,22 @@ class EmptyFactor:
         self.is_open = True
 
     def solve(self, b: Array) -> Array:
-        """Return columns without rows, (0, k)."""
+        """Return an array without rows, (0, k)."""
         return np.zeros((0, b.shape[1]), order="F")
 
     def close(self) -> None:
-        """No effect: there is nothing to free."""
+        """Do nothing: there is nothing to free."""
         self.is_open = False
 
 
 class Factorization(AbstractContextManager["Factorization"]):
-    """A factorised symmetric matrix; the context manager frees the factor."""
+    """Factorised symmetric matrix; the context manager frees the factor."""
 
     def __init__(self, factor: Factor, solver: Solver) -> None:
-        self.factor = factor  #: made by the solver
+        self.factor = factor  #: factor that the solver computed
         self.n = factor.n  #: order of the matrix
-        self.description = factor.description  #: solver, its version and settings, for the provenance
-        self.solver = solver  #: the solver that made the factor, for further matrices of the same body
+        self.description = factor.description  #: name, version and settings of the solver, for the provenance
+        self.solver = solver  #: solver that computed the factor, for further matrices of the same body
 
     @property
     def n_factor_entries(self) -> int:
@@ -90,7 +91,7 @@ class Factorization(AbstractContextManager["Factorization"]):
 
     @property
     def inertia(self) -> Inertia:
-        """Return the signs of the eigenvalues from the pivots, by Sylvester's law.
+        """Return the number of negative and positive eigenvalues from the pivots, by Sylvester's law.
 
         Raises
         ------
@@ -106,7 +107,7 @@ class Factorization(AbstractContextManager["Factorization"]):
         return Inertia(factor.n_negative, factor.n_perturbed, factor.n_positive)
 
     def solve(self, b: Array) -> Array:
-        """Return A⁻¹ b for one column, (n,), or many, (n, k), in the memory order of the factor."""
+        """Return A⁻¹ b for one column, (n,), or many columns, (n, k), in the memory order of the factor."""
         if not self.factor.is_open:
             raise FactorizationError("solve: the factorisation was closed; factorise again")
         b = np.asarray(b, dtype=np.float64)
@@ -160,7 +161,7 @@ def factorize(A: Matrix, *, definite: bool = True, solver: str | Solver | None =
 
 
 def _ready(A: Matrix, definite: bool, solver: Solver) -> Callable[[], Factor]:
-    """Step (1): return a function that makes the factor; distributed rows stay distributed if the solver allows."""
+    """Step (1): return a function that factorises; distributed rows stay distributed if the solver allows it."""
     if solver.spread is not None and (block := spread_block(A)) is not None:
         if definite:
             _require_positive(A.diagonal())
@@ -178,7 +179,7 @@ def _ready(A: Matrix, definite: bool, solver: Solver) -> Callable[[], Factor]:
 
 
 def lower_triangle(A: sp.csc_array) -> sp.csc_array:
-    """Return the lower triangle with every diagonal entry stored (as zero if necessary) and sorted row indices."""
+    """Return the lower triangle with all diagonal entries stored (zeros if necessary) and row indices sorted."""
     n = A.shape[0]
     if not A.has_canonical_format:
         A = A.copy()

@@ -1,4 +1,4 @@
-"""Protocol of a solver for (K - sigma M) x = f, as the eigensolver uses it."""
+"""Protocol of a solver for (K - sigma M) x = f in the eigensolver."""
 
 from typing import Protocol
 
@@ -22,11 +22,11 @@ class Inverse(Protocol):
 
     @property
     def solver(self) -> Solver:
-        """The solver that factorised, for further matrices of the same pencil."""
+        """Solver that computed the factor, for further matrices of the same pencil."""
 
     @property
     def inertia(self) -> Inertia:
-        """Signs of the eigenvalues of K - sigma M."""
+        """Return the signs of the eigenvalues of K - sigma M."""
 
     def solve(self, b: Array) -> Array:
-        """Return the solutions of right-hand sides (n, k)."""
+        """Return the solutions for the right-hand sides b, (n, k)."""

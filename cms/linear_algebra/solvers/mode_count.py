@@ -14,7 +14,7 @@ __all__ = ["ModeCount", "mode_count"]
 @dataclass(frozen=True)
 @checked_fields(ArgumentError)
 class ModeCount:
-    """The wanted vibration modes: the lowest n, or all up to a cutoff.
+    """Requested vibration modes: the lowest n, or all up to a cutoff.
 
     Wherever a function takes `n_modes`, an integer means that many of the lowest modes; this type covers the other
     cases:
@@ -60,12 +60,12 @@ class ModeCount:
 
     @property
     def omega2(self) -> float | None:
-        """Squared angular frequency of the cutoff; None if a number is given."""
+        """Squared angular frequency of the cutoff; None if a number of modes is given."""
         return None if self.cutoff is None else (2 * math.pi * self.cutoff) ** 2
 
     @property
     def description(self) -> str:
-        """Description for messages and records."""
+        """Description of the request, for messages and records."""
         return f"n_modes = {self.n}" if self.cutoff is None else f"cutoff = {self.cutoff:g}"
 
 

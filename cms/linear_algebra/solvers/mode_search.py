@@ -1,4 +1,4 @@
-"""The search for the wanted modes: a Krylov basis for large pencils, dense matrices for small ones."""
+"""Search for the wanted modes: a Krylov basis for large pencils, dense matrices for small ones."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -28,10 +28,10 @@ __all__ = ["BlockLanczos", "DenseSearch", "KrylovSearch", "RitzPairs"]
 # largest eigenvalues theta = 1 / (omega² - sigma) belong to the modes nearest above the shift.
 
 
-DEPENDENT = 1e-10  #: length of a new direction relative to its block, below which it is rounding
-TAME = 1e-3  #: ratio of shortest to longest new direction, above which one pass makes them orthogonal to 1e-13
-SETTLED = 1e-12  #: share of the shortest new direction that a pass may remove without a new product with M
-ROUNDOFF = 1e-14  #: defect of M-orthonormal columns that is not corrected
+DEPENDENT = 1e-10  #: length of a new direction over that of its block, below which it is rounding
+TAME = 1e-3  #: ratio of shortest to longest new direction, above which one orthogonalisation pass is exact to 1e-13
+SETTLED = 1e-12  #: share of the shortest new direction that a pass may remove without recomputing its product with M
+ROUNDOFF = 1e-14  #: error of M-orthonormal columns that needs no correction
 MAX_PASSES = 5
 
 
@@ -39,10 +39,10 @@ MAX_PASSES = 5
 class RitzPairs:
     """Eigenpairs of the projected operator, largest theta first."""
 
-    theta: Array  #: (m,) [s²]
-    S: Array  #: vectors over the basis, (m, m)
-    coupling: Array  #: of S x - theta x to the next block, (b, m) [s²]
-    residuals: Array  #: |S x - theta x|_M / |theta| for unit x, from the recurrence, (m,)
+    theta: Array  #: eigenvalues theta of the projected operator, (m,) [s²]
+    S: Array  #: eigenvectors as coefficients over the basis, (m, m)
+    coupling: Array  #: part of S x - theta x along the next block, (b, m) [s²]
+    residuals: Array  #: residual |S x - theta x|_M / |theta| of each unit vector x, from the recurrence, (m,)
 
 
 class BlockLanczos:
@@ -63,31 +63,31 @@ class BlockLanczos:
     def __init__(
         self, solve: Callable[[Any], Any], M: TallProduct, space: TallSpace, *, block: int, capacity: int
     ) -> None:
-        """Start with a random block; solve and M map columns of the space to columns of the space."""
+        """Start with a random block; solve and M are operators on columns of the space."""
         self.solve, self.M, self.space, self.n, self.block = solve, M, space, space.n, block
         self.n_solves = 0
-        self.m = 0  # number of columns of V that are in T
-        self.capacity = min(capacity, self.n)  #: number of columns that V can hold before a restart
-        self._columns = space.empty(self.capacity + block)  # V, then the next block
+        self.m = 0  # number of columns of V included in T
+        self.capacity = min(capacity, self.n)  #: number of columns of V before a restart
+        self._columns = space.empty(self.capacity + block)  # storage of V, followed by the next block
         self._T = np.zeros((self.capacity + block, self.capacity + block))
         self._random = np.random.default_rng(0)
         self._M_next = self._start()  # M V_{j+1}; V_{j+1} itself is stored after V
-        self._R = np.zeros((self._M_next.shape[1], 0))  # coupling of the next block to all of V
-        self._coupled = 0  # first column of V to which the next block is coupled
+        self._R = np.zeros((self._M_next.shape[1], 0))  # coupling of the next block to all columns of V
+        self._coupled = 0  # index of the first column of V to which the next block is coupled
 
     @property
     def V(self) -> Any:
-        """The basis, (n, m)."""
+        """Basis V, (n, m)."""
         return self._columns[:, : self.m]
 
     @property
     def V_and_next(self) -> Any:
-        """The basis and the next block, (n, m + b)."""
+        """Basis V and the next block, (n, m + b)."""
         return self._columns[:, : self.m + self._M_next.shape[1]]
 
     @property
     def is_exhausted(self) -> bool:
-        """Whether V spans the complete range of the operator."""
+        """Whether V spans the whole range of the operator."""
         return self._M_next.shape[1] == 0
 
     def grow(self, capacity: int) -> None:
@@ -127,7 +127,7 @@ class BlockLanczos:
         self._M_next = M_next
 
     def ritz(self) -> RitzPairs:
-        """Return the eigenpairs of T with their residuals |R s|."""
+        """Return the eigenpairs of T and their residuals |R s|."""
         theta, S = la.eigh(self._T[: self.m, : self.m])
         theta, S = theta[::-1], S[:, ::-1]
         scale = np.maximum(np.abs(theta), np.finfo(float).tiny)
@@ -135,7 +135,7 @@ class BlockLanczos:
         return RitzPairs(theta, S, coupling, np.linalg.norm(coupling, axis=0) / scale)
 
     def restart(self, ritz: RitzPairs, keep: int) -> None:
-        """Keep only the span of the leading Ritz vectors; the next block stays."""
+        """Reduce the basis to the span of the leading Ritz vectors; the next block does not change."""
         S = ritz.S[:, :keep]
         combine_in_place(self.V, S)
         b = len(self._R)
@@ -147,7 +147,7 @@ class BlockLanczos:
         self.m = keep
 
     def _start(self) -> Any:
-        """Append an M-orthonormal random block in the range of the operator, orthogonal to V; return M times it."""
+        """Append a random block, M-orthonormal and orthogonal to V, in the range of the operator; return M times it."""
         width = min(self.block, self.n - self.m)
         self.n_solves += width
         _, _, M_W = self._append(self.solve(self.M @ self.space.random(self._random, width)), 0.0)
@@ -196,22 +196,22 @@ class BlockLanczos:
 # mode search ----------------------------------------------------------------------------------------------------------
 
 
-BLOCK = 8  #: columns of a Lanczos block; narrow blocks need fewer columns in total
+BLOCK = 8  #: number of columns in a Lanczos block; narrow blocks need fewer columns in total
 #: columns of a wide block, and number of modes from which it is used; wide blocks are solved faster per column
 WIDE, MANY = 16, 32
-GUARDS = 8  #: Ritz vectors beyond the wanted ones that take part in the last step
-FIRST_GUESS = 30  #: expected number of modes, while only a frequency is given
-MOST_COLUMNS = 40  #: largest number of columns to solve, per wanted mode and guard
+GUARDS = 8  #: number of Ritz vectors beyond the wanted ones in the last step
+FIRST_GUESS = 30  #: assumed number of modes if only a cutoff frequency is given
+MOST_COLUMNS = 40  #: largest number of solved columns per wanted mode and guard mode
 MOST_REFINEMENTS = 4
-VISIBLE = 1e-6  #: share of a mode that a solve may change without an effect on the M-norm, because it has no mass
-FLOOR = 1e-13  #: residual from the recurrence below which only rounding is left
-NEGLIGIBLE = 1e-12  #: theta relative to the largest, below which a mode has no mass
-NEGATIVE = 1e-8  #: magnitude of a negative theta, relative to the largest, that is more than rounding
-MASSLESS = 1e-13  #: eigenvalue of M relative to the largest, below which a direction has no mass
+VISIBLE = 1e-6  #: change of a mode in a solve that has no effect on the M-norm, because the changed part has no mass
+FLOOR = 1e-13  #: residual from the recurrence, below which it is only rounding
+NEGLIGIBLE = 1e-12  #: theta over the largest one, below which a mode has no mass
+NEGATIVE = 1e-8  #: size of a negative theta over the largest one, above which it is more than rounding
+MASSLESS = 1e-13  #: eigenvalue of M over the largest one, below which a direction has no mass
 
 
 class KrylovSearch:
-    """Block Lanczos, extended until the wanted modes have converged; more modes can be requested afterwards."""
+    """Block Lanczos until the wanted modes have converged; more modes can be requested later."""
 
     def __init__(self, operator: ShiftInverted, wanted: ModeCount) -> None:
         self.operator = operator
@@ -224,7 +224,7 @@ class KrylovSearch:
         self._is_clean = operator.has_mass_everywhere  # otherwise S removes rounding in massless dofs
 
     def modes(self, wanted: ModeCount, at_least: int = 0) -> Modes:
-        """Return the wanted modes, or at least `at_least`, improved; their true residuals are below the tolerance."""
+        """Return the wanted modes, at least `at_least`, refined to true residuals below the tolerance."""
         operator, tolerance = self.operator, self.operator.tolerance
         for _ in range(MOST_REFINEMENTS):
             ritz, k = self._converge(wanted, at_least, tolerance)
@@ -239,14 +239,14 @@ class KrylovSearch:
                 residual = modes.residuals.max(initial=0.0)
             if residual <= operator.tolerance:
                 return modes
-            tolerance = max(0.1 * tolerance, FLOOR)  # the residual from the recurrence was smaller than the true one
+            tolerance = max(0.1 * tolerance, FLOOR)  # the residual from the recurrence can be smaller than the true one
         raise EigenError(
             f"eigenmodes: residuals stay at {residual:.1e}, expected {operator.tolerance:.1e}; "
             "K is too ill-conditioned for this tolerance: allow a larger one, or correct units and stiffness contrasts"
         )
 
     def _converge(self, wanted: ModeCount, at_least: int, tolerance: float) -> tuple[RitzPairs, int]:
-        """Iterate until the wanted pairs have converged according to the recurrence; return all pairs and how many."""
+        """Iterate until the recurrence residuals of the wanted pairs converge; return all pairs and their number."""
         lanczos = self._lanczos
         next_look = 0
         k, most = 1, np.inf
@@ -271,7 +271,7 @@ class KrylovSearch:
         raise EigenError(f"eigenmodes: no convergence after {lanczos.n_solves} columns; allow a larger tolerance")
 
     def _judge(self, ritz: RitzPairs, wanted: ModeCount, at_least: int, tolerance: float) -> tuple[int, bool]:
-        """Return how many pairs are wanted according to present knowledge, and whether all of them have converged."""
+        """Return the number of pairs that are wanted according to current knowledge, and whether all have converged."""
         is_exhausted = self._lanczos.is_exhausted
         theta, residuals = ritz.theta, ritz.residuals
         if wanted.omega2 is None:
@@ -285,7 +285,7 @@ class KrylovSearch:
         else:
             theta_cutoff = 1 / (wanted.omega2 - self.operator.shift)
             k = max(int((theta > theta_cutoff).sum()), at_least)
-            # the next mode is certainly beyond the frequency, or has converged there
+            # the next mode is certainly above the cutoff frequency, or has converged there
             is_bounded = is_exhausted or (
                 k < len(theta)
                 and (theta[k] * (1 + residuals[k]) < theta_cutoff or residuals[k] <= tolerance)
@@ -297,7 +297,7 @@ class KrylovSearch:
 
 
 def improved_modes(lanczos: BlockLanczos, ritz: RitzPairs, k: int, shift: float) -> Modes:
-    """Return modes in the span of Y = S X of the leading Ritz vectors X = V s, without a solve.
+    """Return modes in the span of Y = S X, without a solve, for leading Ritz vectors X = V s.
 
     (1) S X = X theta + V_next (R s), so Y = S X / theta = X + V_next g with g = R s / theta: an inverse iteration
     (2) (K - sigma M) Y = M X / theta, so Yᵀ (K - sigma M) Y = 1 / theta = H;  Yᵀ M Y = 1 + gᵀ g = G
@@ -342,7 +342,7 @@ class DenseSearch:
         refuse_negative(self._theta)
 
     def modes(self, wanted: ModeCount, at_least: int = 0) -> Modes:
-        """Return the wanted modes, or at least `at_least`, refined."""
+        """Return the wanted modes, at least `at_least`, refined."""
         operator, theta = self.operator, self._theta
         n_finite = leading_count(theta, 1, len(theta))
         if wanted.omega2 is None:
@@ -369,12 +369,12 @@ class DenseSearch:
 
 
 def basis_size(k: int, block: int) -> int:
-    """Return the number of columns of a Krylov basis in which k modes usually converge without a restart."""
+    """Return the size of a Krylov basis in which k modes usually converge without restart."""
     return 3 * k + 15 * block + 80
 
 
 def leading_count(theta: Array, least: int, most: int) -> int:
-    """Return how many of the leading theta, `least` to `most`, are large enough to take part in the last step."""
+    """Return the number of leading theta that are large enough for the last step, from `least` to `most`."""
     is_large = theta[:most] > NEGLIGIBLE * theta[0] if least <= 1 else theta[:most] > 0.1 * theta[least - 1]
     return max(least, int(is_large.sum())) if least > 1 else int(is_large.sum())
 

@@ -25,7 +25,7 @@ __all__ = ["PardisoFactor", "missing_pardiso", "mkl_runtime"]
 
 POSITIVE_DEFINITE, INDEFINITE = 2, -2  # mtype: real symmetric
 ANALYSE_AND_FACTORIZE, SOLVE, RELEASE = 12, 33, -1  # phase
-CHUNK = 64  #: right-hand sides per call; more are not faster, and PARDISO's workspace grows with them
+CHUNK = 64  #: number of right-hand sides per call; larger blocks are not faster, and the workspace grows with them
 #: pivots below 1e-13 of the matrix norm are set to this bound and counted; PARDISO then refines
 PIVOT_PERTURBATION = 13
 #: backward error of a stable factorisation, far above rounding (1e-15) and far below a lost one (1e-3 and more)
@@ -46,7 +46,7 @@ BITWISE = bool(os.environ.get("MKL_CBWR"))
 
 @cache
 def mkl_runtime() -> ctypes.CDLL | None:
-    """Return the loaded library; None if it is not available (other processors, macOS, not installed)."""
+    """Return the loaded MKL library; None if it is not available (other processors, macOS, not installed)."""
     # its threads release the processor immediately, because NumPy and our own threads need it between two solves
     os.environ.setdefault("KMP_BLOCKTIME", "0")
     path = installed_mkl()
@@ -61,12 +61,12 @@ def mkl_runtime() -> ctypes.CDLL | None:
 
 
 def missing_pardiso() -> str:
-    """Describe the missing parts of PARDISO here; "" if it can be used."""
+    """Describe which parts of PARDISO are missing; "" if it can be used."""
     return "" if mkl_runtime() is not None else "needs MKL, which is not installed; pip install pypardiso (x86-64 only)"
 
 
 def installed_mkl() -> str | None:
-    """Return the path of the runtime library in the installed package `mkl`, if there is one."""
+    """Return the path of the runtime library in the installed package `mkl`; None if there is none."""
     try:
         files = distribution("mkl").files or []
     except PackageNotFoundError:
@@ -83,7 +83,7 @@ class PardisoFactor:
     """
 
     def __init__(self, lower: sp.csc_array, *, definite: bool) -> None:
-        """Factorise the matrix with this lower triangle, (n, n), every diagonal entry stored, sorted row indices."""
+        """Factorise a matrix from its lower triangle, (n, n), all diagonal entries stored, row indices sorted."""
         library = mkl_runtime()
         if library is None:
             raise FactorizationError(f"PARDISO {missing_pardiso()}")
@@ -119,13 +119,13 @@ class PardisoFactor:
         self.description = f"PARDISO (MKL {version}; {kind}; no refinement; {self._n_threads} threads{bitwise})"
 
     def _factorize(self, *, definite: bool, matching: bool) -> None:
-        """Make the factor; raise `FactorizationError` if PARDISO cannot."""
+        """Compute the factor; raise `FactorizationError` if PARDISO fails."""
         self._pt = np.zeros(64, np.int64)
         self._iparm = np.zeros(64, np.int32)  # entries that are not set below: see [1]_
         self._iparm[0] = 1  # use the values given here instead of defaults
         self._iparm[1] = 2 if BITWISE else 3  # nested dissection, serial or parallel
         self._iparm[9] = PIVOT_PERTURBATION
-        self._iparm[17] = -1  # report the number of entries of the factor
+        self._iparm[17] = -1  # request the number of entries of the factor
         self._iparm[34] = 1  # 0-based
         if matching:
             self._iparm[10] = self._iparm[12] = 1  # scaling and matching, for multipliers with a zero diagonal
@@ -144,7 +144,7 @@ class PardisoFactor:
             )
 
     def _backward_error(self) -> float:
-        """Return max |A x - b| / (|A| |x| + |b|) over the rows, of two solves from a random column.
+        """Return max |A x - b| / (|A| |x| + |b|) over the rows, from two solves with a random column.
 
         It is rounding whatever the condition of A, unless pivots grow.
         """

@@ -23,7 +23,7 @@ __all__ = ["DEFAULTS", "SMALL", "SOLVERS", "cholesky_or_superlu", "solver_of"]
 # the solver that runs on every processor: our Cholesky factorisation, or SuperLU where that is unsuitable -------------
 
 
-SMALL = 3000  #: number of rows below which SuperLU finishes before the compiled loops are loaded
+SMALL = 3000  #: number of rows below which SuperLU finishes before the compiled loops of our Cholesky factor are loaded
 
 
 def cholesky_or_superlu(lower: sp.csc_array, *, definite: bool) -> Factor:
@@ -53,7 +53,7 @@ LARGE = 150_000  #: number of rows above which the faster solves of our Cholesky
 
 
 def pardiso_or_cholesky(lower: sp.csc_array, *, definite: bool) -> Factor:
-    """Return the factor of PARDISO, or our Cholesky factor if the matrix is large and must be positive definite."""
+    """Return the factor of PARDISO, or our Cholesky factor if the matrix is large and positive definite."""
     if definite and lower.shape[0] >= LARGE:
         return CholeskyFactor(lower)
     return SOLVERS["pardiso"].factor(lower, definite=definite)
@@ -64,7 +64,7 @@ DEFAULTS = (Solver("pardiso", pardiso_or_cholesky, lambda: SOLVERS["pardiso"].mi
 
 
 def solver_of(choice: str | Solver | None = None) -> Solver:
-    """Return the solver of that name, or the given solver; None: the fastest installed one, depending on the size.
+    """Return the solver with this name, or the given solver; None: the fastest installed solver for the matrix size.
 
     Raises
     ------

@@ -22,57 +22,58 @@ __all__ = [
     "refined_modes",
 ]  # fmt: skip
 
-SAMPLES = 4  #: number of columns for a common measurement of all residuals
+SAMPLES = 4  #: number of random combinations that measure all residuals together
 
 
 # where an iteration keeps its columns, (n, k) with n much larger than k -----------------------------------------------
 
 
 class TallProduct(Protocol):
-    """The map x -> A x of a symmetric matrix A, for columns of one space."""
+    """Map x -> A x with a symmetric matrix A, for columns of one space."""
 
     def __matmul__(self, x: Any) -> Any:
         """Return A x, (n, k)."""
 
 
 class TallSpace(Protocol):
-    """The columns of an iteration: their start, their storage, and the maps between them."""
+    """Storage of the columns of an iteration, with random columns and the operators on them."""
 
     n: int
 
     def random(self, generator: np.random.Generator, k: int) -> Any:
-        """Return columns of normally distributed numbers, (n, k)."""
+        """Return k columns of normally distributed numbers, (n, k)."""
 
     def empty(self, k: int) -> Any:
-        """Return columns to be filled, (n, k)."""
+        """Return k uninitialised columns, (n, k)."""
 
     def product(self, A: Any) -> TallProduct:
-        """Return the product with a symmetric matrix, (n, n)."""
+        """Return the product with a symmetric matrix A, (n, n), as an operator."""
 
     def solver(self, factorization: Inverse) -> Callable[[Any], Any]:
-        """Return the function that solves for columns with a factorisation."""
+        """Return the solution with a factorisation as an operator on columns."""
 
 
 @dataclass(eq=False)
 class ArraySpace:
-    """Columns are arrays of this process."""
+    """Space whose columns are arrays of this process."""
 
     n: int  #: number of rows
-    numbering: IntArray | None = None  #: row r of random columns takes value numbering[r]; None: row order
+    #: row r of random columns gets random value numbering[r]; None: the value of its row
+    numbering: IntArray | None = None
 
     def random(self, generator: np.random.Generator, k: int) -> Array:
-        """Return columns of normally distributed numbers, (n, k)."""
+        """Return k columns of normally distributed numbers, (n, k)."""
         columns = generator.standard_normal((k, self.n))
         return columns.T if self.numbering is None else columns[:, self.numbering].T
 
     product = SymmetricProduct
 
     def empty(self, k: int) -> Array:
-        """Return columns to be filled, (n, k), stored column by column."""
+        """Return k uninitialised columns, (n, k), stored column by column."""
         return np.empty((self.n, k), order="F")
 
     def solver(self, factorization: Inverse) -> Callable[[Array], Array]:
-        """Return the function that solves for columns with a factorisation, in the memory order of the factor."""
+        """Return the solution with a factorisation as an operator on columns in the memory order of the factor."""
         return factorization.solve
 
 
@@ -80,7 +81,7 @@ class ArraySpace:
 
 
 class ShiftInverted:
-    """The operator S with its tolerance, on columns of one space; it counts the columns solved."""
+    """Operator S with its tolerance, for columns of one space; it counts the solved columns."""
 
     def __init__(
         self,
@@ -98,7 +99,7 @@ class ShiftInverted:
         self.M_product = self.space.product(M)
         self.n_solves = 0
         self.factorization = factorization
-        #: receives the number of modes found and the number wanted
+        #: callback that receives the number of found modes and of wanted modes
         self.report = progress or (lambda found, wanted: None)
         self._solve = self.space.solver(factorization)
 
@@ -110,13 +111,13 @@ class ShiftInverted:
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """Modes as coefficients of a block of columns: the wanted modes, followed by a few guards."""
+    """Modes as combinations of a block of columns: the wanted modes, then a few guard modes."""
 
-    omega2: Array  #: ascending, (n_wanted + n_guards,)
+    omega2: Array  #: squared angular frequencies, ascending, (n_wanted + n_guards,)
     n_wanted: int
     residuals: Array  #: residuals of the wanted modes before the last improvement, (n_wanted,)
-    Y: Any  #: columns of the space, (n, p)
-    Z: Array  #: coefficients, M-orthonormal Phi = Y Z, (p, n_wanted + n_guards)
+    Y: Any  #: columns of the space that are combined, (n, p)
+    Z: Array  #: coefficients of M-orthonormal modes Phi = Y Z, (p, n_wanted + n_guards)
 
 
 def refined_modes(operator: ShiftInverted, X: Any, theta: Array, n_wanted: int) -> Modes:

@@ -33,7 +33,7 @@ __all__ = ["RankSpace", "SlepcSearch", "search_on_ranks"]
 
 
 class RankProduct:
-    """The product with a distributed matrix."""
+    """Product of columns with a distributed matrix."""
 
     def __init__(self, space: "RankSpace", A: Matrix) -> None:
         self.space, self.key = space, new_key()
@@ -51,22 +51,22 @@ class RankProduct:
 
 
 class RankSpace:
-    """Columns are keys of rows on all ranks, until `close`; rank 0 holds only its own rows."""
+    """Space whose columns are rows on all ranks, identified by keys until `close`; rank 0 stores only its own rows."""
 
     def __init__(self, factor: PetscFactor, numbering: IntArray | None = None) -> None:
-        """Distribute columns like the rows of the factor; numbering: as for `ArraySpace`."""
+        """Distribute columns like the rows of the factor; `numbering` as in `ArraySpace`."""
         self.numbering = slice(None) if numbering is None else numbering
         self.factor, self.ranks, self.rows, self.n = factor, factor.ranks, factor.rows, factor.n
         self.layout = RowLayout(factor.ranks, np.arange(factor.n), factor.rows)
 
     def made(self, k: int, function: Callable[..., Any], *arguments: Any) -> SpreadColumns:
-        """Return new columns, (n, k), whose rows function(ranks, *arguments) returns on each rank."""
+        """Return new columns, (n, k), whose rows each rank computes by function(ranks, *arguments)."""
         found = SpreadColumns(self.layout, Part(new_key(), 0, k))
         self.layout.ask(rows_kept_here, found.part.key, function, *arguments)
         return found
 
     def close(self) -> None:
-        """Free data without references, on all ranks."""
+        """Free unreferenced data on all ranks."""
         self.layout.ask(give_back_here)
 
     def random(self, generator: np.random.Generator, k: int) -> SpreadColumns:
@@ -74,20 +74,20 @@ class RankSpace:
         return spread_columns(self.layout, generator.standard_normal((k, self.n))[:, self.numbering].T)
 
     def empty(self, k: int) -> SpreadColumns:
-        """Return columns to be filled, (n, k)."""
+        """Return k uninitialised columns, (n, k)."""
         return spread_parts(self.layout, k, ())
 
     def has_rows_of(self, A: Matrix) -> bool:
-        """Return whether the rows of a matrix are distributed like those of the columns."""
+        """Return whether a matrix has the same distribution of rows as the columns."""
         block = spread_block(A)
         return block is not None and block.rows == self.rows
 
     def product(self, A: Matrix) -> RankProduct:
-        """Distribute the rows of a symmetric matrix, (n, n), if necessary, and return the product with it."""
+        """Return the product with a symmetric matrix, (n, n), whose rows are distributed if necessary."""
         return RankProduct(self, A)
 
     def solver(self, factorization: Inverse) -> Callable[[SpreadColumns], SpreadColumns]:
-        """Return the function that solves for columns with the factor of this space."""
+        """Return the solution with the factor of this space as an operator on columns."""
         assert isinstance(factorization, Factorization)
         assert factorization.factor is self.factor
         return lambda b: self.made(b.shape[1], solved_here, self.factor.key, self.rows, b.part)
@@ -108,7 +108,7 @@ def search_on_ranks(
 
 
 def rows_kept_here(ranks: Ranks, key: str, function: Callable[..., Any], *arguments: Any) -> None:
-    """Keep the rows of columns that a function returns on this rank."""
+    """Store the rows of columns that a function returns on this rank."""
     ranks.store[key] = function(ranks, *arguments)
 
 
@@ -118,19 +118,19 @@ def give_back_here(ranks: Ranks) -> None:
 
 
 def product_here(ranks: Ranks, key: str, rows: Rows) -> None:
-    """Replace the matrix that rank 0 holds by this rank's rows; columns equal rows, because A is symmetric."""
+    """Replace a matrix on rank 0 by its rows on this rank; columns are rows, because A is symmetric."""
     A = ranks.store.pop(key, None)
     ranks.store[key] = (A.indptr, A.indices, A.data) if isinstance(A, sp.csc_array) else A
     ranks.store[key] = RowsProduct(ranks, rows, *rows_here(ranks, key, rows))
 
 
 def multiplied_here(ranks: Ranks, key: str, x: Part) -> Array:
-    """Return this rank's rows of A x."""
+    """Return the rows of A x on this rank."""
     return np.asarray(ranks.store[key] @ own_part(ranks, x))
 
 
 def solved_here(ranks: Ranks, key: str, rows: Rows, b: Part) -> Array:
-    """Return this rank's rows of A⁻¹ b, for blocks of columns."""
+    """Return the rows of A⁻¹ b on this rank, for blocks of columns."""
     x = np.empty((rows.count(ranks.rank), b.last - b.first), order="F")
     for first in range(b.first, b.last, CHUNK):
         some = Part(b.key, first, min(first + CHUNK, b.last))
@@ -141,14 +141,14 @@ def solved_here(ranks: Ranks, key: str, rows: Rows, b: Part) -> Array:
 # modes by SLEPc: Krylov-Schur iteration for the largest theta of S = K⁻¹ M, with a distributed basis ------------------
 
 
-GUARDS = 4  #: modes requested beyond the wanted ones, to see where a frequency is passed
-FIRST_GUESS = 30  #: expected number of modes, while only a frequency is given
+GUARDS = 4  #: number of modes beyond the wanted ones, which show where the cutoff frequency is exceeded
+FIRST_GUESS = 30  #: assumed number of modes if only a cutoff frequency is given
 #: factor on the tolerance of the caller; here it applies to theta, whose error is the square of the residual
 SHARPER = 1e-6
 
 
 class SlepcSearch:
-    """Krylov-Schur with distributed vectors; rank 0 receives the modes."""
+    """Krylov-Schur iteration with distributed vectors; rank 0 receives the modes."""
 
     def __init__(self, operator: ShiftInverted, wanted: ModeCount) -> None:
         assert isinstance(operator.factorization, Factorization)
@@ -163,7 +163,7 @@ class SlepcSearch:
         factor.ranks.everywhere(spread_mass, self.key, factor.rows)
 
     def modes(self, wanted: ModeCount, at_least: int = 0) -> Modes:
-        """Return the wanted modes, or at least `at_least`."""
+        """Return the wanted modes, at least `at_least`."""
         operator = self.operator
         n_asked = max(wanted.n or FIRST_GUESS, at_least) + GUARDS
         while True:
@@ -186,7 +186,7 @@ class SlepcSearch:
 
 
 def spread_mass(ranks: Ranks, key: str, rows: Rows) -> None:
-    """Keep this rank's rows of the upper triangle of M."""
+    """Store the rows of the upper triangle of M on this rank."""
     PETSc = petsc()
     n_own = rows.count(ranks.rank)
     lower = ranks.store.pop(key, None)  # columns of the lower triangle are rows of the upper triangle
@@ -198,7 +198,7 @@ def spread_mass(ranks: Ranks, key: str, rows: Rows) -> None:
 
 
 def n_solved() -> int:
-    """Return how many columns this process has solved, as counted by PETSc."""
+    """Return the number of columns that this process has solved, as counted by PETSc."""
     return int(petsc().Log.Event("MatSolve").getPerfInfo()["count"])
 
 

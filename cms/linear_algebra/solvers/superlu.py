@@ -13,12 +13,12 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["SuperLuFactor"]
 
-SMALL = 3000  #: rows below which minimum degree is good enough, and finishes before compiled loops are loaded
-MANY = 50_000  #: rows above which the duration is estimated
+SMALL = 3000  #: number of rows below which minimum degree is a good ordering, and faster than loading compiled loops
+MANY = 50_000  #: number of rows above which the duration is estimated
 LONG = 30.0  #: duration in seconds above which a warning is given before the work
 #: operations per second (4.6e9 to 4.8e9 measured: tet10 rod with 58 788 rows, grid with 32 768; one processor)
 OPERATIONS = 4e9
-BYTES = 48.0  #: bytes of memory per entry of the triangular factor while L and U are made (docs/memory.md)
+BYTES = 48.0  #: memory per entry of the triangular factor while L and U are computed [bytes] (docs/memory.md)
 
 log = logging.getLogger(__name__)
 
@@ -27,7 +27,7 @@ class SuperLuFactor:
     """L U factor of a symmetric matrix, with pivots on the diagonal where possible."""
 
     def __init__(self, lower: sp.csc_array, *, definite: bool) -> None:
-        """Factorise the matrix with this lower triangle, (n, n), every diagonal entry stored, sorted row indices."""
+        """Factorise a matrix from its lower triangle, (n, n), all diagonal entries stored, row indices sorted."""
         self.n = lower.shape[0]
         if self.n >= MANY:
             announce(analyse(lower), definite=definite)
@@ -84,7 +84,7 @@ class SuperLuFactor:
 
 
 def announce(fronts: Fronts, *, definite: bool) -> None:
-    """Warn before the work how much time and memory SuperLU needs, and what needs less; silent if it needs little."""
+    """Warn before the work if SuperLU needs much time and memory, and name solvers that need less."""
     seconds = 2 * fronts.operations / OPERATIONS
     if seconds < LONG:
         return

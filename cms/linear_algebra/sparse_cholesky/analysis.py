@@ -16,22 +16,22 @@ if TYPE_CHECKING:
 
 __all__ = ["Fronts", "analyse", "dissection_order"]
 
-LEAF = 12  #: vertices (mostly mesh nodes) below which a part is not dissected further
-MANY = 5000  #: vertices above which parts of a graph are dissected in parallel
-SHARES = 8  #: reciprocal share of all vertices that such a part may have
-FEW = 24  #: columns up to which small fronts are merged regardless of the zeros that this adds
+LEAF = 12  #: number of vertices (mostly mesh nodes) up to which a part is not dissected further
+MANY = 5000  #: number of vertices above which parts of a graph are dissected in parallel
+SHARES = 8  #: parts that are dissected in parallel have at most 1 / SHARES of all vertices
+FEW = 24  #: number of columns up to which small fronts are always merged, whatever zeros this adds
 SHARE = 0.5  #: allowed share of zeros in a merged front with about `FEW` columns; smaller in larger fronts
 
 
 @dataclass(frozen=True, eq=False)
 class Fronts:
-    """Dense fronts of a multifrontal factorisation, children before parents; rows and columns in the new order."""
+    """Dense fronts of a multifrontal factorisation, children before parents; rows and columns are reordered."""
 
     order: IntArray  #: matrix row at position k, (n,)
     first: IntArray  #: first column of each front, (n_fronts + 1,)
     begin: IntArray  #: start of the rows below each front in `rows`, (n_fronts + 1,)
     rows: IntArray  #: rows below the columns of all fronts, ascending within each front
-    above: IntArray  #: parent of each front, -1: none, (n_fronts,)
+    above: IntArray  #: parent of each front, (n_fronts,); -1: none
 
     @property
     def width(self) -> IntArray:
@@ -45,7 +45,7 @@ class Fronts:
 
     @property
     def n_entries(self) -> int:
-        """Number of entries of the factor."""
+        """Number of entries of the factor, without the zeros in its storage."""
         w, u = self.width, self.below
         return int((w * (w + 1) // 2 + w * u).sum())
 
@@ -60,12 +60,12 @@ class Fronts:
 
     @property
     def n_stored(self) -> int:
-        """Number of stored numbers of the factor."""
+        """Number of stored numbers of the factor, with the zeros."""
         return int(self.stored[-1])
 
     @cached_property
     def place(self) -> IntArray:
-        """Position of each row below a front in its parent front: first the parent's columns, then the rows below."""
+        """Position of each row below a front in its parent front: columns of the parent first, then its rows below."""
         from cms.linear_algebra.sparse_cholesky import kernels
 
         return kernels.places_above(self.begin, self.rows, self.first, self.above)
@@ -108,7 +108,7 @@ def analyse(lower: sp.csc_array) -> Fronts:
     order, sizes = order[by_front], sizes[by_front]
     first = np.searchsorted(front[by_front], np.arange(len(above) + 1))
     begin, rows = kernels.front_rows(start, neighbours, first, above)
-    at = np.concatenate([[0], np.cumsum(sizes)])  # converts vertices to rows of the matrix
+    at = np.concatenate([[0], np.cumsum(sizes)])  # convert vertices to rows of the matrix
     members = np.argsort(inverse(order)[group], kind="stable")
     lengths = sizes[rows]
     ends = np.concatenate([[0], np.cumsum(lengths)])
@@ -142,7 +142,7 @@ def nested_dissection(start: IntArray, neighbours: IntArray, weight: IntArray) -
 
 
 def quotient(lower: sp.csc_array) -> "tuple[IntArray, IntArray, IntArray, IntArray]":
-    """Return the graph of a matrix in which rows with equal neighbours are one vertex.
+    """Return the graph of a matrix in which rows with equal neighbours form one vertex.
 
     Returns
     -------
@@ -167,7 +167,7 @@ def quotient(lower: sp.csc_array) -> "tuple[IntArray, IntArray, IntArray, IntArr
 
 
 def renumbered(start: IntArray, neighbours: IntArray, order: IntArray) -> "tuple[IntArray, IntArray]":
-    """Return the graph with the vertices in another order: order[k] becomes k."""
+    """Return the graph with renumbered vertices: order[k] becomes k."""
     rank = inverse(order).astype(np.int32)
     lengths = np.diff(start)[order]
     begin = np.concatenate([[0], np.cumsum(lengths)])
@@ -176,7 +176,7 @@ def renumbered(start: IntArray, neighbours: IntArray, order: IntArray) -> "tuple
 
 
 def inverse(order: "Array | IntArray") -> IntArray:
-    """Return the position of each element in an order."""
+    """Return the position of each element in the order."""
     rank = np.empty(len(order), np.int64)
     rank[order] = np.arange(len(order))
     return rank

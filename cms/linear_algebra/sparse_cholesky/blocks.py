@@ -18,17 +18,17 @@ if TYPE_CHECKING:
 
 __all__ = ["Blocks", "blocks_of", "for_each"]
 
-PARTS = 32  #: a subtree with more than 1/32 of the total work is divided
-ENTRY = 100.0  #: number of operations that take as long as the other work per entry of the factor
+PARTS = 32  #: a subtree with more than 1 / PARTS of the total work is divided
+ENTRY = 100.0  #: time per factor entry for work other than arithmetic, in operations
 
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """Consecutive fronts as blocks: a subtree, several neighbouring subtrees, or one front above other blocks."""
+    """Blocks of consecutive fronts: a subtree, several neighbouring subtrees, or one front above other blocks."""
 
     fronts: Fronts
     first: IntArray  #: first front of each block, (n_blocks + 1,)
-    above: IntArray  #: block that contains the parent of its roots, -1: none, (n_blocks,)
+    above: IntArray  #: block that contains the parent of the roots of each block, (n_blocks,); -1: none
 
     def __len__(self) -> int:
         return len(self.above)
@@ -44,7 +44,7 @@ class Blocks:
 
     @cached_property
     def tree(self) -> "Tree":
-        """The fronts in the form that kernels use."""
+        """Fronts in the form that the kernels use."""
         from cms.linear_algebra.sparse_cholesky.front_kernels import Tree
 
         fronts = self.fronts
@@ -56,7 +56,7 @@ class Blocks:
         return self.fronts.stored[self.first]
 
     def room(self, k: int, size: IntArray) -> tuple[int, int, int]:
-        """Return array sizes for a block: its largest front, its stack, and the update matrices left on the stack.
+        """Return array sizes for a block: its largest front, its stack, and the update matrices that remain.
 
         size: size of the update matrix of each front, (n_fronts,).
         """
@@ -66,12 +66,12 @@ class Blocks:
 
     @cached_property
     def work(self) -> "Array":
-        """Time of each block in the factorisation, in operations, (n_blocks,)."""
+        """Factorisation time of each block, (n_blocks,), in operations."""
         return np.add.reduceat(front_work(self.fronts), self.first[:-1])
 
     @cached_property
     def by_distance(self) -> IntArray:
-        """Priority of each block by the work on its path to the root, most first, (n_blocks,)."""
+        """Priority of each block, (n_blocks,): blocks with the most work on the path to the root come first."""
         path = self.work.copy()
         for k in reversed(range(len(self))):
             if self.above[k] >= 0:
@@ -80,7 +80,7 @@ class Blocks:
 
     @cached_property
     def by_height(self) -> IntArray:
-        """Priority of each block on the way down by the longest path below it, most first, (n_blocks,)."""
+        """Priority of each block on the way down, (n_blocks,): blocks with the longest path below come first."""
         height = self.work.copy()
         for k, above in enumerate(self.above):
             if above >= 0:
@@ -89,15 +89,15 @@ class Blocks:
 
     @cached_property
     def by_depth(self) -> IntArray:
-        """Priority of each block that minimises waiting update matrices: subtree after subtree, (n_blocks,)."""
+        """Priority of each block, (n_blocks,), that minimises waiting update matrices: one subtree after the other."""
         return np.arange(len(self))
 
     def turns(self, *, on_disk: bool) -> IntArray:
-        """Return the priorities for the factorisation: for the shortest time, or for the smallest memory."""
+        """Return the priorities for the factorisation, for the shortest time or for the smallest memory."""
         return self.by_depth if on_disk else self.by_distance
 
     def n_working(self, n_threads: int, *, on_disk: bool = False) -> int:
-        """Return the peak number of values held besides the factor: active fronts, and waiting update matrices.
+        """Return the peak number of values besides the factor: active fronts and waiting update matrices.
 
         Blocks run in the order of `for_each`, each for a time proportional to its operations. On disk, the panels of
         active blocks are included.
@@ -127,7 +127,7 @@ class Blocks:
 
 
 def front_work(fronts: Fronts) -> "Array":
-    """Return the time of each front, in operations, (n_fronts,), including reading and writing its entries."""
+    """Return the time of each front, (n_fronts,), in operations; it includes reading and writing of entries."""
     return fronts.front_operations + ENTRY * fronts.width * (fronts.width + fronts.below)
 
 
@@ -135,7 +135,7 @@ def blocks_of(fronts: Fronts) -> Blocks:
     """Cut the tree of fronts into blocks, independently of the number of threads."""
     n_fronts, above = len(fronts.above), fronts.above
     work = front_work(fronts)
-    start = np.arange(n_fronts)  # first front of each subtree
+    start = np.arange(n_fronts)  # index of the first front of each subtree
     for f in range(n_fronts):
         if above[f] >= 0:
             work[above[f]] += work[f]
@@ -192,7 +192,7 @@ def for_each(
                 begun.append(k)
             try:
                 task(k)
-            except BaseException as error:  # passed on to the calling thread
+            except BaseException as error:  # is raised again in the calling thread
                 with change:
                     failures.append(error)
                     change.notify_all()
@@ -221,7 +221,7 @@ def for_each(
             thread.join()
     if failures:
         first = failures[0]
-        failures.clear()  # its traceback references the arrays of the tasks
+        failures.clear()  # tracebacks reference the arrays of the tasks
         try:
             raise first
         finally:

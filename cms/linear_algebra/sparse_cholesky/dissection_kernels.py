@@ -12,8 +12,8 @@ __all__ = ["dissect"]
 
 jit = njit(cache=True, nogil=True, error_model="numpy")
 
-WAYS = 6  #: orderings of a part, each of which gives a cut
-NEAR = 1.5  #: cuts with a cost of up to this factor times the smallest are refined, and the best is used
+WAYS = 6  #: number of orderings of a part; each gives a cut
+NEAR = 1.5  #: cost over the smallest cost up to which cuts are refined; then the best is used
 
 
 @jit
@@ -36,7 +36,7 @@ def breadth_first(graph, mark, part, first, queue, distance, stamp, stamps):
 
 @jit
 def best_cut(graph, mark, part, vertices, value):
-    """Return the best cut of a part by `value`: the cut, the side whose boundary is the separator, and its cost.
+    """Return the best cut of a part by `value`, the side whose boundary is the separator, and the cost.
 
     A cut c puts vertices with values below c HERE and the others THERE. The vertices HERE that touch THERE are those
     with value < c <= the largest value among their neighbours, and vice versa, so one pass over the edges counts them
@@ -128,7 +128,7 @@ def dissect(graph, cut, order, lo, hi, leaf, small):
             stamp += 1
             breadth_first(graph, mark, part, far, place, distance[k], stamp, stamps)
             far = place[m - 1]
-            if k == 1:  # the third vertex is far from both
+            if k == 1:  # the third vertex is far from the first two
                 for v in vertices:
                     if min(distance[0, v], distance[1, v]) > min(distance[0, far], distance[1, far]):
                         far = v
@@ -172,7 +172,7 @@ def dissect(graph, cut, order, lo, hi, leaf, small):
 
 @jit
 def way_value(distance, way, v):
-    """Return the value of a vertex in one of six orderings of a part: three distances, and their differences."""
+    """Return the value of a vertex in one of six orderings of a part: three distances and their differences."""
     if way < 3:
         return distance[way, v]
     return distance[way - 3, v] - distance[(way - 2) % 3, v]

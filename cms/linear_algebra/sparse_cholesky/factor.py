@@ -23,7 +23,7 @@ __all__ = ["CholeskyFactor", "Panels", "PanelsInFile", "PanelsInMemory"]
 
 
 class Panels(Protocol):
-    """The numbers of the factor by block (`cms.linear_algebra.sparse_cholesky.blocks`); each block is written once."""
+    """Storage of the factor by block (`cms.linear_algebra.sparse_cholesky.blocks`); each block is written once."""
 
     def put(self, k: int, numbers: Array) -> None:
         """Store the numbers of block k."""
@@ -36,7 +36,7 @@ class Panels(Protocol):
 
 
 class PanelsInMemory:
-    """Panels as arrays."""
+    """Storage of the factor in arrays."""
 
     def __init__(self) -> None:
         self._numbers: dict[int, Array] = {}
@@ -55,10 +55,10 @@ class PanelsInMemory:
 
 
 class PanelsInFile:
-    """Panels in an unnamed file, which the system removes when the process ends, however it ends."""
+    """Storage of the factor in an unnamed file, which the system removes whenever the process ends."""
 
     def __init__(self, ends: IntArray, folder: Path | None = None) -> None:
-        """Open the file, by default in the folder for temporary files.
+        """Open the file in a folder, by default in the folder for temporary files.
 
         Parameters
         ----------
@@ -138,7 +138,7 @@ class CholeskyFactor:
         self, lower: sp.csc_array, *, definite: bool = True, on_disk: bool = False, folder: Path | None = None,
         fronts: Fronts | None = None,
     ) -> None:  # fmt: skip
-        """Factorise the matrix with this lower triangle, (n, n), every diagonal entry stored, sorted row indices.
+        """Factorise a matrix from its lower triangle, (n, n), with all diagonal entries stored and row indices sorted.
 
         Parameters
         ----------
@@ -182,7 +182,7 @@ class CholeskyFactor:
         entries = front_kernels.Entries(*kernels.permuted(lower.indptr, lower.indices, lower.data, rank))
         tree, blocks = self._blocks.tree, self._blocks
         left_size = self._fronts.below.astype(np.int64) ** 2
-        left: dict[int, Array] = {}  # update matrices by block, waiting for the parent block
+        left: dict[int, Array] = {}  # update matrices of each block that wait for the parent block
         local = threading.local()
 
         def factorise(k: int) -> None:
@@ -225,7 +225,7 @@ class CholeskyFactor:
         return x
 
     def _substituted(self, b: Array) -> Array:
-        """Return the solutions for b, (n, k) with k <= 16, in C order."""
+        """Return the solutions for b, (n, k), in C order; k is at most 16."""
         from cms.linear_algebra.sparse_cholesky import solve_kernels
         from cms.linear_algebra.sparse_cholesky.tiles import LANES, ROWS
 
@@ -238,7 +238,7 @@ class CholeskyFactor:
         left: dict[int, Array] = {}
         most = int(self._fronts.width.max(initial=0)) + ROWS
 
-        def eliminate(k: int) -> None:  # L y = b
+        def eliminate(k: int) -> None:  # solves L y = b
             lo, hi = int(blocks.first[k]), int(blocks.first[k + 1])
             _, n_stack, _ = blocks.room(k, left_size)
             own, stack = np.empty(most * width), np.empty(n_stack)
@@ -252,7 +252,7 @@ class CholeskyFactor:
                 solve_kernels.eliminate_fronts(tree, lo, hi, parts, order, b, self._panels.of(k), own, stack, Y)
             left[k] = stack
 
-        def substitute(k: int) -> None:  # Lᵀ x = y
+        def substitute(k: int) -> None:  # solves Lᵀ x = y
             lo, hi = int(blocks.first[k]), int(blocks.first[k + 1])
             own, eight = np.empty(most * width), np.empty(ROWS * width)
             solve_kernels.substitute_back(tree, lo, hi, parts, order, self._panels.of(k), own, eight, Y, x)

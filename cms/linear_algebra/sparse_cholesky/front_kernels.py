@@ -27,7 +27,7 @@ __all__ = [
     "words",
 ]
 
-TOGETHER = 8  #: number of tiles written at the same time
+TOGETHER = 8  #: number of tiles that are written together
 STRIPE = 64  #: columns whose rows below BLAS eliminates at once; products do the rest, at twice the speed
 
 jit = njit(cache=True, nogil=True, error_model="numpy")
@@ -44,7 +44,7 @@ dgemm, dpotrf, dsyrk, dtrsm = external("dgemm"), external("dpotrf"), external("d
 
 
 class Tree(NamedTuple):
-    """Fronts in the form that kernels use (`Fronts`)."""
+    """Fronts (`Fronts`) in the form that the kernels use."""
 
     first: IntArray
     begin: IntArray
@@ -55,7 +55,7 @@ class Tree(NamedTuple):
 
 
 class Entries(NamedTuple):
-    """Lower triangle of the matrix in the order of the fronts, by columns."""
+    """Lower triangle of the matrix in the order of the fronts, stored by columns."""
 
     start: IntArray
     rows: IntArray
@@ -63,7 +63,7 @@ class Entries(NamedTuple):
 
 
 class Words(NamedTuple):
-    """Arguments of BLAS and LAPACK, which are passed by address; one set for each thread."""
+    """Arguments of BLAS and LAPACK routines, which need addresses; each thread has its own set."""
 
     sizes: IntArray
     factors: Array
@@ -71,13 +71,13 @@ class Words(NamedTuple):
 
 
 def words() -> Words:
-    """Return the arguments: sizes, which kernels set; 1 and -1; the letters L, N, R and T."""
+    """Return the arguments: sizes, which the kernels set; 1 and -1; the letters L, N, R and T."""
     return Words(np.zeros(6, np.intc), np.array([1.0, -1.0]), np.frombuffer(b"LNRT", np.uint8).copy())
 
 
 @jit
 def room(tree, lo, hi, size):
-    """Return array sizes for consecutive subtrees: largest F, stack, and update matrices that roots leave on it.
+    """Return array sizes for consecutive subtrees: largest F, stack, and update matrices that the roots leave.
 
     size: size of the update matrix of each front, (n_fronts,).
     """
@@ -112,7 +112,7 @@ def begin_front(tree, entries, f, F, U, local):
 
 @jit
 def add_update(place, left, w, u, F, U):
-    """Add the update matrix of a child, (m, m), to a front at the positions of its rows."""
+    """Add the update matrix of a child, (m, m), to a front, at the positions of its rows."""
     m = place.size
     for j in range(m):
         if place[j] < w:
@@ -139,7 +139,7 @@ def take_updates(tree, lo, hi, stack, f, F, U):
 
 @jit
 def finish_front(tree, f, F, U, panel, words):
-    """Eliminate the columns of a front and write them as tiles; return 0, or the number of the pivot that failed.
+    """Eliminate the columns of a front and write them as tiles; return 0, or the number of the failed pivot.
 
     F11 = L11 L11ᵀ;  L21 = F21 L11⁻ᵀ, stripe by stripe of its columns;  U <- U - L21 L21ᵀ
     """

@@ -1,4 +1,4 @@
-"""Compiled loops of elimination tree and fronts; imported only where used, because numba takes half a second to import.
+"""Compiled loops for elimination tree and fronts; imported only when used, because importing numba is slow.
 
 Graphs are given by compressed rows `start`, `neighbours`, without the vertex itself.
 """
@@ -36,7 +36,7 @@ def sums_over_rows(indptr, indices, keys):
 
 @jit
 def graph_of(indptr, indices, representative, group):
-    """Return the graph of the vertices, each represented by one row, with both directions of the lower triangle."""
+    """Return the graph of the vertices, each represented by one row; every edge appears in both directions."""
     n = representative.size
     start, stands = np.zeros(n + 2, np.int64), np.zeros(group.size, np.bool_)
     stands[representative] = True
@@ -80,7 +80,7 @@ def elimination_tree(start, neighbours):
 
 @jit
 def postorder(parent):
-    """Return the columns in an order in which each subtree is contiguous and ends with its root, (n,)."""
+    """Return the columns in postorder, (n,): each subtree is contiguous and ends with its root."""
     n = parent.size
     first, beside = np.full(n, -1, np.int64), np.full(n, -1, np.int64)
     for j in range(n - 1, -1, -1):
@@ -109,7 +109,7 @@ def postorder(parent):
 
 @jit
 def weighted_counts(start, neighbours, parent, weight):
-    """Return the weight below the diagonal of each column of the factor, (n,)."""
+    """Return the total weight below the diagonal in each column of the factor, (n,)."""
     n = parent.size
     count, seen = np.zeros(n, np.int64), np.full(n, -1, np.int64)
     for i in range(n):
@@ -177,7 +177,7 @@ def amalgamate(parent, count, weight, few, share):
 
 @jit
 def append_rows(rows, at, found, lo, hi, last, seen, f):
-    """Append entries of found[lo:hi] from row `last` on that front f lacks; return rows (maybe enlarged) and end."""
+    """Append those entries of found[lo:hi] from row `last` on that are not in front f; return rows and their end."""
     for k in range(lo, hi):
         i = found[k]
         if i >= last and seen[i] != f:
@@ -191,7 +191,7 @@ def append_rows(rows, at, found, lo, hi, last, seen, f):
 
 @jit
 def front_rows(start, neighbours, first, above):
-    """Return the start of the rows below each front, and the rows, ascending; front f starts at column first[f]."""
+    """Return the start of the rows below each front, and the rows in ascending order; first[f] is its first column."""
     n_fronts, n = first.size - 1, start.size - 1
     seen = np.full(n, -1, np.int64)
     begin = np.zeros(n_fronts + 1, np.int64)
@@ -216,7 +216,7 @@ def front_rows(start, neighbours, first, above):
 
 @jit
 def places_above(begin, rows, first, above):
-    """Return the position of each row below a front in its parent front: parent's columns first, then rows below."""
+    """Return the position of each row below a front in its parent front: columns first, then rows below."""
     place = np.empty(rows.size, np.int32)
     for f in range(above.size):
         p = above[f]
@@ -235,7 +235,7 @@ def places_above(begin, rows, first, above):
 
 @jit
 def permuted(indptr, indices, data, rank):
-    """Return the lower triangle of a reordered matrix by columns: row i becomes rank[i]; rows are not sorted."""
+    """Return the lower triangle of a reordered matrix by columns: row i becomes rank[i]; rows remain unsorted."""
     n = rank.size
     start = np.zeros(n + 1, np.int64)
     for j in range(n):

@@ -1,4 +1,4 @@
-"""Addresses of the routines of SciPy's BLAS and LAPACK, for calls without the interpreter."""
+"""Addresses of the BLAS and LAPACK routines of SciPy, for calls without the Python interpreter."""
 
 import ctypes
 

@@ -1,4 +1,4 @@
-"""Compiled refinement of a separator, which cuts a part of a graph into two sides without an edge between them."""
+"""Compiled refinement of a separator, which divides a part of a graph into two sides without a common edge."""
 
 from typing import NamedTuple
 
@@ -11,16 +11,16 @@ __all__ = ["BETWEEN", "HERE", "THERE", "Cut", "Graph", "cost_of", "refine", "sta
 
 jit = njit(cache=True, nogil=True, error_model="numpy")
 
-HERE, THERE, BETWEEN = 0, 1, 2  # the side of a vertex
-PENALTY = 1.5  #: exponent of the shares of both sides in the cost of a separator; uneven halves cost more
-PASSES = 6  #: passes over a separator; none may increase its cost
-LARGEST = 0.7  #: largest share of a part that a side may have
-LEAST = 30  #: moves without success that end a pass, plus a quarter of the vertices of the separator
+HERE, THERE, BETWEEN = 0, 1, 2  # sides of a vertex, and the separator
+PENALTY = 1.5  #: exponent of the shares of both sides in the cost of a separator, which penalises uneven halves
+PASSES = 6  #: number of passes over a separator; no pass may increase its cost
+LARGEST = 0.7  #: largest share of the vertices on one side
+LEAST = 30  #: number of moves without success that end a pass, in addition to a quarter of the separator vertices
 BETTER = 1.0 - 1e-9
 
 
 class Graph(NamedTuple):
-    """Vertices with weights; compressed rows without the vertex itself."""
+    """Graph with vertex weights; compressed rows do not contain the vertex itself."""
 
     start: IntArray
     neighbours: IntArray
@@ -28,17 +28,17 @@ class Graph(NamedTuple):
 
 
 class Cut(NamedTuple):
-    """Workspace over all vertices, of which one part is in use."""
+    """Workspace over all vertices; only one part is in use at a time."""
 
     mark: IntArray  #: part of each vertex
     side: np.ndarray  #: HERE, THERE or BETWEEN, as small integers
     separator: IntArray  #: vertices of the separator, the first length[0] of the array
     length: IntArray
     size: IntArray  #: weights of HERE, THERE and BETWEEN, (3,)
-    place: IntArray  #: position of a vertex in the separator
-    pull: IntArray  #: weight that a vertex of the separator pulls from the other side if it moves to a side, (2, n)
+    place: IntArray  #: position of each vertex in the separator
+    pull: IntArray  #: weight that enters the separator from the other side if a vertex moves to each side, (2, n)
     locked: IntArray  #: whether a vertex has moved in this pass
-    changes: IntArray  #: changes of a pass, as 3 vertex + previous side
+    changes: IntArray  #: moves of a pass, as 3 vertex + previous side
 
 
 def workspace(n: int) -> Cut:
@@ -52,7 +52,7 @@ def workspace(n: int) -> Cut:
 
 @jit
 def cost_of(size):
-    """Return the weight of a separator times a power of the shares of both sides; infinite if a side is empty."""
+    """Return the weight of a separator times a power of the shares of both sides; infinite if one side is empty."""
     if size[HERE] <= 0 or size[THERE] <= 0:
         return np.inf
     share = size[HERE] / (size[HERE] + size[THERE])
@@ -96,7 +96,7 @@ def leave(graph, cut, v, to):
 
 @jit
 def start_cut(graph, cut, vertices, chosen):
-    """Make the separator from the vertices of one side that touch the other, given the sides."""
+    """Determine the separator, given the sides: the vertices of one side that have an edge to the other."""
     cut.length[0] = 0
     cut.size[:] = 0
     for v in vertices:
@@ -113,7 +113,7 @@ def start_cut(graph, cut, vertices, chosen):
 
 @jit
 def best_move(graph, cut, largest):
-    """Return the vertex of the separator, and the side, whose move makes it lightest; -1 if none may move."""
+    """Return the vertex and the side whose move makes the separator lightest; -1 if no move is allowed."""
     vertex, to, most = -1, 0, np.iinfo(np.int64).min
     for k in range(cut.length[0]):
         v = cut.separator[k]

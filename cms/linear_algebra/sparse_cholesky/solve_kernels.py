@@ -25,7 +25,7 @@ jit = njit(cache=True, nogil=True, error_model="numpy")
 
 @jit
 def begin_rows(tree, f, parts, order, b, own, below):
-    """Copy right-hand sides of the columns of a front from b, (n, k) in C order; contributions below start at zero."""
+    """Copy right-hand sides from b, (n, k) in C order, to the columns of a front; zero the contributions below."""
     width = LANES * len(parts)
     lo, w, u = tree.first[f], tree.first[f + 1] - tree.first[f], tree.begin[f + 1] - tree.begin[f]
     own[: -(-w // ROWS) * ROWS * width] = 0.0
@@ -38,7 +38,7 @@ def begin_rows(tree, f, parts, order, b, own, below):
 
 @jit
 def take_rows(place, left, w, width, own, below):
-    """Add the contributions of a child, one row for each of its rows below, to the rows of its parent."""
+    """Add the contributions of a child to the rows of its parent, one row for each row below the child."""
     for k in range(place.size):
         if place[k] < w:
             at = place[k] * width
@@ -71,7 +71,7 @@ def finish_rows(tree, f, parts, panel, own, below, Y):
 
 @jit
 def take_rows_of(tree, lo, hi, left, f, parts, own, below):
-    """Add the contributions of the roots among fronts lo to hi to their parent, front f."""
+    """Add the contributions of roots among fronts lo to hi to their parent, front f."""
     width = LANES * len(parts)
     w, at = tree.first[f + 1] - tree.first[f], 0
     for c in range(lo, hi):
@@ -83,7 +83,7 @@ def take_rows_of(tree, lo, hi, left, f, parts, own, below):
 
 @jit
 def eliminate_fronts(tree, lo, hi, parts, order, b, panels, own, stack, Y):
-    """Solve L y = b for consecutive subtrees, y into Y, (n, width); contributions of their roots stay on the stack."""
+    """Solve L y = b for consecutive subtrees, y in Y, (n, width); contributions of their roots stay on the stack."""
     width = LANES * len(parts)
     left_by, n_left, top = np.empty(hi - lo, np.int64), 0, 0
     for f in range(lo, hi):
@@ -109,7 +109,7 @@ def eliminate_fronts(tree, lo, hi, parts, order, b, panels, own, stack, Y):
 
 @jit
 def substitute_back(tree, lo, hi, parts, order, panels, own, eight, Y, x):
-    """Solve Lᵀ x = y for fronts lo to hi, last first; y is in Y, (n, width), and x overwrites it.
+    """Solve Lᵀ x = y for fronts lo to hi, last front first; y is in Y, (n, width), x overwrites it.
 
     x: (n, k) in C order, in the order of the matrix;
     own, eight: workspaces, with the rows of the largest front and eight rows.

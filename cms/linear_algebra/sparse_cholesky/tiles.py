@@ -22,15 +22,15 @@ from numba.extending import intrinsic
 
 __all__ = ["LANES", "ROWS", "solve_tile", "solve_transposed_tile", "subtract_tile", "subtract_transposed_tile"]
 
-ROWS = 8  #: of a tile
+ROWS = 8  #: number of rows in a tile
 LANES = 8  #: numbers in a vector
-AHEAD = 32  #: columns of a tile that are prefetched in advance
+AHEAD = 32  #: number of columns that are prefetched in advance
 double, integer = ir.DoubleType(), ir.IntType(64)
 vector = ir.VectorType(double, LANES)
 
 
 class Columns:
-    """The instructions of one function on rows of `width` columns."""
+    """LLVM instructions of one function on rows with `width` columns."""
 
     def __init__(self, builder: ir.IRBuilder, width: int) -> None:
         self.builder, self.width = builder, width
@@ -53,7 +53,7 @@ class Columns:
             self.builder.store(row_values[part], self.place(address, row, part), align=8)
 
     def entry(self, tile: Any, i: int, j: Any) -> Any:
-        """Return entry (i, j) of a tile in all lanes of a vector."""
+        """Return entry (i, j) of a tile, repeated in all lanes of a vector."""
         b = self.builder
         at = b.add(b.mul(number(j), number(ROWS)), number(i))
         value = b.load(b.gep(b.inttoptr(tile, double.as_pointer()), [at]))
@@ -62,7 +62,7 @@ class Columns:
         return b.shuffle_vector(one, ir.Constant(vector, ir.Undefined), zeros)
 
     def fetch(self, tile: Any, j: Any) -> None:
-        """Prefetch data that is read slightly later; processors do so automatically, but too late."""
+        """Prefetch data that is needed soon; automatic prefetching by processors is too late."""
         b = self.builder
         at = b.add(b.mul(number(j), number(ROWS)), number(AHEAD * ROWS))
         byte, word = ir.IntType(8).as_pointer(), ir.IntType(32)
@@ -72,7 +72,7 @@ class Columns:
         b.call(ask, [place, *(ir.Constant(word, value) for value in (0, 3, 1))])  # for reading, into all caches, data
 
     def less(self, c: list[Any], a: Any, y: list[Any]) -> list[Any]:
-        """Return c - a y, rounded once."""
+        """Return c - a y with a single rounding."""
         b = self.builder
         of_vectors = ir.FunctionType(vector, [vector] * 3)
         fma = cgutils.get_or_insert_function(b.module, of_vectors, f"llvm.fma.v{LANES}f64")
@@ -81,12 +81,12 @@ class Columns:
 
 
 def number(value: Any) -> Any:
-    """Return an integer as a constant; the result of an instruction is returned unchanged."""
+    """Return an integer as a constant; return the result of an instruction unchanged."""
     return ir.Constant(integer, value) if isinstance(value, int) else value
 
 
 def subtract(columns: Columns, Z: Any, tile: Any, Y: Any, n: Any) -> None:
-    """Z[:8] -= T Y: eight rows stay in registers while n columns of the tile are read."""
+    """Compute Z[:8] -= T Y: eight rows stay in registers while n columns of the tile are read."""
     b = columns.builder
     held = [[cgutils.alloca_once(b, vector) for _ in columns.parts] for _ in range(ROWS)]
     for i in range(ROWS):
@@ -104,7 +104,7 @@ def subtract(columns: Columns, Z: Any, tile: Any, Y: Any, n: Any) -> None:
 
 
 def subtract_transposed(columns: Columns, Y: Any, tile: Any, Z: Any, n: Any) -> None:
-    """Y[:n] -= Tᵀ Z: the same eight rows stay in registers while the rows of Y are read."""
+    """Compute Y[:n] -= Tᵀ Z: the same eight rows stay in registers while the rows of Y are read."""
     z = [columns.load(Z, i) for i in range(ROWS)]
     with cgutils.for_range(columns.builder, n) as loop:
         columns.fetch(tile, loop.index)
@@ -115,7 +115,7 @@ def subtract_transposed(columns: Columns, Y: Any, tile: Any, Z: Any, n: Any) -> 
 
 
 def solve(columns: Columns, Z: Any, tile: Any) -> None:
-    """Z[:8] = L⁻¹ Z, row by row from the first."""
+    """Compute Z[:8] = L⁻¹ Z, from the first row to the last."""
     z = [columns.load(Z, i) for i in range(ROWS)]
     for j in range(ROWS):
         reciprocal = columns.entry(tile, j, j)
@@ -126,7 +126,7 @@ def solve(columns: Columns, Z: Any, tile: Any) -> None:
 
 
 def solve_transposed(columns: Columns, Z: Any, tile: Any) -> None:
-    """Z[:8] = L⁻ᵀ Z, row by row from the last."""
+    """Compute Z[:8] = L⁻ᵀ Z, from the last row to the first."""
     z = [columns.load(Z, i) for i in range(ROWS)]
     for j in reversed(range(ROWS)):
         reciprocal = columns.entry(tile, j, j)
@@ -137,7 +137,7 @@ def solve_transposed(columns: Columns, Z: Any, tile: Any) -> None:
 
 
 def on_tile_and_rows(emit: Callable[..., None]) -> Any:
-    """Return the intrinsic that kernels call for one of these functions, with `parts` as its first argument."""
+    """Return the intrinsic for one of these functions in kernels; its first argument is `parts`."""
 
     def function(typing_context, parts, Z, tile, Y, n):
         def code(context, builder, signature, values):
@@ -150,7 +150,7 @@ def on_tile_and_rows(emit: Callable[..., None]) -> Any:
 
 
 def on_tile(emit: Callable[..., None]) -> Any:
-    """Return the intrinsic that kernels call for a function without rows other than those of the tile."""
+    """Return the intrinsic for a function that needs only the rows of its tile."""
 
     def function(typing_context, parts, Z, tile):
         def code(context, builder, signature, values):

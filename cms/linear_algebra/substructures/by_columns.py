@@ -7,7 +7,7 @@ from fe_models.foundation.threads import bounded_threads, n_threads
 
 __all__ = ["by_columns"]
 
-COLUMNS = 64  #: largest number of columns at a time in one thread
+COLUMNS = 64  #: largest number of columns that a thread processes at a time
 
 
 def by_columns(k: int, work: Callable[[slice], None]) -> None:

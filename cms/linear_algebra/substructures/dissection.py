@@ -10,7 +10,7 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["Dissection", "dissect", "node_graph"]
 
-DIRECTIONS = 3  #: principal axes of a part that are tried as the normal of its cut
+DIRECTIONS = 3  #: number of principal axes of a part that are tried as normals of its cut
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,8 +22,8 @@ class Dissection:
     """
 
     order: IntArray  #: dofs in elimination order, (n,)
-    starts: IntArray  #: (n_substructures + 1,)
-    parents: IntArray  #: (n_substructures,), -1 for the root
+    starts: IntArray  #: start of each substructure in `order`, and its end, (n_substructures + 1,)
+    parents: IntArray  #: parent of each substructure, (n_substructures,); -1 for the root
 
     @property
     def n(self) -> int:
@@ -46,7 +46,7 @@ class Dissection:
 
 
 def node_graph(K: sp.csc_array, M: sp.csc_array, nodes: IntArray) -> tuple[sp.csr_array, IntArray]:
-    """Return which nodes share an entry of K or M, and the node of every dof, renumbered from 0.
+    """Return the graph of nodes that share an entry of K or M, and the node of each dof, renumbered from 0.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def node_graph(K: sp.csc_array, M: sp.csc_array, nodes: IntArray) -> tuple[sp.cs
 
 
 def dissect(graph: sp.csr_array, points: Array, weights: IntArray, *, leaf: int, last: IntArray) -> Dissection:
-    """Divide nodes repeatedly until no part is larger than a leaf.
+    """Divide nodes recursively until no part is larger than a leaf.
 
     All parts of one level are divided together.
 
@@ -99,7 +99,7 @@ def dissect(graph: sp.csr_array, points: Array, weights: IntArray, *, leaf: int,
     """
     n = len(points)
     of_node = np.full(n, -1)  # substructure that owns a node; -1: the node is still in a part
-    part = np.zeros(n, dtype=np.int64)  # for nodes without owner: the substructure that will own the node or its cut
+    part = np.zeros(n, dtype=np.int64)  # substructure that will own the node (or its cut), for nodes without owner
     of_node[last] = 0
     parents = [-1]
     edges = sp.coo_array(sp.triu(graph, 1))
@@ -158,7 +158,7 @@ def _best_sides(points: Array, weights: IntArray, part: IntArray, row: IntArray,
 
 
 def _cover(row: IntArray, column: IntArray, side: IntArray) -> IntArray:
-    """Step (2): return the smallest set of nodes that touches every edge between the sides, by Koenig's theorem."""
+    """Step (2): return the smallest set of nodes that covers every edge between the sides, by Koenig's theorem."""
     if not len(row):
         return np.zeros(0, dtype=np.int64)
     swap = side[row] == 1
@@ -172,7 +172,7 @@ def _cover(row: IntArray, column: IntArray, side: IntArray) -> IntArray:
     of_right[of_left[of_left >= 0]] = np.flatnonzero(of_left >= 0)
     reached_left = of_left < 0
     reached_right = np.zeros(len(rights), dtype=bool)
-    while True:  # alternating paths from unmatched nodes: any edge to the right, a matched edge back
+    while True:  # alternating paths from unmatched nodes: forward along any edge, back along a matched edge
         hit = np.zeros(len(rights), dtype=bool)
         hit[b[reached_left[a]]] = True
         new = hit & ~reached_right
@@ -188,7 +188,7 @@ def _ordered(of_node: IntArray, parents: IntArray) -> Dissection:
     """Return the tree in postorder; empty substructures are removed, and their children move up."""
     counts = np.bincount(of_node, minlength=len(parents))
     up = parents.copy()
-    for t in range(1, len(parents)):  # parents come first here
+    for t in range(1, len(parents)):  # parents come first in this order
         while up[t] > 0 and counts[up[t]] == 0:
             up[t] = up[up[t]]
     children: list[list[int]] = [[] for _ in parents]
@@ -197,7 +197,7 @@ def _ordered(of_node: IntArray, parents: IntArray) -> Dissection:
             children[up[t]].append(t)
     postorder: list[int] = []
     stack = [0]
-    while stack:  # root first, reversed at the end
+    while stack:  # the root comes first; the order is reversed at the end
         t = stack.pop()
         postorder.append(t)
         stack += children[t]

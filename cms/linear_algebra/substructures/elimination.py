@@ -1,4 +1,4 @@
-"""Elimination of one substructure after the other: its own modes, and its contribution to enclosing separators."""
+"""Elimination of substructures one after the other: modes of each, and its contribution to enclosing separators."""
 
 import ctypes
 from collections.abc import Sequence
@@ -66,12 +66,12 @@ def call(name: str, *arguments: Any) -> None:
 
 
 def leading(A: Array) -> int:
-    """Return the distance between two columns of a matrix in Fortran order, which may be a part of a larger matrix."""
+    """Return the leading dimension of a matrix in Fortran order, which may be a block of a larger matrix."""
     return max(A.strides[1] // 8 if A.shape[1] > 1 else A.shape[0], A.shape[0], 1)
 
 
 def cholesky(A: Array) -> int:
-    """Overwrite the lower triangle of A, (s, s), with L, L Lᵀ = A; return 0, or the number of the row that failed."""
+    """Overwrite the lower triangle of A, (s, s), with L, where A = L Lᵀ; return 0, or the number of the failed row."""
     info = ctypes.c_int(0)
     call("dpotrf", "L", len(A), A, leading(A), info)
     return int(info.value)
@@ -148,32 +148,33 @@ def largest_eigenpairs(A: Array, above: float) -> tuple[Array, Array]:
 # elimination ----------------------------------------------------------------------------------------------------------
 
 
-DEPENDENT = 1e-10  #: smallest constraint relative to the strongest one, below which it is redundant
+DEPENDENT = 1e-10  #: size of a constraint over the largest one, below which it is redundant
 
 
 @dataclass(frozen=True, eq=False)
 class Substructure:
-    """An eliminated substructure with s dofs, and b dofs of the enclosing separators."""
+    """Eliminated substructure with s dofs; b dofs of enclosing separators affect it."""
 
     start: int  #: first dof in elimination order
-    boundary: IntArray  #: dofs of enclosing separators that move it, ascending, (b,)
-    L: Array  #: Cholesky factor of its condensed stiffness, lower triangle, (s, s)
-    Psi: Array  #: its own constraint modes, -K_ss⁻¹ K_sb, (s, b)
-    Phi: Array  #: its own modes with all enclosing separators held, orthonormal in its condensed mass, (s, m)
-    omega2: Array  #: of these modes, ascending, (m,) [1/s²]
+    boundary: IntArray  #: dofs of enclosing separators that affect it, ascending, (b,)
+    L: Array  #: Cholesky factor of the condensed stiffness, lower triangle, (s, s)
+    Psi: Array  #: constraint modes of the substructure, -K_ss⁻¹ K_sb, (s, b)
+    Phi: Array  #: modes with all enclosing separators fixed, orthonormal in the condensed mass, (s, m)
+    omega2: Array  #: squared angular frequencies of these modes, ascending, (m,) [1/s²]
     coupling: Array  #: mass between the modes of all substructures below, in order, and these modes, (m_below, m)
     children: tuple[int, ...]
-    pivots: IntArray | None = None  #: only for a root with multipliers: L then holds the factors of SciPy's `lu_factor`
+    #: pivots of a root with multipliers, whose L then has the factors of SciPy's `lu_factor`; otherwise None
+    pivots: IntArray | None = None
     spread: Array | None = None  #: in that case S with S Sᵀ f = u for [K Cᵀ; C 0] [u; .] = [f; 0], (s, s - n_ties)
 
     @property
     def stop(self) -> int:
-        """Index after its last dof."""
+        """Index after the last dof of the substructure."""
         return self.start + len(self.L)
 
     @property
     def n_numbers(self) -> int:
-        """Number of stored values."""
+        """Number of stored numbers."""
         return self.L.size + self.Psi.size + self.Phi.size + self.coupling.size
 
     def solve_own(self, f: Array) -> None:
@@ -196,15 +197,15 @@ class Substructure:
 class Remainder:
     """Contributions of eliminated substructures to the enclosing separators."""
 
-    boundary: IntArray  #: dofs, ascending, (b,)
+    boundary: IntArray  #: dofs of the enclosing separators, ascending, (b,)
     K: Array  #: condensed stiffness, lower triangle, (b, b)
     M: Array  #: condensed mass, lower triangle, (b, b)
-    rows: Array  #: mass between all modes below and the boundary, (m_below, b)
+    rows: Array  #: mass coupling between all modes below and the boundary, (m_below, b)
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Consecutive substructures that are eliminated as one task: a complete subtree, or a separator at the top.
+    """Task: consecutive substructures that are eliminated together, a complete subtree or a separator at the top.
 
     K and M hold the columns of its dofs of the lower triangles in elimination order. Rows and dofs are numbered over
     the whole body.
@@ -215,8 +216,8 @@ class Part:
     children: tuple[tuple[int, ...], ...]
     K: sp.csc_array
     M: sp.csc_array
-    omega2: float  #: modes of substructures are kept up to this omega² [1/s²]
-    multipliers: IntArray  #: dofs that are Lagrange multipliers; all belong to the root
+    omega2: float  #: squared frequency up to which modes of substructures are retained [1/s²]
+    multipliers: IntArray  #: dofs that are Lagrange multipliers; all are in the root
     remainders: tuple[Remainder, ...] = ()
 
 
@@ -248,7 +249,7 @@ def eliminate_part(part: Part) -> Reduced:
 def eliminate(
     part: Part, t: int, below: Sequence[Remainder], children: tuple[int, ...]
 ) -> tuple[Substructure, Remainder]:
-    """Eliminate substructure t of a part; s are its own dofs, b those of enclosing separators.
+    """Eliminate substructure t of a part; s are its dofs, b those of enclosing separators.
 
     (1) assemble K and M of s and b: entries of the body in the columns of s, plus contributions of the substructures
         below
@@ -339,7 +340,7 @@ def _root_with_multipliers(
 
 
 def own_modes(K: Array, M: Array, L: Array, bound: float) -> tuple[Array, Array]:
-    """Step (3): return omega² up to a bound, ascending, and M-orthonormal modes; K and M (lower) may be overwritten.
+    """Step (3): return omega² up to a bound, ascending, and M-orthonormal modes; K and M may be overwritten.
 
     M may be semidefinite: A = L⁻¹ M L⁻ᵀ has eigenvalues theta = 1 / omega², and 0 for massless directions.
     """
@@ -354,7 +355,7 @@ def own_modes(K: Array, M: Array, L: Array, bound: float) -> tuple[Array, Array]
 
 
 def _assembled(A: sp.csc_array, first: int, start: int, stop: int, boundary: IntArray) -> tuple[Array, Array, Array]:
-    """Step (1): return the entries of the body: A_ss (lower triangle), A_sb, and an empty A_bb."""
+    """Step (1): return the entries of the body matrix: A_ss (lower triangle), A_sb, and an empty A_bb."""
     s, b = stop - start, len(boundary)
     A_ss, A_sb, A_bb = (np.zeros(shape, order="F") for shape in ((s, s), (s, b), (b, b)))
     entries = slice(A.indptr[first], A.indptr[first + s])

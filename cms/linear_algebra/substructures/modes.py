@@ -30,8 +30,8 @@ __all__ = ["Interior", "MultilevelResult", "guessed_omega2", "multilevel_modes"]
 # estimate of the n-th natural frequency, before any mode is computed --------------------------------------------------
 
 
-SAMPLES = 8  #: number of subtrees whose modes are computed
-EACH = 6  #: smallest number of wanted modes of a subtree, if the body has enough of them
+SAMPLES = 8  #: number of subtrees whose modes are computed for the estimate
+EACH = 6  #: smallest number of computed modes per subtree, if the body has enough modes
 
 
 def guessed_omega2(dissection: Dissection, K: sp.csc_array, M: sp.csc_array, count: int) -> float:
@@ -78,32 +78,32 @@ def _lowest(K: sp.csc_array, M: sp.csc_array, dofs: IntArray, n_modes: int) -> A
 
 log = logging.getLogger(__name__)
 
-LEAF = 200  #: dofs of a part: larger parts cost more arithmetic, smaller parts more calls
+LEAF = 200  #: number of dofs of a part; larger parts need more arithmetic, smaller parts more calls
 #: guard modes beyond the wanted ones that take part: a number, and a share of the wanted modes
 GUARDS, GUARD_SHARE = 12, 0.08
 MOST_STEPS = 8  #: largest number of inverse iteration steps
 SHARE = 8  #: smallest number of interior dofs per wanted mode
 #: cutoff factors: the number of modes grows with frequency for a surface, and with its third power for a solid
 THIN, SOLID = 20.0, 4.0
-DENSER, MANY = 14.0, 400  #: cutoff factor of shells, and number of dofs per wanted mode up to which it applies
-TOO_HIGH = 1.5  #: factor by which the estimated highest frequency is usually at least too high
-MARGIN = 1.1  #: margin on a cutoff, because reduced frequencies are above the true ones
+DENSER, MANY = 14.0, 400  #: cutoff factor of shells, and largest number of dofs per wanted mode for which it applies
+TOO_HIGH = 1.5  #: factor by which the estimate of the highest frequency is usually too high, or more
+MARGIN = 1.1  #: factor on a cutoff frequency, because reduced frequencies are above the true ones
 #: increase of the bound (as a frequency) if too few substructure modes are found, and number of increases
 RAISE, MOST_RAISES = 2.0, 3
 
 
 @dataclass(frozen=True, eq=False)
 class Interior:
-    """The interior of a body whose boundary is held."""
+    """Interior of a body whose boundary is fixed."""
 
-    K: sp.csc_array  #: (n, n) [N/m]
-    M: sp.csc_array  #: (n, n) [kg]
-    nodes: IntArray  #: node of every dof, (n,)
+    K: sp.csc_array  #: interior stiffness, (n, n) [N/m]
+    M: sp.csc_array  #: interior mass, (n, n) [kg]
+    nodes: IntArray  #: node of each dof, (n,)
     points: Array  #: positions of all nodes of the body, (n_nodes, 3) [m]
     is_multiplier: Array  #: whether each dof is a Lagrange multiplier, (n,)
 
     def dissection(self, leaf: int) -> Dissection:
-        """Return the tree of the dofs; multipliers and the nodes that they tie are in its root."""
+        """Return the tree of substructures; multipliers and the nodes that they tie are in its root."""
         graph, node = node_graph(self.K, self.M, self.nodes)
         tied = np.zeros(graph.shape[0], dtype=bool)
         tied[node[self.is_multiplier]] = True
@@ -118,13 +118,13 @@ class Interior:
 
 @dataclass(frozen=True, eq=False)
 class MultilevelResult:
-    """Modes, their remaining errors, and the tree, which can solve for other columns too."""
+    """Computed modes, their remaining errors, and the tree, which can also solve for other columns."""
 
     modes: EigenResult
-    errors: Array  #: estimated relative error of each frequency, an upper estimate, (k,)
+    errors: Array  #: upper estimate of the relative error of each frequency, (k,)
     n_steps: int  #: number of inverse iteration steps
-    n_reduced: int  #: number of modes of all substructures
-    cutoff_factor: float  #: substructure modes are kept up to this factor times the highest wanted frequency
+    n_reduced: int  #: total number of modes of all substructures
+    cutoff_factor: float  #: frequency up to which substructure modes are retained, over the highest wanted frequency
     tree: SubstructureTree
 
     def __post_init__(self) -> None:
@@ -257,7 +257,7 @@ def multilevel_modes(
 
 
 def _factor(interior: Interior, wanted: ModeCount) -> float:
-    """Return the cutoff factor: for shells and beams, whose nodes have rotations, or for solids."""
+    """Return the cutoff factor for shells and beams, whose nodes have rotations, or for solids."""
     n = len(interior.nodes)
     if n <= 4.5 * len(np.unique(interior.nodes)):
         return SOLID
@@ -265,7 +265,7 @@ def _factor(interior: Interior, wanted: ModeCount) -> float:
 
 
 def _tree_of(make: Callable[[float], SubstructureTree], bound: float, least: int) -> tuple[SubstructureTree, float]:
-    """Step (3): return a tree with at least `least` modes up to a bound on omega², raising the bound if necessary."""
+    """Step (3): return a tree with at least `least` modes up to a bound on omega², which is raised if necessary."""
     tree = make(bound)
     for _ in range(MOST_RAISES):
         if tree.mode_starts[-1] >= least:
@@ -277,7 +277,7 @@ def _tree_of(make: Callable[[float], SubstructureTree], bound: float, least: int
 
 
 def _smallest(values: Array, k: int) -> float:
-    """Return the k-th smallest of some values, k from 1; zero for k = 0."""
+    """Return the k-th smallest value, k from 1; zero for k = 0."""
     return float(np.partition(values, k - 1)[k - 1]) if k else 0.0
 
 
@@ -289,7 +289,7 @@ def _highest(own: Array, mass: ReducedMass, guess: float, count: int) -> float:
 
 
 def _reduced(own: Array, mass: ReducedMass, wanted: ModeCount, highest: float) -> tuple[Array, Array]:
-    """Step (5): return omega² and modes of the reduced pencil: the wanted modes, and guards beyond them."""
+    """Step (5): return omega² and modes of the reduced pencil: the wanted modes, then guard modes."""
     n = len(own)
     if wanted.n is not None:
         return reduced_modes(own, mass, min(wanted.n + _guards(wanted.n), n))
@@ -307,7 +307,7 @@ def _guards(count: int) -> int:
 
 
 def _improved(modes: ApproximateModes, Z: Array, count: int, tolerance: float, highest: float) -> tuple[Array, int]:
-    """Step (6): improve modes until the remaining error of the wanted ones is below the tolerance.
+    """Step (6): improve modes until the remaining errors of the wanted ones are below the tolerance.
 
     The wanted modes are at least `count`, and all below omega² = `highest`. All modes are improved together with the
     guards, whose amplitudes are the last columns of Z. A mode improved alone would keep its component along an
@@ -326,7 +326,7 @@ def _improved(modes: ApproximateModes, Z: Array, count: int, tolerance: float, h
 
 
 def _require_all(interior: Interior, omega2: Array, k: int, wanted: ModeCount, solver: Solver | None) -> None:
-    """Count the modes below a gap after the wanted ones by Sylvester's law of inertia."""
+    """Check the number of modes below a gap after the wanted ones by Sylvester's law of inertia."""
     last, sigma = counting_shift(omega2[: k + GUARDS], k, wanted, 0.0)
     A = sp.csc_array(interior.K - sigma * interior.M)
     with factorize(A, definite=False, solver=solver) as factorization:

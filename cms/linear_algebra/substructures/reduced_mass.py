@@ -1,4 +1,4 @@
-"""The mass of the reduced pencil: unit diagonal, and a dense block between each substructure and all below it."""
+"""Mass matrix of the reduced pencil: unit diagonal, and a dense block between each substructure and all below it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,9 +21,9 @@ class ReducedMass:
     below it, which are contiguous: firsts[t] to starts[t].
     """
 
-    starts: IntArray  #: (n_substructures + 1,)
-    firsts: IntArray  #: (n_substructures,)
-    blocks: Sequence[Array]  #: (starts[t] - firsts[t], starts[t + 1] - starts[t])
+    starts: IntArray  #: first mode of each substructure, and the end, (n_substructures + 1,)
+    firsts: IntArray  #: first mode in the subtree of each substructure, (n_substructures,)
+    blocks: Sequence[Array]  #: block of each substructure t, (starts[t] - firsts[t], starts[t + 1] - starts[t])
 
     @property
     def n(self) -> int:
@@ -64,7 +64,7 @@ class ReducedMass:
         return product
 
     def of(self, is_kept: NDArray[np.bool_]) -> "ReducedMass":
-        """Return the mass of a part of the modes, given as a mask (n,)."""
+        """Return the mass matrix of some modes, given as a mask (n,)."""
         number = np.concatenate([[0], np.cumsum(is_kept)])
         blocks = [
             C if is_kept[below].all() and is_kept[own].all() else C[is_kept[below]][:, is_kept[own]]
@@ -73,7 +73,7 @@ class ReducedMass:
         return ReducedMass(number[self.starts], number[self.firsts], blocks)
 
     def toarray(self) -> Array:
-        """Return M dense, (n, n)."""
+        """Return M as a dense matrix, (n, n)."""
         M = np.eye(self.n)
         for below, own, C in self._parts():
             M[below, own] = C
@@ -81,7 +81,7 @@ class ReducedMass:
         return M
 
     def tocsc(self) -> sp.csc_array:
-        """Return M sparse, (n, n)."""
+        """Return M as a sparse matrix, (n, n)."""
         rows, columns, values = [np.arange(self.n)], [np.arange(self.n)], [np.ones(self.n)]
         for below, own, C in self._parts():
             row, column = (x.ravel() for x in np.mgrid[below, own])

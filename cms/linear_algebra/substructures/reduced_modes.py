@@ -22,12 +22,12 @@ __all__ = ["COLUMNS", "PROBES", "SLICE", "ApproximateModes", "reduced_modes", "r
 # Improvement of modes by inverse iteration with the tree and Rayleigh-Ritz, and an estimate of the remaining error.
 
 
-COLUMNS = 128  #: columns of a block
-SLICE = 16384  #: rows that are moved at a time
-PROBES = 64  #: random columns that measure the residuals of any number of modes
-RARE = 1e-3  #: share of the modes whose residual the probes underestimate
+COLUMNS = 128  #: number of columns in a block
+SLICE = 16384  #: number of rows that are moved at a time
+PROBES = 64  #: number of random columns that measure the residuals of all modes
+RARE = 1e-3  #: share of the modes whose residual the random columns may underestimate
 SUMS = 16  #: number of neighbouring modes whose residuals are measured together
-FEW = 0.25  #: share of the modes up to which doubtful ones are measured individually
+FEW = 0.25  #: share of the modes up to which doubtful modes are measured individually
 
 
 class ApproximateModes:
@@ -39,9 +39,9 @@ class ApproximateModes:
     def __init__(self, tree: SubstructureTree, K: sp.csc_array, M: sp.csc_array, omega2: Array, X: Array) -> None:
         self.tree = tree
         self.K, self.M = (SymmetricProduct(A, columns=COLUMNS) for A in (K, M))
-        self.omega2 = omega2  #: Rayleigh quotients, (p,)
-        self.X = X  #: (n, p), C order, with the given number of columns
-        self.residuals = np.full(len(omega2), np.nan)  #: |r|_K / omega of the modes before the last step, (p,)
+        self.omega2 = omega2  #: Rayleigh quotients of the modes, (p,)
+        self.X = X  #: leading modes, (n, p), in C order
+        self.residuals = np.full(len(omega2), np.nan)  #: residual |r|_K / omega of each mode before the last step, (p,)
         self.n_solves = 0
 
     def improve(self) -> None:
@@ -71,7 +71,7 @@ class ApproximateModes:
         self.X = combined(self.X, Z / scale[:, None])
 
     def errors(self, count: int, tolerance: float = np.inf) -> Array:
-        """Return an estimate of the relative error of each of the first frequencies (they are too high), (count,).
+        """Return an estimate of the relative error of each of the first frequencies, (count,); all are too high.
 
         (1) r = x - omega² K⁻¹ M x,  a = |r|²_K / omega²,  b = |r|²_M  for each mode, with one solve for each
         (2) for many modes: a from above by random probes; b / a from sums of neighbours, r_j / omega_j with random
@@ -96,13 +96,13 @@ class ApproximateModes:
         return errors
 
     def _errors_of(self, a: Array, b: Array, which: IntArray) -> Array:
-        """Step (3): return the error of some modes from a, and b / omega², of each."""
+        """Step (3): return the error of some modes, from a and b / omega² of each mode."""
         omega2 = self.omega2[which]
         apart = 1 - omega2 / self.omega2[-1]
         return (a + omega2 * b / np.maximum(apart, np.finfo(float).eps)) / 2
 
     def _residuals_of_sums(self, pick: Array) -> tuple[Array, Array]:
-        """Step (1): return a, and b / omega², for sums of r_j / omega_j with coefficients in pick, (count, m)."""
+        """Step (1): return a and b / omega² for sums of r_j / omega_j with coefficients `pick`, (count, m)."""
         r = self._residuals(pick)
         a, b = (np.maximum(np.einsum("nk,nk->k", r, A @ r), 0.0) for A in (self.K, self.M))
         return a, b
@@ -142,17 +142,17 @@ class ApproximateModes:
 # reduced modes --------------------------------------------------------------------------------------------------------
 
 
-START = 5  #: substructure modes per wanted mode in the first pencil of the search
+START = 5  #: number of substructure modes per wanted mode in the first pencil of the search
 DENSE = 3000  #: number of substructure modes up to which dense matrices are fast and small
-TOLERANCE = 1e-4  #: residual of the iteration, far below the error of the substructures
-WIDER = 4  #: ratio of substructure modes in successive pencils
-SETTLED = 5e-5  #: relative error of omega² that the iteration may leave
-LAG = 4.0  #: factor on the error after a step, compared with the contribution of much higher modes alone
+TOLERANCE = 1e-4  #: tolerated residual of the iteration, far below the error due to substructuring
+WIDER = 4  #: ratio between numbers of substructure modes in successive pencils
+SETTLED = 5e-5  #: relative error of omega² at which the iteration ends
+LAG = 4.0  #: factor on the estimated error after a step, which considers only much higher modes
 MOST_STEPS = 20
 
 
 class Diagonal:
-    """The inverse of a diagonal matrix, in the form that the eigensolver needs."""
+    """Inverse of a diagonal matrix with the interface that the eigensolver needs."""
 
     description = "a diagonal"
 
@@ -213,7 +213,7 @@ def _symmetric(A: Array) -> Array:
 
 
 def _is_settled(before: Array, lam: Array, cut: float) -> bool:
-    """Return whether the share of the last change that a step leaves is small.
+    """Return whether the remaining share of the last change is small after a step.
 
     The missing part of the modes lies along modes above the cut; a step leaves about (lam / cut)² of their error.
     """
@@ -245,7 +245,7 @@ def _iterated(omega2: Array, M: ReducedMass, lam: Array, Z: Array, cut: float) -
 
 
 def _at_once(omega2: Array, M: ReducedMass, count: int) -> tuple[Array, Array]:
-    """Solve densely: with D = diag(omega²), the largest theta of D^-½ M D^-½ are 1 / omega² of the modes."""
+    """Solve densely: with D = diag(omega²), the largest eigenvalues of D^-½ M D^-½ are 1 / omega² of the modes."""
     n = len(omega2)
     if n > DENSE and 3 * count < n:
         found = eigenmodes(
@@ -259,7 +259,7 @@ def _at_once(omega2: Array, M: ReducedMass, count: int) -> tuple[Array, Array]:
 
 
 def reduced_omega2(omega2: Array, M: ReducedMass, k: int) -> float:
-    """Return the k-th lowest eigenvalue, k from 1, by a dense solution."""
+    """Return the k-th lowest eigenvalue, k from 1, from dense matrices."""
     n = len(omega2)
     A, _ = _scaled(omega2, M)
     theta = la.eigh(A, subset_by_index=(n - k, n - k), overwrite_a=True, eigvals_only=True)

@@ -1,4 +1,4 @@
-"""The tree of eliminated substructures: solutions with the whole tree, and the motions spanned by its modes."""
+"""Tree of eliminated substructures: solutions with the whole tree, and motions spanned by its modes."""
 
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import replace
@@ -16,8 +16,8 @@ from fe_models.foundation.threads import bounded_threads, n_threads
 
 __all__ = ["SubstructureTree", "substructure_tree"]
 
-BLOCK = 256  #: columns that are brought into elimination order at a time
-PARTS = 16  #: size limit of a task: the size of the body divided by this number for each processor
+BLOCK = 256  #: number of columns that are brought into elimination order at a time
+PARTS = 16  #: a task has at most 1 / (PARTS n_processors) of the body
 
 
 class SubstructureTree:
@@ -39,7 +39,7 @@ class SubstructureTree:
 
     @property
     def division(self) -> str:
-        """Description of the division of the body."""
+        """Description of how the body is divided."""
         levels = np.zeros(self.dissection.n, dtype=int)
         for t in range(self.dissection.n - 2, -1, -1):
             levels[t] = levels[self.dissection.parents[t]] + 1
@@ -65,7 +65,7 @@ class SubstructureTree:
         return ReducedMass(self.mode_starts, firsts, [each.coupling for each in self.substructures])
 
     def expand(self, Z: Array) -> Array:
-        """Return the motion of all dofs in elimination order, (n, k), for amplitudes of the modes, (n_modes, k).
+        """Return the motion of all dofs in elimination order, (n, k), for modal amplitudes, (n_modes, k).
 
         It is computed from the root down: u_s = Phi z_s + Psi u_b.
         """
@@ -219,7 +219,7 @@ def substructure_tree(
 
 
 class _Body:
-    """The matrices in elimination order, cut into parts."""
+    """Matrices in elimination order, from which parts are cut."""
 
     def __init__(
         self, dissection: Dissection, K: sp.csc_array, M: sp.csc_array, omega2: float, multipliers: IntArray
@@ -240,7 +240,7 @@ class _Body:
         return [range(first[t], t + 1) for t in np.flatnonzero(~is_top & is_top[parents]).tolist()], is_top
 
     def part(self, run: range, below: tuple[Remainder, ...] = ()) -> Part:
-        """Return consecutive substructures with their columns, or one with the contributions of its children."""
+        """Return a part: consecutive substructures with their columns, or one with contributions of its children."""
         starts = self.dissection.starts[run.start : run.stop + 1]
         numbers = tuple(tuple(c - run.start for c in self.children[t]) for t in run)
         if len(run) == 1:

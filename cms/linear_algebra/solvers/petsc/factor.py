@@ -22,9 +22,9 @@ from fe_models.foundation.ranks.trim import give_back
 
 __all__ = ["PetscFactor"]
 
-CHUNK = 64  #: columns per solve; the workspace of MUMPS grows with them
-ROOM = (20, 60, 200)  #: workspace beyond the estimate in percent (ICNTL(14)); the values are tried in turn
-METIS = 5  #: ICNTL(7)
+CHUNK = 64  #: number of columns per solve; the workspace of MUMPS grows with it
+ROOM = (20, 60, 200)  #: workspace beyond the estimate in percent (ICNTL(14)); the values are tried one after the other
+METIS = 5  #: code of METIS for ICNTL(7)
 #: values of INFOG(1) for a lack of workspace, which the next value of ROOM may cure
 TOO_SMALL = (-8, -9, -11, -14, -15, -17, -20)
 NOT_FACTORIZED = {
@@ -51,7 +51,7 @@ class PetscFactor:
         on_disk: bool = False,
         keeps_matrix: bool = False,
     ) -> None:
-        """Factorise the matrix with this lower triangle, (n, n), every diagonal entry stored, sorted row indices.
+        """Factorise a matrix from its lower triangle, (n, n), with all diagonal entries stored and row indices sorted.
 
         The entries are sent to the ranks, and `lower` is empty afterwards, so that rank 0 does not hold them twice. For
         a distributed matrix each rank uses its own rows.
@@ -109,7 +109,7 @@ class PetscFactor:
 
 
 def emptied(n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return indptr, indices, data of an empty matrix with n columns."""
+    """Return indptr, indices and data of an empty matrix with n columns."""
     return np.zeros(n + 1, np.int32), np.zeros(0, np.int32), np.zeros(0)
 
 
@@ -122,7 +122,7 @@ def communicator(ranks: Ranks) -> Any:
 def factorize_here(
     ranks: Ranks, key: str, rows: Rows, definite: bool, on_disk: bool, keeps_matrix: bool
 ) -> dict[str, Any]:
-    """Steps (1) and (2), on every rank: return what MUMPS reports."""
+    """Steps (1) and (2) on each rank: distribute and factorise; return the report of MUMPS."""
     PETSc = petsc()
     comm = communicator(ranks)
     indptr, indices, data = rows_here(ranks, key, rows)
@@ -158,7 +158,7 @@ def factorize_here(
             break
         ksp.destroy()
     if not keeps_matrix and error >= 0:  # the factor no longer needs the matrix
-        for each in (pc, ksp, A):  # pc too, because Python would leave it in PETSc's garbage
+        for each in (pc, ksp, A):  # pc as well, because Python would leave it in the garbage of PETSc
             each.destroy()
     ranks.store[key] = (F, ksp, A) if keeps_matrix else (F,)
     give_back()
@@ -173,18 +173,18 @@ def factorize_here(
 
 
 def rows_here(ranks: Ranks, key: str, rows: Rows) -> tuple[np.ndarray, np.ndarray, Array]:
-    """Return the rows that this rank holds or receives from rank 0."""
+    """Return the rows that this rank already has, or receives from rank 0."""
     given = ranks.store.pop(key, None)
     return (given.indptr, given.indices, given.data) if isinstance(given, OwnRows) else spread(ranks, rows, given)
 
 
 def entries(value: int) -> int:
-    """Return a count of MUMPS; negative values are in millions."""
+    """Return a count reported by MUMPS, where negative values are in millions."""
     return -value * 10**6 if value < 0 else value
 
 
 def solve_here(ranks: Ranks, key: str, rows: Rows) -> Array | None:
-    """Step (3), on every rank: return the solutions on rank 0."""
+    """Step (3) on each rank: solve, and return the solutions on rank 0."""
     own = own_rows(ranks, rows, ranks.store.pop("columns", None))
     x = collected(ranks, rows, solved_rows(ranks, key, rows, own))
     give_back()
@@ -192,7 +192,7 @@ def solve_here(ranks: Ranks, key: str, rows: Rows) -> Array | None:
 
 
 def solved_rows(ranks: Ranks, key: str, rows: Rows, own: Array) -> Array:
-    """Return this rank's rows of the solutions, given its rows of the right-hand sides, (n_own, k)."""
+    """Return the rows of the solutions on this rank, given its rows of the right-hand sides, (n_own, k)."""
     PETSc = petsc()
     comm = communicator(ranks)
     F = ranks.store[key][0]

@@ -1,4 +1,4 @@
-"""PETSc, SLEPc and MPI for Python; they have no wheels and must be built beside MPI (docs/cluster_mpi.md)."""
+"""PETSc, SLEPc and MPI for Python; no wheels exist, so they must be built with MPI (docs/cluster_mpi.md)."""
 
 from functools import cache
 from importlib import import_module
@@ -11,7 +11,7 @@ HOW = "benchmarks/install_petsc.sh builds them beside Debian's PETSc (docs/clust
 
 
 def missing_petsc() -> str:
-    """Describe the missing parts; "" if PETSc can be used."""
+    """Describe which parts of PETSc are missing; "" if it can be used."""
     lacks = [name for name in ("petsc4py", "slepc4py", "mpi4py") if find_spec(name) is None]
     return f"needs {', '.join(lacks)}, which {'is' if len(lacks) == 1 else 'are'} not installed; {HOW}" if lacks else ""
 
