@@ -22,7 +22,7 @@ __all__ = [
 
 
 class ModeSetError(CmsError, ValueError):
-    """The mode set cannot be made from this body with these options."""
+    """The body and the options do not allow this mode set."""
 
 
 class FactorizationError(CmsError, RuntimeError):
@@ -30,19 +30,19 @@ class FactorizationError(CmsError, RuntimeError):
 
 
 class FactorRoomError(CmsError, RuntimeError):
-    """There is not enough memory or disk space for a factor; this says nothing about the matrix."""
+    """Memory or disk space does not suffice for a factor; the matrix may be regular."""
 
 
 class ForeignBodyError(CmsError, ValueError):
-    """A body reduced by another program cannot be read without guessing, or lacks data that a reduced body needs."""
+    """A body reduced by another program is ambiguous, or lacks data that a reduced body needs."""
 
 
 class CompareError(CmsError, ValueError):
-    """The comparison of mode sets cannot be made as requested."""
+    """The requested comparison of mode sets is impossible."""
 
 
 class EigenError(CmsError, RuntimeError):
-    """Vibration modes were not found to the tolerance, or their number contradicts the inertia of the matrix."""
+    """Vibration modes did not converge to the tolerance, or their number contradicts the inertia of the matrix."""
 
 
 class JobError(CmsError, ValueError):
@@ -50,7 +50,7 @@ class JobError(CmsError, ValueError):
 
 
 class MemoryBudgetError(CmsError, ValueError):
-    """The reduction does not fit into the given memory, or the size is invalid; the message says what would help."""
+    """The reduction does not fit into the given memory, or the memory size is invalid; the message names remedies."""
 
 
 class ExportError(CmsError, ValueError):
@@ -58,4 +58,4 @@ class ExportError(CmsError, ValueError):
 
 
 class RecoveryError(CmsError, ValueError):
-    """Recovery rows cannot be made as requested, or cannot be written."""
+    """The requested recovery rows cannot be computed or written."""

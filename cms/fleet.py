@@ -30,30 +30,30 @@ __all__ = ["FleetJob", "FleetRow", "inputs_of", "reduce_fleet"]
 
 @dataclass(frozen=True)
 class FleetJob:
-    """A job and its modal file, both by full path, and a fingerprint of all files on which the job depends."""
+    """Job of a fleet: full paths of the job and its modal file, and a fingerprint of all files that it depends on."""
 
     job: Path
     output: Path
     digest: str
-    solver: str | None = None  #: overrides the solver of the job
+    solver: str | None = None  #: solver that replaces the solver of the job; None: that of the job
 
 
 @dataclass(frozen=True)
 class FleetRow:
-    """The result of one job."""
+    """Result of one job of a fleet."""
 
     job: FleetJob
     name: str = ""  #: name of the body
     n_modes: int = 0
     seconds: float = 0.0
-    notes: tuple[str, ...] = ()  #: warnings during the job
-    error: str = ""  #: reason why there is no file
-    is_lasting: bool = True  #: whether another attempt would give the same error
-    is_known: bool = False  #: whether the row comes from the journal
+    notes: tuple[str, ...] = ()  #: warnings during this job
+    error: str = ""  #: reason if there is no modal file; empty: success
+    is_lasting: bool = True  #: whether another attempt would fail with the same error
+    is_known: bool = False  #: whether the row was read from the journal
 
 
 class RecordingHandler(logging.Handler):
-    """Keeps the warnings of one thread."""
+    """Logging handler that collects the warnings of one thread."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
@@ -61,14 +61,14 @@ class RecordingHandler(logging.Handler):
         self.notes: list[str] = []
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Keep one warning."""
+        """Store one warning."""
         if record.thread == self.thread and not record.name.startswith("distributed"):
             self.notes.append(record.getMessage())
 
 
 @contextmanager
 def recorded_notes() -> Iterator[list[str]]:
-    """Collect warnings for the row, which reports them with the name of the job; they are not printed meanwhile."""
+    """Collect warnings for the row, which reports them with the name of the job, instead of printing them."""
     root, kept = logging.getLogger(), RecordingHandler()
     before, root.handlers = root.handlers, [kept]
     try:
@@ -78,7 +78,7 @@ def recorded_notes() -> Iterator[list[str]]:
 
 
 class FleetTask:
-    """Reduces a job to its modal file, in a worker."""
+    """Task of a worker: reduce a job to its modal file."""
 
     def __call__(self, job: FleetJob) -> FleetRow:
         """Run a job and write its modal file."""
@@ -96,16 +96,16 @@ class FleetTask:
         return FleetRow(job, error=words, is_lasting=is_lasting)
 
     def key(self, job: FleetJob) -> tuple[str, str, str]:
-        """Return the files of a job, and the digest of what it reads."""
+        """Return the files of a job as key in the journal, and the digest of the input."""
         return str(job.job), str(job.output), job.digest
 
     def record(self, row: FleetRow) -> dict[str, Any] | None:
-        """Return a finished row and the digest of its modal file; failed jobs are run again."""
+        """Return the journal entry of a finished row, with the digest of its modal file; failed jobs are run again."""
         made = {"made": file_digest(row.job.output), "name": row.name, "n_modes": row.n_modes, "seconds": row.seconds}
         return None if row.error else {**made, "notes": row.notes}
 
     def row(self, job: FleetJob, record: dict[str, Any]) -> FleetRow:
-        """Return the row of a record whose modal file is unchanged."""
+        """Return the row of a journal entry if its modal file is unchanged."""
         if record["made"] != file_digest(job.output):
             raise ValueError("another modal file")
         notes = tuple(str(note) for note in record["notes"])
@@ -172,7 +172,7 @@ def reduce_fleet(
 
 
 def fleet_of(jobs: Sequence[Path], outputs: Sequence[Path], solver: str | None = None) -> list[FleetJob]:
-    """Return the checked jobs of a fleet; raise `JobError` if two of their files are the same."""
+    """Return the checked jobs of a fleet; raise `JobError` if two jobs have the same file."""
     inputs = [inputs_of(path, read_job(path)) for path in jobs]
     # several jobs may use the same mesh
     digests = {each: file_digest(each) for each in {each for files in inputs for each in files}}
@@ -192,7 +192,7 @@ def fleet_of(jobs: Sequence[Path], outputs: Sequence[Path], solver: str | None =
 
 
 def inputs_of(path: Path, job: Job) -> list[Path]:
-    """Return the job file and all files that it names: base files, meshes, tables, matrices, and neighbours' files."""
+    """Return the job file and all files that it refers to: base files, meshes, tables, matrices, neighbours."""
     found = [path, *extended_files(path, JobError)]
     for each in files_named(job):
         found += inputs_of(each, read_job(each)) if each.suffix == ".toml" and each not in found else [each]

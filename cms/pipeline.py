@@ -40,7 +40,7 @@ __all__ = ["Plan", "budget_of", "expected_columns", "reduce_job", "reduced", "st
 
 log = logging.getLogger(__name__)
 
-GUESSED_MODES = 50  #: assumed number of modes for the memory estimate, if a cutoff or "auto" determines it
+GUESSED_MODES = 50  #: assumed number of modes for the memory estimate if a cutoff or "auto" determines the number
 
 
 def reduce_job(
@@ -51,7 +51,7 @@ def reduce_job(
     memory: str | float | None = None,
     on_report: Callable[[Any], None] | None = None,
 ) -> ReducedBody:
-    """Run a job up to the reduced body.
+    """Process a job up to the reduced body.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def reduce_job(
 
 
 def states_of_job(job: Job, families: "Families") -> "UnitStates":
-    """Return the static states of the unit loads whose geometric stiffness a job requests."""
+    """Return the static states of unit loads for the geometric stiffness that a job requests."""
     from cms.reduction.geometric_stiffness.unit_states import unit_states
 
     asked = job.reduction.geometric_stiffness
@@ -122,7 +122,7 @@ def reduced(
     states: "UnitStates | None",
     stages: Stages,
 ) -> ReducedBody:
-    """Reduce the body of a job to its modes.
+    """Reduce the coupled body of a job to its modes.
 
     Parameters
     ----------
@@ -156,14 +156,16 @@ def reduced(
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What a reduction decides before its long work: the solver, where columns lie, and the geometric stiffness."""
+    """Decisions before the expensive part of a reduction: solver, storage of columns, and geometric stiffness."""
 
-    body: FEBody  #: the coupled body
-    asked: "Asked"  #: geometric stiffness: True, False, the interfaces whose loads it has; None: if it is small
-    is_requested: bool  #: whether the job requests the geometric stiffness, or quadratic modes, which need it
-    is_optional: bool  #: whether it is computed if it is small: nobody decided, and the elements know it
-    solver: Solver | None = None  #: of the factorisation; None: the fastest that is installed
-    to_disk: bool = False  #: whether the columns lie on disk
+    body: FEBody  #: coupled body
+    #: geometric stiffness: True, False, or the interfaces whose loads it includes; None: only if it is small
+    asked: "Asked"
+    is_requested: bool  #: whether the job requests the geometric stiffness, or quadratic modes, which require it
+    #: whether it is computed only if it is small, because the job leaves this open and the elements support it
+    is_optional: bool
+    solver: Solver | None = None  #: solver for the factorisation; None: the fastest installed one
+    to_disk: bool = False  #: whether the columns are stored on disk
 
     @classmethod
     def of(cls, job: Job, body: FEBody, solver: Solver, budget: float | None) -> "Plan":
@@ -186,7 +188,7 @@ class Plan:
         if plan.is_requested:
             require_geometric_stiffness(body)
             for name in plan.asked if isinstance(plan.asked, list) else ():
-                body.interface(name)  # an unknown name is refused before the long work
+                body.interface(name)  # raises an error for an unknown name before the expensive work
             require_room_for_stiffness(body, n_columns, plan.asked)
             words = stiffness_words(body, n_columns, plan.asked)
         if words:
@@ -199,7 +201,7 @@ class Plan:
 
     @classmethod
     def of_stiffness(cls, job: Job, body: FEBody) -> "Plan":
-        """Plan the geometric stiffness alone, for many reductions with one factorisation."""
+        """Plan only the geometric stiffness, for several reductions with one factorisation."""
         from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffness
 
         asked = job.reduction.geometric_stiffness
@@ -207,18 +209,18 @@ class Plan:
         return cls(body, asked, is_requested, not is_requested and asked is None and has_geometric_stiffness(body))
 
     def needs_states(self, n_modes: int) -> bool:
-        """Return whether a mode set of this size is reduced with the static states of unit loads."""
+        """Return whether a mode set of this size needs the static states of unit loads."""
         return self.is_requested or (self.is_optional and not self.left_out(n_modes))
 
     def left_out(self, n_modes: int) -> str:
-        """Return a note that an optional geometric stiffness is left out because it is large, or ""."""
+        """Return a note if an optional geometric stiffness is omitted because it is large; otherwise ""."""
         from cms.modes.families.cost import left_out_words
 
         return left_out_words(self.body, n_modes) if self.is_optional else ""
 
 
 def budget_of(job: Job, solver: str | Solver | None, memory: str | float | None) -> float | None:
-    """Return the memory that a reduction may take [bytes]; None: no limit.
+    """Return the memory limit of a reduction [bytes]; None: no limit.
 
     Raises
     ------
@@ -241,7 +243,7 @@ def budget_of(job: Job, solver: str | Solver | None, memory: str | float | None)
 
 
 def expected_columns(job: Job, body: FEBody) -> int:
-    """Return a lower bound of the number of columns of the mode set of a job, before the set is made."""
+    """Return a lower bound on the number of columns of the mode set of a job, before it is computed."""
     from cms.modes.families.cost import interface_reduction_size
     from cms.modes.mode_sets import INTERFACE_SETS
 

@@ -43,7 +43,7 @@ R = TypeVar("R")
 
 FAULT, USER_ERROR, INTERRUPTED = 1, 2, 130
 NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-show_tracebacks = ContextVar("show_tracebacks", default=False)  #: the option --debug
+show_tracebacks = ContextVar("show_tracebacks", default=False)  #: whether the option --debug is given
 PIPE_WIDTH = 160  #: width in columns of tables that are not written to a terminal
 
 
@@ -76,7 +76,7 @@ def run(app: typer.Typer, name: str) -> None:
 
 
 class Notes(logging.Handler):
-    """Prints the warnings of the packages on standard error, one line each."""
+    """Logging handler that prints the warnings of the packages on standard error, one line each."""
 
     def emit(self, record: logging.LogRecord) -> None:
         """Print one warning."""
@@ -84,7 +84,7 @@ class Notes(logging.Handler):
 
 
 class PlainHelp(TyperCommand):
-    """A command whose help is printed literally: words in brackets are tables and units, not markup."""
+    """Command whose help is printed literally: words in brackets are tables and units, not markup."""
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
@@ -95,7 +95,7 @@ class PlainHelp(TyperCommand):
 
 
 class Commands(typer.Typer):
-    """An application of such commands."""
+    """Application with commands of the class `PlainHelp`."""
 
     def command(self, name: str | None = None, **options: Any) -> Any:
         """Register a command."""
@@ -103,7 +103,7 @@ class Commands(typer.Typer):
 
 
 def register(app: typer.Typer, groups: Mapping[str, Mapping[str, Callable[..., None]]]) -> None:
-    """Add the commands of a program, by the heading of their group in --help and by name, in the order of work."""
+    """Add commands under the headings of their groups in --help, in the order of work."""
     for heading, members in groups.items():
         for name, command in members.items():
             app.command(name, rich_help_panel=heading)(command)
@@ -203,7 +203,7 @@ def bug(error: BaseException) -> str:
 
 
 def print_error(text: str) -> None:
-    """Print a message on standard error literally, without wrapping or markup."""
+    """Print a message on standard error, literally, without wrapping."""
     typer.secho("error: ", fg=typer.colors.RED, bold=True, nl=False, err=True)
     typer.echo(text, err=True)
 
@@ -211,7 +211,7 @@ def print_error(text: str) -> None:
 def output_path(
     given: Any, default: Any, error: type[Exception], *, overwrite_of: Iterable[Any] = (), needs_file: bool = False
 ) -> Any:
-    """Return the output path, after a check before any work that it can be written.
+    """Return the output path after a check, before any work, that it can be written.
 
     A device or a pipe is written to directly; with `needs_file`, for output in several parts, it is rejected.
 
@@ -245,7 +245,7 @@ def output_path(
 
 
 def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-    """Print a table on standard output; a heading that ends in '>' is right-aligned; no headings: no header line."""
+    """Print a table on standard output. A heading ending in '>' is right-aligned; `columns` may be empty."""
     from rich import box
     from rich.table import Table
 
@@ -268,7 +268,7 @@ def say(text: str) -> None:
 
 
 def escape(cell: Any) -> str:
-    """Return a cell as text that rich prints literally."""
+    """Return the text of a cell, escaped such that rich prints it literally."""
     from rich.markup import escape as escaped
 
     return escaped(cell if isinstance(cell, str) else f"{cell:.6g}" if isinstance(cell, float) else str(cell))
@@ -308,6 +308,6 @@ def stages(*, remaining: bool = False) -> Iterator[Stages]:
 
 
 def vector_words(values: Any, scale: float | None = None) -> str:
-    """Return numbers in one line; numbers that are rounding relative to the scale (default: the largest) become 0."""
+    """Return numbers on one line; numbers within rounding of the scale (default: the largest) become 0."""
     scale = max((abs(value) for value in values), default=0.0) if scale is None else scale
     return "(" + ", ".join(f"{value if abs(value) > 1e-12 * scale else 0:.6g}" for value in values) + ")"

@@ -20,9 +20,9 @@ from cms.errors import JobError
 
 __all__ = ["run_demo"]
 
-JOBS = ("rod.toml", "crank.toml")  #: these files are included beside this module
+JOBS = ("rod.toml", "crank.toml")  #: job files included in this package
 MODE = 3
-FPS = 15  #: frames per second of the film of the motion, 8 s long; drawing it is most of the work of the demo
+FPS = 15  #: frames per second of the film of the motion, which lasts 8 s; drawing it takes most of the time
 
 
 def run_demo(folder: Path) -> None:
@@ -76,7 +76,7 @@ def run_steps(folder: Path, wait_for_kernels: Callable[[], None]) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Begun:
-    """A command that runs in its own process, and the file that receives its output."""
+    """Command in a separate process, and the file that receives its output."""
 
     words: str
     worker: subprocess.Popen[bytes]
@@ -84,7 +84,7 @@ class Begun:
 
 
 def begun(running: ExitStack, folder: Path, words: str) -> Begun:
-    """Start a command, `cms ...` or `floatframe ...`, in the folder, as a user does; the stack ends it.
+    """Start a command, `cms ...` or `floatframe ...`, in the folder as a user does; the stack terminates it.
 
     Apart from this, the package does not know `floatframe`.
     """
@@ -99,7 +99,7 @@ def begun(running: ExitStack, folder: Path, words: str) -> Begun:
 
 
 def finish(folder: Path, command: Begun) -> None:
-    """Announce a command that was started, wait for its end, and print its output.
+    """Announce a started command, wait for its end, and print its output.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def finish(folder: Path, command: Begun) -> None:
 
 
 def ended(worker: subprocess.Popen[bytes]) -> None:
-    """End a process that still runs."""
+    """Terminate a process that is still running."""
     worker.kill()
     worker.wait()
 
@@ -128,7 +128,7 @@ def environment() -> dict[str, str]:
 
 
 def list_files(folder: Path) -> None:
-    """Print the list of files that were made."""
+    """Print the list of created files."""
     made = {
         "rod.msh": "the shipped mesh, tet10",
         "rod.toml": "what to reduce and how",
@@ -171,7 +171,7 @@ def kernels_compiled_beside() -> Iterator[Callable[[], None]]:
 
 
 def put_inputs(folder: Path) -> None:
-    """Copy the mesh and the job files into the folder; raise `JobError` for a changed job, which is not overwritten."""
+    """Copy the mesh and job files into the folder; raise `JobError` rather than overwrite a changed job."""
     from fe_models.foundation.paths import replace_file
     from fe_models.parts import shipped_mesh
 
@@ -192,6 +192,6 @@ def put_inputs(folder: Path) -> None:
 
 
 def announce(folder: Path, command: str) -> None:
-    """Announce a step by the equivalent command."""
+    """Announce a step by printing the equivalent command."""
     typer.echo()
     typer.secho(f"{folder}$ {command}", bold=True)

@@ -40,7 +40,8 @@ __all__ = [
 # the command `cms formats`: formats of other programs that are read and written ---------------------------------------
 
 
-HELD = ("mesh", "geometry", "deck", "matrices", "reduced body")  #: contents of files, from the part to the body
+#: kinds of file content, in the order from the part to the body
+HELD = ("mesh", "geometry", "deck", "matrices", "reduced body")
 FORMATS = tuple(sorted((*MODELS, *REDUCED, *EXPORTED), key=lambda known: HELD.index(known.holds)))
 IN = ("program", "format", "holds", "what is lost", "tried")
 OUT = ("program", "format", "--to", "what is lost", "tried")
@@ -90,18 +91,18 @@ def format_words(known: FileFormat) -> str:
 
 @dataclass(frozen=True)
 class ExportRequest:
-    """The arguments of `cms export`."""
+    """Arguments of `cms export`."""
 
     file: Path
     to: str
     units: str | None
     nodes: str
     output: Path | None
-    loads: tuple[str, ...] = ()  #: "NAME=AMPLITUDE"
+    loads: tuple[str, ...] = ()  #: texts "NAME=AMPLITUDE"
 
 
 def run_export(request: ExportRequest) -> None:
-    """Write the files, and report data that the format does not hold.
+    """Write the files, and report data that the format cannot hold.
 
     Raises
     ------
@@ -130,7 +131,7 @@ def run_export(request: ExportRequest) -> None:
 
 
 def loads_of(request: ExportRequest) -> dict[str, float]:
-    """Return the requested amplitudes by the names of their load cases."""
+    """Return the requested amplitude of each load case."""
     loads = {}
     for text in request.loads:
         name, _, amplitude = text.rpartition("=")
@@ -148,7 +149,7 @@ def loads_of(request: ExportRequest) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class ImportRequest:
-    """The arguments of `cms import`."""
+    """Arguments of `cms import`."""
 
     files: tuple[str, ...]  #: paths, or ROLE=path
     units: str | None
@@ -156,8 +157,8 @@ class ImportRequest:
     name: str | None = None
     form: str | None = None
     nodes: Path | None = None
-    boundary: str | None = None  #: "3,11,19"
-    interfaces: tuple[str, ...] = ()  #: "NAME=3,11"
+    boundary: str | None = None  #: boundary node numbers, such as "3,11,19"
+    interfaces: tuple[str, ...] = ()  #: interfaces, such as "NAME=3,11"
     full_mass: tuple[str, ...] = ()  #: files of the full model
     nodal_masses: Path | None = None
     mesh: Path | None = None
@@ -167,7 +168,7 @@ class ImportRequest:
     damping: float | None = None
     repair_mass: bool = False
     accept: tuple[str, ...] = ()
-    heavy: bool = False  #: whether a damping ratio above 0.2 is meant
+    heavy: bool = False  #: whether a damping ratio above 0.2 is intended
 
 
 def run_import(request: ImportRequest) -> "ReducedBody":
@@ -214,7 +215,7 @@ def run_import(request: ImportRequest) -> "ReducedBody":
 
 
 def named_files(words: tuple[str, ...]) -> "list[Path] | dict[str, Path]":
-    """Return paths, or paths by role if files are given as ROLE=path."""
+    """Return the paths, by role if files are given as ROLE=path."""
     roles = [word.partition("=") for word in words]
     with_role = [role in ("K", "M", "D", "dofs") and bool(mark) for role, mark, _ in roles]
     if not any(with_role):
@@ -235,7 +236,7 @@ def numbers_of(option: str, text: str) -> list[int]:
 
 
 def interfaces_of(words: tuple[str, ...]) -> dict[str, list[int]] | None:
-    """Return the nodes of each interface from NAME=3,11; None if none are given."""
+    """Return the node numbers of each interface, given as NAME=3,11; None if there are none."""
     found: dict[str, list[int]] = {}
     for word in words:
         name, mark, numbers = word.partition("=")
@@ -287,7 +288,7 @@ def table_of_masses(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def frame_of(request: ImportRequest) -> "Frame | None":
-    """Return the requested frame; None: the default."""
+    """Return the requested frame; None for the default."""
     from cms.cli.frame import FrameRequest
     from cms.cli.frame import frame_of as frame_of_request
 
@@ -297,7 +298,7 @@ def frame_of(request: ImportRequest) -> "Frame | None":
 
 
 def damping_of(request: ImportRequest) -> "Damping | None":
-    """Return the damping requested in addition to that of the files."""
+    """Return the requested damping, which is added to that of the files."""
     from cms.reduction.basis.damping import ModalDamping
 
     return None if request.damping is None else ModalDamping(request.damping, heavy=request.heavy)
@@ -308,7 +309,7 @@ def damping_of(request: ImportRequest) -> "Damping | None":
 
 @dataclass(frozen=True)
 class RecoveryCommand:
-    """The arguments of `cms recovery`."""
+    """Arguments of `cms recovery`."""
 
     file: Path
     table: str | None
@@ -319,7 +320,7 @@ class RecoveryCommand:
 
 
 def run_recovery(request: RecoveryCommand) -> None:
-    """List the rows of a body, or write one table; if `rows` is given, the tables of that file are made first.
+    """List the rows of a body, or write one table; if a file `rows` is given, compute its tables first.
 
     Raises
     ------
@@ -357,7 +358,7 @@ def run_recovery(request: RecoveryCommand) -> None:
 
 
 def with_rows(body: "ReducedBody", path: Path) -> "ReducedBody":
-    """Return the body with the tables requested in a file, as far as it knows them without its model."""
+    """Return the body with the tables requested in a file, as far as it can compute them without its model."""
     from cms.jobs.tables.recovery_section import RecoveryFile, requests_of
     from cms.reduction.recovery.matrices import recovery_matrices
     from fe_models.foundation.toml_file import read_toml, validated

@@ -20,18 +20,18 @@ __all__ = ["FrameRequest", "frame_of", "numbers", "run_frame"]
 
 @dataclass(frozen=True)
 class FrameRequest:
-    """The arguments of `cms frame`."""
+    """Arguments of `cms frame`."""
 
     file: Path
-    to: str  #: key of `FRAMES`
+    to: str  #: key of `FRAMES` for the new frame
     at: str | None = None
-    origin: str | None = None  #: "x,y,z"
-    axes: str | None = None  #: "x,y,z;x,y,z;x,y,z", the three axes
+    origin: str | None = None  #: origin of the new frame, "x,y,z"
+    axes: str | None = None  #: three axes of the new frame, "x,y,z;x,y,z;x,y,z"
     ratio: float | None = None
     units: str | None = None
     output: Path | None = None
-    keep_geometric: bool = True  #: False: leave the geometric stiffness out
-    heavy: bool = False  #: whether a ratio above 0.2 is meant
+    keep_geometric: bool = True  #: whether the geometric stiffness is converted; if not, it is omitted
+    heavy: bool = False  #: whether a damping ratio above 0.2 is intended
 
 
 def run_frame(request: FrameRequest) -> "ReducedBody":
@@ -90,7 +90,7 @@ def frame_of(request: FrameRequest) -> "Frame":
 
 
 def damping_of(request: FrameRequest) -> "Damping | None":
-    """Return the damping that replaces that of the file; None if none is requested."""
+    """Return the damping that replaces the damping of the file; None if none is requested."""
     from cms.reduction.basis.damping import ModalDamping
 
     return None if request.ratio is None else ModalDamping(request.ratio, heavy=request.heavy)

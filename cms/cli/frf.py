@@ -34,7 +34,7 @@ OVERLAY_DAMPING = 0.01
 
 @dataclass(frozen=True)
 class FrfRequest:
-    """The arguments of the command."""
+    """Arguments of the command `cms frf`."""
 
     file: Path
     excited: str
@@ -111,7 +111,7 @@ def parse_component(text: str) -> tuple[int, int]:
 
 
 def full_model(request: FrfRequest, reduced: ReducedBody, highest: float) -> tuple[PortModel, float]:
-    """Return the full model of a job at the two interfaces, valid up to a frequency [Hz], and its time unit [s]."""
+    """Return the full model of a job at two interfaces, valid up to a frequency [Hz], and its time unit [s]."""
     from cms.assessment.quality.reduction_check import require_same_units
     from cms.assessment.quality.reference.ports import Ports
     from cms.assessment.quality.reference.reference_response import reference_response
@@ -141,7 +141,7 @@ def print_peaks(
     full: FrequencyResponse | None,
     pairs: tuple[tuple[int, int], ...],
 ) -> None:
-    """Print the largest peaks of each component, and the error relative to the full model."""
+    """Print the largest peaks of each component, and their errors relative to the full model."""
     from cms.assessment.quality.of_reduction.frf import peaks
 
     unit = response_unit
@@ -173,7 +173,7 @@ def plotted_response(response: FrequencyResponse, is_inertance: bool) -> np.ndar
 
 
 def pair_words(motion: int, force: int) -> str:
-    """Return 'uz/fz', 'rz/mz', 'ux/my'."""
+    """Return the names of motion and force, such as 'uz/fz', 'rz/mz', 'ux/my'."""
     names = ("fx", "fy", "fz", "mx", "my", "mz")
     return f"{MOTION_COMPONENTS[motion]}/{names[force]}"
 
@@ -194,7 +194,7 @@ def response_table(
     full: FrequencyResponse | None,
     pairs: tuple[tuple[int, int], ...],
 ) -> Table:
-    """Return the frequency, and each component as a complex column."""
+    """Return a table with the frequency and a complex column for each component."""
     columns, units = {"frequency": own.frequencies}, {"frequency": "Hz"}
     for source, response in (("reduced", own), ("full", full)):
         if response is None:
@@ -213,7 +213,7 @@ def response_figure(
     full: FrequencyResponse | None,
     pairs: tuple[tuple[int, int], ...],
 ) -> "Figure":
-    """Return magnitude and phase of each component."""
+    """Return a figure with magnitude and phase of each component."""
     from cms.assessment.quality.plots import frf_figure
 
     curves = {"reduced": own} if full is None else {"full model": full, "reduced": own}

@@ -25,7 +25,7 @@ __all__ = ["FacesRequest", "run_converge", "run_faces"]
 
 
 def run_converge(path: Path, *, ratio: float, n_modes: int, as_json: bool) -> None:
-    """Print frequencies at both sizes, with the estimated error at the job's own size.
+    """Print the frequencies for both mesh sizes, with the estimated error for the mesh size of the job.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def run_converge(path: Path, *, ratio: float, n_modes: int, as_json: bool) -> No
 
 @dataclass(frozen=True)
 class FacesRequest:
-    """The arguments of `cms faces`."""
+    """Arguments of `cms faces`."""
 
     file: Path
     units: str
@@ -86,7 +86,7 @@ class FacesRequest:
 
 
 def run_faces(request: FacesRequest) -> None:
-    """List and draw all faces, or those that a selector chooses.
+    """List and draw all faces, or the faces that a selector chooses.
 
     Raises
     ------
@@ -178,5 +178,5 @@ def record(part: "CadPart", faces: "Iterable[CadFace]") -> dict[str, Any]:
 
 
 def listed(values: "Array | None") -> list[float] | None:
-    """Return an array as a list; None stays None."""
+    """Return an array as a list; None remains None."""
     return None if values is None else [float(value) for value in values]

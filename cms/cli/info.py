@@ -13,11 +13,11 @@ if TYPE_CHECKING:
 
 __all__ = ["info_command", "info_record", "print_body"]
 
-MOST_SETS = 20  #: largest number of sets that are listed
+MOST_SETS = 20  #: largest number of sets in the output
 
 
 def info_record(file: Path, units: str | None = None, mass_at: str | None = None) -> str:
-    """Return the content of a modal file as JSON, with the effective masses at an interface if one is named."""
+    """Return the content of a modal file as JSON, with effective masses if an interface is named."""
     import json
 
     from cms.assessment.quality.body_record import body_record, effective_mass_record
@@ -119,7 +119,7 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
 
 
 def stiffening_words(record: Any) -> str:
-    """Describe which loads stiffen the body, or why none do."""
+    """Describe which loads stiffen the body, or why no load does."""
     is_told = "geometric stiffness" in record["provenance"]
     if record["geometric_stiffness"]:
         return f"spin, accelerations, {'loads at some interfaces, see below' if is_told else 'interface loads'}"
@@ -127,7 +127,7 @@ def stiffening_words(record: Any) -> str:
 
 
 def numbering_rows(record: Any) -> list[tuple[str, str]]:
-    """Return the range of the user's numbers, and the points with rotations."""
+    """Return the ranges of the user's numbers, and the points with rotations, as table rows."""
     rows = []
     for what in ("nodes", "elements"):
         found = record[what]
@@ -144,33 +144,33 @@ def numbering_rows(record: Any) -> list[tuple[str, str]]:
 
 
 def turned_axes(axes: Any) -> list[tuple[str, Any]]:
-    """Return the axes of B by name; an empty list if they are the mesh axes."""
+    """Return the axes of B by name; an empty list if they equal the mesh axes."""
     columns = [[row[k] for row in axes] for k in range(3)]
     unit = [[float(i == k) for i in range(3)] for k in range(3)]
     return [] if columns == unit else list(zip("xyz", columns, strict=True))
 
 
 def load_scale(case: Any, mass: float) -> float:
-    """Return the size of the forces of a load case, also if it is balanced, from its resultant and modal forces."""
+    """Return the size of the forces of a load case from its resultant and modal forces, even if it is balanced."""
     return max(map(abs, [*case["force"], *(h * mass**0.5 for h in case["modal_forces"])]), default=0.0)
 
 
 def moments_words(record: Any) -> str:
-    """Describe how accurately the mass moments are known."""
+    """Describe the accuracy of the mass moments."""
     if not record["moments_are_exact"]:
         return "approximate (from bare matrices)"
     return "exact, as far as they are known" if record["missing_inertia_terms"] else "exact"
 
 
 def stress_words(stress: Any) -> str:
-    """Describe where the stress of the modes is known."""
+    """Describe at which points the modes have stress."""
     places = ["at the kept nodes"] if stress["nodal"] else []
     places += [f"at {stress['points']} points"] if stress["points"] else []
     return " and ".join(places) or "not kept"
 
 
 def hertz(value: float | None) -> str:
-    """Return a frequency with six digits; "" for a shape without mass."""
+    """Return a frequency with six digits [Hz]; "" for a shape without mass."""
     return "static" if value is None else f"{value:.6g}"
 
 

@@ -16,7 +16,7 @@ __all__ = ["DeckRequest", "write_job"]
 
 @dataclass(frozen=True)
 class DeckRequest:
-    """The arguments of the command."""
+    """Arguments of the command `cms job`."""
 
     deck: Path
     output: Path | None
@@ -28,7 +28,7 @@ class DeckRequest:
 
 
 def write_job(request: DeckRequest) -> None:
-    """Read the deck, print what is not converted, and write the job."""
+    """Read the deck, print which cards are not converted, and write the job."""
     from fe_models.files.decks.read_deck import read_deck
 
     if request.units is None or request.units not in UNIT_SYSTEMS:
@@ -42,7 +42,7 @@ def write_job(request: DeckRequest) -> None:
     relative = os.path.relpath(request.deck.resolve(), path.resolve().parent)
     try:
         text = job_text(deck, asked, Path(relative).as_posix())
-    finally:  # the table explains a refusal too
+    finally:  # the table also explains an error
         if rows := deck.ledger.rows():
             print_table("Not taken over from the deck", ("name", "count>", "consequence"), rows)
     path.write_text(text, encoding="utf-8")
@@ -50,7 +50,7 @@ def write_job(request: DeckRequest) -> None:
 
 
 def densities_of(words: tuple[str, ...]) -> dict[str, float]:
-    """Return the density of each material from NAME=NUMBER; a single number applies to all materials without one."""
+    """Return the density of each material from NAME=NUMBER; a number alone applies to materials without density."""
     found = {}
     for word in words:
         name, _, number = word.rpartition("=")

@@ -72,7 +72,7 @@ FRAME_WORDS = {
 
 
 def list_modes(path: Path, *, as_json: bool) -> None:
-    """Make the mode set and the reduced body of a job, and print their contents; writes no file."""
+    """Compute the mode set and the reduced body of a job, and print their contents without writing a file."""
     from cms.jobs.body_of_job import job_body
     from cms.jobs.job import read_job
     from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
@@ -120,7 +120,7 @@ def mode_record(modes: "ModeSet", reduced: "ReducedBody") -> dict[str, Any]:
 
 
 def print_modes(record: dict[str, Any]) -> None:
-    """Print the record of `mode_record`."""
+    """Print a record from `mode_record`."""
     columns, n_dropped = record["columns"], sum(column["dropped"] for column in record["columns"])
     say(f"Body {record['body']}, mode set {record['set']}: {len(columns)} columns, in this order")
     print_table(

@@ -1,4 +1,4 @@
-"""Output files of commands: their endings are checked before the work, and all are written together at its end."""
+"""Output files of commands: suffixes are checked before the work, all files are written together at the end."""
 
 import io
 import json
@@ -33,7 +33,7 @@ def output_files(
     overwrite_of: Iterable[Any] = (),
     needs_file: bool = False,
 ) -> list[Path]:
-    """Return the output paths, after a check before any work that they can be written and have known endings.
+    """Return the output paths after a check, before any work, that they can be written and have known suffixes.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def output_files(
 def output_file(
     given: Path | None, default: Path, endings: Sequence[str], error: type[Exception], **options: Any
 ) -> Path:
-    """Return the only output path, as `output_files` does."""
+    """Return the only output path, as in `output_files`."""
     return output_files(None if given is None else [given], [default], endings, error, **options)[0]
 
 
@@ -79,7 +79,7 @@ def write_outputs(
     others: Mapping[str, Callable[[Path], bytes | Mapping[Path, bytes]]] | None = None,
     is_quiet: bool = False,
 ) -> None:
-    """Write a result in the forms of the endings: all files completely, or none.
+    """Write a result in the forms given by the suffixes; all files are complete, or none is written.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def write_outputs(
         elif ending in TABLES and table is not None:
             contents[path] = table().content(ending, str(path))
         else:
-            assert figure is not None  # endings were checked
+            assert figure is not None  # the suffixes have been checked
             picture = io.BytesIO()
             figure().savefig(picture, format=ending[1:], dpi=dpi)
             contents[path] = picture.getvalue()

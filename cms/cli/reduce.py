@@ -47,7 +47,7 @@ def reduce_and_write(job: "Job", path: Path, solver: str | None = None, memory: 
 
 
 def with_workers(job: "Job", workers: str) -> "Job":
-    """Return a job whose substructures are eliminated by these workers."""
+    """Return the job with a number of workers for the elimination of substructures."""
     from fe_models.foundation.tasks.workers import checked_workers
 
     reduction = job.reduction.model_copy(update={"workers": checked_workers(workers)})
@@ -62,12 +62,12 @@ def print_times(clock: "Stages") -> None:
 
 @dataclass(frozen=True)
 class Fleet:
-    """Several jobs, and how they are run."""
+    """Several jobs, and options for running them."""
 
     jobs: Sequence[Path]
-    output: Path | None  #: folder of the modal files, or the file of a single job; None: beside the jobs
+    output: Path | None  #: folder of the modal files, or modal file of a single job; None: next to the jobs
     workers: str | None
-    journal: Path | None  #: None: beside the modal files
+    journal: Path | None  #: path of the journal; None: next to the modal files
     solver: str | None = None
 
     def journal_path(self, outputs: Sequence[Path]) -> Path:
@@ -78,7 +78,7 @@ class Fleet:
 
 
 def reduce_and_write_fleet(fleet: Fleet) -> None:
-    """Run several jobs by workers, write their modal files, and print the outcome of each.
+    """Run several jobs in workers, write their modal files, and print the result of each.
 
     Raises
     ------
@@ -192,7 +192,7 @@ PARALLEL_SOLVERS = ("petsc", "petsc-disk", "slepc")  #: solvers that several ran
 
 
 def one_job_of_ranks(jobs: Sequence[Path], workers: str | None, solver: str | None) -> None:
-    """Raise `JobError` if several ranks cannot process the request; a single process has no restrictions."""
+    """Raise `JobError` if several ranks cannot process this request; one process can process any."""
     n = started_ranks()
     if n == 1:
         return
@@ -204,7 +204,7 @@ def one_job_of_ranks(jobs: Sequence[Path], workers: str | None, solver: str | No
 
 
 def on_ranks(question: Callable[[], Sequence[Path | str]], work: Callable[[], None]) -> None:
-    """Do the work on rank 0, after a check that all ranks have the same program and input; a single rank just does it.
+    """Do the work on rank 0 after a check that all ranks have the same program and input.
 
     Parameters
     ----------

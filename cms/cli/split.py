@@ -27,19 +27,19 @@ __all__ = ["SplitRequest", "direction_of", "places_of", "split_job"]
 log = logging.getLogger(__name__)
 
 CUT_KINDS = ("rigid", "distributing")
-COORDINATE = 1e-9  #: largest difference between coordinates of the same node, relative to the mesh size
+COORDINATE = 1e-9  #: largest difference between coordinates of one node, over the mesh size
 
 
 @dataclass(frozen=True)
 class SplitRequest:
-    """The arguments of `cms split`."""
+    """Arguments of `cms split`."""
 
     job: Path
     n: int | None = None
-    at: tuple[float, ...] | None = None  #: positions of the cuts along the axis
+    at: tuple[float, ...] | None = None  #: positions of the cuts along the axis; None: equal parts
     axis: tuple[float, float, float] | None = None
     kind: str = "rigid"  #: kind of the interfaces at the cuts
-    folder: Path | None = None  #: default: NAME_parts beside the job
+    folder: Path | None = None  #: folder of the jobs; None: NAME_parts next to the job
 
 
 def direction_of(text: str | None) -> tuple[float, float, float] | None:
@@ -55,7 +55,7 @@ def direction_of(text: str | None) -> tuple[float, float, float] | None:
 
 
 def places_of(text: str | None) -> tuple[float, ...] | None:
-    """Return the positions of the cuts from numbers separated by commas."""
+    """Return the positions of the cuts, given as numbers separated by commas."""
     if text is None:
         return None
     try:
@@ -125,7 +125,7 @@ def split_job(request: SplitRequest) -> list[Path]:
 
 
 def text_without_damping(document: Any, job: Job) -> str:
-    """Return the job of a part with absolute paths and without damping."""
+    """Return the job text of a part with absolute paths and without damping."""
     import tomlkit
 
     copy = tomlkit.parse(tomlkit.dumps(document))
@@ -172,7 +172,7 @@ def parts_damping(job: Job, texts: list[str], parts: "tuple[Any, ...]") -> "Part
 
 
 def description_of(found: "PartsDamping", job: Job) -> str:
-    """Return the ratios of the modes of the whole body in parts."""
+    """Return a text with the damping ratios of the joined parts."""
     second = UNIT_SYSTEMS[job.body.units].time
     listed = "; ".join(
         f"{k}: {mode.frequency / second:.4g} Hz, {mode.ratio:.3g} for {mode.wanted:.3g}"
@@ -208,7 +208,7 @@ def mesh_of(job: Job) -> Any:
 
 
 def homes_of(job: Job, mesh: Any, parts: tuple[Any, ...], cuts: list[str]) -> dict[str, int]:
-    """Return the index of the part of each interface; raise `JobError` if it is on two parts or on a cut."""
+    """Return the part index of each interface; raise `JobError` if an interface is on two parts or on a cut."""
     from cms.jobs.attachments_of_job import frame_interface
     from cms.jobs.parts_of_job import interface_of
     from cms.jobs.shell_body import shell_interface_of
@@ -245,7 +245,7 @@ def homes_of(job: Job, mesh: Any, parts: tuple[Any, ...], cuts: list[str]) -> di
 
 
 def shares(A: np.ndarray, B: np.ndarray, tolerance: float) -> bool:
-    """Return whether two sets of points have a point in common."""
+    """Return whether two sets of points have a common point."""
     from scipy.spatial import cKDTree
 
     return bool(np.isfinite(cKDTree(A).query(B, distance_upper_bound=tolerance)[0]).any())
@@ -263,7 +263,7 @@ def edit_job(
     cuts: "list[Cut]",
     inside: list[str],
 ) -> None:
-    """Edit the job of the whole body to that of a part, with its comments and order."""
+    """Convert the job of the whole body to the job of a part; comments and order remain."""
     import tomlkit
 
     body = document["body"]
@@ -318,7 +318,7 @@ def edit_reduction(reduction: Any, job: Job, interfaces: list[str]) -> None:
 
 
 def keep(document: Any, key: str, names: list[str]) -> None:
-    """Keep the named tables of a table of tables; drop the table if none is left."""
+    """Keep only the named tables in a table of tables; remove it if it becomes empty."""
     if key not in document:
         return
     for name in [name for name in document[key] if name not in names]:
@@ -328,7 +328,7 @@ def keep(document: Any, key: str, names: list[str]) -> None:
 
 
 def keep_groups(document: Any, key: str, groups_key: str, groups: Mapping[str, Any]) -> None:
-    """Keep the tables of a table of tables that name groups of this part, with only those groups."""
+    """Keep the tables that name groups of this part, with only these groups."""
     for name in list(document.get(key, {})):
         given = document[key][name].get(groups_key, "all")
         names = [given] if isinstance(given, str) else list(given)
@@ -340,7 +340,7 @@ def keep_groups(document: Any, key: str, groups_key: str, groups: Mapping[str, A
 
 
 def attached(tables: Mapping[str, Any], key: str, part: Any, cuts: "list[Cut]") -> list[str]:
-    """Return the attachments on this part; raise `JobError` if one is on a cut, where two parts would have it."""
+    """Return the attachments on this part; raise `JobError` for one on a cut, because both parts would have it."""
     on_cut = [set(part.node_sets[cut.name].tolist()) for cut in cuts]
     names = []
     for name, table in tables.items():
@@ -361,7 +361,7 @@ def attached(tables: Mapping[str, Any], key: str, part: Any, cuts: "list[Cut]") 
 
 
 def loads_on(job: Job, part: Any, inside: list[str], request: SplitRequest) -> list[str]:
-    """Return the load cases of this part: gravity, pressure on its faces, forces at its interfaces."""
+    """Return the load cases of this part: gravity, pressure on its faces, and forces at its interfaces."""
     names = []
     groups = part.cell_sets if job.shells else getattr(part, "face_sets", {})
     for name, case in job.load_cases.items():
@@ -384,7 +384,7 @@ def key(name: str) -> str:
 
 
 def system_text(job: Job, n: int) -> str:
-    """Return a system file with the parts in their original positions, joined at the cuts."""
+    """Return the text of a system file with the parts in their original positions, joined at the cuts."""
     name = str(job.body.name)
     lines = [
         f"# {name!r} in {n} parts, each with a frame of its own. Reduce them first: cms reduce part_1.toml, ...",

@@ -20,7 +20,7 @@ WORDS = {"pass": "passes", "warn": "passes with warnings", "fail": "fails", "inf
 
 
 def check_file(file: Path, job: Path | None, *, band: float | None, as_json: bool) -> int:
-    """Check a modal file and print the verdicts; the exit code is 1 if one fails, else 0."""
+    """Check a modal file and print the verdicts; return exit code 1 if one is "fail", else 0."""
     from cms.assessment.quality.body_check import check_body
     from cms.assessment.quality.errors import QualityError
     from cms.body.modal_file.file import read
@@ -108,7 +108,7 @@ def number(value: float | None) -> str:
 
 @dataclass(frozen=True)
 class AcceptRequest:
-    """The arguments of the command."""
+    """Arguments of the command `cms accept`."""
 
     file: Path
     full: Path | None

@@ -36,7 +36,7 @@ SHORT = {
 
 @dataclass(frozen=True)
 class CompareRequest:
-    """The arguments of the command."""
+    """Arguments of the command `cms compare`."""
 
     job: Path
     sets: str
@@ -52,7 +52,7 @@ class CompareRequest:
 
 
 def run_compare(request: CompareRequest) -> None:
-    """Compare, print the verdicts, and write the report.
+    """Run the comparison, print the verdicts, and write the report.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def run_compare(request: CompareRequest) -> None:
 
 
 def require_job(path: Path) -> None:
-    """Raise `CompareError` for a modal file or bare matrices, and say what is needed."""
+    """Raise `CompareError` for a modal file or bare matrices; the message says what is needed."""
     if path.suffix.lower() in (".h5", ".hdf5"):
         raise CompareError(
             f"{path}: a modal file holds no full model to compare with; give the job (.toml) it was made from, or "
@@ -110,7 +110,7 @@ def require_job(path: Path) -> None:
 
 
 def parse_sets(text: str) -> tuple[str, ...]:
-    """Return the names of mode sets separated by commas, each once.
+    """Return the names of mode sets in a text separated by commas, each name once.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def parse_sets(text: str) -> tuple[str, ...]:
 
 
 def parse_load(text: str) -> Any:
-    """Return the load of INTERFACE:mass=1.2,stiffness=1e4, made by `cms.point_load`.
+    """Return the load "INTERFACE:mass=1.2,stiffness=1e4" as made by `cms.point_load`.
 
     Raises
     ------
@@ -182,7 +182,7 @@ def body_of(job: "Job", clock: Any, reports: list[Any]) -> "FEBody":
 
 
 def body_of_file(path: Path) -> "FEBody":
-    """Return the coupled body of a job file; called in a worker."""
+    """Return the coupled body of a job file; workers call this function."""
     from cms.jobs.body_of_job import job_body
     from cms.jobs.job import read_job
 
@@ -190,7 +190,7 @@ def body_of_file(path: Path) -> "FEBody":
 
 
 def options_of(job: "Job", body: "FEBody", names: tuple[str, ...], loads: list[Any]) -> Mapping[str, dict[str, Any]]:
-    """Return the options of every set: those of the job for its own set, and loads for sets that need them."""
+    """Return the options of each set: those of the job for its own set, and loads for sets that need them."""
     from cms.jobs.mode_set_of_job import set_options
     from cms.jobs.reduction_table import mode_set_options
 
@@ -207,7 +207,7 @@ def options_of(job: "Job", body: "FEBody", names: tuple[str, ...], loads: list[A
 
 
 def read_motion(path: Path, body: "FEBody") -> "Snapshots":
-    """Read a reference motion from an .npz file: u, (n_dof, n_t), over the coupled dofs, and t, (n_t,) [s].
+    """Read a reference motion from .npz: u, (n_dof, n_t), over the dofs of the coupled body, and t, (n_t,) [s].
 
     Raises
     ------
@@ -243,7 +243,7 @@ def read_motion(path: Path, body: "FEBody") -> "Snapshots":
 
 
 def write_report(folder: Path, comparison: "Comparison", stills: int) -> list[Path]:
-    """Write HTML, JSON, CSV, and PDF if reportlab is there; return their paths."""
+    """Write HTML, JSON, CSV and, if reportlab is installed, PDF; return their paths."""
     from cms.assessment.report import comparison_document, comparison_json, comparison_table
     from fe_models.foundation.documents.write import document_content
     from fe_models.foundation.paths import replace_files
@@ -261,7 +261,7 @@ def write_report(folder: Path, comparison: "Comparison", stills: int) -> list[Pa
 
 
 def print_comparison(comparison: "Comparison") -> None:
-    """Print the answer, the verdicts with their numbers, and the reasons."""
+    """Print the answer, the verdicts with their values, and the reasons."""
     from cms.assessment.compare.verdicts import DECIDING
     from cms.assessment.report.formatting import hertz, seconds, share
     from cms.assessment.report.parts import MARKS

@@ -20,7 +20,7 @@ __all__ = ["CorrelateRequest", "run_correlate"]
 
 @dataclass(frozen=True)
 class CorrelateRequest:
-    """The arguments of the command."""
+    """Arguments of the command `cms correlate`."""
 
     file: Path
     output: Path | None
@@ -29,7 +29,7 @@ class CorrelateRequest:
 
 
 def run_correlate(request: CorrelateRequest) -> None:
-    """Compare, update if the file has [update], print pairs and parameters, and write page and updated job."""
+    """Compare; update if the file has [update]; print pairs and parameters; write report and updated job."""
     from cms.assessment.correlation.errors import CorrelationError
     from cms.jobs.studies.correlation_file import read_correlation, run_correlation
     from cms.jobs.studies.correlation_report import correlation_document
@@ -110,7 +110,7 @@ def print_parameters(update: "Update") -> None:
 
 
 def updated_text(path: Path, parameters: "tuple[Parameter, ...]", values: "Array") -> str:
-    """Return the text of a job with the updated values; comments and order are kept."""
+    """Return the job text with updated values; comments and order remain."""
     import tomlkit
 
     from cms.assessment.correlation.errors import CorrelationError
