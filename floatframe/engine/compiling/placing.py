@@ -7,8 +7,8 @@ A body without a position begins where its mesh is drawn. Its joints then move i
         drawn), and the first body of a part without any of them
     (2) orientation     its own; a body without one takes the smallest rotation that fulfils the first joint with
                         `axis_b` or `rotation`
-    (3) position        the shortest translation d with n · (r_B + d - r_A) = 0, in the least squares, for the held
-                        directions n of its joints to bodies already placed
+    (3) position        the shortest translation d with n · (r_B + d - r_A) = f, in the least squares, for the held
+                        directions n of its joints to bodies already placed; f is 0, or a prescribed distance at t = 0
 
 What the joints leave free stays as drawn: a distance along an axis, an angle, a body that only springs hold. A joint
 with one marker lies where this marker is, and asks for no pose. Joints that close loops can stay open; the start of a
@@ -128,7 +128,7 @@ def length_of(bodies: list[Body], links: list[list[Link]]) -> float:
 
 def rank_of(bodies: list[Body], links: list[Link], done: set[int]) -> int:
     """Return the number of independent directions in which placed bodies fix a body."""
-    rows = [n for link in links if link.other.body in done for n in held(bodies, link)]
+    rows = [n for link in links if link.other.body in done for n in held(bodies, link)[0]]
     return int(np.linalg.matrix_rank(np.array(rows), tol=1e-6)) if rows else 0
 
 
@@ -142,14 +142,17 @@ def rows_of(bodies: list[Body], link: Link) -> tuple[Row, ...]:
         return ()
 
 
-def held(bodies: list[Body], link: Link) -> Array:
-    """Return the directions in which a joint fixes the distance of its points, ground axes, (n, 3)."""
+def held(bodies: list[Body], link: Link) -> tuple[Array, Array]:
+    """Return the directions in which a joint fixes the distance of its points, ground axes, (n, 3), and these, (n,)."""
     _, A = pose(bodies, link.other if link.is_b else link.own)
     rows = rows_of(bodies, link)
-    found = [row.x for row in rows if row.kind == POINT]
-    found += [A @ row.x for row in rows if row.kind == SLIDE and row.motion is None]
-    found += [A @ np.cross(row.x, row.z) for row in rows if row.kind == SCREW]  # along its axis
-    return np.array(found).reshape(-1, 3)
+    screws = [row for row in rows if row.kind == SCREW]  # the distance along the axis follows the angle, zero as drawn
+    found = [(row.x, 0.0) for row in rows if row.kind == POINT]
+    found += [(A @ np.cross(row.x, row.z), 0.0) for row in screws]
+    for row in rows:
+        if row.kind == SLIDE and not (screws and row.motion):
+            found.append((A @ row.x, 0.0 if row.motion is None else row.motion(0.0)))
+    return np.array([n for n, _ in found]).reshape(-1, 3), np.array([f for _, f in found])
 
 
 def pose(bodies: list[Body], marker: MarkerData) -> tuple[Array, Array]:
@@ -175,9 +178,9 @@ def placed(bodies: list[Body], i: int, links: list[Link], length: float) -> Body
             break
     rows, gaps = [np.zeros((0, 3))], [np.zeros(0)]
     for link in links:
-        n = held(moving, link)
+        n, f = held(moving, link)
         rows.append(n)
-        gaps.append(n @ (pose(moving, link.other)[0] - pose(moving, link.own)[0]))
+        gaps.append(n @ (pose(moving, link.other)[0] - pose(moving, link.own)[0]) + (f if link.is_b else -f))
     n, gap = np.concatenate(rows), np.concatenate(gaps)
     if not np.abs(gap).max(initial=0.0) > AT_JOINT * length:
         return body

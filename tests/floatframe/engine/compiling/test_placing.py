@@ -33,6 +33,7 @@ from floatframe.analyses.system_check import check_system
 from floatframe.engine.compiling.placing import placed_bodies
 from floatframe.integrators import GeneralizedAlpha
 from floatframe.model.forces import Gravity
+from floatframe.model.functions.time_functions import harmonic
 from tests.floatframe.examples import CRANK
 
 POST = np.array([0.7, -0.4, 0.9])
@@ -109,6 +110,18 @@ def test_what_joints_leave_free_stays_as_drawn():
     assert_allclose(positions(foot)["foot"], (POST @ axis) * axis, rtol=0, atol=1e-12)
     hung = System([rigid("bob")], forces=[SpringDamper("rope", post, Marker("bob", position=(0, 0, 0)), 50.0)])
     assert_array_equal(positions(hung)["bob"], np.zeros(3))
+
+
+@pytest.mark.parametrize("is_b", [True, False])
+def test_a_prescribed_distance_is_that_at_the_start(is_b, caplog):
+    axis, post, own = np.array([0.48, -0.6, 0.64]), Marker(GROUND, position=POST), Marker("block", position=(0, 0, 0))
+    ends = (post, own) if is_b else (own, post)
+    rail = PrismaticJoint("rail", *ends, axis=axis, motions={"distance": harmonic(0.5, 3.0, 1.2)})
+    expected = POST + (1 if is_b else -1) * 0.5 * np.sin(1.2) * axis
+    system = System([rigid("block")], [rail])
+    assert_allclose(placed_bodies(system)[0].drawn_position, expected, rtol=0, atol=1e-12)
+    assert_allclose(positions(system)["block"], expected, rtol=0, atol=1e-12)
+    assert not caplog.records
 
 
 @pytest.mark.parametrize("is_b", [True, False])
