@@ -205,7 +205,8 @@ def test_an_unknown_kind_is_refused_with_the_nearest(folder):
 
 def test_run_runs_a_sweep_by_its_kind(folder):
     (folder / "sweep.toml").write_text(
-        'kind = "sweep"\nsystem = "cart.toml"\nanalysis = "modes"\n[parameters.stiffness]\npath = "stiffness"\n'
+        'kind = "sweep"\nsystem = "cart.toml"\nanalysis = "modes"\nworkers = 1\n'
+        '[parameters.stiffness]\npath = "stiffness"\n'
         'values = [125.0, 500.0]\n[outputs.f]\nof = "frequency 2"\n'
     )
     result = run("run", folder / "sweep.toml", "-o", folder / "sweep.csv")

@@ -117,7 +117,7 @@ def heave_and_pitch(wing, t):
         c, n = np.cos(rest[2]), np.sin(rest[2])
         rest[10 + k] = SPEED / (0.35 - (0.35 - z) / 3)
         rest[3 + k] = 1.25 - (rest[1] - n * gears[k][1] - z) / c
-    y = solve_ivp(rates, (0, t[-1]), rest, method="LSODA", t_eval=t, rtol=1e-7, atol=1e-8, max_step=4e-3).y
+    y = solve_ivp(rates, (0, t[-1]), rest, method="LSODA", t_eval=t, rtol=1e-6, atol=1e-7, max_step=4e-3).y
     accelerations = np.array([rates(a, b)[5:10] for a, b in zip(t, y.T, strict=True)])
     c, n = np.cos(y[2]), np.sin(y[2])
     cockpit = accelerations[:, 1] + accelerations[:, 2] * (-c * 2.6 - n * 0.3) - y[7] ** 2 * (-n * 2.6 + c * 0.3)

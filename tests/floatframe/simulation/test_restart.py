@@ -136,7 +136,7 @@ def killed(path, t_end, delay):
     return is_killed
 
 
-@pytest.mark.parametrize(("n_kills", "latest"), [(2, 0.6), pytest.param(100, 1.2, marks=pytest.mark.long)])
+@pytest.mark.parametrize(("n_kills", "latest"), [(1, 0.6), pytest.param(100, 1.2, marks=pytest.mark.long)])
 def test_killed_run_is_readable_and_can_be_resumed(tmp_path, n_kills, latest):
     """Killed (SIGKILL) at random moments up to `latest` times the length of a run, also while a segment is written."""
     t_end = 6.0
