@@ -218,8 +218,9 @@ def forty_pieces():
 
 
 def test_pieces_in_files_are_judged_as_those_in_memory(forty_pieces, tmp_path):
-    found = pieces(0.05, 3, 120, folder=tmp_path)
-    assert [motion.validity for motion in found] == [motion.validity for motion in forty_pieces]
+    found = pieces(0.05, 3, 60, folder=tmp_path)
+    assert [motion.validity for motion in found] == [motion.validity for motion in forty_pieces[:20]]
+    assert any(motion.validity for motion in found)
 
 
 def test_a_motion_in_pieces_is_judged_as_one(forty_pieces):

@@ -273,7 +273,7 @@ def test_flipped_bytes_in_the_data_of_a_repacked_file_are_detected(path):
         spans = [(d.id.get_offset(), d.id.get_storage_size()) for d in (file["nodes/Phi"], file["moments/S_kl"])]
     rng = np.random.default_rng(2)
     for start, size in spans:
-        for position in start + rng.integers(0, size, 40):
+        for position in start + rng.integers(0, size, 15):
             damaged = bytearray(whole)
             damaged[position] ^= 1 << rng.integers(8)
             copy.write_bytes(damaged)

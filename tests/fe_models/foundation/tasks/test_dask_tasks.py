@@ -72,7 +72,8 @@ def slow_square(folder, value):
     return value * value
 
 
-@pytest.mark.parametrize("which", ["processes", "dask"])
+#: of processes also by test_one_bad_value_never_loses_the_others of test_processes.py
+@pytest.mark.parametrize("which", [pytest.param("processes", marks=pytest.mark.long), "dask"])
 def test_a_worker_killed_at_work_loses_nothing(dask, tmp_path, which):
     killed = []
 
