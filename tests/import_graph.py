@@ -20,6 +20,7 @@ from tests.root import ROOT
 
 __all__ = [
     "PACKAGES",
+    "all_uses",
     "changed_files",
     "files_of",
     "graph",

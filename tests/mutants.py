@@ -35,7 +35,7 @@ from functools import cache
 from itertools import accumulate
 from pathlib import Path
 
-from tests.import_graph import graph, guards, imported_modules, module_name, modules
+from tests.import_graph import all_uses, guards, imported_modules, module_name, modules
 from tests.root import ROOT
 
 __all__ = ["WINGS", "Mutant", "draw", "main", "physics"]
@@ -274,7 +274,7 @@ def guarding_files(path: Path, n_files: int) -> list[str]:
     name = module_name(path)
     steps = guards([name])
     files = [file for file in steps if not file.startswith(("tests/docs", "tests/external"))]
-    users = [modules()[user] for user, used in graph().items() if name in used]
+    users = [modules()[user] for user, used in all_uses().items() if name in used and user in modules()]
     near = [str(user.relative_to(ROOT)) for user in users if user.is_relative_to(path.parent)]
     of_users = frozenset().union(*map(words_of, near))
     own = words_of(str(path.relative_to(ROOT)))
