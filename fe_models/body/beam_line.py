@@ -1,4 +1,4 @@
-"""A straight beam of beam theory: mass and stiffness per length along x, uniform, tapered or stepped."""
+"""Straight beam with mass and stiffness per length along x: uniform, tapered or stepped."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ from fe_models.foundation.records import checked_fields
 
 __all__ = ["BeamLine", "Law"]
 
-Law = float | Polynomial | Callable[[Array], Array]  #: a quantity per length: constant, or a function of x
+Law = float | Polynomial | Callable[[Array], Array]  #: quantity per length: a constant, or a function of x
 
 STIFFNESSES = ("EA", "EIy", "EIz", "GJ", "GAy", "GAz")
-SMOOTH_DEGREE = 24  #: polynomial degree assumed when a law given as a Python function is integrated
+SMOOTH_DEGREE = 24  #: polynomial degree assumed for the integration of a law that is a Python function
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,12 +83,12 @@ class BeamLine:
 
     @property
     def has_shear(self) -> bool:
-        """Whether the beam deforms in shear."""
+        """Whether the beam has shear deformation."""
         return any(callable(law) or np.isfinite(law) for law in (self.GAy, self.GAz))
 
     @property
     def degree(self) -> int:
-        """Highest polynomial degree of the laws as they are integrated."""
+        """Highest polynomial degree of the laws, as used for their integration."""
         degrees = [0]
         for name in (*STIFFNESSES, "rho_A", "rho_Iy", "rho_Iz"):
             law = getattr(self, name)
@@ -99,7 +99,7 @@ class BeamLine:
         return max(degrees)
 
     def at(self, name: str, x: Array) -> Array:
-        """Return the values of a law at positions x, (n,).
+        """Return the values of a law at the positions x, (n,).
 
         Parameters
         ----------
@@ -125,7 +125,7 @@ class BeamLine:
         return values
 
     def points(self, degree: int, *, breaks: Array | None = None) -> tuple[Array, Array]:
-        """Return Gauss points and weights, (n,), exact between breaks for laws times polynomials of this degree."""
+        """Return Gauss points and weights, (n,), exact between breaks for products of a law and such a polynomial."""
         inner = np.asarray(self.breaks if breaks is None else [*self.breaks, *breaks])
         inner = np.unique(inner[(inner > 0) & (inner < self.length)])
         ends = np.concatenate([[0.0], inner, [self.length]])

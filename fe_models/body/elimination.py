@@ -11,11 +11,11 @@ from fe_models.foundation.errors import BodyError
 
 __all__ = ["eliminate_dofs"]
 
-ROUNDING = 1e-14  #: part of the sum of the magnitudes of its terms below which an entry of a sum is rounding
+ROUNDING = 1e-14  #: entry over the sum of the magnitudes of its terms, below which it is rounding
 
 
 def eliminate_dofs(body: FEBody, slaves: IntArray, T_s: sp.sparray) -> FEBody:
-    """Substitute u_slaves = T_s u in M, K, D and the load cases, as Tᵀ A T, and return the new body.
+    """Substitute u_slaves = T_s u in M, K, D and the load cases (Tᵀ A T), and return the new body.
 
     The nodes stay. The recovery of the mesh dofs is updated, and the boundary dofs are renumbered.
 
@@ -66,7 +66,7 @@ def eliminate_dofs(body: FEBody, slaves: IntArray, T_s: sp.sparray) -> FEBody:
 
 
 def _congruent(D: sp.csc_array, T: sp.csr_array) -> sp.csc_array:
-    """Return Tᵀ D T without entries that are rounding of larger terms: a damper between linked dofs has no effect."""
+    """Return Tᵀ D T without rounding of cancelled terms: a damper between linked dofs has no effect."""
     made = sp.csc_array(T.T @ D @ T)
     terms = sp.csc_array(abs(T).T @ abs(D) @ abs(T))
     made = sp.csc_array(made.multiply(abs(made) > ROUNDING * terms))

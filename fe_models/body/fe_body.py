@@ -33,16 +33,16 @@ from fe_models.meshes.numbering import Numbering
 
 __all__ = ["INTERFACE_KINDS", "MULTIPLIER", "ElementModel", "FEBody", "Interface", "Recovery", "StressPointModel"]
 
-MULTIPLIER = -1  #: component code of a Lagrange multiplier of a distributing (RBE3) interface
+MULTIPLIER = -1  #: component number of a Lagrange multiplier of a distributing (RBE3) interface
 INTERFACE_KINDS = ("rigid", "distributing", "nodes")
 
 
 class ElementModel(Protocol):
-    """Quantities that only the elements know: exact mass integrals, stress and geometric stiffness."""
+    """Quantities that only the elements can compute: exact mass integrals, stress and geometric stiffness."""
 
     @property
     def has_nodal_stress(self) -> bool:
-        """Whether `nodal_stress` may be called; bare matrices and pure beam frames do not know the stress."""
+        """Whether `nodal_stress` is available; it is not for bare matrices and pure beam frames."""
 
     def mass_gram(self, u: Array) -> Array:
         """Return the mass integrals ∫ a aᵀ dm with a = [1, c, u_x, u_y, u_z] (docs/theory.md §5).
@@ -76,7 +76,7 @@ class ElementModel(Protocol):
         """
 
     def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
-        """Return rotation vectors, from the adjoining elements, at nodes that have no rotational dofs.
+        """Return rotation vectors, computed from the adjoining elements, at nodes without rotational dofs.
 
         Parameters
         ----------
@@ -93,7 +93,7 @@ class ElementModel(Protocol):
 
     @property
     def has_geometric_stiffness(self) -> bool:
-        """Whether the three methods below may be called; bare matrices do not know the geometric stiffness."""
+        """Whether the three methods below are available; they are not for bare matrices."""
 
     def mass_forces(self, loads: MassLoads) -> Array:
         """Return consistent nodal forces of loads per unit mass: their work on any u equals the work of the loads.
@@ -110,7 +110,7 @@ class ElementModel(Protocol):
         """
 
     def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
-        """Return the nodal forces that hold the displacements u: f_int = K u of the elements, without couplings.
+        """Return the nodal forces for displacements u: f_int = K u of the elements, without couplings.
 
         Parameters
         ----------
@@ -170,7 +170,7 @@ class StressPointModel(Protocol):
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class Interface:
-    """A named place at which neighbours connect to the body.
+    """Interface: a named place at which neighbours connect to the body.
 
     "rigid" (RBE2): the member nodes move rigidly with the reference node.
     "distributing" (RBE3): the reference node follows the weighted mean motion of the members.
@@ -234,25 +234,25 @@ class Interface:
 
 @dataclass(frozen=True, eq=False)
 class Recovery:
-    """The map from a coupled body back to its mesh dofs: u_mesh = matrix @ u."""
+    """Map from the dofs of a coupled body to its mesh dofs: u_mesh = matrix @ u."""
 
-    matrix: sp.csr_array  #: (n_mesh_dof, n_dof)
+    matrix: sp.csr_array  #: matrix of the map, (n_mesh_dof, n_dof)
     dofs: IntArray  #: (node, component) of the mesh dofs, (n_mesh_dof, 2)
-    layout: RowLayout | None = None  #: ranks on which the rows of the mesh dofs lie, if they are distributed
+    layout: RowLayout | None = None  #: distribution of the mesh-dof rows over ranks; None: not distributed
 
 
 @dataclass(frozen=True, eq=False)
 class Tie:
-    """A distributing interface that a weld has put inside a body: multipliers hold C u = S (motion - mean) u at zero.
+    """Distributing interface inside a welded body: multipliers enforce C u = S (motion - mean) u = 0.
 
     The mean motion of the members is not linear in large rotations. Only the geometric stiffness needs this record; M
     and K have the linear tie.
     """
 
-    interface: Interface  #: the interface; its `dofs` are None
-    motion: sp.csr_array  #: motion of its reference node as rows over the dofs, (6, n_dof)
-    multipliers: IntArray  #: dofs of the multipliers, (n,); n is 6, or less if some have been eliminated
-    S: Array  #: scale of the rows of the multipliers, (n, 6)
+    interface: Interface  #: interface without dofs (`dofs` is None)
+    motion: sp.csr_array  #: motion of the reference node of the interface as rows over the dofs, (6, n_dof)
+    multipliers: IntArray  #: dofs of the multipliers, (n,); n is 6, or less if some are eliminated
+    S: Array  #: scale factors of the multiplier rows, (n, 6)
     #: the interface whose members the reference node follows rigidly; None: it follows nodes of the body
     leader: Interface | None = None
 
@@ -266,18 +266,18 @@ class Tie:
 
 @dataclass(frozen=True, eq=False)
 class MeanNode:
-    """A node inside a body that follows the mean motion of others (RBE3) and has no dofs of its own.
+    """Node inside a body without dofs, which follows the mean motion of other nodes (RBE3).
 
     Only the geometric stiffness needs this record; M and K have the linear mean.
     """
 
-    members: IntArray  #: nodes of the body, (n_members,)
-    weights: Array  #: of the translations of the members, with sum 1, (n_members,)
+    members: IntArray  #: member nodes of the body, (n_members,)
+    weights: Array  #: weights of the translations of the members, with sum 1, (n_members,)
     reference: Array  #: position of the node, mesh axes, (3,) [m]
-    follows: sp.csr_array  #: motion of the mesh dofs by that of the node, its followers included, (n_mesh_dof, 6)
+    follows: sp.csr_array  #: motion of the mesh dofs due to that of the node, including its followers, (n_mesh_dof, 6)
 
     def placed(self, first_node: int, first_row: int, n_rows: int) -> "MeanNode":
-        """Return the record in a body of several parts, whose nodes and mesh dofs begin at these numbers."""
+        """Return the record for a body of several parts, in which its nodes and mesh dofs begin at these indices."""
         rows = sp.coo_array(self.follows)
         follows = sp.csr_array((rows.data, (rows.row + first_row, rows.col)), shape=(n_rows, 6))
         return replace(self, members=self.members + first_node, follows=follows)
@@ -287,7 +287,7 @@ class MeanNode:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class FEBody:
-    """Finite element model of one body, free or intentionally held to the ground.
+    """Finite element model of one body, free or intentionally fixed to the ground.
 
     Dof k is component `dofs[k, 1]` (0-2 translation, 3-5 rotation, `MULTIPLIER`) of node `dofs[k, 0]`, in mesh axes. A
     body is *coupled* if every interface has its boundary dofs (`cms.couple`). Mode sets need a coupled body.
@@ -396,7 +396,7 @@ class FEBody:
         n_dof = len(self.dofs)
         for name in ("M", "K", "D"):
             A: Any = getattr(self, name)
-            if isinstance(A, SpreadMatrix):  # it was symmetrised when it was made
+            if isinstance(A, SpreadMatrix):  # a distributed matrix was already symmetrised when it was assembled
                 if A.shape != (n_dof, n_dof) or not np.isfinite(A.largest):
                     raise BodyError(
                         f"{where}: {name}: expected finite entries and shape {(n_dof, n_dof)}, got {A.shape}, up to "
@@ -429,7 +429,7 @@ class FEBody:
 
     @property
     def to_mesh(self) -> Recovery:
-        """The recovery; the identity where the dofs are the mesh dofs."""
+        """Recovery of the mesh dofs; the identity if the dofs are the mesh dofs."""
         if self.recovery is not None:
             return self.recovery
         return Recovery(sp.eye_array(self.n_dof, format="csr"), self.dofs)
@@ -441,7 +441,7 @@ class FEBody:
 
     @property
     def layout(self) -> RowLayout | None:
-        """How the rows of K and M are distributed over ranks; None if they are matrices of this process."""
+        """Distribution of the rows of K and M over ranks; None if this process has the whole matrices."""
         return self.K.layout if isinstance(self.K, SpreadMatrix) else None
 
     @property
@@ -458,16 +458,16 @@ class FEBody:
 
     @property
     def i(self) -> IntArray:
-        """Interior dofs, which are all others, ascending, (n_i,)."""
+        """Interior dofs: all dofs that are not boundary dofs, ascending, (n_i,)."""
         return np.setdiff1d(np.arange(self.n_dof), self.b)
 
     @property
     def length(self) -> float:
-        """Diagonal of the bounding box of the nodes [m], which scales rotations; 1 if all nodes are at one place."""
+        """Diagonal of the bounding box of the nodes [m], used to scale rotations; 1 if all nodes coincide."""
         return float(np.linalg.norm(np.ptp(self.nodes, axis=0))) or 1.0
 
     def interface(self, name: str) -> Interface:
-        """Return the interface of that name; raise `BodyError` with the known names if there is none."""
+        """Return the interface with this name; raise `BodyError` with the known names if there is none."""
         for interface in self.interfaces:
             if interface.name == name:
                 return interface
@@ -483,7 +483,7 @@ class FEBody:
             )
 
     def mesh_displacement(self, u: Any) -> Any:
-        """Return the columns u, (n_dof, k), as displacement columns over the mesh dofs, (n_mesh_dof, k).
+        """Return displacement columns over the mesh dofs, (n_mesh_dof, k), from columns u, (n_dof, k).
 
         Columns on many ranks stay distributed if the recovery has a layout; otherwise the result is an array.
         """
@@ -502,7 +502,7 @@ class FEBody:
         return result
 
     def translations(self, u: Array) -> Array:
-        """Return the translations at all nodes, (n_nodes, 3, k) [m], of displacement columns u, (n_dof, k).
+        """Return the translations of all nodes, (n_nodes, 3, k) [m], for displacement columns u, (n_dof, k).
 
         They are zero at nodes without translational dofs. The reference node of a distributing interface has such dofs.
         """
@@ -514,7 +514,7 @@ class FEBody:
         return field_
 
     def with_interfaces(self, *interfaces: Interface) -> "FEBody":
-        """Return the body with these interfaces added; they are not yet coupled."""
+        """Return the body with these interfaces added, not yet coupled."""
         return replace(self, interfaces=(*self.interfaces, *interfaces))
 
     def with_load_cases(self, *load_cases: LoadCase) -> "FEBody":
@@ -523,6 +523,6 @@ class FEBody:
 
 
 def put_translations(field_: Array, dofs: IntArray, u: Array) -> None:
-    """Write the translational rows of u into `field_`, (n_nodes, 3, k)."""
+    """Copy the translational rows of u into `field_`, (n_nodes, 3, k)."""
     rows = np.flatnonzero((dofs[:, 1] >= 0) & (dofs[:, 1] < 3))
     field_[dofs[rows, 0], dofs[rows, 1]] = u[rows]

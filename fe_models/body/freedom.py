@@ -1,4 +1,4 @@
-"""Forces of the stiffness of a body in rigid-body motion, which are zero for a free body."""
+"""Forces of a stiffness matrix in rigid-body motion, which are zero for a free body."""
 
 from dataclasses import dataclass
 
@@ -24,14 +24,14 @@ MOTIONS = ("x", "y", "z", "a turn about x", "a turn about y", "a turn about z")
 class RigidForces:
     """Forces K Psi_R of rigid-body motions about the mean of the nodes; rotations are scaled to the body size."""
 
-    F: Array  #: K Psi_R, (n_dof, 6) [N/m]; zero for motions that the dofs of the body cannot make
+    F: Array  #: forces K Psi_R, (n_dof, 6) [N/m]; zero for motions that the dofs cannot represent
     #: share of every row: |F| divided by the sum of |K_kl| s_l, where s is the size of the motion of a dof, (n_dof, 6)
     share: Array
-    largest: Array  #: largest force divided by the stiffest entry, (6,)
+    largest: Array  #: largest force over the stiffest entry, for each motion, (6,)
     energy: Array  #: Psi_Rᵀ K Psi_R, (6, 6) [N/m]
     mass: Array  #: Psi_Rᵀ M Psi_R, (6, 6) [kg]
     stiffest: float  #: largest entry of K [N/m]
-    is_possible: np.ndarray  #: whether the dofs of the body can make each motion, (6,) bool
+    is_possible: np.ndarray  #: whether the dofs can represent each motion, (6,) bool
 
     def __post_init__(self) -> None:
         for name in ("F", "share", "largest", "energy", "mass"):
@@ -39,22 +39,22 @@ class RigidForces:
 
     @property
     def is_free(self) -> bool:
-        """Whether no motion meets a resistance beyond rounding."""
+        """Whether no motion causes forces beyond rounding."""
         return not self.resists.any()
 
     @property
     def resists(self) -> np.ndarray:
-        """Whether each motion meets a resistance, (6,) bool."""
+        """Whether each motion causes forces, (6,) bool."""
         return np.asarray((self.largest > FREE) | self._resists.any(axis=0))
 
     @property
     def rows(self) -> IntArray:
-        """Rows that resist some motion, ascending."""
+        """Rows with forces in some motion, ascending."""
         return np.flatnonzero(self._resists.any(axis=1)).astype(np.int64)
 
     @property
     def _resists(self) -> np.ndarray:
-        """Whether each row resists each motion, (n_dof, 6) bool.
+        """Whether each row has a force in each motion, (n_dof, 6) bool.
 
         Translations do not depend on the digits of the node positions, so a soft spring shows as a row far above the
         others.
@@ -66,7 +66,7 @@ class RigidForces:
 
     @property
     def n_free(self) -> int:
-        """Number of independent possible motions, combinations included, that meet no resistance beyond rounding."""
+        """Number of independent motions without forces beyond rounding, including combinations."""
         F = self.F[:, self.is_possible]
         values = np.linalg.svd(F, compute_uv=False)
         return int((values <= max(ROUNDING * self.stiffest, WEAKEST * values.max(initial=0.0))).sum())
@@ -79,14 +79,14 @@ class RigidForces:
 
     @property
     def rigid_body_frequency(self) -> Array:
-        """Frequency at which the body would oscillate in each motion if it moved rigidly, (6,) [1 / time unit]."""
+        """Frequency of the rigid body on its supports in each motion, (6,) [1 / time unit]."""
         mass = np.diag(self.mass)
         omega2 = np.diag(self.energy) / np.where(mass > 0, mass, np.inf)
         return np.asarray(np.sqrt(np.maximum(omega2, 0.0)) / (2 * np.pi))
 
 
 def rigid_forces(K: sp.csc_array, M: sp.csc_array, nodes: Array, dofs: IntArray) -> RigidForces:
-    """Compute the forces with which K resists rigid-body motion.
+    """Compute the forces by which K resists rigid-body motion.
 
     A motion is left out if the body has no dof at all of a component that moves in it. A plane body, for example, has
     no motion out of its plane, and a row of masses along x only has the motion along x. A motion is not left out

@@ -1,4 +1,4 @@
-"""Reasons why matrices are not those of a free body: an intended support, or a recognisable mistake.
+"""Reasons why matrices do not belong to a free body: an intended support, or a recognisable mistake.
 
 A support resists translations at its nodes. Rows in a wrong order resist everywhere, and fit once they are reordered.
 Wrong node positions resist rotations alone. A penalty has a conspicuously large diagonal entry.
@@ -16,16 +16,16 @@ from fe_models.foundation.words import node_list
 
 __all__ = ["mistake_description", "support_description"]
 
-Called = Callable[[int], str]  #: gives the user's name of a node, by its index
+Called = Callable[[int], str]  #: function that returns the user's name of a node, given its index
 
 #: ratio of a diagonal entry to the median diagonal above which a row that resists with all its stiffness is a penalty
 PENALTY = 1e6
-ALONE = 0.9  #: share of a row that counts as all of its stiffness
+ALONE = 0.9  #: share of the stiffness of a row, above which it counts as all
 LENGTHS = {1e-3: "mm beside matrices in m", 1e3: "m beside matrices in mm", 0.0254: "inches beside matrices in m",
            1 / 0.0254: "m beside matrices in inches"}  # fmt: skip
 #: factor by which the nodes would have to be multiplied, and the unit mistake that it reveals
-MOST_SOLVED = 3000  #: largest number of dofs of suspected nodes for which the true positions are computed
-APART = 1e-3  #: distance from a node to its true position, relative to the size of the body, that counts as a mistake
+MOST_SOLVED = 3000  #: largest number of dofs of suspected nodes for which correct positions are computed
+APART = 1e-3  #: distance between a node and its correct position over the body size, above which it is a mistake
 
 
 def mistake_description(
@@ -38,7 +38,7 @@ def mistake_description(
     with_rows: bool,
     called: Called = str,
 ) -> str | None:
-    """Describe the fault of matrices that are not free; None if a support explains them.
+    """Describe the mistake in matrices that are not free; None if a support explains them.
 
     (1) a penalty on the diagonal
     (2) the same matrices are free if their rows are reordered, or if the nodes are in another unit
@@ -85,7 +85,7 @@ def mistake_description(
 
 
 def fitting_order(K: sp.csc_array, M: sp.csc_array, nodes: Array, dofs: IntArray) -> str:
-    """Return the order of rows for which these matrices are free; "" if no usual order makes them free."""
+    """Return the usual row order for which these matrices are free; "" if there is none."""
     node, component = dofs.T
     orders = {"component-major": np.lexsort((node, component)), "node-major": np.lexsort((component, node))}
     for name, order in orders.items():
@@ -95,7 +95,7 @@ def fitting_order(K: sp.csc_array, M: sp.csc_array, nodes: Array, dofs: IntArray
 
 
 def moved_description(K: sp.csc_array, nodes: Array, dofs: IntArray, forces: RigidForces, called: Called) -> str:
-    """Say which nodes are misplaced, as far as the matrices allow."""
+    """Describe which nodes are misplaced, as far as the matrices show it."""
     suspected = np.unique(dofs[forces.rows, 0])
     S = np.flatnonzero(np.isin(dofs[:, 0], suspected))
     rest = np.flatnonzero(~np.isin(dofs[:, 0], suspected))
@@ -139,7 +139,7 @@ def missing_rows(dofs: IntArray, n_nodes: int) -> list[tuple[int, int]]:
 
 
 def support_description(forces: RigidForces, dofs: IntArray, time: float, *, called: Called = str) -> str:
-    """Describe where a body is held and how stiffly; `time` is its time unit [s]."""
+    """Describe where a body is supported and how stiffly; `time` is its time unit [s]."""
     row, motion = forces.place
     n_nodes = len(np.unique(dofs[forces.rows, 0]))
     return (

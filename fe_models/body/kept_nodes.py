@@ -1,4 +1,4 @@
-"""Nodes, named by the user, that a reduced body keeps in addition to its surface and interfaces."""
+"""Nodes that a reduced body keeps at the user's request, in addition to its surface and interfaces."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -13,11 +13,11 @@ from fe_models.meshes.numbering import NONE, node_place
 
 __all__ = ["TOLERANCE", "keep_nodes"]
 
-TOLERANCE = 1e-3  #: largest distance between a node and the position that selects it, relative to the size of the body
+TOLERANCE = 1e-3  #: largest distance between a node and the position that selects it, over the size of the body
 
 
 def keep_nodes(body: FEBody, keep: Sequence[Any]) -> FEBody:
-    """Return the body that also keeps these nodes, with translations and rotations.
+    """Return the body with a request to keep these nodes, with translations and rotations.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def keep_nodes(body: FEBody, keep: Sequence[Any]) -> FEBody:
 
 
 def named_rows(body: FEBody, where: str, asked: Any) -> IntArray:
-    """Return the nodes of one entry: a node number, a set or a position."""
+    """Return the nodes of one request: a node number, a set or a position."""
     numbering = body.numbering
     if isinstance(asked, str):
         prefix = asked.rpartition(".")[0]
@@ -72,7 +72,7 @@ def named_rows(body: FEBody, where: str, asked: Any) -> IntArray:
 
 
 def own_nodes(body: FEBody, rows: IntArray) -> IntArray:
-    """Return the rows that are nodes themselves, each node once, without points of a skin and duplicates."""
+    """Return the rows of real nodes, without skin points and duplicates."""
     numbering = body.numbering
     if numbering.on_skin.size:
         rows = rows[numbering.on_skin[rows] == 0]
@@ -86,6 +86,6 @@ def own_nodes(body: FEBody, rows: IntArray) -> IntArray:
 
 
 def mesh_nodes(body: FEBody) -> IntArray:
-    """Return the nodes that have dofs of their own, in the mesh or after coupling."""
+    """Return the nodes that have dofs, in the mesh or after coupling."""
     parts = [body.dofs] if body.recovery is None else [body.dofs, body.recovery.dofs]
     return np.concatenate([dofs[dofs[:, 1] >= 0, 0] for dofs in parts])

@@ -13,7 +13,7 @@ from fe_models.foundation.records import ArrayShape, checked_fields, frozen_copi
 
 __all__ = ["LOAD_CASE_KINDS", "LoadCase", "ReducedLoadCase", "check_load_cases", "load_columns"]
 
-LOAD_CASE_KINDS = ("pressure", "gravity", "force")  #: kinds in the job file; a body accepts any text
+LOAD_CASE_KINDS = ("pressure", "gravity", "force")  #: kinds of load cases in the job file; a body accepts any text
 
 
 @presented
@@ -21,7 +21,7 @@ LOAD_CASE_KINDS = ("pressure", "gravity", "force")  #: kinds in the job file; a 
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class LoadCase:
-    """A named load of unit amplitude: generalised forces over the dofs of its body.
+    """Named load of unit amplitude: generalised forces on the dofs of its body.
 
     A coupling u_mesh = T u keeps the work and so transforms the forces to f = Tᵀ f_mesh; a reduction to Phiᵀ f.
 
@@ -49,7 +49,7 @@ class LoadCase:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class ReducedLoadCase:
-    """A named load of unit amplitude on a reduced body: its resultant and its modal forces.
+    """Named load of unit amplitude on a reduced body: its resultant and its modal forces.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class ReducedLoadCase:
 
 
 def check_load_cases(where: str, load_cases: tuple[LoadCase, ...], n_dof: int) -> None:
-    """Raise `BodyError` if two load cases have one name, or a length does not fit."""
+    """Raise `BodyError` if two load cases have the same name, or if the length of one is wrong."""
     names = [case.name for case in load_cases]
     if len(set(names)) != len(names):
         twice = next(name for name in names if names.count(name) > 1)
@@ -83,6 +83,6 @@ def check_load_cases(where: str, load_cases: tuple[LoadCase, ...], n_dof: int) -
 
 
 def load_columns(load_cases: Iterable[LoadCase], n_dof: int) -> Array:
-    """Return the forces of load cases side by side, (n_dof, n_load_cases)."""
+    """Return the forces of the load cases as columns, (n_dof, n_load_cases)."""
     columns = [case.f for case in load_cases]
     return np.stack(columns, axis=1) if columns else np.zeros((n_dof, 0))

@@ -23,7 +23,7 @@ from fe_models.meshes.selections import AnyMesh, Selection, selected_facets
 
 __all__ = ["gravity_load", "interface_load", "nodal_load", "pressure_load", "selection_load"]
 
-UNREACHED = 1e-9  #: largest share of a force or torque that the nodes may fail to carry; above it the load is rejected
+UNREACHED = 1e-9  #: largest share of a force or torque that the nodes cannot transmit; a load above it is rejected
 
 
 def pressure_load(body: FEBody, mesh: AnyMesh, name: str, selection: Selection, pressure: float) -> LoadCase:
@@ -203,7 +203,7 @@ def selection_load(
 
 
 def _spread(body: FEBody, nodes: IntArray, weights: Array, reference: Array, wrench: Array, where: str) -> Array:
-    """Return forces and moments at nodes with the resultant wrench about the reference point, (n_nodes, 6).
+    """Return nodal forces and moments whose resultant about the reference point is the wrench, (n_nodes, 6).
 
     Translations carry the wrench where they can. Otherwise moments are added at nodes that have rotations.
     """
@@ -213,7 +213,7 @@ def _spread(body: FEBody, nodes: IntArray, weights: Array, reference: Array, wre
     G[:, :3] = rigid_motion_of_points(body.nodes[nodes], reference)
     G[has_rotation, 3:, 3:] = np.eye(3)
     arms = np.linalg.norm(body.nodes[nodes] - reference, axis=1)
-    length = float(arms.max()) or 1.0  # makes force and torque comparable in size
+    length = float(arms.max()) or 1.0  # length that makes force and torque comparable
     unit = np.repeat([1.0, length], 3)
     for moments in (0.0, length**2):
         W = weights[:, None] * np.repeat([1.0, moments], 3)
@@ -260,7 +260,7 @@ def _known(dofs: IntArray, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def _require_outward(mesh: Mesh, where: str, kind: str, rows: IntArray) -> None:
-    """Raise `LoadError` unless every face is a facet of the boundary, where facets point outward."""
+    """Raise `LoadError` unless every face is on the boundary of the mesh, where normals point outward."""
     facets = boundary_facets(mesh).get(kind, np.zeros((0, rows.shape[1]), np.int64))
     classes, _ = first_of_equal_rows(np.concatenate([facets, rows]))
     inside = ~np.isin(classes[len(facets) :], classes[: len(facets)])

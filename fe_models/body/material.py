@@ -247,7 +247,7 @@ AnyMaterial = Material | OrthotropicMaterial | AnisotropicMaterial
 
 
 def material_words(material: AnyMaterial) -> str:
-    """Return the constants of a material as one line of the provenance."""
+    """Return the constants of a material as one line for the provenance."""
     if isinstance(material, Material):
         return f"E = {material.E!r}, nu = {material.nu!r}, rho = {material.rho!r}"
     axes = f"axes {[list(row) for row in material.axes]}"
@@ -261,7 +261,7 @@ def material_words(material: AnyMaterial) -> str:
 
 
 def require_isotropic(where: str, material: object) -> None:
-    """Raise `MaterialError` unless the material is isotropic; the caller has no elements for other materials."""
+    """Raise `MaterialError` unless the material is isotropic, for elements that need isotropic materials."""
     if isinstance(material, OrthotropicMaterial | AnisotropicMaterial):
         kind = "orthotropic" if isinstance(material, OrthotropicMaterial) else "anisotropic"
         raise MaterialError(f"{where}: material {material.name!r} is {kind}; expected an isotropic one (Material)")
@@ -286,7 +286,7 @@ def _normalised(S: Array) -> Array:
 
 
 def _stress_turn(R: Array) -> Array:
-    """Return T, (6, 6), which maps stress in the axes R (columns) to stress in mesh axes, rows xx yy zz yz xz xy.
+    """Return T, (6, 6), which transforms stress from the axes R (columns) to mesh axes, rows xx yy zz yz xz xy.
 
     sigma_ij = R_ik R_jl s_kl. Equal strain energy then gives the stiffness in mesh axes as T C Tᵀ.
     """
@@ -301,7 +301,7 @@ def _stress_turn(R: Array) -> Array:
 def assign_materials(
     mesh: Mesh, materials: AnyMaterial | Mapping[str, AnyMaterial]
 ) -> tuple[tuple[AnyMaterial, ...], dict[str, IntArray]]:
-    """Return the materials in use and, for each cell type, the index of the material of every cell.
+    """Return the materials in use and, for each cell type, the material index of each cell.
 
     Parameters
     ----------
@@ -350,7 +350,7 @@ def assign_materials(
 
 
 def groups_of(mesh: Mesh, missing: Mapping[str, IntArray]) -> str:
-    """Name the groups of the cells without a material."""
+    """Name the groups of cells without material."""
     groups = [
         group
         for group, by_type in mesh.cell_sets.items()

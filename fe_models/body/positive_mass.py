@@ -1,4 +1,4 @@
-"""Repair of mass matrices with slightly negative eigenvalues, as some programs write them."""
+"""Repair of mass matrices with slightly negative eigenvalues, as written by some programs."""
 
 from dataclasses import replace
 
@@ -20,13 +20,13 @@ ROUNDING = 1e-10
 #: matrix
 REPAIR_LIMIT = 1e-3
 DENSE = 1500  #: number of dofs up to which all eigenvalues are computed
-MOST_NEGATIVE = 200  #: number of negative eigenvalues that are searched for in a large matrix
+MOST_NEGATIVE = 200  #: largest number of negative eigenvalues that are computed for a large matrix
 #: entries of an eigenvector below this share of the largest are dropped, so that the matrix stays sparse
 ROUNDING_OF_VECTORS = 1e-13
 
 
 def scales(M: sp.csc_array, dofs: IntArray) -> Array:
-    """Return the scale of every dof: the root of the largest mass of a translation, modal coordinate or rotation."""
+    """Return the scale of each dof: the root of the largest mass of its kind (translation, modal, rotation)."""
     diagonal = np.abs(M.diagonal())
     size = np.ones(len(dofs))
     for is_kind in (dofs[:, 1] < 0, (dofs[:, 1] >= 0) & (dofs[:, 1] < 3), dofs[:, 1] >= 3):
@@ -36,7 +36,7 @@ def scales(M: sp.csc_array, dofs: IntArray) -> Array:
 
 
 def negative_mass(M: sp.csc_array, dofs: IntArray) -> tuple[Array, Array]:
-    """Return the negative eigenvalues of M and their vectors, with translations and rotations scaled to similar mass.
+    """Return the negative eigenvalues of M and their vectors, with translations and rotations scaled alike.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def negative_mass(M: sp.csc_array, dofs: IntArray) -> tuple[Array, Array]:
 
 
 def positive_mass(body: FEBody) -> FEBody:
-    """Return the body with the negative eigenvalues of its mass set to zero, and record this in its provenance.
+    """Return the body with the negative eigenvalues of its mass set to zero, which its provenance records.
 
     (1) find the negative eigenvalues and vectors of M, translations and rotations scaled to similar mass
         (`negative_mass`)

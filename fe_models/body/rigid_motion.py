@@ -1,4 +1,4 @@
-"""Motion of points and dofs that follow a rigid body, its loads per unit mass, and the work of forces on it.
+"""Motion of points and dofs of a rigid body, loads per unit mass in this motion, and the work of forces on it.
 
 Weight and d'Alembert loads of rigid motion are linear in position (theory.md §7).
 """
@@ -14,7 +14,7 @@ __all__ = ["MassLoads", "rigid_motion_of_dofs", "rigid_motion_of_points", "rotat
 
 
 def rigid_motion_of_points(points: Array, origin: ArrayLike) -> Array:
-    """Return the translations of points under the six unit rigid-body motions about the origin, (n_points, 3, 6).
+    """Return the translations of points in the six unit rigid-body motions about the origin, (n_points, 3, 6).
 
     u = d + theta × (c - origin), with columns d_x d_y d_z theta_x theta_y theta_z.
     """
@@ -28,7 +28,7 @@ def rigid_motion_of_points(points: Array, origin: ArrayLike) -> Array:
 
 
 def rigid_motion_of_dofs(nodes: Array, dofs: IntArray, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
-    """Return the values of dofs under the six unit rigid-body motions about the origin, (n_dof, 6).
+    """Return the dofs in the six unit rigid-body motions about the origin, (n_dof, 6).
 
     The columns are d_x d_y d_z [-] and theta_x theta_y theta_z [m]. Rotational dofs take the rotation; multipliers are
     zero.
@@ -54,14 +54,14 @@ def rigid_motion_of_dofs(nodes: Array, dofs: IntArray, origin: ArrayLike = (0.0,
 
 @dataclass(frozen=True, eq=False)
 class MassLoads:
-    """k loads, each with forces per unit mass f = A c + b at the undeformed position c, mesh axes."""
+    """Set of k loads with the force per unit mass f = A c + b at the undeformed position c, mesh axes."""
 
-    A: Array  #: (k, 3, 3) [1/s² per unit of the load]
-    b: Array  #: (k, 3) [m/s² per unit of the load]
+    A: Array  #: gradient of each load, (k, 3, 3) [1/s² per unit of the load]
+    b: Array  #: value of each load at the mesh origin, (k, 3) [m/s² per unit of the load]
 
     @classmethod
     def none(cls, k: int) -> "MassLoads":
-        """Return k loads of zero."""
+        """Return k zero loads."""
         return cls(np.zeros((k, 3, 3)), np.zeros((k, 3)))
 
     @property
@@ -70,7 +70,7 @@ class MassLoads:
         return len(self.b)
 
     def at(self, points: Array) -> Array:
-        """Return the forces per unit mass at points (..., 3), as (..., 3, k)."""
+        """Return the forces per unit mass, (..., 3, k), at points (..., 3)."""
         return np.einsum("jab,...b->...aj", self.A, points) + self.b.T
 
     def plus_rigid(self, motion: Array, origin: Array) -> "MassLoads":
@@ -84,7 +84,7 @@ class MassLoads:
 
 
 def rotation_work(V: Array) -> Array:
-    """Return W, (..., 3, 3), in thetaᵀ W theta', the work of forces on the second-order term of a rigid rotation.
+    """Return W, (..., 3, 3): thetaᵀ W theta' is the work of forces on the second-order motion of a rigid rotation.
 
     A point at lever o moves by theta × o + ½ theta × (theta × o) if theta is a rotation vector. Forces f do work on the
     bilinear form ½ [theta × (theta' × o) + theta' × (theta × o)]. Hence W = sym(V) - tr(V) 1 with V = Σ f oᵀ.

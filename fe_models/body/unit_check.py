@@ -17,16 +17,16 @@ log = logging.getLogger(__name__)
 SIZE = (1e-4, 1e3)  #: diagonal of the bounding box of a body [m]
 #: plausible range, outside of which a warning follows: a mesh in mm read in metres is large and slow [m]
 USUAL_SIZE = (1e-4, 50.0)
-DENSITY = (10.0, 25_000.0)  #: from rigid foam to osmium [kg/m³]
-MODULUS = (1e3, 2e12)  #: from soft gel to above diamond [Pa]
-WAVE_SPEED = (10.0, 30_000.0)  #: sqrt(E / rho): from soft rubber to above diamond [m/s]
-STEEL = 7850.0  #: [kg/m³]
-LIGHTEST = 1e-3  #: mass divided by the volume of the convex hull, which is mostly air in a frame [kg/m³]
-MESHED_SPEED = (1.0, 3e5)  #: sqrt(K_kk / M_kk) times the node distance: wave speed times up to ten [m/s]
+DENSITY = (10.0, 25_000.0)  #: plausible densities, from rigid foam to osmium [kg/m³]
+MODULUS = (1e3, 2e12)  #: plausible moduli, from soft gel to above diamond [Pa]
+WAVE_SPEED = (10.0, 30_000.0)  #: plausible sqrt(E / rho), from soft rubber to above diamond [m/s]
+STEEL = 7850.0  #: density of steel [kg/m³]
+LIGHTEST = 1e-3  #: smallest plausible mass over the volume of the convex hull, which is mostly air for a frame [kg/m³]
+MESHED_SPEED = (1.0, 3e5)  #: plausible sqrt(K_kk / M_kk) times node distance, up to ten times the wave speed [m/s]
 #: 2 f L of the first elastic frequency: at most the wave speed, much less for slender bodies [m/s]
 SWING_SPEED = (1e-3, 6e4)
-FLAT = 1e-6  #: thickness of a point cloud relative to its size, below which it has no volume
-LENGTHS = {"mm": 1e-3, "m": 1.0, "inches": 0.0254}  #: in which lengths nodes may be, besides that of the units [m]
+FLAT = 1e-6  #: thickness of a point cloud over its size, below which it has no volume
+LENGTHS = {"mm": 1e-3, "m": 1.0, "inches": 0.0254}  #: length units in which nodes may be given by mistake [m]
 
 
 class _Elastic(Protocol):
@@ -40,13 +40,14 @@ class _Elastic(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class BodyNumbers:
-    """What is known of a body, as plain numbers in its units; None: unknown."""
+    """Known properties of a body, as plain numbers in its units; None: unknown."""
 
-    size: float = 0.0  #: diagonal of the bounding box of its nodes; 0: not checked
-    hull: float = 0.0  #: volume of the convex hull of its nodes; 0: they lie in a plane, or it is not checked
+    size: float = 0.0  #: diagonal of the bounding box of the nodes; 0: not checked
+    hull: float = 0.0  #: volume of the convex hull of the nodes; 0: they lie in a plane, or it is not checked
     mass: float | None = None
     frequency: float | None = None  #: lowest elastic frequency of the free body
-    meshed_speed: float | None = None  #: sqrt(K_kk / M_kk) times the distance to the nearest node, median of the rows
+    #: median over the rows of sqrt(K_kk / M_kk) times the distance to the closest node
+    meshed_speed: float | None = None
     materials: Sequence[_Elastic] = ()
 
 
@@ -63,7 +64,7 @@ def implausible_numbers(units: Units, numbers: BodyNumbers) -> list[tuple[bool, 
         for other in UNIT_SYSTEMS.values()
         if other.name != units.name and not _findings(other, numbers)
     ]
-    if numbers.meshed_speed is not None:  # of matrices, which do not change with the nodes
+    if numbers.meshed_speed is not None:  # computed from matrices, which do not change with node positions
         for word, length in LENGTHS.items():
             factor = length / units.length
             size, speed = factor * numbers.size, factor * numbers.meshed_speed
@@ -100,7 +101,7 @@ def _findings(units: Units, numbers: BodyNumbers) -> list[tuple[bool, str]]:
     density, stress = units.mass / units.length**3, units.mass / (units.length * units.time**2)  # one unit in SI
     for material in numbers.materials:
         rho, E = material.rho * density, material.E * stress
-        if rho and not DENSITY[0] <= rho <= DENSITY[1]:  # zero density is allowed: it stands for springs with a shape
+        if rho and not DENSITY[0] <= rho <= DENSITY[1]:  # zero density is allowed for springs with a shape
             texts.append((
                 True,
                 f"density of {material.name!r} {material.rho:.4g} {units.mass_symbol}/{units.length_symbol}³ = "

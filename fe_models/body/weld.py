@@ -1,4 +1,4 @@
-"""Weld several bodies into one body, joined at their interfaces; solids and frames alike."""
+"""Welding of several bodies into one body at their interfaces, for solids and frames."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -17,12 +17,12 @@ from fe_models.meshes.numbering import numbering_side_by_side
 
 __all__ = ["WeldedModel", "WeldedPoints", "block_damping", "mesh_rows", "points_side_by_side", "weld"]
 
-Place = tuple[str, str]  #: name of a body, name of its interface
+Place = tuple[str, str]  #: name of a body, and name of its interface
 
 
 @dataclass(frozen=True, eq=False)
 class WeldedModel:
-    """The element models of the parts side by side; an `fe_models.body.fe_body.ElementModel`."""
+    """Element models of the parts side by side, as an `fe_models.body.fe_body.ElementModel`."""
 
     parts: tuple[ElementModel, ...]
     n_mesh_dof: tuple[int, ...]  #: number of mesh dofs of each part
@@ -30,7 +30,7 @@ class WeldedModel:
 
     @property
     def has_nodal_stress(self) -> bool:
-        """Whether any part knows its stress; the other parts report zero."""
+        """Whether any part has nodal stress; the other parts report zero."""
         return any(part.has_nodal_stress for part in self.parts)
 
     def mass_gram(self, u: Array) -> Array:
@@ -55,7 +55,7 @@ class WeldedModel:
         return np.concatenate(stresses)
 
     def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
-        """Return rotations at the given nodes, (n, 3, k); NaN where the part does not know them."""
+        """Return rotations at the given nodes, (n, 3, k); NaN where a part cannot compute them."""
         rotation = np.full((len(nodes), 3, np.shape(u)[1]), np.nan)
         first = np.cumsum([0, *self.n_nodes])
         for part, rows, begin, n_nodes in zip(self.parts, self._rows(), first[:-1], self.n_nodes, strict=True):
@@ -66,7 +66,7 @@ class WeldedModel:
 
     @property
     def has_geometric_stiffness(self) -> bool:
-        """Whether all parts know their geometric stiffness; a missing part would make the sum wrong."""
+        """Whether all parts have a geometric stiffness; with a missing part the sum would be wrong."""
         return all(part.has_geometric_stiffness for part in self.parts)
 
     def mass_forces(self, loads: MassLoads) -> Array:
@@ -100,7 +100,7 @@ class WeldedModel:
 
 @dataclass(frozen=True, eq=False)
 class WeldedPoints:
-    """The stress points of all parts that have stress points; a `fe_models.body.fe_body.StressPointModel`."""
+    """Stress points of all parts, as a `fe_models.body.fe_body.StressPointModel`."""
 
     #: name of the part, its stress points, and its rows among the mesh dofs
     parts: tuple[tuple[str, StressPointModel, slice], ...]
@@ -285,7 +285,7 @@ def _moved(body: FEBody, interface: Interface, is_ambiguous: bool, first_dof: in
 def _ties(
     bodies: tuple[FEBody, ...], joined: set[Place], n_dof: int, start: dict[str, tuple[int, int]]
 ) -> Iterator[Tie]:
-    """Yield the ties of the parts, and those of their joined distributing interfaces, over all dofs."""
+    """Yield the ties of the parts and of their joined distributing interfaces, over all dofs."""
     for body in bodies:
         first_dof, first_node = start[body.name]
         T = sp.csr_array(
@@ -322,7 +322,7 @@ def _numbered(dofs: list[IntArray], first_node: IntArray) -> IntArray:
 
 
 def points_side_by_side(bodies: Sequence[FEBody], n_mesh_dof: tuple[int, ...]) -> WeldedPoints | None:
-    """Return the stress points of all bodies, whose mesh dofs lie side by side; None if no body has any."""
+    """Return the stress points of all bodies, with their mesh dofs one after the other; None if there are none."""
     points = tuple(
         (body.name, body.stress_points, rows)
         for body, rows in zip(bodies, mesh_rows(n_mesh_dof), strict=True)
@@ -332,7 +332,7 @@ def points_side_by_side(bodies: Sequence[FEBody], n_mesh_dof: tuple[int, ...]) -
 
 
 def block_damping(bodies: Sequence[FEBody]) -> sp.csc_array | None:
-    """Return the damping of all bodies side by side; None if no body has any."""
+    """Return the block diagonal damping of all bodies; None if no body has damping."""
     if all(body.D is None for body in bodies):
         return None
     return sp.block_diag([sp.csc_array(body.K.shape) if body.D is None else body.D for body in bodies], format="csc")
@@ -345,7 +345,7 @@ def _followers(
 
     The third result is the leader of each node whose leader was replaced by the mean motion of its members.
     """
-    leader: dict[int, int] = {}  # node -> node
+    leader: dict[int, int] = {}  # leader of each node
     dofs_of: dict[int, IntArray] = {}
     for pair in pairs:
         nodes = [int(body.dofs[dofs[0], 0]) for dofs in pair]
@@ -380,19 +380,19 @@ def _followers(
 
 
 def _has_only_multipliers(body: FEBody, dofs: IntArray) -> bool:
-    """Whether only multipliers hold the node of these dofs, as in a distributing interface."""
+    """Return whether only multipliers act on the node of these dofs, as in a distributing interface."""
     rows, _ = body.K[:, dofs].nonzero()
     return bool((body.dofs[rows, 1] == MULTIPLIER).all())
 
 
 def _multipliers(body: FEBody, dofs: IntArray) -> IntArray:
-    """Return the multipliers that hold the reference node of these dofs."""
+    """Return the multipliers that act on the reference node of these dofs."""
     rows = np.unique(body.K[:, dofs].nonzero()[0])
     return np.asarray(rows[body.dofs[rows, 1] == MULTIPLIER], np.int64)
 
 
 def _mean_motion(body: FEBody, dofs: IntArray) -> tuple[IntArray, sp.csr_array]:
-    """Return the multipliers of a reference node, and A of u_reference = A u_members over all dofs, (6, n_dof)."""
+    """Return the multipliers of a reference node, and A in u_reference = A u_members over all dofs, (6, n_dof)."""
     multipliers = _multipliers(body, dofs)
     C = sp.csr_array(body.K[multipliers])
     at_reference = C[:, dofs].toarray()

@@ -52,7 +52,7 @@ def spread_extension(A: SpreadMatrix, keep: IntArray, more: sp.csc_array) -> Spr
 
 
 def extended_here(ranks: Ranks, rows: Rows, more: sp.csr_array) -> OwnRows:
-    """Return the rows of the result that this rank holds."""
+    """Return the rows of the result on this rank."""
     stay: OwnRows = ranks.store.pop(KEY)
     own = rows.of(ranks.rank)
     indptr = np.concatenate([stay.indptr, np.full(own.stop - own.start + 1 - len(stay.indptr), stay.indptr[-1])])
@@ -86,7 +86,7 @@ def spread_body(body: FEBody, ranks: Ranks) -> FEBody:
 
 
 def spread_whole(ranks: Ranks, A: sp.csc_array, order: IntArray, rows: Rows) -> SpreadMatrix:
-    """Distribute a symmetric matrix of rank 0 by rows over all ranks, in this order."""
+    """Distribute a symmetric matrix from rank 0 over all ranks, by rows in the given order."""
     by_rows = sp.csr_array((A.data, A.indices, A.indptr), shape=A.shape)[order]
     place = np.empty(len(order), by_rows.indices.dtype)
     place[order] = np.arange(len(order), dtype=place.dtype)
@@ -98,5 +98,5 @@ def spread_whole(ranks: Ranks, A: sp.csc_array, order: IntArray, rows: Rows) -> 
 
 
 def given_here(ranks: Ranks, rows: Rows) -> OwnRows:
-    """Return this rank's rows of the matrix that rank 0 holds."""
+    """Return the rows on this rank of a matrix that rank 0 has."""
     return OwnRows(*spread(ranks, rows, ranks.store.pop(KEY_OF_WHOLE, None)))

@@ -56,7 +56,7 @@ def couple(body: FEBody) -> FEBody:
     _require_dofs(body, todo)
     has_rotation = body.dofs[body.dofs[:, 1] >= 3, 0]
     for interface in (*rigid, *distributing):
-        # one node with rotations carries all six motions of a rigid interface
+        # a single node with rotations has all six motions of a rigid interface
         if interface.kind == "distributing" or not np.isin(interface.nodes, has_rotation).any():
             weights = interface.weights if interface.kind == "distributing" else np.ones(len(interface.nodes))
             require_spread(interface.name, interface.kind, body.nodes[interface.nodes], np.asarray(weights))
@@ -183,7 +183,7 @@ def _congruence(
     n_more: int,
     more: sp.csc_array | None = None,
 ) -> sp.csc_array:
-    """Return Tᵀ A T + more with T = [1 0; 0 T_s], where T has n_more empty rows and columns at the end.
+    """Return Tᵀ A T + more with T = [1 0; 0 T_s], extended by n_more empty rows and columns.
 
     The kept block is cut out in one pass, and the few new rows and columns are added. The product with the whole T
     would read all of A three times. A distributed matrix stays distributed.
@@ -204,7 +204,7 @@ def _congruence(
 def _reference_entries(
     A: sp.csc_array, keep: IntArray, slave_rows: IntArray, T_s: sp.csr_array, n_new: int
 ) -> sp.csc_array:
-    """Return the rows and columns of the reference nodes, (n_new, n_new)."""
+    """Return the rows and columns of the reference nodes in the coupled matrix, (n_new, n_new)."""
     n_kept = len(keep)
     A_slave = sp.csr_array(A[:, slave_rows] @ T_s)  # (n_dof, 6 n_rigid)
     A_kr = sp.coo_array(A_slave[keep])
@@ -300,7 +300,7 @@ def _require_dofs(body: FEBody, interfaces: list[Interface]) -> None:
 
 
 def require_spread(name: str, kind: str, positions: Array, weights: Array) -> None:
-    """Raise `InterfaceError` unless the weighted points span a plane, that is two radii of gyration above zero."""
+    """Raise `InterfaceError` unless the weighted points span a plane: two radii of gyration above zero."""
     where = f"interface {name!r}: {kind}"
     weighted = positions[weights > 0]
     if len(weighted) < 3:
