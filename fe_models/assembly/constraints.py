@@ -33,7 +33,7 @@ PART = 1e-6  #: largest share of such a motion in a requested component
 
 
 def characteristic_length(points: Array, reference: Array) -> float:
-    """Return the mean distance of the points from the reference point [m], or 1 if all points coincide with it.
+    """Return the mean distance of the points from the reference point [m]; 1 if all points coincide with it.
 
     Nastran multiplies the weights of rotations by the square of this length, so that they compare with those of
     translations. Other programs use other lengths, or ignore the rotations of members.
@@ -129,27 +129,27 @@ class RigidNodes:
 
     name: str
     node: int
-    followers: IntArray  #: (n_followers,)
+    followers: IntArray  #: node index of each follower, (n_followers,)
     components: tuple[int, ...] = ALL
 
 
 @dataclass(frozen=True, eq=False)
 class MeanMotion:
-    """A node that follows the weighted mean motion of others (docs/theory.md §1)."""
+    """Node that follows the weighted mean motion of other nodes (docs/theory.md §1)."""
 
     name: str
     node: int
-    members: IntArray  #: (n_members,)
+    members: IntArray  #: node index of each member, (n_members,)
     weights: Array  #: weights of the translations, (n_members,), or of each component, mesh axes, (n_members, 6)
     components: tuple[int, ...] = ALL
 
 
 @dataclass(frozen=True)
 class NodeEquation:
-    """Σ coefficient × component = 0; the component of the first term is eliminated."""
+    """Linear equation Σ coefficient × component = 0; the component of the first term is eliminated."""
 
     name: str
-    terms: tuple[tuple[int, int, float], ...]  #: node, component, coefficient
+    terms: tuple[tuple[int, int, float], ...]  #: (node, component, coefficient) of each term
 
 
 Constraint = RigidNodes | MeanMotion | NodeEquation
@@ -216,7 +216,7 @@ def eliminated(
 def motion_by_nodes(
     constraints: Iterable[Constraint], nodes: IntArray, points: Array, dof_of: IntArray, n_dof: int
 ) -> sp.csr_array:
-    """Return the motion of all dofs by that of some nodes that follow others, as if these nodes were free.
+    """Return the map from the motion of nodes that follow others to all dofs, as if these nodes were independent.
 
     Parameters
     ----------
@@ -242,14 +242,14 @@ def motion_by_nodes(
     motion, moved = start, start
     while moved.nnz:
         moved = sp.coo_array(put @ (C @ moved))
-        keep = (owner[moved.row] != moved.col // 6) & (moved.data != 0)  # a node does not move itself
+        keep = (owner[moved.row] != moved.col // 6) & (moved.data != 0)  # drops the motion of a node by itself
         moved = sp.csr_array((moved.data[keep], (moved.row[keep], moved.col[keep])), shape=(n_dof, len(own)))
         motion = motion + moved
     return sp.csr_array(motion)
 
 
 def translation_weights(coupling: MeanMotion) -> Array | None:
-    """Return one weight for each listed member, or None if rotations or single components have weights."""
+    """Return one weight for each member; None if rotations or single components have weights."""
     given = np.asarray(coupling.weights, dtype=float)
     if given.ndim == 1:
         return given

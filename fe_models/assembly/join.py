@@ -47,7 +47,7 @@ class MasslessNodes:
 
     @property
     def has_nodal_stress(self) -> bool:
-        """False, because there is no material at these nodes."""
+        """Return False, because there is no material at these nodes."""
         return False
 
     def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
@@ -56,7 +56,7 @@ class MasslessNodes:
 
     @property
     def has_geometric_stiffness(self) -> bool:
-        """True; the geometric stiffness is zero."""
+        """Return True; the geometric stiffness is zero."""
         return True
 
     def mass_gram(self, u: Array) -> Array:
@@ -86,18 +86,19 @@ class MasslessNodes:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A body without interfaces, and the nodes of the joined body that are its first nodes."""
+    """Body without interfaces; its first nodes are nodes of the joined body."""
 
     body: FEBody
-    nodes: IntArray  #: numbers in the joined body, (n,); nodes of the part beyond n are its own (skin), without dofs
+    #: node of the joined body for each of its first n nodes, (n,); further nodes are skin nodes without dofs
+    nodes: IntArray
 
 
 @dataclass(frozen=True, eq=False)
 class Joined:
-    """The joined body, and the position of each given node among its nodes."""
+    """Joined body, and the position of each given node among its nodes."""
 
     body: FEBody
-    place: IntArray  #: node of the body for each given node, -1 if it has none, (n_nodes,)
+    place: IntArray  #: node of the body for each given node, (n_nodes,); -1 if the body does not have it
 
 
 def join(
@@ -110,7 +111,7 @@ def join(
     node_sets: Mapping[str, IntArray] | None = None,
     normal: int | None = None,
 ) -> Joined:
-    """Make one body of parts that share nodes.
+    """Join parts that share nodes into one body.
 
     Parameters
     ----------
@@ -163,7 +164,7 @@ def join(
 def _mean_nodes(
     constraints: list[Constraint], points: Array, place: IntArray, dof_of: IntArray, to_mesh: sp.csr_array
 ) -> tuple[MeanNode, ...]:
-    """Return a record of each mean motion of translations: its second order is that of the nearest rigid motion."""
+    """Return the record of each mean motion of translations, for its second order (the closest rigid motion)."""
     found = [(c, w) for c in constraints if isinstance(c, MeanMotion) and (w := translation_weights(c)) is not None]
     if not found:
         return ()
@@ -179,7 +180,7 @@ def _mean_nodes(
 
 
 def _retained_nodes(part: Part, begin: int, place: IntArray) -> IntArray:
-    """Return the nodes that a part keeps, as nodes of the joined body; shared nodes have one copy."""
+    """Return the kept nodes of a part as nodes of the joined body; shared nodes have one copy."""
     kept = part.body.kept
     is_shared = kept < len(part.nodes)
     return np.concatenate([place[part.nodes[kept[is_shared]]], begin + kept[~is_shared]])
@@ -194,7 +195,7 @@ def _numbering(
     """
     side = []
     for part in parts:
-        own = part.body.numbering.nodes  # indices of the joined body, with which the mesh of the part was numbered
+        own = part.body.numbering.nodes  # indices in the joined body, by which the mesh of the part is numbered
         at = np.full(len(part.body.nodes), NONE) if not own.size else np.array(own)
         at[: len(part.nodes)] = part.nodes
         on_skin = (np.arange(len(at)) >= len(part.nodes)).astype(np.int64)
@@ -238,7 +239,7 @@ def _shared_dofs(parts: Sequence[Part], place: IntArray, leaders: IntArray) -> t
 def _side_by_side(name: str, bodies: list[FEBody], S: sp.csr_array, dofs: IntArray, nodes: Array) -> FEBody:
     first = np.cumsum([0, *(len(body.nodes) for body in bodies)])
     recoveries = [body.to_mesh for body in bodies]
-    loose = np.flatnonzero(np.diff(S.tocsc().indptr) == 0)  # dofs of leaders that belong to no part
+    loose = np.flatnonzero(np.diff(S.tocsc().indptr) == 0)  # dofs of leaders that are in no part
     own = sp.csr_array((np.ones(len(loose)), (np.arange(len(loose)), loose)), shape=(len(loose), len(dofs)))
     n_mesh_dof = tuple(int(recovery.matrix.shape[0]) for recovery in recoveries)
     models = [body.element_model for body in bodies]

@@ -1,4 +1,4 @@
-"""Lumped mass of beams and shells: elements without mass, and point masses at their nodes.
+"""Lumped mass of beams and shells: massless elements, and point masses at their nodes.
 
 (1) a beam has half of its mass at each end, on its centroid line; the ends carry no rotary inertia
 (2) a shell has m_i = ∫ N_i rho t dA at its corner i, on the surface of its centre of mass, without rotary inertia
@@ -33,7 +33,7 @@ __all__ = ["lumped_beams", "lumped_shells"]
 def lumped_beams(
     mesh: LineMesh, properties: BeamProperty | Mapping[str, BeamProperty]
 ) -> tuple[BeamProperty | dict[str, BeamProperty], list[PointMass]]:
-    """Return the properties without mass, and step (1): the point masses.
+    """Step (1): return the properties without mass, and the point masses.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def lumped_beams(
 def lumped_shells(
     mesh: ShellMesh, properties: AnyShellProperty | Mapping[str, AnyShellProperty]
 ) -> tuple[AnyShellProperty | dict[str, AnyShellProperty], list[PointMass]]:
-    """Return the properties without mass, and step (2): the point masses.
+    """Step (2): return the properties without mass, and the point masses.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def _without_mass(item: AnyShellProperty) -> AnyShellProperty:
 
 
 def _point_masses(nodes: IntArray, masses: Array, arms: Array) -> list[PointMass]:
-    """Return one point mass for each node and arm; masses (n, c), arms from the nodes (n, c, 3)."""
+    """Return a point mass for each node and arm, from masses (n, c) and arms from the nodes (n, c, 3)."""
     sums: dict[tuple[int, float, float, float], float] = {}
     for node, mass, arm in zip(nodes.ravel().tolist(), masses.ravel().tolist(), arms.reshape(-1, 3), strict=True):
         x, y, z = arm.tolist()

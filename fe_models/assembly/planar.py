@@ -14,7 +14,7 @@ __all__ = ["planar"]
 
 
 def planar(body: FEBody, *, normal: int = 2) -> FEBody:
-    """Return the body without any deformation out of a plane.
+    """Return the body with all deformation restricted to one plane.
 
     Each node keeps its in-plane dofs: two translations and the rotation about the normal. Out of the plane every node
     follows one reference node rigidly. The body therefore has only three out-of-plane dofs: the translation of that
@@ -61,7 +61,7 @@ def planar(body: FEBody, *, normal: int = 2) -> FEBody:
 
 
 def _reference_node(body: FEBody, is_out: np.ndarray, where: str) -> int:
-    """Return the node of the first boundary dofs, or else the first node, that has three dofs out of the plane."""
+    """Return the node of the first boundary dofs, otherwise the first node, with three out-of-plane dofs."""
     candidates = [np.asarray(i.dofs) for i in body.interfaces if i.dofs is not None]
     nodes = np.concatenate([*[body.dofs[dofs, 0] for dofs in candidates], body.dofs[:, 0]])
     count = np.bincount(body.dofs[is_out, 0], minlength=len(body.nodes))

@@ -26,7 +26,7 @@ class Rod:
     """Material and cross-section area of rods."""
 
     material: Material
-    area: float  #: [m²]
+    area: float  #: cross-section area [m²]
 
 
 def rod_body(mesh: LineMesh, rods: Mapping[str, Rod], *, name: str, units: Units, is_lumped: bool = False) -> FEBody:
