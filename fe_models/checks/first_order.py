@@ -28,15 +28,15 @@ from fe_models.meshes.quadratic_mesh import quadratic_mesh, tetrahedra_of
 
 __all__ = ["PROVENANCE", "FirstOrderError", "first_order_error"]
 
-LARGEST_PIECE = 1000  #: largest number of nodes of the piece; second order has eight times as many
-LARGEST_CUT = 400  #: the same for cells that are divided into tetrahedra, which gives thirty times as many
+LARGEST_PIECE = 1000  #: largest number of nodes of the sample piece; its second-order mesh has eight times as many
+LARGEST_CUT = 400  #: the same for cells that are divided into tetrahedra, which gives thirty times as many nodes
 SMALL = 900  #: number of second-order dofs up to which dense matrices are faster
 N_MODES, N_GUARDS = 3, 2
 STEPS = 12  #: number of LOBPCG steps
-SMOOTHINGS = 6  #: number of smoothing passes, over neighbours, of the share of boundary nodes
-SHIFT = 1e-4  #: shift relative to the median of K_kk / M_kk; it lies below the elastic modes of a piece of this size
-PROVENANCE = "first-order error"  #: key in the provenance of a body; the value is the error, then a text
-STEEL = Material("any", E=2.1e11, nu=0.3, rho=7850.0)  #: used if no material is given; E and rho do not matter
+SMOOTHINGS = 6  #: number of passes that average the share of boundary nodes over neighbours
+SHIFT = 1e-4  #: shift over the median of K_kk / M_kk; it is below the elastic modes of the piece
+PROVENANCE = "first-order error"  #: key in the provenance of a body; its value is the error, followed by a text
+STEEL = Material("any", E=2.1e11, nu=0.3, rho=7850.0)  #: material used if none is given; E and rho have no influence
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,8 @@ class FirstOrderError:
 
     error: float  #: largest f / f_second - 1 of the lowest elastic modes; a lower bound
     n_cells: int  #: number of cells of the piece
-    is_whole: bool  #: whether the piece is the complete mesh
-    kinds: tuple[str, ...]  #: types of the cells
+    is_whole: bool  #: whether the piece is the whole mesh
+    kinds: tuple[str, ...]  #: cell types in the piece
 
     @property
     def finding(self) -> str:
@@ -76,7 +76,7 @@ class FirstOrderError:
 def first_order_error(
     mesh: Mesh, materials: AnyMaterial | Mapping[str, AnyMaterial] | None = None, *, incompatible_modes: bool = False
 ) -> FirstOrderError:
-    """Measure how much too high the lowest frequencies are because cells are of first order.
+    """Estimate by how much first-order cells raise the lowest frequencies.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def first_order_error(
 
 
 class LowestModes:
-    """The lowest elastic modes of a free piece, and the factor with which they were computed.
+    """Lowest elastic modes of a free piece, and the factorisation that computed them.
 
     Attributes
     ----------
@@ -129,7 +129,7 @@ class LowestModes:
         self.omega2, self.Phi = omega2[order], Phi[:, order]
 
     def improved(self, K: sp.csc_array, M: sp.csc_array, nodes: Array, P: sp.csr_array) -> Array:
-        """Return omega² of the same modes in a higher-order field that contains this one, ascending.
+        """Return omega² of the same modes in a higher-order field that contains the first-order field, ascending.
 
         Parameters
         ----------
@@ -156,7 +156,7 @@ class LowestModes:
 
         rigid = rigid_motion_of_points(nodes, nodes.mean(axis=0)).reshape(-1, 6)
         operator = spla.LinearOperator(K.shape, precondition, matmat=precondition, dtype=np.float64)
-        with warnings.catch_warnings():  # stopping early is intended
+        with warnings.catch_warnings():  # early termination is intended
             warnings.simplefilter("ignore")
             omega2, _ = spla.lobpcg(
                 K, up @ self.Phi, B=M, M=operator, Y=rigid, largest=False, maxiter=STEPS, tol=1e-4 * self.omega2[0]
@@ -165,7 +165,7 @@ class LowestModes:
 
 
 def piece_of(mesh: Mesh) -> tuple[Mesh, IntArray]:
-    """Step (1): return the piece, and the indices of its cells, counted through all types, ascending, (n,)."""
+    """Step (1): return the piece, and the indices of its cells in the numbering over all types, ascending, (n,)."""
     pairs = facets_of(mesh).pairs
     n = mesh.n_cells
     joined = sp.coo_array(
@@ -200,6 +200,6 @@ def piece_of(mesh: Mesh) -> tuple[Mesh, IntArray]:
 
 
 def by_type(mesh: Mesh, number: IntArray) -> dict[str, IntArray]:
-    """Split cell indices counted through all types into indices for each type."""
+    """Split cell indices in the numbering over all types into indices for each type."""
     ends = np.cumsum([len(cells) for cells in mesh.cells.values()])
     return dict(zip(mesh.cells, np.split(number, ends[:-1]), strict=True))

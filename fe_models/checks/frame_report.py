@@ -1,4 +1,4 @@
-"""Report of a frame: its numbers and findings, before any solution."""
+"""Report of a frame: numbers and findings, before any solution."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -16,19 +16,19 @@ from fe_models.meshes.line_mesh import LineMesh
 
 __all__ = ["FrameReport", "report_frame"]
 
-COINCIDENCE = 1e-6  #: distance of coincident nodes relative to the diagonal of the bounding box
+COINCIDENCE = 1e-6  #: distance of coincident nodes over the diagonal of the bounding box
 
 
 @dataclass(frozen=True, eq=False)
 class FrameReport(Report):
-    """Numbers of a mesh of lines, and findings about it."""
+    """Numbers of a mesh of lines, and findings."""
 
     source: str
     units: Units
     n_nodes: int
     n_lines: int
     length: float  #: total length of all lines [m]
-    n_parts: int  #: number of parts that are not joined by a line, link or spring
+    n_parts: int  #: number of parts that no line, link or spring connects
     findings: tuple[Finding, ...]
 
     def numbers(self) -> list[tuple[str, str]]:
@@ -50,7 +50,7 @@ def report_frame(
     springs: Iterable[Spring] = (),
     links: Iterable[RigidLink] = (),
 ) -> FrameReport:
-    """Measure a frame, and check whether it is connected and its units are plausible.
+    """Measure a frame, and check whether it is connected and whether its units are plausible.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Report of a mesh: its numbers and faults, before any solution."""
+"""Report of a mesh: numbers and faults, before any solution."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -36,7 +36,7 @@ _CHUNK = 20_000  #: number of cells processed at a time
 
 
 def face_angles(mesh: Mesh) -> tuple[float, float]:
-    """Return the smallest and the largest angle between two faces of a cell that share an edge [degrees].
+    """Return the smallest and the largest angle between two faces of a cell with a common edge [degrees].
 
     The angle is measured at both ends of every edge, between the straight edges to other corners. It is 70.5 for a
     regular tetrahedron and 90 for a cube. Both are NaN for a mesh without solid cells. Coincident corners count as
@@ -58,7 +58,7 @@ def face_angles(mesh: Mesh) -> tuple[float, float]:
 
 @cache
 def _corners(kind: str) -> IntArray:
-    """Return rows i, j, k, m, (n, 4): edge i-j, and the other neighbours of i on the two faces of the edge."""
+    """Return rows i, j, k, m, (n, 4): edge i-j, and the other neighbours of i on the two faces at this edge."""
     beside: dict[tuple[int, int], list[int]] = {}
     for facet in CELL_SHAPES[kind].facets:
         n = len(facet)
@@ -72,10 +72,10 @@ def _corners(kind: str) -> IntArray:
 # mesh report ----------------------------------------------------------------------------------------------------------
 
 
-COINCIDENCE = 1e-6  #: distance of coincident nodes relative to the diagonal of the bounding box
-FLAT = 1e-9  #: volume relative to the cube of the cell size, below which the cell is degenerate
-ROUNDING = 1e-12  #: Jacobian relative to its mean, below which it counts as zero
-FIRST_ORDER_NOTED = 0.02  #: error of the lowest frequencies above which first-order cells give a warning
+COINCIDENCE = 1e-6  #: distance of coincident nodes over the diagonal of the bounding box
+FLAT = 1e-9  #: volume over the cube of the cell size, below which a cell is degenerate
+ROUNDING = 1e-12  #: Jacobian over its mean, below which it counts as zero
+FIRST_ORDER_NOTED = 0.02  #: error of the lowest frequencies due to first-order cells above which a warning is given
 UNMEASURABLE = {"inverted", "degenerate", "overlap", "transition"}  #: errors that prevent the computation of modes
 
 
@@ -83,18 +83,18 @@ UNMEASURABLE = {"inverted", "degenerate", "overlap", "transition"}  #: errors th
 class CellGeometry:
     """Volumes and Jacobians of the cells of one type."""
 
-    volume: Array  #: (n_cells,) [m³]
-    moment: Array  #: ∫x over the cell, (n_cells, 3) [m⁴]
-    lowest_inside: Array  #: smallest Jacobian at the integration points divided by the mean magnitude, (n_cells,)
-    lowest_at_nodes: Array  #: smallest Jacobian at the nodes divided by the mean magnitude, (n_cells,)
-    flatness: Array  #: volume divided by the cube of the largest extent, (n_cells,)
+    volume: Array  #: volume of each cell, (n_cells,) [m³]
+    moment: Array  #: first moment ∫ x dV of each cell, (n_cells, 3) [m⁴]
+    lowest_inside: Array  #: smallest Jacobian at the integration points over the mean magnitude, (n_cells,)
+    lowest_at_nodes: Array  #: smallest Jacobian at the nodes over the mean magnitude, (n_cells,)
+    flatness: Array  #: volume over the cube of the largest extent, (n_cells,)
 
 
 @presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class MeshReport(Report):
-    """Numbers of a mesh and findings about it.
+    """Numbers of a mesh, and findings.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def report_mesh(
     units: Units | str = "m-kg-s",
     incompatible_modes: bool = False,
 ) -> MeshReport:
-    """Measure a mesh and check whether it can serve as a finite element model.
+    """Measure a mesh, and check whether it is usable as a finite element model.
 
     Parameters
     ----------
@@ -304,12 +304,12 @@ def cell_geometry(mesh: Mesh, kind: str) -> CellGeometry:
 
 
 def _measure(kind: str, X: Array) -> tuple[Array, ...]:
-    """Return the fields of `CellGeometry` for cells with these nodes, (n_cells, n_nodes, 3)."""
+    """Compute the fields of `CellGeometry` for cells with node positions X, (n_cells, n_nodes, 3)."""
     points, weights = quadrature(kind)
     N, _ = shape_values(kind, points)
     jacobians = cell_jacobians(kind, X, np.vstack([points, CELL_SHAPES[kind].nodes]))
     inside = jacobians[:, : len(points)]
-    size = np.abs(inside) @ weights  # volume without regard to sign
+    size = np.abs(inside) @ weights  # volume with the absolute value of the Jacobian
     mean = np.where(size > 0, size, 1.0) / weights.sum()
     extent = (X.max(axis=1) - X.min(axis=1)).max(axis=1)
     return (
@@ -322,7 +322,7 @@ def _measure(kind: str, X: Array) -> tuple[Array, ...]:
 
 
 def _measure_tetra10(X: Array) -> tuple[Array, ...]:
-    """Measure ten-node tetrahedra; straight-edged ones, usually nearly all, from their corners (constant Jacobian)."""
+    """Measure ten-node tetrahedra; those with straight edges (usually most) only by their corners."""
     middles = np.array(CELL_SHAPES["tetra10"].middles)
     extent = (X.max(axis=1) - X.min(axis=1)).max(axis=1)
     bend = np.abs(2 * X[:, 4:] - X[:, middles[:, 0]] - X[:, middles[:, 1]]).max(axis=(1, 2))
@@ -381,7 +381,7 @@ def _cell_findings(
 
 
 def _listed(mesh: Mesh, chosen: Mapping[str, IntArray]) -> str:
-    """Return '3 tetra10 cells (numbers 5, 8, 12) are'."""
+    """Return a text such as '3 tetra10 cells (numbers 5, 8, 12) are'."""
     parts = []
     for kind, rows in chosen.items():
         numbers = mesh.cell_numbers[kind][rows[:5]] if kind in mesh.cell_numbers else rows[:5]

@@ -1,4 +1,4 @@
-"""Base of all mesh reports: findings, and the decision whether the mesh is usable."""
+"""Base class of all mesh reports: findings, and whether the mesh is usable."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
@@ -14,7 +14,7 @@ __all__ = ["Finding", "Report"]
 @dataclass(frozen=True)
 @checked_fields(ArgumentError)
 class Finding:
-    """A fault of a mesh, or a doubt about it.
+    """Error or warning about a mesh.
 
     Parameters
     ----------
@@ -32,9 +32,9 @@ class Finding:
 
 
 class Report(ABC):
-    """Numbers of a mesh, and findings about it."""
+    """Numbers of a mesh, and findings."""
 
-    source: str  #: the file, or how the mesh was made
+    source: str  #: file of the mesh, or a description of how it was made
     findings: tuple[Finding, ...]
 
     @property
@@ -56,7 +56,7 @@ class Report(ABC):
 
     @property
     def title(self) -> str:
-        """Head of the table."""
+        """Title of the table."""
         return "Mesh"
 
     @abstractmethod

@@ -1,4 +1,4 @@
-"""Report of a shell mesh: its numbers and findings, before any solution."""
+"""Report of a shell mesh: numbers and findings, before any solution."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ from fe_models.meshes.shell_mesh import ShellMesh
 
 __all__ = ["ShellReport", "report_shell"]
 
-COINCIDENCE = 1e-6  #: distance of coincident nodes relative to the diagonal of the bounding box
+COINCIDENCE = 1e-6  #: distance of coincident nodes over the diagonal of the bounding box
 WARP_NOTED = 10.0  #: angle between the two halves of a quad above which a warning is given [degree]
 ASPECT_NOTED = 20.0  #: ratio of longest to shortest side above which a warning is given
 
@@ -32,7 +32,7 @@ ASPECT_NOTED = 20.0  #: ratio of longest to shortest side above which a warning 
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class ShellReport(Report):
-    """Numbers of a mesh of shells, and findings about it.
+    """Numbers of a shell mesh, and findings.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def report_shell(
     springs: Iterable[Spring] = (),
     links: Iterable[RigidLink] = (),
 ) -> ShellReport:
-    """Measure a shell, and check its cells, whether it is connected, and whether its units are plausible.
+    """Measure a shell, and check its cells, its connection and the plausibility of its units.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def report_shell(
 
 
 def _judge_cells(mesh: ShellMesh) -> tuple[list[Finding], float, float]:
-    """Return findings about single cells, their total area, and the largest warp."""
+    """Return findings about single cells, the total area, and the largest warp angle."""
     findings = []
     area = warp = 0.0
     for kind, cells in mesh.cells.items():
