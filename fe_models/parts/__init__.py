@@ -1,4 +1,4 @@
-"""Parametric parts, meshed with gmsh, and meshes that are part of the package."""
+"""Parametric parts, meshed by gmsh, and meshes included in the package."""
 
 from fe_models.errors import MeshingError
 from fe_models.parts.bracket import Bracket, mesh_bracket

@@ -1,4 +1,4 @@
-"""A parametric bracket: a bolted foot, an upright with a bore, a rib between them."""
+"""Parametric bracket: a bolted foot, an upright with a bore, and a rib between them."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,18 +21,18 @@ class Bracket:
     is symmetric about y = 0. Four bolts pass through the foot along z, and the bore passes through the upright along x.
     """
 
-    foot_length: float = 90.0  #: along x, including the thickness of the upright
-    width: float = 70.0  #: along y
-    height: float = 110.0  #: along z
+    foot_length: float = 90.0  #: length of the foot along x, including the thickness of the upright
+    width: float = 70.0  #: width along y
+    height: float = 110.0  #: height of the upright along z
     thickness: float = 10.0  #: thickness of foot and upright
-    fillet: float = 8.0  #: radius in the inner corner
+    fillet: float = 8.0  #: fillet radius in the inner corner
     bolt: float = 9.0  #: diameter of the bolt holes
     bolt_edge: float = 14.0  #: distance from a bolt axis to the edge of the foot, or to the upright
-    bore: float = 32.0  #: diameter
+    bore: float = 32.0  #: diameter of the bore
     bore_height: float = 80.0  #: height of the bore axis above z = 0
-    rib_thickness: float = 8.0  #: along y
-    rib_length: float = 55.0  #: along the foot, from the inner face of the upright
-    rib_height: float = 42.0  #: along the upright, from the upper face of the foot
+    rib_thickness: float = 8.0  #: rib thickness along y
+    rib_length: float = 55.0  #: rib length along the foot, from the inner face of the upright
+    rib_height: float = 42.0  #: rib height along the upright, from the upper face of the foot
 
     def __post_init__(self) -> None:
         require_lengths(self)
@@ -96,7 +96,7 @@ class Bracket:
 
     @property
     def bolt_x(self) -> tuple[float, float]:
-        """Positions of the two rows of bolts along x."""
+        """Positions x of the two rows of bolts."""
         return self.thickness + self.bolt_edge, self.foot_length - self.bolt_edge
 
     @property
@@ -107,7 +107,7 @@ class Bracket:
 
 
 def mesh_bracket(bracket: Bracket | None = None, *, size: float = 8.0, order: int = 2, path: str | Path) -> PartMesh:
-    """Mesh a bracket into a Gmsh 4.1 binary file.
+    """Mesh a bracket, and write a binary file in Gmsh 4.1 format.
 
     Groups: volume "bracket"; faces "bolts" (all four holes), "bolt_1" to "bolt_4" (`Bracket.bolt_axes`), "bore".
 
@@ -146,7 +146,7 @@ def mesh_bracket(bracket: Bracket | None = None, *, size: float = 8.0, order: in
 
 
 def draw(gmsh: ModuleType, bracket: Bracket) -> None:
-    """Draw the solid: (1) the L-shape with its fillet, (2) the rib on it, (3) cut out the holes and the bore."""
+    """Draw the solid: (1) an L-shape with fillet, (2) the rib on it, (3) holes and bore cut out."""
     occ = gmsh.model.occ
     t, f, w = bracket.thickness, bracket.fillet, bracket.width
 
@@ -161,7 +161,7 @@ def draw(gmsh: ModuleType, bracket: Bracket) -> None:
     lines += [arc, occ.addLine(p[4], p[5]), occ.addLine(p[5], p[6]), occ.addLine(p[6], p[0])]
     ell = extrude_y(occ, lines, w)  # (1)
     y = -bracket.rib_thickness / 2
-    inside = t / 2  # the rib starts inside both plates, so that faces do not merely touch
+    inside = t / 2  # the rib starts inside both plates, so that solids overlap
     corners = (
         (inside, inside),
         (t + bracket.rib_length, inside),
@@ -180,6 +180,6 @@ def draw(gmsh: ModuleType, bracket: Bracket) -> None:
 
 
 def extrude_y(occ: ModuleType, lines: list[int], depth: float) -> tuple[int, int]:
-    """Return the solid between a closed loop of curves in a plane y = const and its copy moved along +y."""
+    """Return the solid swept along +y by a closed loop of curves in a plane y = const."""
     bodies = occ.extrude([(2, occ.addPlaneSurface([occ.addCurveLoop(lines)]))], 0, depth, 0)
     return next((dim, tag) for dim, tag in bodies if dim == 3)

@@ -1,4 +1,4 @@
-"""A parametric connecting rod: two bored ends, a tapered I-shaped shank with filleted roots, bolt bosses."""
+"""Parametric connecting rod: two bored ends, a tapered I-shaped shank with fillets, and bolt bosses."""
 
 from dataclasses import dataclass
 from importlib.resources import files
@@ -23,7 +23,7 @@ SHIPPED_MESHES = {"connecting_rod": "connecting_rod.msh", "slender_rod": "slende
 
 
 def shipped_mesh(name: str) -> Path:
-    """Return the path of a mesh of the package, such as "connecting_rod" (tet10, mm, groups of its mesher).
+    """Return the path of a mesh of the package, such as "connecting_rod" (tet10, mm, with groups).
 
     Raises
     ------
@@ -55,22 +55,23 @@ class ConnectingRod:
     about y = 0 and z = 0.
     """
 
-    centre_distance: float = 140.0  #: from bore axis to bore axis
-    big_bore: float = 48.0  #: diameter
-    big_outer: float = 68.0  #: diameter
-    big_width: float = 24.0  #: along z
-    small_bore: float = 22.0  #: diameter
-    small_outer: float = 34.0  #: diameter
-    small_width: float = 24.0  #: along z
-    shank_height_big: float = 32.0  #: along y, where the taper extended reaches the axis of the big end
-    shank_height_small: float = 22.0  #: along y, where the taper extended reaches the axis of the small end
-    shank_width: float = 16.0  #: along z
-    web: float = 5.0  #: thickness along z between the two pockets; equal to shank_width: no pockets
-    flange: float = 4.5  #: thickness beside the pockets, in the plane
-    fillet: float = 14.0  #: radius of the fillet between shank and ends, in the plane
-    bolt: float = 8.0  #: diameter of the bolt holes of the cap; 0: neither holes nor bosses
+    centre_distance: float = 140.0  #: distance between the bore axes
+    big_bore: float = 48.0  #: bore diameter of the big end
+    big_outer: float = 68.0  #: outer diameter of the big end
+    big_width: float = 24.0  #: width of the big end along z
+    small_bore: float = 22.0  #: bore diameter of the small end
+    small_outer: float = 34.0  #: outer diameter of the small end
+    small_width: float = 24.0  #: width of the small end along z
+    shank_height_big: float = 32.0  #: height of the shank along y, with its taper extended to the axis of the big end
+    #: height of the shank along y, with its taper extended to the axis of the small end
+    shank_height_small: float = 22.0
+    shank_width: float = 16.0  #: width of the shank along z
+    web: float = 5.0  #: thickness of the web between the two pockets along z; equal to shank_width: no pockets
+    flange: float = 4.5  #: thickness of the flanges beside the pockets, in the xy plane
+    fillet: float = 14.0  #: radius of the fillet between shank and ends, in the xy plane
+    bolt: float = 8.0  #: diameter of the bolt holes of the cap; 0: no holes and no bosses
     boss: float = 18.0  #: diameter of the bolt bosses
-    boss_length: float = 46.0  #: along x
+    boss_length: float = 46.0  #: length of the bolt bosses along x
 
     def __post_init__(self) -> None:
         require_lengths(self, zero_allowed=("bolt",))
@@ -135,12 +136,12 @@ class ConnectingRod:
 
     @property
     def bolt_offset(self) -> float:
-        """Distance of a bolt axis from the rod axis, along y, at which the boss just touches the bore."""
+        """Distance along y between a bolt axis and the rod axis, at which the boss just touches the bore."""
         return (self.big_bore + self.boss) / 2
 
 
 def shank_outline(rod: ConnectingRod) -> tuple[Point, Point, Point, Point, Point, Point]:
-    """Return the tangent points of the upper outline and the centres of its two fillets, in the plane.
+    """Return tangent points of the upper outline and centres of its two fillets, in the xy plane.
 
     The upper edge of the shank is the line n·p = d, n = (sin a, cos a). A fillet of radius f touches it from above, so
     its centre c has n·c = d + f. It crosses the outer circle (centre o, radius R) at `ROOT_ANGLE`, so that |c - o|² =
@@ -168,13 +169,13 @@ def shank_outline(rod: ConnectingRod) -> tuple[Point, Point, Point, Point, Point
 
 
 def taper(rod: ConnectingRod) -> tuple[float, float]:
-    """Return the angle a of the shank's upper edge [rad] and its distance d from the origin [length]."""
+    """Return the angle a of the upper edge of the shank [rad], and its distance d from the origin [length]."""
     a = atan2((rod.shank_height_big - rod.shank_height_small) / 2, rod.centre_distance)
     return a, rod.shank_height_big / 2 * cos(a)
 
 
 def pocket_circles(rod: ConnectingRod) -> tuple[tuple[float, float], tuple[float, float]] | None:
-    """Return (x, radius) of the two end circles of a pocket, one flange from the outline and the rings; or None."""
+    """Return (x, radius) of the two end circles of a pocket, one flange away from outline and rings; or None."""
     a, d = taper(rod)
     inside = d - rod.flange
     x_big = (rod.big_outer / 2 + rod.flange + inside) / (1 + sin(a))
@@ -186,7 +187,7 @@ def pocket_circles(rod: ConnectingRod) -> tuple[tuple[float, float], tuple[float
 def mesh_connecting_rod(
     rod: ConnectingRod | None = None, *, size: float = 5.5, order: int = 2, path: str | Path
 ) -> PartMesh:
-    """Mesh a connecting rod into a Gmsh 4.1 binary file.
+    """Mesh a connecting rod, and write a binary file in Gmsh 4.1 format.
 
     Groups: volume "rod"; faces "big_end" and "small_end" (the bores).
 
@@ -220,7 +221,7 @@ def mesh_connecting_rod(
 
 
 def draw(gmsh: ModuleType, rod: ConnectingRod) -> None:
-    """Draw the solid: (1) a plate with the outline, (2) rings and bosses, (3) cut out bores, holes and pockets."""
+    """Draw the solid: (1) a plate with the outline, (2) rings and bosses, (3) bores, holes and pockets cut out."""
     occ = gmsh.model.occ
     L, z = rod.centre_distance, rod.shank_width / 2
     plate = extrude(occ, outline_wire(occ, rod, -z), rod.shank_width)  # (1)
@@ -299,7 +300,7 @@ def slot_wire(occ: ModuleType, circles: tuple[tuple[float, float], tuple[float, 
 
 
 def boss(occ: ModuleType, rod: ConnectingRod, side: int) -> tuple[int, int]:
-    """Return a bolt boss along x at y = side * bolt_offset: round on the outside, open toward the ring."""
+    """Return a bolt boss along x at y = side * bolt_offset, which is round outside and open toward the ring."""
     x, y, r = -rod.boss_length / 2, side * rod.bolt_offset, rod.boss / 2
     corners = [occ.addPoint(x, yy, zz) for yy, zz in ((0, -r), (y, -r), (y + side * r, 0), (y, r), (0, r))]
     centre = occ.addPoint(x, y, 0)
@@ -317,7 +318,7 @@ def boss(occ: ModuleType, rod: ConnectingRod, side: int) -> tuple[int, int]:
 
 
 def extrude(occ: ModuleType, wire: int, height: float) -> tuple[int, int]:
-    """Return the solid between the plane face of a wire and its copy moved along z."""
+    """Return the solid swept along z by the plane face of a wire."""
     bodies = occ.extrude([(2, occ.addPlaneSurface([wire]))], 0, 0, height)
     return next((dim, tag) for dim, tag in bodies if dim == 3)
 
@@ -337,4 +338,4 @@ SLENDER_ROD = ConnectingRod(
     flange=1.0,
     fillet=8.0,
     bolt=0.0,
-)  #: cut from a plate of 10 mm; so slender that its own inertia visibly bends it at 2400 turns a minute
+)  #: rod cut from a plate of 10 mm, so slender that its inertia visibly bends it at 2400 revolutions per minute

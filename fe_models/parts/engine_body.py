@@ -1,4 +1,4 @@
-"""A parametric body of a four-axle locomotive: shells on beams, equipment as masses, seats of the suspension.
+"""Parametric body of a four-axle locomotive: shells on beams, equipment as masses, seats of the suspension.
 
 x points forward, y to the left, z up from the top of the rails. The body is symmetric about x = 0 and y = 0. Its walls
 are swept along stations of x, y and z that contain every edge, so that a finer mesh keeps the shape.
@@ -23,22 +23,22 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class EngineBody:
-    """Dimensions of the body in m; heights are above the rails."""
+    """Dimensions of the body [m]; heights are above the top of the rails."""
 
-    length: float = 18.0  #: between the end walls
+    length: float = 18.0  #: length between the end walls
     width: float = 2.9
     floor: float = 1.2  #: height of the floor
-    waist: float = 2.05  #: lower edge of the windows
+    waist: float = 2.05  #: height of the lower edge of the windows
     window_top: float = 2.75
-    cantrail: float = 3.4  #: height where side walls meet the roof
-    rise: float = 0.5  #: height of the roof above the cantrails
-    pivot: float = 5.2  #: distance of the bogie pivots from the middle
+    cantrail: float = 3.4  #: height at which side walls meet the roof
+    rise: float = 0.5  #: rise of the roof above the cantrails
+    pivot: float = 5.2  #: distance of the bogie pivots from the middle, along x
     seat: float = 1.05  #: distance of the secondary springs from the middle, along y
-    bulkhead: float = 6.7  #: distance of the wall between machine room and cab from the middle
-    window_start: float = 7.3  #: start of the side windows of the cabs, from the middle
+    bulkhead: float = 6.7  #: distance from the middle to the wall between machine room and cab
+    window_start: float = 7.3  #: distance from the middle to the start of the side windows of the cabs
     window_end: float = 8.2
-    inner: float = 1.4  #: distance of the transformer mounts, and of the frames there, from the middle
-    outer: float = 3.4  #: distance of the converter mounts from the middle
+    inner: float = 1.4  #: distance from the middle to the transformer mounts and their frames
+    outer: float = 3.4  #: distance from the middle to the converter mounts
     pitch: float = 0.75  #: largest distance between frames
 
     def __post_init__(self) -> None:
@@ -55,24 +55,24 @@ class EngineBody:
             )
 
     def frames(self) -> Array:
-        """Return positions x >= 0 of the frames, ascending; every edge has a frame."""
+        """Return the positions x >= 0 of the frames, ascending; there is a frame at every edge."""
         edges = (self.inner, self.outer, self.pivot, self.bulkhead, self.window_start, self.window_end)
         return divided((0.0, *edges, self.length / 2), self.pitch)
 
     def stations(self, size: float) -> tuple[Array, Array, Array]:
-        """Return x, y and z (of the side walls) of the nodes, ascending; cells are not longer than `size`."""
+        """Return x, y and z (of the side walls) of the nodes, ascending, such that no cell is longer than `size`."""
         x = divided(tuple(self.frames()), size)
         y = divided((0.0, self.seat, self.width / 2), size)
         z = divided((self.floor, self.waist, self.window_top, self.cantrail), size)
         return np.concatenate([-x[:0:-1], x]), np.concatenate([-y[:0:-1], y]), z
 
     def roof(self, y: Array) -> Array:
-        """Return heights of the roof at positions y: a parabola."""
+        """Return the roof height at positions y; the roof is a parabola."""
         return self.cantrail + self.rise * (1 - (2 * y / self.width) ** 2)
 
 
 def divided(edges: tuple[float, ...], size: float) -> Array:
-    """Return the edges and, between them, equal divisions that are not longer than `size`, ascending."""
+    """Return the edges with equal divisions between them that are not longer than `size`, ascending."""
     parts = [
         np.linspace(a, b, max(int(np.ceil((b - a) / size - 1e-9)), 1) + 1)[:-1] for a, b in itertools.pairwise(edges)
     ]
@@ -80,7 +80,7 @@ def divided(edges: tuple[float, ...], size: float) -> Array:
 
 
 def engine_body_mesh(part: EngineBody | None = None, *, size: float = 0.5) -> ShellMesh:
-    """Return the mesh of the body: quads and lines.
+    """Return the mesh of the body, which consists of quads and lines.
 
     The groups of cells are "floor", "side", "roof", "end" and "bulkhead". The groups of lines are "solebar" and
     "cantrail" (along the edges of floor and roof), "stringer" (along sides and roof), "post" (of end walls and
@@ -154,7 +154,7 @@ def engine_body_mesh(part: EngineBody | None = None, *, size: float = 0.5) -> Sh
 def _places(
     part: EngineBody, x: Array, y: Array, floor: IntArray, roof: IntArray, left: IntArray, right: IntArray
 ) -> dict[str, int]:
-    """Return the nodes of suspension, equipment and points of observation, by name."""
+    """Return the nodes of suspension, equipment and observation points, by name."""
     found: dict[str, int] = {}
     seats, edge = (("left", _at(y, part.seat)), ("right", _at(y, -part.seat))), (("left", -1), ("right", 0))
     for number, sign in ((1, 1), (2, -1)):
@@ -182,7 +182,7 @@ def _at(stations: Array, value: float) -> int:
 
 
 class _Grid:
-    """Nodes shared by walls, and cells and lines during construction."""
+    """Nodes shared by walls, and cells and lines, during construction of the mesh."""
 
     def __init__(self, part: EngineBody) -> None:
         self.part = part
@@ -193,7 +193,7 @@ class _Grid:
         self.line_groups: dict[str, list[int]] = {}
 
     def nodes(self, points: Array) -> IntArray:
-        """Return the node numbers of points (..., 3); existing points keep their number."""
+        """Return the node numbers of points (..., 3); a point that already exists keeps its number."""
         keys = [tuple(row) for row in np.round(points.reshape(-1, 3), 6).tolist()]
         found = [self.number.setdefault(key, len(self.number)) for key in keys]
         return np.array(found, dtype=np.int64).reshape(points.shape[:-1])
@@ -207,7 +207,7 @@ class _Grid:
         self.cell_groups.setdefault(group, []).extend(range(first, first + len(cells)))
 
     def line(self, group: str, nodes: IntArray) -> None:
-        """Add lines between consecutive nodes."""
+        """Add lines between successive nodes."""
         ends = [(int(a), int(b)) for a, b in itertools.pairwise(nodes)]
         self.line_groups.setdefault(group, []).extend(range(len(self.lines), len(self.lines) + len(ends)))
         self.lines += ends
@@ -215,7 +215,7 @@ class _Grid:
     def mesh(self, sets: dict[str, int], source: str) -> ShellMesh:
         """Return the mesh."""
         cells, lines = np.concatenate(self.cells), np.array(self.lines, dtype=np.int64)
-        used = np.unique(np.concatenate([cells.ravel(), lines.ravel()]))  # other nodes lie inside a window
+        used = np.unique(np.concatenate([cells.ravel(), lines.ravel()]))  # unused nodes lie inside windows
         place = np.full(len(self.number), -1)
         place[used] = np.arange(len(used))
         return ShellMesh(
@@ -230,7 +230,7 @@ class _Grid:
 
 
 def mesh_deck(mesh: ShellMesh) -> str:
-    """Return quads, lines and groups as the mesh part of an Abaqus deck; numbers start at 1, lines after quads."""
+    """Return quads, lines and groups as an Abaqus deck without other data; lines are numbered after quads."""
     return "\n".join(_deck(mesh)) + "\n"
 
 

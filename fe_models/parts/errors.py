@@ -6,4 +6,4 @@ __all__ = ["PartError"]
 
 
 class PartError(FeModelsError, ValueError):
-    """The dimensions of a part do not fit together."""
+    """The dimensions of a part are inconsistent."""

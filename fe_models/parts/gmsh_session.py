@@ -1,4 +1,4 @@
-"""The gmsh model of a parametric part: opened, meshed, and written with its groups."""
+"""Gmsh model of a parametric part: opening, meshing, and writing with groups."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,7 +16,7 @@ __all__ = ["PartMesh", "cylinder_faces", "mesh_and_write", "part_model"]
 
 @dataclass(frozen=True)
 class PartMesh:
-    """A meshed part: its file, its exact volume, and the quality of its worst element."""
+    """Meshed part: its file, its exact volume, and the quality of its worst element."""
 
     path: Path
     volume: float  #: volume of the exact geometry, before meshing [length³]
@@ -27,7 +27,7 @@ class PartMesh:
 
 @contextmanager
 def part_model(name: str, size: float, order: int) -> Iterator[ModuleType]:
-    """Open an empty gmsh model for one part, and always close it; gmsh options are restored."""
+    """Open an empty gmsh model for one part; it is always closed, and gmsh options are restored."""
     if not (np.isfinite(size) and size > 0):
         raise MeshError(f"part {name!r}: size: expected a positive element size, got {size}")
     if order not in (1, 2):
@@ -38,7 +38,7 @@ def part_model(name: str, size: float, order: int) -> Iterator[ModuleType]:
 
 
 def cylinder_faces(gmsh: ModuleType, low: np.ndarray, high: np.ndarray) -> list[int]:
-    """Return the cylindrical faces inside the box low..high, each (3,) [length], ascending."""
+    """Return the cylindrical faces inside the box from low to high, (3,) [length] each, ascending."""
     slack = 1e-4 * float(np.linalg.norm(np.subtract(high, low)))
     box = [*(np.asarray(low) - slack), *(np.asarray(high) + slack)]
     found = gmsh.model.getEntitiesInBoundingBox(*box, dim=2)
@@ -46,7 +46,7 @@ def cylinder_faces(gmsh: ModuleType, low: np.ndarray, high: np.ndarray) -> list[
 
 
 def mesh_and_write(gmsh: ModuleType, *, name: str, groups: dict[str, list[int]], path: Path) -> PartMesh:
-    """Mesh the only volume of the open model and write it with its groups as Gmsh 4.1 binary.
+    """Mesh the only volume of the open model, and write it with its groups in binary Gmsh 4.1 format.
 
     Raises
     ------

@@ -11,7 +11,7 @@ __all__ = ["require", "require_lengths"]
 
 
 def require_lengths(part: Any, *, zero_allowed: tuple[str, ...] = ()) -> None:
-    """Raise `PartError` unless every field of the part is a finite positive length (or zero where allowed)."""
+    """Raise `PartError` unless every field of the part is finite and positive, or zero where this is allowed."""
     for field in fields(part):
         value = getattr(part, field.name)
         low_ok = value >= 0 if field.name in zero_allowed else value > 0
@@ -21,6 +21,6 @@ def require_lengths(part: Any, *, zero_allowed: tuple[str, ...] = ()) -> None:
 
 
 def require(part: Any, holds: bool, rule: str, advice: str) -> None:
-    """Raise `PartError` with the violated rule and advice, unless the rule holds."""
+    """Raise `PartError` with the violated rule and the advice, unless the rule holds."""
     if not holds:
         raise PartError(f"{type(part).__name__}: expected {rule}; {advice}")
