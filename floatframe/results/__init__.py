@@ -1,1 +1,1 @@
-"""Computed motions: the results file (`writer`, `results_file`), the trajectory, and quantities evaluated from them."""
+"""Computed motions: the results file (`writer`, `results_file`), the trajectory, and quantities computed from them."""

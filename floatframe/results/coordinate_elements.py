@@ -20,20 +20,21 @@ __all__ = ["CouplerMotion", "UserForceMotion", "coupler_motion", "user_force_mot
 class CouplerMotion:
     """Coordinates of a coupler over time, in the order of its terms, and the forces along them."""
 
-    t: Array  #: (n_t,) [s]
+    t: Array  #: output times, (n_t,) [s]
     value: Array  #: distances, and angles counted through full turns, (n_t, n_terms) [m, rad]
-    rate: Array  #: (n_t, n_terms) [m/s, rad/s]
-    force: Array  #: positive if it acts to increase the coordinate, (n_t, n_terms) [N, N m]
+    rate: Array  #: rates of the coordinates, (n_t, n_terms) [m/s, rad/s]
+    #: force along each coordinate, positive if it tends to increase the coordinate, (n_t, n_terms) [N, N m]
+    force: Array
 
 
 @dataclass(frozen=True, eq=False)
 class UserForceMotion:
     """Coordinates, forces and states of a user force over time, by name, each (n_t,)."""
 
-    t: Array  #: (n_t,) [s]
-    value: Mapping[str, Array]  #: of the coordinates; angles are counted through full turns
+    t: Array  #: output times, (n_t,) [s]
+    value: Mapping[str, Array]  #: value of each coordinate; angles are counted through full turns
     rate: Mapping[str, Array]
-    force: Mapping[str, Array]  #: positive if it acts to increase its coordinate
+    force: Mapping[str, Array]  #: force along each coordinate, positive if it tends to increase the coordinate
     states: Mapping[str, Array]
 
 
@@ -73,7 +74,7 @@ def user_force_motion(system: System, trajectory: Trajectory, name: str) -> User
 
 
 def unknowns(system: System, trajectory: Trajectory) -> Array:
-    """Return all unknowns of connections, (n_t, n_w); `ResultsError` if the motion is of another system."""
+    """Return all unknowns of connections, (n_t, n_w); `ResultsError` if the motion belongs to another system."""
     w = trajectory.source.read("w")
     if w.shape[1] != int(compiled_system(system).model.connections.w0[-1]):
         raise ResultsError(f"the motion of {trajectory.head.system!r} is not one of the system {system.name!r}")

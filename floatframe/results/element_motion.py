@@ -106,7 +106,7 @@ def element_motion(system: System, trajectory: Trajectory, name: str) -> Element
 
 
 def marker_place(system: System, trajectory: Trajectory, marker: MarkerData) -> PlaceMotion:
-    """Return the motion of a marker of an element."""
+    """Return the motion of a marker at which an element acts."""
     if marker.body < 0:
         return still_place(trajectory.t, marker.shape)
     body = system.bodies[marker.body]
@@ -118,7 +118,7 @@ def marker_place(system: System, trajectory: Trajectory, marker: MarkerData) -> 
 
 
 def motion_row(place: PlaceMotion, accelerations: bool) -> Array:
-    """Return position, axes row by row, velocity, angular velocity, (n_t, 18), or also their rates, (n_t, 24)."""
+    """Return position, axes row by row, velocity, angular velocity, (n_t, 18), and if wanted their rates, (n_t, 24)."""
     parts = [place.position, place.axes.reshape(-1, 9), place.velocity, place.omega]
     if accelerations:
         parts += [place.acceleration, np.zeros_like(place.omega) if place.alpha is None else place.alpha]

@@ -9,7 +9,7 @@ __all__ = ["balance_defect", "energy_scale"]
 
 
 def energy_scale(trajectory: Trajectory) -> float:
-    """Return the largest energy in motion [J], relative to which energy errors are judged.
+    """Return the largest energy in motion [J], the reference for energy errors.
 
     It is the largest of kinetic, strain and spring energy, the range of the potential of gravity (whose zero is
     arbitrary), and the work of forces and dampers.
@@ -20,6 +20,6 @@ def energy_scale(trajectory: Trajectory) -> float:
 
 
 def balance_defect(trajectory: Trajectory) -> Array:
-    """Return total energy - work + dissipated, minus its initial value, (n_t,) [J]; zero for an exact motion."""
+    """Return the energy error, (n_t,) [J]: change of (total energy - work + dissipated) since the start."""
     balance = trajectory.energies.balance
     return np.asarray(balance - balance[:1])

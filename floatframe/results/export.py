@@ -1,4 +1,4 @@
-"""Motions for other programs: a table, deformed surfaces for ParaView (PVD and VTU), a record of the run."""
+"""Motions for other programs: a table, deformed surfaces for ParaView (PVD and VTU), a summary of the run."""
 
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -85,7 +85,7 @@ def motion_table(
 
 
 def sensor_table(trajectory: Trajectory, chosen: Sequence[Measurement]) -> Table:
-    """Return the time and the columns of measurements."""
+    """Return the time and the columns of the chosen measurements."""
     columns, units = {"t": trajectory.t}, {"t": trajectory.units.time_symbol}
     for measurement in chosen:
         add_measurement(measurement, columns, units)
@@ -93,7 +93,7 @@ def sensor_table(trajectory: Trajectory, chosen: Sequence[Measurement]) -> Table
 
 
 def add_measurement(measurement: Measurement, columns: dict[str, Array], units: dict[str, str]) -> None:
-    """Add the columns of a measurement and their units."""
+    """Add the columns of a measurement and their units to two dictionaries."""
     columns |= {measurement.head(name): values for name, values in measurement.columns.items()}
     units |= {measurement.head(name): unit for name, unit in measurement.units.items()}
 
@@ -182,7 +182,7 @@ def export_vtk(
 
 
 def numbers_of(bodies: list[ReducedBody]) -> tuple[dict[str, IntArray], dict[str, list[IntArray]]]:
-    """Return the user's numbers of nodes and elements of several bodies as point and cell data, if there are any."""
+    """Return the user's numbers of nodes and elements of several bodies as point data and cell data, if they exist."""
     nodes = [filled(body.numbering.nodes, len(body.nodes)) for body in bodies]
     elements = [filled(body.numbering.elements, len(body.surface)) for body in bodies]
     by_node = {"node": np.concatenate(nodes)} if any(body.numbering.nodes.size for body in bodies) else {}
@@ -191,7 +191,7 @@ def numbers_of(bodies: list[ReducedBody]) -> tuple[dict[str, IntArray], dict[str
 
 
 def filled(numbers: IntArray, n: int) -> IntArray:
-    """Return the numbers, or -1 for each of n entries if there are none."""
+    """Return the numbers, or -1 for each of n entries if they do not exist."""
     return numbers if numbers.size else np.full(n, NONE)
 
 
@@ -199,7 +199,7 @@ def filled(numbers: IntArray, n: int) -> IntArray:
 
 
 def run_record(trajectory: Trajectory, system: System | None = None) -> dict[str, Any]:
-    """Return times, bodies, energies, energy balance, drift and ranges of sensors, in plain types and units of the run.
+    """Return times, bodies, energies, energy balance, drift and sensor ranges as plain types, in units of the run.
 
     `energy_defect` is the largest |balance defect| divided by `energy_scale`; a drift is the largest over time.
     """
@@ -258,7 +258,7 @@ def run_record(trajectory: Trajectory, system: System | None = None) -> dict[str
 
 
 def sensors_record(system: System, trajectory: Trajectory) -> dict[str, Any]:
-    """Return unit, least, greatest and last value of every quantity that the sensors of a system measure.
+    """Return unit, smallest, largest and last value of every quantity that the system's sensors measure.
 
     `peak` holds the time at which the magnitude is largest, and the numbers of the place (node, instance) then.
     """

@@ -1,4 +1,4 @@
-"""Angles counted through full turns: with the turns that a run has counted, else from one output to the next."""
+"""Angles counted through full turns: from the turns that the run counted, else from one output to the next."""
 
 import numpy as np
 
@@ -10,12 +10,12 @@ from floatframe.results.trajectory import Trajectory
 __all__ = ["followed_angle", "through_turns"]
 
 TURN = 2 * np.pi
-#: largest difference between an angle and its extrapolation by the rates over an output interval [rad]
+#: largest difference between an angle and its extrapolation by rates over one output interval [rad]
 DOUBTFUL = 0.5 * np.pi
 
 
 def through_turns(trajectory: Trajectory, where: str, angle: CountedAngle, value: Array, rate: Array) -> Array:
-    """Return an angle, known up to full turns, with its full turns, (n_t,) [rad].
+    """Return an angle that is known up to full turns, with its full turns added, (n_t,) [rad].
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def through_turns(trajectory: Trajectory, where: str, angle: CountedAngle, value
 
 
 def followed_angle(where: str, t: Array, value: Array, rate: Array) -> Array:
-    """Return an angle that was not counted, each value the one nearest to its extrapolation by the mean rate, (n_t,).
+    """Return an angle without a count, each value nearest to its extrapolation by the mean rate, (n_t,).
 
     Raises
     ------

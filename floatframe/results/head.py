@@ -1,4 +1,4 @@
-"""The head of a results file: its content besides arrays, as JSON text, which is validated when it is read."""
+"""The head of a results file: all content besides arrays, as JSON text that is validated when it is read."""
 
 import json
 import math
@@ -18,14 +18,14 @@ NUMBERS_OF_RUN = ("t_start", "t_end", "h")
 
 @dataclass(frozen=True)
 class BodyEntry:
-    """The position of the columns of a body."""
+    """The columns of a body in the arrays of a results file."""
 
     name: str
     n_q: int
     q0: int  #: first column in q
     u0: int  #: first column in u
     source: str = ""  #: path of the modal file; "" for rigid bodies and bodies made in memory
-    digest: str = ""  #: digest of that file
+    digest: str = ""  #: digest of the modal file
     is_stiffened: bool = False  #: whether its geometric stiffness is used
 
 
@@ -38,25 +38,26 @@ class Head:
     bodies: tuple[BodyEntry, ...]
     joints: tuple[str, ...]
     springs: tuple[str, ...]
-    w0: tuple[int, ...]  #: first column in w of each connection (joints, springs, couplers, user forces), and the end
+    #: first column in w of each connection (joints, springs, couplers, user forces), then the number of columns
+    w0: tuple[int, ...]
     run: Mapping[str, Any]  #: integrator and its parameters, h, t_end, version
-    #: of a completed run: n_steps, n_rejected, n_iterations (of Newton's method), wall_time [s]
+    #: of a completed run: n_steps, n_rejected, n_iterations (Newton), wall_time [s]
     summary: Mapping[str, Any] = field(default_factory=dict)
-    angles: tuple[CountedAngle, ...] | None = None  #: of the columns of `angle`; None: not counted
-    #: by sensor: descriptions of the nodes used for places on flexible bodies, and their distance from the requested
-    #: places
+    angles: tuple[CountedAngle, ...] | None = None  #: angles in the columns of `angle`; None: not counted
+    #: for each sensor, descriptions of the nodes that it uses on flexible bodies, with their distance from the given
+    #: points
     places: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     loads: tuple[str, ...] | None = None  #: point forces, in the order of `load`; None: not written
-    load_cases: tuple[str, ...] | None = None  #: forces that are load cases, in the order of `load_case`
+    load_cases: tuple[str, ...] | None = None  #: load cases, in the order of `load_case`; None: not written
 
 
 def text_of_head(head: Head) -> str:
-    """Return the head as JSON."""
+    """Return the head as JSON text."""
     return json.dumps(asdict(head))
 
 
 def head_of_text(text: Any) -> Head:
-    """Return the head of a JSON text.
+    """Return the head for a JSON text.
 
     Raises
     ------
@@ -148,7 +149,7 @@ def entries_of(tables: list[dict[str, Any]]) -> tuple[BodyEntry, ...]:
 
 
 def check_run(run: Any) -> None:
-    """Raise unless the entries of the run that are used have valid types."""
+    """Raise an error unless the used entries of the run have valid types."""
     require(isinstance(run, dict), "run", "an object", run)
     for name in NUMBERS_OF_RUN:
         if name in run:
@@ -166,7 +167,7 @@ def check_run(run: Any) -> None:
 
 
 def check_summary(summary: Mapping[str, Any]) -> None:
-    """Raise unless the entries of the summary that are used have valid types."""
+    """Raise an error unless the used entries of the summary have valid types."""
     for name in ("n_steps", "n_rejected", "n_iterations"):
         value = summary.get(name, 0)
         require(type(value) is int and value >= 0, f"summary.{name}", "a whole number", value)
@@ -201,6 +202,6 @@ def is_number(value: Any) -> bool:
 
 
 def require(holds: Any, where: str, expected: str, got: Any) -> None:
-    """Raise `ValueError` that names a key of the head unless a condition holds."""
+    """Raise `ValueError` with a key of the head unless a condition is true."""
     if not holds:
         raise ValueError(f"head: {where}: expected {expected}, got {quoted(got)}")

@@ -36,17 +36,17 @@ MOST = 30
 
 @dataclass(frozen=True, eq=False)
 class SlidingPlace:
-    """Position of marker B along the line over time."""
+    """Position of marker B along a deformed line over time."""
 
-    s: Array  #: from marker A, measured on the undeformed line, (n_t,) [m]
-    rate: Array  #: (n_t,) [m/s]
-    tangent: Array  #: unit vector along the deformed line, in ground axes, (n_t, 3)
-    #: derivative of the line's rotation by s, divided by the slope of the line, in ground axes, (n_t, 3) [1/m]
+    s: Array  #: distance from marker A along the undeformed line, (n_t,) [m]
+    rate: Array  #: rate of s, (n_t,) [m/s]
+    tangent: Array  #: unit tangent of the deformed line, ground axes, (n_t, 3)
+    #: derivative of the line's rotation by s, divided by the slope of the line, ground axes, (n_t, 3) [1/m]
     turning: Array
 
 
 def sliding_place(system: System, trajectory: Trajectory, joint: SlidingJoint, end: PlaceMotion) -> SlidingPlace:
-    """Return the position along the line of marker B with a given motion; as in kernels/joints/deformed_line.py."""
+    """Return the position along the line of marker B for its motion; as in kernels/joints/deformed_line.py."""
     name = body_name(joint.marker_a.body)
     body = system.body(name)
     assert isinstance(body, FlexibleBody)
@@ -80,21 +80,21 @@ def sliding_place(system: System, trajectory: Trajectory, joint: SlidingJoint, e
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """Cubics through stations over time, in body axes."""
+    """Cubic polynomials through the stations of a line over time, in body axes."""
 
-    places: Array  #: (n,)
-    e: Array  #: (3,)
+    places: Array  #: undeformed positions of the stations along the line, (n,)
+    e: Array  #: unit vector along the undeformed line, (3,)
     deformed: Array  #: displacement and rotation of the stations, (n, n_t, 6)
-    rates: Array  #: (n, n_t, 6)
+    rates: Array  #: rates of `deformed`, (n, n_t, 6)
 
     def piece(self, s: Array) -> tuple[IntArray, Array, Array]:
-        """Return the index of the piece at each time, its length, and the distance of s from its beginning."""
+        """Return, for each time, index and length of the interval that contains s, and the distance from its start."""
         j = np.clip(np.searchsorted(self.places[1:-1], s, side="left"), 0, len(self.places) - 2)
         h = self.places[j + 1] - self.places[j]
         return j, h, s - self.places[j]
 
     def displacement(self, s: Array, order: int, *, of_rates: bool = False) -> Array:
-        """Return D or a derivative by s, (n_t, 3)."""
+        """Return the displacement D at s, or its derivative by s of the given order, (n_t, 3)."""
         table = self.rates if of_rates else self.deformed
         j, h, along = self.piece(s)
         x = np.clip(along / h, 0.0, 1.0)
@@ -113,7 +113,7 @@ class Line:
         return np.asarray(own + np.cross(b_1[:, None] * first[:, 3:] + b_2[:, None] * second[:, 3:], self.e))
 
     def rotation(self, s: Array) -> tuple[Array, Array]:
-        """Return the rotation vector of the line and its derivative by s, (n_t, 3) each."""
+        """Return the rotation vector of the line at s and its derivative by s, (n_t, 3) each."""
         j, h, along = self.piece(s)
         w = np.clip(along / h, 0.0, 1.0)
         times = np.arange(len(s))
@@ -130,12 +130,12 @@ class Line:
 class CoordinateMotion:
     """A coordinate of a joint over time."""
 
-    t: Array  #: (n_t,) [s]
+    t: Array  #: output times, (n_t,) [s]
     value: Array  #: distance, or angle counted through full turns, (n_t,) [m, rad]
-    rate: Array  #: (n_t,) [m/s, rad/s]
-    #: force or torque of the drive or of joint forces, positive if it acts to increase the coordinate, (n_t,) [N, N m]
+    rate: Array  #: rate of the coordinate, (n_t,) [m/s, rad/s]
+    #: force or torque of the drive or of joint forces, positive if it tends to increase the coordinate, (n_t,) [N, N m]
     force: Array
-    is_angle: bool = False  #: an angle [rad], else a distance [m]
+    is_angle: bool = False  #: whether the coordinate is an angle [rad] or a distance [m]
 
 
 def joint_coordinates(system: System, trajectory: Trajectory) -> dict[str, CoordinateMotion]:
@@ -198,14 +198,14 @@ def joint_coordinate(system: System, trajectory: Trajectory, joint: str, coordin
     return CoordinateMotion(a.t, value, rate, own.force(place, w), own.is_angle)
 
 
-#: markers and coordinates by joint and name, cached because runs with events need them repeatedly
+#: markers and coordinates by joint and name; cached because runs with events need them repeatedly
 PLACED: WeakKeyDictionary[System, dict[tuple[str, str], tuple]] = WeakKeyDictionary()
 
 
 def as_placed(
     system: System, joint: Joint, name: str
 ) -> tuple[tuple[MarkerData, MarkerData], RowCoordinate | None]:  # fmt: skip
-    """Return the markers of a joint and one of its coordinates (None along a deformed line), as assembled."""
+    """Return the assembled markers of a joint and one of its coordinates (None along a deformed line)."""
     known = PLACED.setdefault(system, {})
     key = joint.name, name
     if key not in known:
@@ -216,14 +216,14 @@ def as_placed(
 
 
 def row_coordinate(system: System, joint: Joint, ends: tuple[MarkerData, MarkerData], name: str) -> RowCoordinate:
-    """Return a coordinate of a joint with its directions, as assembled."""
+    """Return an assembled joint coordinate with its directions."""
     (r_a, A_a), (r_b, A_b) = (marker_pose(end, compiled_system(system).placed, n_q_of(system)) for end in ends)
     rows = joint.rows(A_a, A_b, r_b - r_a)
     return next(row.coordinate for row in rows if row.coordinate is not None and row.coordinate.name == name)
 
 
 def force_rows(small: SmallMotions, joint: str, coordinate: str) -> Rows | None:
-    """Return the change of the force along a coordinate, -E · dw - w · dE, one row; None along a deformed line.
+    """Return one row with the change of the force along a coordinate, -E · dw - w · dE; None along a deformed line.
 
     E rotates with the marker in which it is fixed, or with the line between the points of a distance.
     """
@@ -250,7 +250,7 @@ def force_rows(small: SmallMotions, joint: str, coordinate: str) -> Rows | None:
 def sliding_motion(
     system: System, trajectory: Trajectory, joint: SlidingJoint, marker_b: MarkerData
 ) -> CoordinateMotion:
-    """Return the position along a deformed line; the force is that of its drive, zero if it slides freely."""
+    """Return the position along a deformed line; its force belongs to the drive, zero for free sliding."""
     b = end_motion(system, trajectory, marker_b)
     place = sliding_place(system, trajectory, joint, b)
     first = trajectory.head.w0[[each.name for each in system.joints].index(joint.name)]

@@ -1,4 +1,4 @@
-"""A motion that knows its system: joints, bodies and sensors by name, tables for pandas and xarray.
+"""A motion together with its system: joints, bodies and sensors by name, tables for pandas and xarray.
 
 motion = integrate(system, GeneralizedAlpha(), t_end=1.0, h=1e-3)      # or read_results("crank.h5")
 motion.joint("pin").angle                                              # (n_t,), counted through full turns
@@ -45,7 +45,7 @@ __all__ = ["JointMotion", "Motion", "MovedBody", "motion_of"]
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class Motion(Trajectory):
-    """A motion with its system.
+    """A motion together with its system.
 
     Parameters
     ----------
@@ -69,18 +69,18 @@ class Motion(Trajectory):
         return found
 
     def body(self, name: str) -> "MovedBody":
-        """Return the motion of a body, with places on it."""
+        """Return the motion of a body, with the motion of points on it."""
         motion = super().body(name)
         return MovedBody(*(getattr(motion, part.name) for part in fields(BodyMotion)), motion=self, name=name)
 
     def joint(self, name: str) -> "JointMotion":
-        """Return coordinates, reaction and constraint error of a joint; `ResultsError` if there is none."""
+        """Return coordinates, reaction and constraint error of a joint; `ResultsError` if the joint does not exist."""
         if name not in self.head.joints:
             raise ResultsError(f"motion: no joint {quoted(name)}{nearest(name, self.head.joints)}")
         return JointMotion(self, name)
 
     def sensor(self, name: str) -> Measurement:
-        """Return what a sensor, a joint coordinate ("pin.angle") or one of their columns ("tip x") measured.
+        """Return the measurement of a sensor, joint coordinate ("pin.angle") or one of their columns ("tip x").
 
         Raises
         ------
@@ -102,7 +102,7 @@ class Motion(Trajectory):
         return controller_samples(self.system, self, name)
 
     def measurements(self, *names: str) -> tuple[Measurement, ...]:
-        """Return the measurements of sensors and coordinates by name, with * and ? for letters; without names, of all.
+        """Return measurements of sensors and coordinates by name, with wildcards * and ?; all if no name is given.
 
         The name of a joint stands for its coordinates and its reaction, that of a body for the position of its origin,
         that of a controller for its outputs and states.
@@ -118,7 +118,7 @@ class Motion(Trajectory):
         return tuple(measured(system, self, [*coordinate_sensors(system), *sensors_of(system)]).values())
 
     def to_table(self, *names: str) -> Table:
-        """Return the time t and measurements (see `measurements`) as a table, columns such as "tip x".
+        """Return the time t and measurements (see `measurements`) as a table with columns such as "tip x".
 
         `motion.to_table("tip").write("tip.csv")` writes them, also as .json, .mat, .npz or .parquet.
         """
@@ -128,7 +128,7 @@ class Motion(Trajectory):
         return Table({"t": self.t, **columns}, {"t": self.units.time_symbol, **units})
 
     def plot(self, *names: str, ax: "Axes | None" = None) -> "Figure":
-        """Plot measurements over time (see `measurements`), with the units of the system at the axes.
+        """Plot measurements over time (see `measurements`), with units of the system at the axes.
 
         Parameters
         ----------
@@ -173,7 +173,7 @@ class Motion(Trajectory):
 @frozen_copies
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MovedBody(BodyMotion):
-    """Motion of a body of a motion, with places on it."""
+    """Motion of a body in a motion, with points on it."""
 
     motion: Motion
     name: str
@@ -201,29 +201,29 @@ class MovedBody(BodyMotion):
 
 @dataclass(frozen=True, eq=False)
 class JointMotion:
-    """A joint of a motion: `angle`, `angle_rate` and `angle_force` for a coordinate "angle", and so on, each (n_t,)."""
+    """A joint in a motion: `angle`, `angle_rate` and `angle_force` for a coordinate "angle", and so on, each (n_t,)."""
 
     motion: Motion
     name: str
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """Names of its coordinates."""
+        """Names of the joint's coordinates."""
         joints = {joint.name: tuple(joint.coordinates) for joint in self.motion.system.joints}
         return joints[self.name]
 
     @property
     def reaction(self) -> Reaction:
-        """Force and moment on its marker A, in ground axes."""
+        """Force and moment on marker A of the joint, ground axes."""
         return self.motion.reaction(self.name)
 
     @property
     def drift(self) -> Drift:
-        """Its constraint error."""
+        """Constraint error of the joint."""
         return self.motion.drift(self.name)
 
     def coordinate(self, name: str) -> CoordinateMotion:
-        """Return a coordinate with its rate and the force along it; `ResultsError` if there is none."""
+        """Return a coordinate with its rate and force; `ResultsError` if it does not exist."""
         if name not in self.coordinates:
             choices = self.coordinates
             raise ResultsError(
@@ -252,6 +252,6 @@ class JointMotion:
 
 
 def motion_of(trajectory: Trajectory, system: System | Callable[[], System | None] | None) -> Motion:
-    """Return a motion with its system, or with a function that finds it when it is needed."""
+    """Return a motion with its system, or with a function that loads the system when it is needed."""
     t = trajectory
     return Motion(t.head, t.source, t.is_complete, t.path, t.validity, system)

@@ -1,4 +1,4 @@
-"""Quantities evaluated from a motion: motion of interfaces and points, angles, stress.
+"""Quantities computed from a motion: motion of interfaces and points, angles, stress.
 
 The kinematics of a marker are in bodies/marker_shape.py.
 """
@@ -47,19 +47,19 @@ __all__ = [
 
 @dataclass(frozen=True, eq=False)
 class PlaceMotion:
-    """Motion of a point with axes, over time, ground axes."""
+    """Motion over time of a point with axes, in ground axes."""
 
-    t: Array  #: (n_t,) [s]
-    position: Array  #: (n_t, 3) [m]
-    velocity: Array  #: (n_t, 3) [m/s]
-    acceleration: Array  #: (n_t, 3) [m/s²]
-    axes: Array  #: columns, (n_t, 3, 3)
+    t: Array  #: output times, (n_t,) [s]
+    position: Array  #: position of the point, (n_t, 3) [m]
+    velocity: Array  #: velocity of the point, (n_t, 3) [m/s]
+    acceleration: Array  #: acceleration of the point, (n_t, 3) [m/s²]
+    axes: Array  #: axes at the point as columns, (n_t, 3, 3)
     omega: Array  #: angular velocity of the axes, (n_t, 3) [rad/s]
-    alpha: Array | None = None  #: angular acceleration of the axes, (n_t, 3) [rad/s²]; None: they do not rotate
+    alpha: Array | None = None  #: angular acceleration of the axes, (n_t, 3) [rad/s²]; None if they do not rotate
 
 
 def interface_motion(trajectory: Trajectory, body: str, reduced: ReducedBody, interface: str) -> PlaceMotion:
-    """Return the motion of the reference point of an interface, with its axes.
+    """Return the motion of an interface's reference point with its axes.
 
     Parameters
     ----------
@@ -86,19 +86,19 @@ def interface_motion(trajectory: Trajectory, body: str, reduced: ReducedBody, in
 
 
 def shape_motion(motion: BodyMotion, shape: MarkerShape) -> PlaceMotion:
-    """Return the motion of a marker of a body, both in the same frame."""
+    """Return the motion of a marker on a body, both given in the same frame."""
     return place_of(motion, motion_in_body(shape, motion.q, motion.q_dot, motion.q_ddot))
 
 
 def still_place(t: Array, shape: MarkerShape) -> PlaceMotion:
-    """Return the motion of a marker on the ground, which is at rest."""
+    """Return the constant motion of a marker on the ground."""
     still = np.zeros((len(t), 3))
     axes = np.broadcast_to(shape.triad, (len(t), 3, 3))
     return PlaceMotion(t, still + shape.position, still, still, axes, still)
 
 
 def as_moved(trajectory: Trajectory, body: str, reduced: ReducedBody) -> tuple[BodyMotion, ReducedBody]:
-    """Return the motion of a body and the reduced body in the engine's frame, in which joint constraints hold."""
+    """Return body motion and reduced body in the engine's frame, in which joint constraints are exact."""
     motion = trajectory.body(body)
     axes = mean_axes(reduced) if trajectory.entry(body)[1].is_stiffened else None
     if axes is None:
@@ -112,7 +112,7 @@ def as_moved(trajectory: Trajectory, body: str, reduced: ReducedBody) -> tuple[B
 
 
 def node_motion(trajectory: Trajectory, body: str, reduced: ReducedBody, node: int | IntArray) -> PlaceMotion:
-    """Return the motion of a kept node (its row in `ReducedBody.nodes`), or the mean motion of several nodes.
+    """Return the motion of a kept node (row of `ReducedBody.nodes`), or the mean motion of several kept nodes.
 
     Its displacement in the body is that of `nodal_displacements`: Phi q, plus ½ Σ q_k q_l g_kl for a stiffened body
     with quadratic modes. Its axes are those of the body frame, rotated by the rotation of the node if this is kept
@@ -140,7 +140,7 @@ def point_motion(
     tolerance: float = TOLERANCE,
     undeformed: bool = False,
 ) -> PlaceMotion:
-    """Return the motion of a point of a body, with the axes of its frame; on a flexible body, it follows a node.
+    """Return the motion of a point on a body with the axes of its frame; on a flexible body the point follows a node.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def point_motion(
 
 
 def place_of(motion: BodyMotion, own: MotionInBody) -> PlaceMotion:
-    """Return the motion of a point from its motion relative to the body."""
+    """Return the absolute motion of a point from its motion relative to the body."""
     body = BodyFrameMotion(
         motion.r, rotation_matrix(motion.p), motion.v, motion.omega_B, motion.v_dot, motion.omega_B_dot
     )
@@ -189,7 +189,7 @@ def place_of(motion: BodyMotion, own: MotionInBody) -> PlaceMotion:
 
 
 def rotation_angle(a: PlaceMotion, b: PlaceMotion, axis: Array | tuple[float, float, float]) -> Array:
-    """Return the rotation angle of place b relative to place a about an axis in a, (n_t,) [rad].
+    """Return the rotation angle of axes b relative to axes a about an axis fixed in a, (n_t,) [rad].
 
     It is zero if the axes of both coincide. Full turns are counted by extrapolation of the rate from time to time.
 
@@ -202,7 +202,7 @@ def rotation_angle(a: PlaceMotion, b: PlaceMotion, axis: Array | tuple[float, fl
 
 
 def normals_of_axis(axis: Array | tuple[float, float, float]) -> tuple[Array, Array]:
-    """Return two directions x, y normal to an axis, with the axis along x × y."""
+    """Return two directions x and y normal to an axis, for which x × y is the axis."""
     e = np.asarray(axis, dtype=float)
     size = np.linalg.norm(e)
     if size == 0:
@@ -215,7 +215,7 @@ def normals_of_axis(axis: Array | tuple[float, float, float]) -> tuple[Array, Ar
 
 
 def angle_and_rate(a: PlaceMotion, b: PlaceMotion, x: Array, y: Array) -> tuple[Array, Array]:
-    """Return the angle from x of a, towards y, to the direction x of b, between -pi and pi, and its rate, (n_t,)."""
+    """Return the angle from x of a (towards y) to x of b, between -pi and pi, and its rate, (n_t,)."""
     X, Y, D = a.axes @ x, a.axes @ y, b.axes @ x
     D_dot = cross(b.omega - a.omega, D)
     C, S = dot(X, D), dot(Y, D)
@@ -252,7 +252,7 @@ def nodal_stress(trajectory: Trajectory, body: str, reduced: ReducedBody, i_time
 def largest_von_mises(
     trajectory: Trajectory, body: str, reduced: ReducedBody, *, rows: IntArray | None = None
 ) -> tuple[Array, IntArray]:
-    """Return the largest von Mises stress of the kept nodes over time, (n_t,) [Pa], and the row of the node, (n_t,).
+    """Return the largest von Mises stress of the kept nodes over time, (n_t,) [Pa], and the row of its node, (n_t,).
 
     Parameters
     ----------

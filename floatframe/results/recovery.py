@@ -1,4 +1,4 @@
-"""Positions of nodes and interfaces of bodies, in ground axes, from a motion."""
+"""Positions of nodes and interfaces in ground axes, computed from a motion."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ __all__ = [
 
 
 def require_same_modes(trajectory: Trajectory, body_name: str, reduced: ReducedBody) -> None:
-    """Raise `ResultsError` unless the reduced body has as many modes as the body of the trajectory."""
+    """Raise `ResultsError` unless the reduced body has as many modes as the body in the trajectory."""
     _, entry = trajectory.entry(body_name)
     if entry.n_q != reduced.n_q:
         raise ResultsError(
@@ -59,7 +59,7 @@ def nodal_displacements(trajectory: Trajectory, body_name: str, reduced: Reduced
 
 
 def interface_positions(trajectory: Trajectory, body_name: str, reduced: ReducedBody, interface: str) -> Array:
-    """Return the positions of the reference point of an interface over time, in ground axes, (n_t, 3) [m]."""
+    """Return positions of an interface's reference point over time, ground axes, (n_t, 3) [m]."""
     require_same_modes(trajectory, body_name, reduced)
     motion = trajectory.body(body_name)
     d = elastic_displacements(trajectory, body_name, reduced, interface)

@@ -1,4 +1,4 @@
-"""Reading of results on disk: one file, or the segments of an unfinished run (docs/results_file.md)."""
+"""Reading of results from disk: one file, or the segments of an unfinished run (docs/results_file.md)."""
 
 import logging
 import os
@@ -36,9 +36,9 @@ __all__ = [
 log = logging.getLogger(__name__)
 
 FORMAT = "floatframe-results"
-VERSION = 2  #: version of the format; version 1 had neither seal nor checksums
+VERSION = 2  #: version of the format; version 1 had no seal and no checksums
 KIND = Kind("results-file", VERSION, ResultsError, "`floatframe run` or `integrate`")
-SEGMENTS = ".segments"  #: appended to the name of the results file
+SEGMENTS = ".segments"  #: suffix after the name of the results file for the folder of segments
 VALIDITY = "validity"  #: attribute with the validity notes of a run
 ROWS_CHECKED = 1000  #: number of rows checked at a time
 RESTART = "restart"  #: group in a segment with the state of the integrator at its end
@@ -64,7 +64,7 @@ DATASETS = {  # name in the file -> field of `Rows`, description
 
 
 class ArraySource(Protocol):
-    """The location of the arrays of a trajectory, in memory or in files."""
+    """The arrays of a trajectory, in memory or in files."""
 
     def read(self, name: str) -> Array:
         """Return a whole dataset by its name in `DATASETS`."""
@@ -78,7 +78,7 @@ class MemorySource:
     arrays: Mapping[str, Array]
 
     def read(self, name: str) -> Array:
-        """Return a whole dataset."""
+        """Return a whole dataset by name."""
         return self.arrays[name]
 
 
@@ -91,7 +91,7 @@ class FileSource:
     shapes: Mapping[str, tuple[int, ...]]  #: shapes of one row, needed if there is no segment
 
     def read(self, name: str) -> Array:
-        """Return a whole dataset; `ResultsError` if a file is missing or has changed since the check."""
+        """Return a whole dataset by name; `ResultsError` if a file is missing or has changed since it was checked."""
         parts = [np.zeros((0, *self.shapes[name]))]
         for path in self.paths:
             try:
@@ -141,7 +141,7 @@ def segment_paths(folder: Path) -> list[Path]:
 
 @contextmanager
 def checked(path: Path, *, tell_age: bool = True) -> Iterator[tuple[Any, dict[str, Any]]]:
-    """Open a results file or a segment whose seal or digest is valid, and return it with its groups and datasets.
+    """Open a results file or segment with a valid seal or digest; return it with its groups and datasets.
 
     A file of version 1 has neither; it is read with a warning.
     """
@@ -173,7 +173,7 @@ def read_head(path: Path, file: Any) -> tuple[Head, bool]:
 
 
 def require_datasets(path: Path, items: Mapping[str, Any], shapes: Mapping[str, tuple[int, ...]]) -> int:
-    """Raise `ResultsError` unless all datasets are numeric with the shapes of the head; return the number of rows."""
+    """Return the number of rows; `ResultsError` unless all datasets are numeric with the shapes in the head."""
     t = items.get("/t")
     n_t = t.shape[0] if isinstance(t, h5py.Dataset) and len(t.shape) == 1 else -1
     for name, shape in shapes.items():
@@ -190,7 +190,7 @@ def require_datasets(path: Path, items: Mapping[str, Any], shapes: Mapping[str, 
 
 
 def open_segments(folder: Path) -> tuple[Head, FileSource]:
-    """Return the head and the closed segments of an unfinished run, after checking all of them."""
+    """Return the head and the closed segments of an unfinished run after a check of all segments."""
     try:
         with checked(folder / "head.h5") as (file, _):
             head, _ = read_head(folder, file)
@@ -207,7 +207,7 @@ def open_segments(folder: Path) -> tuple[Head, FileSource]:
 
 
 def open_results(path: str | os.PathLike[str]) -> tuple[Head, FileSource, bool]:
-    """Return head, arrays and completeness of a results file, or of the segments left by a killed run.
+    """Return head, arrays and completeness of a results file, or of the segments of an interrupted run.
 
     Raises
     ------

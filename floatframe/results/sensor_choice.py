@@ -18,11 +18,12 @@ from floatframe.results.trajectory import Trajectory
 __all__ = ["chosen_measurements", "controller_samples"]
 
 WILD = "*?"
-SAME_TIME = 1e-6  #: part of a period by which output times and sampling instants may differ
+#: difference between output times and sampling instants, as a fraction of a period, below which they are equal
+SAME_TIME = 1e-6
 
 
 def chosen_measurements(system: System, trajectory: Trajectory, names: Sequence[str]) -> list[Measurement]:
-    """Return the measurements of the sensors with the given names, each once, in the order of the names.
+    """Return the measurements of the named sensors, each once, in the order of the names.
 
     A name is that of a sensor, of a column, "sensor.column" or "sensor column", or of a coordinate, "joint.coordinate".
     The name of a joint stands for its coordinates and its reaction, that of a body for the position of its origin, that
@@ -72,12 +73,12 @@ def chosen_measurements(system: System, trajectory: Trajectory, names: Sequence[
 
 
 def is_wild(name: str, known: Sequence[str]) -> bool:
-    """Return whether a name is a pattern, and not an existing name that contains such a character."""
+    """Return whether a name contains a wildcard and is not an existing name with such a character."""
     return any(letter in name for letter in WILD) and name not in known
 
 
 def pattern_of(name: str) -> str:
-    """Return a pattern in which brackets are literal characters."""
+    """Return a pattern in which brackets stand for themselves."""
     return name.replace("[", "[[]")
 
 
@@ -116,7 +117,7 @@ def held_between(samples: Measurement, t: Array) -> Measurement:
 
 
 def measurements_of_part(system: System, trajectory: Trajectory, name: str) -> dict[str, Measurement]:
-    """Return the measurements of a joint, a body or a controller of that name; none if there is none."""
+    """Return the measurements of the joint, body or controller with this name; none if it does not exist."""
     for joint in system.joints:
         if joint.name == name:
             own: list[Sensor] = [CoordinateSensor(f"{name}.{each}", name, each) for each in joint.coordinates]

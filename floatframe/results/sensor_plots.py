@@ -1,4 +1,4 @@
-"""Plots of measurements over time: panels with the columns of one unit, at most a dozen curves in each."""
+"""Plots of measurements over time: each panel has the columns of one unit, at most a dozen curves."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -14,21 +14,21 @@ if TYPE_CHECKING:
 
 __all__ = ["figure_of", "groups_of", "labelled", "panels_of", "plot_columns", "plot_measurement", "plot_sensors"]
 
-ROUNDING = 1e-9  #: relative to the largest column of a unit; smaller curves would coincide with zero
-MOST_CURVES = 12  #: of a panel; more columns go into several panels
-N_COLORS = 10  #: colours of curves, which then begin anew, with dashes
-LONG_LEGEND = 6  #: entries of a legend, above which it has two columns
+ROUNDING = 1e-9  #: size relative to the largest column of a unit below which a curve is a rounding error
+MOST_CURVES = 12  #: largest number of curves in a panel; further columns go into additional panels
+N_COLORS = 10  #: number of colours, after which they repeat with dashed lines
+LONG_LEGEND = 6  #: number of entries above which a legend has two columns
 
 
 def panels_of(measurement: Measurement) -> tuple[tuple[str, tuple[str, ...]], ...]:
-    """Return the columns of each unit, as the unit and the names of the columns with this unit."""
+    """Return pairs of a unit and the names of the columns with this unit."""
     quantities = measurement.quantities
     units = dict.fromkeys(measurement.units[name] for name in quantities)
     return tuple((unit, tuple(name for name in quantities if measurement.units[name] == unit)) for unit in units)
 
 
 def groups_of(measurement: Measurement) -> tuple[tuple[str, ...], ...]:
-    """Return the columns of each panel: of one unit, without those that stay zero beside others, a dozen at most.
+    """Return the columns of each panel: at most a dozen of one unit, without columns that stay zero beside others.
 
     If all columns of a unit stay zero, the last one is shown.
     """
@@ -44,7 +44,7 @@ def groups_of(measurement: Measurement) -> tuple[tuple[str, ...], ...]:
 def plot_measurement(
     measurement: Measurement, ax: "Axes | None" = None, *, columns: Sequence[str] = (), time_symbol: str = "s"
 ) -> "Axes":
-    """Plot columns of one unit over time, as `groups_of` returns them; default: the first group."""
+    """Plot columns of one unit over time, as grouped by `groups_of`; by default the first group."""
     if ax is None:
         from matplotlib.figure import Figure
 
@@ -66,7 +66,7 @@ def plot_measurement(
 
 
 def plot_columns(measurements: Sequence[Measurement], ax: "Axes", *, time_symbol: str = "s") -> "Axes":
-    """Plot all columns of measurements into one pair of axes, each with its whole name.
+    """Plot all columns of measurements into one pair of axes, labelled with sensor and column.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def plot_columns(measurements: Sequence[Measurement], ax: "Axes", *, time_symbol
 
 
 def plot_sensors(measurements: Sequence[Measurement], *, title: str = "", time_symbol: str = "s") -> "Figure":
-    """Return a figure with panels for every sensor: the columns of a unit, a dozen at most in one panel.
+    """Return a figure with panels for every sensor, each with the columns of one unit, at most a dozen.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def plot_sensors(measurements: Sequence[Measurement], *, title: str = "", time_s
 
 
 def figure_of(ax: "Axes") -> "Figure":
-    """Return the figure of axes; `ResultsError` if they have been removed from theirs."""
+    """Return the figure of axes; `ResultsError` if the axes have been removed from their figure."""
     figure = ax.get_figure(root=True)
     if figure is None:
         raise ResultsError("plot: the given axes belong to no figure")
@@ -128,7 +128,7 @@ def figure_of(ax: "Axes") -> "Figure":
 
 
 def labelled(ax: "Axes", label: str) -> "Axes":
-    """Set the label of the y axis, and add a legend of the curves."""
+    """Set the label of the y axis and add a legend."""
     ax.set_ylabel(label)
     if handles := ax.get_legend_handles_labels()[0]:
         ax.legend(fontsize="small", ncols=1 if len(handles) <= LONG_LEGEND else 2)

@@ -24,18 +24,18 @@ __all__ = ["BodyMotion", "Drift", "Energies", "Reaction", "Trajectory", "read_tr
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class BodyMotion:
-    """Motion of a body: its frame B and its modal coordinates."""
+    """Motion of a body: motion of its frame B and its modal coordinates."""
 
-    t: Array  #: (n_t,) [s]
+    t: Array  #: output times, (n_t,) [s]
     r: Array  #: position of the frame origin, ground axes, (n_t, 3) [m]
     p: Array  #: Euler parameters (w, x, y, z) of R_GB, (n_t, 4)
     q: Array  #: modal coordinates, (n_t, n_q)
     v: Array  #: velocity of the frame origin, ground axes, (n_t, 3) [m/s]
     omega_B: Array  # noqa: N815  #: angular velocity, body axes, (n_t, 3) [rad/s]
-    q_dot: Array  #: (n_t, n_q)
+    q_dot: Array  #: rates of the modal coordinates, (n_t, n_q)
     v_dot: Array  #: acceleration of the frame origin, ground axes, (n_t, 3) [m/s²]
     omega_B_dot: Array  # noqa: N815  #: (n_t, 3) [rad/s²]
-    q_ddot: Array  #: (n_t, n_q)
+    q_ddot: Array  #: second rates of the modal coordinates, (n_t, n_q)
 
 
 @frozen_copies
@@ -45,19 +45,19 @@ class Energies:
 
     kinetic: Array
     strain: Array
-    gravity: Array  #: zero if all mass is at the ground origin
+    gravity: Array  #: potential energy of gravity; zero if all mass is at the ground origin
     springs: Array
-    work: Array  #: work of point forces since the start
+    work: Array  #: work done by point forces and drives since the start
     dissipated: Array  #: energy dissipated by dampers and modal damping since the start
 
     @property
     def total(self) -> Array:
-        """Kinetic and potential energy, (n_t,)."""
+        """Sum of kinetic and potential energy, (n_t,)."""
         return self.kinetic + self.strain + self.gravity + self.springs
 
     @property
     def balance(self) -> Array:
-        """Total minus work plus dissipated, (n_t,); constant except for the error of the integrator."""
+        """Total energy minus work plus dissipated energy, (n_t,); constant except for integration errors."""
         return self.total - self.work + self.dissipated
 
 
@@ -66,8 +66,8 @@ class Energies:
 class Reaction:
     """Force and moment that a joint or spring exerts on its marker A, in ground axes."""
 
-    force: Array  #: (n_t, 3) [N]
-    moment: Array  #: (n_t, 3) [N m]; zero if the connection has no moment
+    force: Array  #: force on marker A, (n_t, 3) [N]
+    moment: Array  #: moment on marker A, (n_t, 3) [N m]; zero if the connection has no moment
 
 
 @frozen_copies
@@ -75,10 +75,10 @@ class Reaction:
 class Drift:
     """The constraint error of a joint, (n_t,) each."""
 
-    distance: Array  #: [m]
-    angle: Array  #: [rad]
-    distance_rate: Array  #: [m/s]
-    angle_rate: Array  #: [rad/s]
+    distance: Array  #: error of distances [m]
+    angle: Array  #: error of angles [rad]
+    distance_rate: Array  #: rate of the distance error [m/s]
+    angle_rate: Array  #: rate of the angle error [rad/s]
 
 
 @presented
@@ -86,7 +86,7 @@ class Drift:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class Trajectory:
-    """A motion, in memory or on disk (arrays are then read on demand).
+    """A motion in memory, or on disk with arrays read on demand.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class Trajectory:
     validity: tuple[ValidityNote, ...] = ()
 
     def summary(self) -> Summary:
-        """Return what `repr` and notebooks show: times, bodies, joints and notes of the run."""
+        """Return the content shown by `repr` and notebooks: times, bodies, joints and notes of the run."""
         second, t = self.units.time_symbol, self.t
         rows = [
             ("time", f"{t[0]:.6g} to {t[-1]:.6g} {second}, {len(t)} outputs" if len(t) else "no outputs"),
@@ -146,12 +146,12 @@ class Trajectory:
 
     @property
     def files(self) -> tuple[str, ...]:
-        """The recorded files from which it was computed: system file, modal files."""
+        """The recorded input files of the run: system file and modal files."""
         sources = (self.head.run.get("system_file", ""), *(body.source for body in self.head.bodies))
         return tuple(str(source) for source in sources if source)
 
     def entry(self, name: str) -> tuple[int, BodyEntry]:
-        """Return index and entry of a body; `ResultsError` with the choices if there is none."""
+        """Return index and entry of a body; `ResultsError` lists the choices if it does not exist."""
         for i, body in enumerate(self.head.bodies):
             if body.name == name:
                 return i, body
@@ -176,7 +176,7 @@ class Trajectory:
         )
 
     def state(self, i_time: int) -> State:
-        """Return the state at an output time (-1: the last), for example as initial state of another motion.
+        """Return the state at an output time (-1: the last), for example as the initial state of another motion.
 
         States of elements and user forces, and counted angles, go on in that motion (`State.w`, `State.angle`), and so
         do the errors that the watch has found up to the last time (`State.watched`).
@@ -203,7 +203,7 @@ class Trajectory:
 
     @cached_property
     def energies(self) -> Energies:
-        """Energies over time."""
+        """Energies of the system over time."""
         d = self.source.read("diagnostics")
         return Energies(d[:, 0], d[:, 1], d[:, 2], d[:, 3], d[:, 10], d[:, 11])
 
@@ -219,7 +219,7 @@ class Trajectory:
 
 
 def read_trajectory(path: str | os.PathLike[str]) -> Trajectory:
-    """Return the trajectory in a results file, or the part left by a killed run (with `is_complete` False).
+    """Return the trajectory in a results file, or the completed part of an interrupted run (`is_complete` is False).
 
     Parameters
     ----------

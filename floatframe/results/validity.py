@@ -1,4 +1,4 @@
-"""Notes of a run about its validity: bodies beyond the linear range, inaccurate steps, spurious energy."""
+"""Notes on the validity of a run: bodies beyond the linear range, inaccurate steps, numerical energy changes."""
 
 import json
 from collections.abc import Iterable
@@ -13,7 +13,8 @@ __all__ = ["ValidityNote", "notes_from_json", "notes_to_json"]
 OF_FRAMES = ("rotation", "load", "speed", "inertia")  #: kinds of notes about the linear frame of a body
 #: notes on functions of time that are faster than the steps, or jump within them
 OF_LAWS = ("frequency", "knots", "law")
-OF_ANGLES = ("angles", "tilt")  #: notes on bushings and bearings that rotate beyond the validity of small angles
+#: kinds of notes on bushings and bearings that rotate beyond the validity of small angles
+OF_ANGLES = ("angles", "tilt")
 OF_ENERGY = ("energy", "damping")  #: kinds of notes about energy that the steps add or remove
 KINDS = (*OF_FRAMES, "steps", *OF_ENERGY, *OF_LAWS, *OF_ANGLES)
 
@@ -21,7 +22,7 @@ KINDS = (*OF_FRAMES, "steps", *OF_ENERGY, *OF_LAWS, *OF_ANGLES)
 @dataclass(frozen=True)
 @checked_fields(ModelError)
 class ValidityNote:
-    """A note of a run about its validity: a limit that is exceeded, and the remedy.
+    """A note on the validity of a run: a limit that was exceeded, and the remedy.
 
     There is one note per body and kind for the linear frame of a body ("rotation", "load", "speed" or "inertia", fields
     of `cms.body.linear_range.Limits`); one for the steps of the run ("steps": their estimated error relative to the
@@ -68,22 +69,22 @@ class ValidityNote:
 
     @classmethod
     def of_law(cls, kind: str, words: str, t: float) -> "ValidityNote":
-        """Return the note of a sentence "where: problem; remedy" about a function of time."""
+        """Return the note for a sentence "where: problem; remedy" about a function of time."""
         where, _, rest = words.partition(": ")
         return cls(where, kind, 0.0, 0.0, t, t, advice=rest)
 
     def with_value(self, value: float, t: float) -> "ValidityNote":
-        """Return the note after a value at time t, which changes it if it is the largest so far."""
+        """Return the note after a value at time t; it changes if the value is the largest so far."""
         return replace(self, largest=value, t_largest=t) if value > self.largest else self
 
     @property
     def key(self) -> tuple[str, ...]:
-        """Identification of a note; a run has one note for each key."""
+        """Identification of the note; a run has one note for each key."""
         return (self.body, self.kind, self.advice) if self.kind in OF_LAWS else (self.body, self.kind)
 
     @property
     def is_of_a_frame(self) -> bool:
-        """Whether the note is about the linear frame of a body, which shorter steps do not change."""
+        """Whether the note concerns the linear frame of a body, which shorter steps do not improve."""
         return self.kind in OF_FRAMES
 
     @property
@@ -147,7 +148,7 @@ class ValidityNote:
 
     @property
     def next_action(self) -> str:
-        """Return the remedy if another frame does not help, or not enough, as text."""
+        """Return the remedy as text, for the case that another frame does not help enough."""
         if self.is_stiffened:
             more = "reduce it with more modes, or " if self.kind == "speed" else ""
             return f"{more}split it into parts (cms split, [body] part)"
@@ -157,7 +158,7 @@ class ValidityNote:
 
     @property
     def words(self) -> str:
-        """Return the note as one sentence, in the units of the system."""
+        """Return the note as one sentence in the units of the system."""
         if self.kind in OF_LAWS:
             return f"{self.body}: {self.advice}"
         if self.kind in OF_ANGLES:
@@ -171,12 +172,12 @@ class ValidityNote:
 
 
 def notes_to_json(notes: Iterable[ValidityNote]) -> str:
-    """Return notes as text."""
+    """Return notes as JSON text."""
     return json.dumps([asdict(note) for note in notes])
 
 
 def notes_from_json(text: str) -> tuple[ValidityNote, ...]:
-    """Return the notes of a text.
+    """Return the notes in a JSON text.
 
     Raises
     ------

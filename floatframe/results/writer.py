@@ -1,4 +1,4 @@
-"""Writing of results: closed segments while a motion is computed, and one file at the end.
+"""Writing of results: closed segments during the computation, and one file at the end.
 
 A run that writes to swing.h5 first fills the folder swing.h5.segments with head.h5 and 000000.h5, 000001.h5, .... Each
 is written under a temporary name and then renamed, so that a killed run leaves all closed segments readable. At the
@@ -55,11 +55,11 @@ log = logging.getLogger(__name__)
 
 
 class LockedError(ReportedError, OSError):
-    """Another process, or another call in this process, holds the lock; the message names it."""
+    """The lock is held by another process, or by another call in this process; the message names it."""
 
 
 class FileLock:
-    """Lock of a file with at most one holder, on this machine and on network file systems that support locks.
+    """Lock of a file for one holder at a time, on this machine and on network file systems that support locks.
 
     The operating system releases it when the process ends, even by SIGKILL, so a file left behind locks nothing.
 
@@ -98,14 +98,14 @@ class FileLock:
         os.write(self.descriptor, words.encode())
 
     def is_held(self) -> bool:
-        """Whether we hold the lock, and its file still has this name."""
+        """Whether we hold the lock and its file still exists under this name."""
         try:
             return self.descriptor >= 0 and os.path.samestat(os.fstat(self.descriptor), os.stat(self.path))
         except FileNotFoundError:
             return False
 
     def release(self) -> None:
-        """Release the lock; the file stays."""
+        """Release the lock; its file remains."""
         if self.descriptor >= 0:
             os.close(self.descriptor)
             self.descriptor = -1
@@ -130,12 +130,12 @@ def lock(descriptor: int) -> None:
 # writer ---------------------------------------------------------------------------------------------------------------
 
 
-UNFINISHED = ".unfinished"  #: appended to the name of a file that is being written
-LOCK = "lock"  #: file in the folder of segments
+UNFINISHED = ".unfinished"  #: suffix of a file that is being written
+LOCK = "lock"  #: name of the lock file in the folder of segments
 
 
 class ResultsPlace(AbstractContextManager["ResultsPlace"]):
-    """The place to which a run writes its results, locked for other runs.
+    """The location to which a run writes its results, locked against other runs.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ class ResultsPlace(AbstractContextManager["ResultsPlace"]):
         self.lock = self.locked(where)
 
     def locked(self, where: str) -> FileLock:
-        """Take the lock of the folder, which is created if it does not exist."""
+        """Take the lock of the folder, which is created if necessary."""
         try:
             while True:
                 self.folder.mkdir(exist_ok=True)
@@ -191,12 +191,12 @@ class ResultsPlace(AbstractContextManager["ResultsPlace"]):
             raise ResultsError(f"{where}: cannot be written: {reason(error)}") from error
 
     def clear(self) -> None:
-        """Remove the files of a run from the folder, except the lock."""
+        """Remove the files of a run from the folder, but not the lock."""
         for path in (*self.folder.glob(f"*{UNFINISHED}"), *self.folder.glob("[0-9]*.h5"), self.folder / "head.h5"):
             path.unlink(missing_ok=True)
 
     def remove(self) -> None:
-        """Remove the folder; it stays if it contains other files."""
+        """Remove the folder, unless it contains other files."""
         self.clear()
         self.lock.path.unlink(missing_ok=True)
         try:
@@ -207,14 +207,14 @@ class ResultsPlace(AbstractContextManager["ResultsPlace"]):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Release the place; an empty folder is removed, segments are kept."""
+        """Release the location; an empty folder is removed, segments remain."""
         if self.lock.is_held() and not (self.folder / "head.h5").exists():
             self.remove()
         self.lock.release()
 
 
 class ResultsWriter:
-    """Writes the rows of a run in closed segments, and joins them at the end.
+    """Writes the rows of a run to closed segments and joins them at the end.
 
     Raises
     ------
@@ -223,23 +223,23 @@ class ResultsWriter:
     """
 
     def __init__(self, place: ResultsPlace, head: Head, *, goes_on: bool = False) -> None:
-        """Begin with an empty folder of segments, or continue after the last restart record in an existing one."""
+        """Begin with an empty folder of segments, or continue after the last restart record in an existing folder."""
         self.place = place
         self.path, self.folder = place.path, place.folder
         self.head = head
         self.n_segments = 0
         self.n_rows = 0  #: number of rows in closed segments
         self.open_rows: list[Rows] = []
-        self.validity = "[]"  #: validity notes of the run, see results/validity.py
+        self.validity = "[]"  #: validity notes of the run as JSON text, see results/validity.py
         self.guarded(self.go_on if goes_on else self.begin)
 
     def begin(self) -> None:
-        """Remove everything from the folder of segments except the head."""
+        """Remove everything from the folder of segments except its head."""
         self.place.clear()
         self.write_file(self.folder / "head.h5", lambda file: self.write_head(file, is_complete=False))
 
     def go_on(self) -> None:
-        """Remove the segments after the last restart record, which will be computed again."""
+        """Remove the segments after the last restart record, because they will be computed again."""
         for path in self.folder.glob(f"*{UNFINISHED}"):
             path.unlink()
         paths = segment_paths(self.folder)
@@ -249,7 +249,7 @@ class ResultsWriter:
         self.n_rows = sum(rows_in(path) for path in paths)
 
     def guarded(self, action: Callable[[], None]) -> None:
-        """Run an action; if it cannot write, raise an error with a description."""
+        """Run an action that writes; convert its failure to an error with a description."""
         try:
             action()
         except OSError as error:
@@ -257,7 +257,7 @@ class ResultsWriter:
             raise ResultsError(f"results file {str(self.path)!r}: cannot be written: {reason(error)}{kept}") from error
 
     def write_file(self, path: Path, fill: Callable[[h5py.File], None]) -> None:
-        """Write a file under a temporary name and move it into place."""
+        """Write a file under a temporary name, then move it to its final name."""
         write_sealed_file(path, KIND, fill, part=path.with_name(path.name + UNFINISHED))
 
     def write_head(self, file: h5py.File, *, is_complete: bool) -> None:
@@ -277,18 +277,18 @@ class ResultsWriter:
         }
 
     def append(self, rows: Rows) -> None:
-        """Append rows to the open segment."""
+        """Append rows to the segment that is still open."""
         if len(rows.t):
             self.open_rows.append(rows)
 
     def open_arrays(self) -> dict[str, Array]:
-        """Return the datasets of the open segment."""
+        """Return the datasets of the segment that is still open."""
         arrays = arrays_of(self.open_rows)
         arrays["drift"] = arrays["drift"][:, : len(self.head.joints)]
         return arrays
 
     def close_segment(self, restart: Mapping[str, Array] | None = None) -> None:
-        """Write the open segment, unless it is empty, with a record for a restart of the run."""
+        """Write the open segment, unless it is empty, optionally with a restart record."""
         if not self.open_rows:
             return
         arrays = self.open_arrays()
@@ -308,7 +308,7 @@ class ResultsWriter:
         self.open_rows = []
 
     def finish(self, summary: Mapping[str, Any] | None = None) -> None:
-        """Join all segments, including the open one, into the results file with the summary of the run; remove them."""
+        """Join all segments, including the open one, to the results file with the summary; then remove them."""
         try:
             self.join(summary or {})
         except BaseException:
@@ -317,7 +317,7 @@ class ResultsWriter:
         self.place.remove()
 
     def join(self, summary: Mapping[str, Any]) -> None:
-        """Write the results file."""
+        """Write the results file from all segments."""
         _, source = open_segments(self.folder)
         if len(source.paths) != self.n_segments or sum(map(rows_in, source.paths)) != self.n_rows:
             raise ResultsError(
@@ -340,12 +340,12 @@ class ResultsWriter:
 
 
 def arrays_of(parts: list[Rows]) -> dict[str, Array]:
-    """Return the datasets of consecutive rows."""
+    """Return consecutive rows as datasets."""
     return {name: np.concatenate([getattr(rows, field) for rows in parts]) for name, (field, _) in DATASETS.items()}
 
 
 def parts_of(source: FileSource, name: str) -> Iterator[Array]:
-    """Yield a dataset of consecutive segments, one segment at a time."""
+    """Yield a dataset segment by segment."""
     for path in source.paths:
         with h5py.File(path, "r") as segment:
             yield segment[name][...]
@@ -358,13 +358,13 @@ def rows_in(path: Path) -> int:
 
 
 def has_restart(path: Path) -> bool:
-    """Return whether a run can be continued after this segment."""
+    """Return whether a run can be resumed after this segment."""
     with h5py.File(path, "r") as file:
         return RESTART in file
 
 
 def last_restart(folder: Path) -> tuple[Head, dict[str, Array] | None]:
-    """Return the head of an interrupted run and its last restart record, or None if there is no record.
+    """Return the head and the last restart record of an interrupted run, or None if there is no record.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Named sensors, which measure a motion, in Python and in the tables [sensors.NAME] of a system file.
+"""Named sensors that measure a motion, in Python and in the tables [sensors.NAME] of a system file.
 
 `SENSORS` is the registry; a new sensor is a class with `measure` and `linear`, and its line there.
 """
@@ -70,8 +70,8 @@ __all__ = [
 ]
 
 
-#: sensor classes by the `type` of a table [sensors.NAME]; a new sensor is added here alone. The fields of a class are
-#: the keys of its table, unless `channel_section.KEYS_OF_PLACES` puts its places together from several keys
+#: sensor classes by the `type` of a table [sensors.NAME]; a new sensor is added only here. The fields of a class are
+#: the keys of its table, unless `channel_section.KEYS_OF_PLACES` builds a place from several keys
 SENSORS: dict[str, type[Sensor]] = {
     **dict.fromkeys(PLACE_QUANTITIES, PlaceSensor),
     "angle": AngleSensor,
@@ -96,7 +96,7 @@ SENSORS: dict[str, type[Sensor]] = {
 
 
 def measured(system: System, trajectory: Trajectory, sensors: Sequence[Sensor] | None = None) -> dict[str, Measurement]:
-    """Return the measurements of sensors during a motion of the system, by name; by default of all its sensors.
+    """Return the measurements of sensors during a motion, by name; by default of all sensors of the system.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def measured(system: System, trajectory: Trajectory, sensors: Sequence[Sensor] |
 
 
 def sensors_of(system: System) -> tuple[Sensor, ...]:
-    """Return the sensors of a system, for which it stores a general type."""
+    """Return the sensors of a system, which stores them under a general type."""
     return cast(tuple[Sensor, ...], system.sensors)
 
 
@@ -139,7 +139,7 @@ def coordinate_sensors(system: System) -> tuple[Sensor, ...]:
 
 
 def sensor_of(system: System, name: str) -> Sensor:
-    """Return a sensor of the system by name, or a sensor for "joint.coordinate" or "element.output".
+    """Return a sensor by name, or a new sensor for "joint.coordinate" or "element.output".
 
     Raises
     ------
@@ -161,7 +161,7 @@ def sensor_of(system: System, name: str) -> Sensor:
 
 
 def measurement_of(system: System, trajectory: Trajectory, name: str) -> Measurement:
-    """Return the measurement of "sensor", "joint.coordinate", or of a column, "sensor.column" or "sensor column".
+    """Return the measurement of "sensor" or "joint.coordinate", or a column: "sensor.column" or "sensor column".
 
     Raises
     ------
@@ -184,7 +184,7 @@ def measurement_of(system: System, trajectory: Trajectory, name: str) -> Measure
 
 
 def sensor_points(system: System) -> dict[str, tuple[str, ...]]:
-    """Return, by sensor, the points on flexible bodies that are not interfaces; sensors without any are omitted.
+    """Return, for each sensor, its points on flexible bodies that are not interfaces; sensors without any are omitted.
 
     Raises
     ------
@@ -196,7 +196,7 @@ def sensor_points(system: System) -> dict[str, tuple[str, ...]]:
 
 
 def places_of(system: System, sensor: Sensor) -> tuple[str, ...]:
-    """Return descriptions of the points of a sensor."""
+    """Return descriptions of the points that a sensor uses."""
     where = f"sensor {sensor.name!r}"
     if isinstance(sensor, StressSensor | StrainGauge | VonMisesSensor):
         body, address = flexible_body(system, sensor.name, sensor.body), address_of(sensor)

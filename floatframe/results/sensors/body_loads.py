@@ -1,4 +1,4 @@
-"""Sensors of loads on bodies: the total force on an interface, springs along their line, recovery rows."""
+"""Sensors of loads on bodies: total force on an interface, springs, recovery rows."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -33,11 +33,11 @@ from floatframe.results.trajectory import Trajectory
 __all__ = ["INTERFACE_AXES", "InterfaceForceSensor", "RecoverySensor", "SpringSensor"]
 
 INTERFACE_AXES = ("ground", "body")
-ROUNDING = 1e-12  #: relative to the largest wrench; smaller values are rounding errors
+ROUNDING = 1e-12  #: size relative to the largest wrench below which a value is a rounding error
 
 
 def interface_loads(system: System, trajectory: Trajectory, body: FlexibleBody) -> Array:
-    """Return force and moment on each interface, at its point, in axes of the body frame, (n_interfaces, n_t, 6).
+    """Return force and moment on each interface at its reference point, axes of the body frame, (n_interfaces, n_t, 6).
 
     Point forces are taken as recorded in the motion, including the effect of events and of external programs. Motions
     of older files have no record; for these, the forces of the system are evaluated, and are zero while events have
@@ -70,7 +70,7 @@ def interface_loads(system: System, trajectory: Trajectory, body: FlexibleBody) 
 def require_loads(
     system: System, trajectory: Trajectory, kind: type[PointForce | BodyLoad], names: tuple[str, ...]
 ) -> list[tuple[int, str]]:
-    """Return number and name of the recorded forces that were driven by an external program; they follow the others.
+    """Return number and name of the recorded forces that an external program prescribes; they come after the others.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def require_loads(
 
 
 def led_interface(system: System, body: FlexibleBody, i: int, name: str) -> int:
-    """Return the interface of body i on which an input of the system acts as a recorded force; -1 for none."""
+    """Return the interface of body i on which a system input acts as a recorded force; -1 if there is none."""
     for channel in system.inputs:
         ends = {f"inputs.{channel.name}": "marker", f"inputs.{channel.name}.against": "relative_to"}
         marker = getattr(channel, ends[name], None) if name in ends else None
@@ -100,23 +100,23 @@ def led_interface(system: System, body: FlexibleBody, i: int, name: str) -> int:
 
 
 def events_of(system: System) -> tuple[Any, ...]:
-    """Return the events of a system and of its elements, for which it stores a general type."""
+    """Return the events of a system and of its elements, which the system stores under a general type."""
     return (*system.events, *(event for each in system.elements for event in each.events()))
 
 
 def happened(trajectory: Trajectory) -> Sequence[Mapping[str, Any]]:
-    """Return the events that have occurred in a motion."""
+    """Return the events that occurred in a motion."""
     return trajectory.head.summary.get("events", ())
 
 
 def in_file(body: FlexibleBody, load: Load) -> Load:
-    """Return a load with the axes of its marker in the frame of the body's file."""
+    """Return a load with its marker axes in the frame of the body's file."""
     axes = body.reduced.frame.axes.T @ body.moved.frame.axes
     return Load(load.interface, load.force, axes @ load.triad)
 
 
 def interface_load_rows(small: SmallMotions, body: FlexibleBody) -> list[Rows]:
-    """Return the change of force and moment on each interface in ground axes, six rows each."""
+    """Return the change of force and moment on each interface as six rows, ground axes."""
     wrenches, loads = loads_on_interfaces(small.system, small.compiled.body_names.index(body.name))
     zero = small.by_motion(np.zeros((6, small.n_x)))
     found = [zero for _ in body.reduced.interfaces]
@@ -189,7 +189,7 @@ class InterfaceForceSensor:
         return Measurement(self.name, trajectory.t, columns, units)
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return force and moment as functions of the wrenches; in body axes Rᵀ (dF + F × theta)."""
+        """Return force and moment as linear functions of wrenches; in body axes Rᵀ (dF + F × theta)."""
         body, k = self.place(small.system)
         rows, frame = interface_load_rows(small, body)[k], small.frame_place(body.name)
         now = self.measure(small.system, small.now).columns
@@ -208,7 +208,7 @@ class InterfaceForceSensor:
         )
 
     def place(self, system: System) -> tuple[FlexibleBody, int]:
-        """Return the body and the index of the interface; `ModelError` with the nearest name if it does not exist."""
+        """Return the body and the index of the interface; `ModelError` with the closest name if it does not exist."""
         body = flexible_body(system, self.name, self.body)
         names = [interface.name for interface in body.reduced.interfaces]
         if self.interface not in names:
@@ -223,7 +223,7 @@ class InterfaceForceSensor:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class SpringSensor:
-    """A spring-damper along its line: length, its rate, and the tension, negative in compression.
+    """A spring-damper: length, rate of length, and tension (negative in compression).
 
     Parameters
     ----------
@@ -247,7 +247,7 @@ class SpringSensor:
         return Measurement(self.name, trajectory.t, columns, self.units(system))
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return all columns: along the line direction e of d, e · d(r_B - r_A) and e · dF, because F is along e."""
+        """Return all columns as linear functions; with F along the line direction e: e · d(r_B - r_A), e · dF."""
         a, b = (small.place(end, self.of) for end in self.ends(small.system))
         d = b.position - a.position
         length = float(np.linalg.norm(d))
@@ -259,7 +259,7 @@ class SpringSensor:
         return scalar_columns({"length": row, "rate": row.rate, "tension": tension}, self.units(small.system))
 
     def ends(self, system: System) -> list[MarkerData]:
-        """Return both markers; `ModelError` with the nearest name if there is no such spring."""
+        """Return both markers; `ModelError` suggests the closest name if the spring does not exist."""
         springs = {force.name: force for force in system.forces if isinstance(force, SpringDamper)}
         if self.of not in springs:
             hint = nearest(self.of, list(springs))
@@ -278,7 +278,7 @@ class SpringSensor:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class RecoverySensor:
-    """Rows of a recovery table of a flexible body: motions, stresses and forces, including residual static parts.
+    """Rows of a flexible body's recovery table: motions, stresses and forces, including residual static parts.
 
     y = D_0 z + D_1 z' + D_2 z'' + L p, see `cms.body.recovery_table`. z' and z'' are velocities and
     accelerations of the body frame in its axes and the rates of q. p contains gravity, spin, the loads on interfaces
@@ -302,7 +302,7 @@ class RecoverySensor:
     rows: Sequence[str] = ()
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
-        """Return the rows over time, by label."""
+        """Return the rows over time by their labels."""
         body, table, rows = self.found(system)
         require_same_modes(trajectory, body.name, body.reduced)
         motion = trajectory.body(body.name)
@@ -315,7 +315,7 @@ class RecoverySensor:
         return Measurement(self.name, trajectory.t, columns, {table.labels[row]: table.units[row] for row in rows})
 
     def places_and_rates(self, small: SmallMotions, z: Rows) -> tuple[Rows, Rows]:
-        """Return the values of z and z' in the rows: positions relative to the frame, velocities relative to rest."""
+        """Return z and z' in the rows: positions relative to the frame, velocities relative to the state of rest."""
         return small.by_motion(np.concatenate([np.zeros((6, small.n_x)), z.x[6:]])), z.rate
 
     def linear(self, small: SmallMotions) -> LinearColumns:
@@ -354,7 +354,7 @@ class RecoverySensor:
         return LinearColumns({table.labels[row]: y[k] for k, row in enumerate(rows)}, units, {})
 
     def found(self, system: System) -> tuple[FlexibleBody, RecoveryTable, IntArray]:
-        """Return the body, its table and the selected rows; `ModelError` with the nearest name if one is missing."""
+        """Return the body, its table and the selected rows; `ModelError` with the closest name if one is missing."""
         body = flexible_body(system, self.name, self.body)
         tables = body.reduced.recovery
         if self.table not in tables:
@@ -371,7 +371,7 @@ class RecoverySensor:
             raise ModelError(f"sensor {self.name!r}: {error}") from error
 
     def loads(self, system: System, trajectory: Trajectory, body: FlexibleBody, table: RecoveryTable) -> Array:
-        """Return the amplitudes of the loads over time, (n_t, n_loads); `ModelError` if a run does not have one."""
+        """Return load amplitudes over time, (n_t, n_loads); `ModelError` if the run does not contain a load."""
         motion = trajectory.body(body.name)
         R, omega = rotation_matrix(motion.p), motion.omega_B
         on_interfaces = interface_loads(system, trajectory, body)
@@ -394,7 +394,7 @@ class RecoverySensor:
 
 
 def load_cases(system: System, trajectory: Trajectory) -> Array:
-    """Return the factors of the load cases of a system, (n_t, n_cases), recorded like forces (`interface_loads`)."""
+    """Return factors of a system's load cases, (n_t, n_cases), recorded like forces (see `interface_loads`)."""
     if trajectory.head.load_cases is not None:
         require_loads(system, trajectory, BodyLoad, trajectory.head.load_cases)
         return trajectory.source.read("load_case")
@@ -411,7 +411,7 @@ SIX = ("fx", "fy", "fz", "mx", "my", "mz")
 
 
 def named(body: object) -> str:
-    """Return the name of a body, given as the body or its name."""
+    """Return the name of a body given as a body or as its name."""
     return body if isinstance(body, str) else str(getattr(body, "name", ""))
 
 

@@ -28,14 +28,14 @@ __all__ = ["QUANTITIES", "RATES", "VALUE", "Channel", "CoordinateChannel", "Stre
 
 QUANTITIES = ("translation", "rotation")
 RATES = ("displacement", "velocity", "acceleration")
-VALUE = "value"  #: name of the only column
+VALUE = "value"  #: name of the only column of a channel
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class Channel:
-    """The motion of a marker along a direction: displacement [m] from the start, or rotation [rad] about it.
+    """Motion of a marker along a direction: displacement [m] since the start, or rotation [rad] about the direction.
 
     On a flexible body, the marker is an interface, or the kept node nearest to a position in mesh axes.
 
@@ -74,11 +74,11 @@ class Channel:
 
     @property
     def markers(self) -> list[tuple[float, Marker]]:
-        """The marker, and the marker to which it is relative, with their signs."""
+        """The marker and its reference marker, with signs."""
         return [(sign, each) for sign, each in ((1.0, self.marker), (-1.0, self.relative_to)) if each is not None]
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
-        """Return the motion along the direction over time; displacements and rotations start at zero."""
+        """Return the motion along the direction over time; displacements and rotations are zero at the start."""
         total = np.zeros(len(trajectory.t))
         for sign, marker in self.markers:
             where = f"channel {self.name!r}: marker"
@@ -96,7 +96,7 @@ class Channel:
         return Measurement(self.name, trajectory.t, {VALUE: total}, {VALUE: self.units(system.units)})
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the motion along the direction as a function of small motions, relative to the rotating system."""
+        """Return the motion along the direction as a linear function of motions relative to the rotating system."""
         rows = small.by_motion(np.zeros((1, small.n_x)))
         for sign, marker in self.markers:
             place = self.place(small, marker)
@@ -108,18 +108,18 @@ class Channel:
         return scalar_columns({VALUE: rows}, {VALUE: self.units(small.system.units)})
 
     def place(self, small: SmallMotions, marker: Marker) -> SmallPlace:
-        """Return the linearised motion of a marker; `ModelError` for the rotation of a node without kept rotation."""
+        """Return a marker's linearised motion; `ModelError` for the rotation of a node without kept rotations."""
         where = f"channel {self.name!r}: marker"
         if self.quantity == "rotation":
             require_turning(small.system, where, marker)
         return small_place(small, where, marker)
 
     def units(self, units: Units) -> str:
-        """Return its unit as an output."""
+        """Return the unit of the channel as an output."""
         return rate_unit(units, self.quantity == "rotation", self.rate)
 
     def force_units(self, units: Units) -> str:
-        """Return its unit as an input."""
+        """Return the unit of the channel as an input."""
         return unit_words(units, "moment" if self.quantity == "rotation" else "force")
 
 
@@ -150,7 +150,7 @@ class CoordinateChannel:
         require_rate(f"channel {self.name!r}", self.rate)
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
-        """Return the coordinate or its rate over time; not the second rate, which results contain only for bodies."""
+        """Return the coordinate or its rate over time; results do not contain second rates of coordinates."""
         if self.rate == 2:
             raise ModelError(
                 f"channel {self.name!r}: a second rate of a joint coordinate is no part of results over time; take "
@@ -161,7 +161,7 @@ class CoordinateChannel:
         return Measurement(self.name, trajectory.t, {VALUE: value}, {VALUE: self.units(system.units)})
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the coordinate as a function of small motions."""
+        """Return the coordinate as a linear function of small motions."""
         rows = small.joint_coordinate(self.joint, self.coordinate, f"channel {self.name!r}")
         for _ in range(self.rate):
             rows = rows.rate
@@ -169,15 +169,15 @@ class CoordinateChannel:
 
     @property
     def is_angle(self) -> bool:
-        """Whether the coordinate is an angle, and not a distance or a position along an axis."""
+        """Whether the coordinate is an angle rather than a distance."""
         return self.coordinate.startswith("angle")
 
     def units(self, units: Units) -> str:
-        """Return its unit as an output."""
+        """Return the unit of the channel as an output."""
         return rate_unit(units, self.is_angle, self.rate)
 
     def force_units(self, units: Units) -> str:
-        """Return its unit as an input."""
+        """Return the unit of the channel as an input."""
         return unit_words(units, "moment" if self.is_angle else "force")
 
 
@@ -214,21 +214,21 @@ class StressChannel:
 
     @property
     def sensor(self) -> StressSensor:
-        """The sensor of all components."""
+        """The sensor that measures all stress components."""
         return StressSensor(self.name, self.body, position=self.position)
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
-        """Return the component over time."""
+        """Return the stress component over time."""
         found = self.sensor.measure(system, trajectory)
         return Measurement(self.name, found.t, {VALUE: found.columns[self.component]}, {VALUE: found.units["xx"]})
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the component as a function of small motions."""
+        """Return the stress component as a linear function of small motions."""
         found = self.sensor.linear(small)
         return scalar_columns({VALUE: found.columns[self.component]}, {VALUE: found.units[self.component]})
 
     def units(self, units: Units) -> str:
-        """Return its unit."""
+        """Return the unit of the stress."""
         return units.stress_symbol
 
 

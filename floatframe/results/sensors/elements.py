@@ -36,7 +36,7 @@ __all__ = ["BushingSensor", "ControlSensor", "CouplerSensor", "ElementSensor", "
 
 
 def output_rows(placed: PlacedLaw, small: SmallMotions) -> Rows:
-    """Return the outputs of an element as functions of small motions, one row each."""
+    """Return the outputs of an element as linear functions of small motions, one row each."""
     model, work = small.compiled.model, small.work
     c, n = placed.connection, len(placed.markers)
     first = int(model.connections.a[c])
@@ -69,7 +69,7 @@ def output_rows(placed: PlacedLaw, small: SmallMotions) -> Rows:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class CouplerSensor:
-    """A coupler: value, rate and force of each of its terms, numbered from 1.
+    """A coupler: value, rate and force of each of its coordinates, numbered from 1.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class CouplerSensor:
         return Measurement(self.name, trajectory.t, columns, units)
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return all columns, which are unknowns like the wrenches."""
+        """Return all columns as linear functions; they are unknowns like the wrenches."""
         model = small.compiled.model
         k = self.coupler_names(small.system).index(self.of)
         columns: dict[str, Rows] = {}
@@ -107,7 +107,7 @@ class CouplerSensor:
         return scalar_columns(columns, dict(self.measure(small.system, small.now).units))
 
     def coupler_names(self, system: System) -> list[str]:
-        """Return the names of the couplers; `ModelError` with the nearest one if that of the sensor does not exist."""
+        """Return the names of the couplers; `ModelError` with the closest one if the sensor's coupler is missing."""
         names = [coupler.name for coupler in system.couplers]
         if self.of not in names:
             raise ModelError(f"sensor {self.name!r}: no coupler {quoted(self.of)}{nearest(self.of, names)}")
@@ -148,7 +148,7 @@ class ControlSensor:
         return Measurement(self.name, trajectory.t, columns, units)
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return all columns except states, which are not linear here (see `linearize`); they are unknowns."""
+        """Return all columns except states, which are not linear here (see `linearize`), as unknowns."""
         model = small.compiled.model
         forces, u = self.user_forces(small.system)
         k, acting = len(small.system.couplers) + u, list(forces[u].forces)
@@ -161,7 +161,7 @@ class ControlSensor:
         return scalar_columns(columns, dict(self.measure(small.system, small.now).units))
 
     def user_forces(self, system: System) -> tuple[list[UserForce], int]:
-        """Return the user forces and the index of the sensor's one; `ModelError` with the nearest name otherwise."""
+        """Return the user forces and the index of the sensor's one; `ModelError` with the closest name if missing."""
         forces = [force for force in system.forces if isinstance(force, UserForce)]
         names = [force.name for force in forces]
         if self.of not in names:
@@ -170,7 +170,7 @@ class ControlSensor:
 
 
 def angles_of(system: System, k: int) -> list[bool]:
-    """Return whether each coordinate of coupler or user force number k is an angle."""
+    """Return whether each coordinate of element k (coupler or user force) is an angle."""
     model = compiled_system(system).model
     rows = model.coordinates.row[model.elements.coordinate0[k] : model.elements.coordinate0[k + 1]]
     return [kind_of(code).is_angle for code in model.rows.kind[rows]]
@@ -209,14 +209,14 @@ class ElementSensor:
     output: str | None = None
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
-        """Return a column for each output, state and multiplier, or the requested one."""
+        """Return a column for each output, state and multiplier, or only the selected column."""
         units = self.units_of(self.placed(system))
         found = element_motion(system, trajectory, self.of)
         columns: dict[str, Array] = {**found.outputs, **found.states, **found.multipliers}
         return Measurement(self.name, trajectory.t, {name: columns[name] for name in units}, units)
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return all columns: outputs from derivatives of the law; states and multipliers are unknowns."""
+        """Return all columns: outputs from derivatives of the law; states and multipliers as unknowns."""
         placed = self.placed(small.system)
         units = self.units_of(placed)
         law = placed.law
@@ -228,7 +228,7 @@ class ElementSensor:
         return LinearColumns({name: columns[name] for name in units}, units, {})
 
     def placed(self, system: System) -> PlacedLaw:
-        """Return the element; `ModelError` with the nearest name if it does not exist."""
+        """Return the element; `ModelError` suggests the closest name if it does not exist."""
         laws = compiled_system(system).laws
         names = [each.element.name for each in laws]
         if self.of not in names:
@@ -236,7 +236,7 @@ class ElementSensor:
         return laws[names.index(self.of)]
 
     def units_of(self, placed: PlacedLaw) -> dict[str, str]:
-        """Return the units of its columns, by name; `ModelError` with the nearest name if there is no such column."""
+        """Return the units of the columns by name; `ModelError` with the closest name if a column is missing."""
         law = placed.law
         units = dict(zip(law.outputs, law.output_units, strict=True))
         units |= dict(zip(law.states, law.state_units, strict=True))
@@ -263,7 +263,7 @@ class ElementSensor:
 #     alpha = (t/2) cot(t/2), tau = 0;   half way: alpha = (t/2) / sin(t/2), tau = tan(t/4) / (2 t)
 
 
-SERIES_BELOW = 1e-2  #: t² below which alpha, beta, tau are evaluated by series
+SERIES_BELOW = 1e-2  #: value of t² below which series give alpha, beta and tau
 NAMES = (*DEFORMATIONS, *(f"{name} rate" for name in DEFORMATIONS))
 
 
@@ -271,7 +271,7 @@ NAMES = (*DEFORMATIONS, *(f"{name} rate" for name in DEFORMATIONS))
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class BushingSensor:
-    """Deformations x, y, z, rx, ry, rz of a bushing and their rates, as used by its stiffness and damping.
+    """Deformations x, y, z, rx, ry, rz of a bushing and their rates, on which its stiffness and damping act.
 
     Parameters
     ----------
@@ -304,7 +304,7 @@ class BushingSensor:
         return Measurement(self.name, trajectory.t, dict(zip(NAMES, columns, strict=True)), self.units(system))
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return de = Cᵀ dd + e × dc and dtheta = S u; the rows of the rates are their derivatives."""
+        """Return de = Cᵀ dd + e × dc and dtheta = S u; the rows of the rates are the derivatives of these rows."""
         share = AXES[self.bushing(small.system).axes]
         a, b = (small.place(end, self.of) for end in self.ends(small.system))
         theta = rotation_log(a.axes.T @ b.axes)
@@ -325,7 +325,7 @@ class BushingSensor:
         return a, b
 
     def bushing(self, system: System) -> Bushing:
-        """Return the bushing; `ModelError` with the nearest name if there is none."""
+        """Return the bushing; `ModelError` suggests the closest name if it does not exist."""
         bushings = {force.name: force for force in system.forces if isinstance(force, Bushing)}
         if self.of not in bushings:
             raise ModelError(f"sensor {self.name!r}: no bushing {quoted(self.of)}{nearest(self.of, list(bushings))}")
@@ -338,7 +338,7 @@ class BushingSensor:
 
 
 def counted(trajectory: Trajectory, angles: list[CountedAngle], theta: Array) -> Array:
-    """Return rotation vectors with the turns that the run has counted, (n_t, 3); unchanged if it has not."""
+    """Return rotation vectors with the full turns that the run counted, (n_t, 3); unchanged if it did not count."""
     known = list(trajectory.head.angles or ())
     first = next((k for k, each in enumerate(known) if each.is_same(angles[0])), None)
     if first is None:
@@ -347,7 +347,7 @@ def counted(trajectory: Trajectory, angles: list[CountedAngle], theta: Array) ->
 
 
 def scalars(t2: Array, share: float) -> tuple[Array, Array, Array]:
-    """Return alpha, beta, tau of t², (n,) each; for small t² from series up to t⁶."""
+    """Return alpha, beta, tau as functions of t², (n,) each; for small t² from series up to t⁶."""
     near = t2 < SERIES_BELOW
     t = np.sqrt(np.where(near, 1.0, t2))
     if share != 0.5:

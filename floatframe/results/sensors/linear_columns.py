@@ -1,4 +1,4 @@
-"""Columns of linear outputs, with the same names as those measured over time."""
+"""Columns of linearised outputs, with the same names as the columns measured over time."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ NO_SIZE = "its size has no slope where the vector is zero"
 
 
 def vector_linear(rows: Rows, value: Array, unit: str, *, prefix: str = "", least: float = 0.0) -> LinearColumns:
-    """Return the columns x, y, z and size of a vector, see `vector_columns`, from three rows and its value now, (3,).
+    """Return columns x, y, z and size of a vector, see `vector_columns`, from three rows and the present value, (3,).
 
     least: magnitude below which the vector counts as zero; its size is then not linear.
     """
@@ -24,5 +24,5 @@ def vector_linear(rows: Rows, value: Array, unit: str, *, prefix: str = "", leas
 
 
 def scalar_columns(columns: dict[str, Rows], units: dict[str, str]) -> LinearColumns:
-    """Return columns of one row each, all of them linear."""
+    """Return linear columns that consist of one row each."""
     return LinearColumns(columns, units, {})

@@ -28,7 +28,7 @@ from floatframe.results.trajectory import Energies, Trajectory
 __all__ = ["AXES", "CoordinateSensor", "EnergySensor", "ModeSensor", "MomentumSensor", "ReactionSensor"]
 
 AXES = ("ground", "marker")
-ROUNDING = 1e-12  #: relative to the largest wrench; smaller values are rounding errors
+ROUNDING = 1e-12  #: size relative to the largest wrench below which a value is a rounding error
 ENERGIES = (*Energies.__dataclass_fields__, "total", "balance")
 
 
@@ -36,7 +36,7 @@ ENERGIES = (*Energies.__dataclass_fields__, "total", "balance")
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class ReactionSensor:
-    """Force and moment that a joint or spring-damper exerts on its marker A, in ground axes or its own.
+    """Force and moment that a joint or spring-damper exerts on its marker A, in ground axes or marker axes.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class ReactionSensor:
         return Measurement(self.name, trajectory.t, columns, units)
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return force and moment as functions of small motions and wrenches; in marker axes Aᵀ (dF + F × theta_A)."""
+        """Return force and moment as linear functions of motions and wrenches; in marker axes Aᵀ (dF + F × theta_A)."""
         self.require_connection(list(small.now.connection_names))
         own, reaction = small.wrench(self.of), small.now.reaction(self.of)
         found = []
@@ -95,12 +95,12 @@ class ReactionSensor:
         )
 
     def require_connection(self, choices: list[str]) -> None:
-        """Raise `ModelError` with the nearest name if there is no such joint or spring."""
+        """Raise `ModelError`, with the closest name, if the joint or spring does not exist."""
         if self.of not in choices:
             raise ModelError(f"sensor {self.name!r}: no joint or spring {quoted(self.of)}{nearest(self.of, choices)}")
 
     def end_a(self, system: System) -> MarkerData:
-        """Return marker A of the joint or spring."""
+        """Return marker A of the joint or spring-damper."""
         joint = next((each for each in system.joints if each.name == self.of), None)
         if joint is not None:
             return joint_markers(system, joint, compiled_system(system).placed)[0]
@@ -144,7 +144,7 @@ class CoordinateSensor:
         )
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return value and rate as functions of small motions; the force also as a function of wrenches."""
+        """Return value and rate as linear functions of small motions; the force also depends on wrenches."""
         value = small.joint_coordinate(self.joint, self.coordinate, f"sensor {self.name!r}")
         force = force_rows(small, self.joint, self.coordinate)
         units, columns = dict(self.measure(small.system, small.now).units), {"value": value, "rate": value.rate}
@@ -196,7 +196,7 @@ class MomentumSensor:
     name: str
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
-        """Return both over time."""
+        """Return linear and angular momentum over time."""
         linear = vector_columns(trajectory.linear_momentum, unit_words(system.units, "momentum"), prefix="linear ")
         angular = vector_columns(
             trajectory.angular_momentum, unit_words(system.units, "angular momentum"), prefix="angular "
@@ -204,7 +204,7 @@ class MomentumSensor:
         return Measurement(self.name, trajectory.t, linear[0] | angular[0], linear[1] | angular[1])
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return both by small motions about a state of rest: Σ R m v and Σ R j + r × R m v, M u = (m v, j, ...)."""
+        """Return momenta about a state of rest: Σ R m v and Σ R j + r × R m v, where M u = (m v, j, ...)."""
         found = self.measure(small.system, small.now)
         if small.is_turning:
             why = dict.fromkeys(found.columns, "the momentum of a system that turns: linearise it at rest")
@@ -251,12 +251,12 @@ class ModeSensor:
         return Measurement(self.name, trajectory.t, columns, {"q": unit, "q_dot": f"{unit}/{system.units.time_symbol}"})
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the coordinate and its rate as functions of small motions."""
+        """Return the coordinate and its rate as linear functions of small motions."""
         self.require_mode(flexible_body(small.system, self.name, self.body).reduced.n_q)
         row = small.coordinates(self.body)[self.mode - 1]
         return scalar_columns({"q": row, "q_dot": row.rate}, dict(self.measure(small.system, small.now).units))
 
     def require_mode(self, n_q: int) -> None:
-        """Raise `ModelError` unless the body has such a mode."""
+        """Raise `ModelError` unless the body has this mode."""
         if not 1 <= self.mode <= n_q:
             raise ModelError(f"sensor {self.name!r}: mode: expected 1 to {n_q}, got {self.mode}")

@@ -47,9 +47,9 @@ __all__ = [
     "small_place",
 ]
 
-ROUNDING_OF_MOTION = 1e-12  #: relative to the size of the system; smaller lengths and angles are rounding errors
+ROUNDING_OF_MOTION = 1e-12  #: size relative to the system below which a length or an angle is a rounding error
 
-TURNING = ("rotation-vector", "angular-velocity")  #: quantities of the axes of a point
+TURNING = ("rotation-vector", "angular-velocity")  #: quantities that describe the axes of a point
 PLACE_QUANTITIES = {
     "position": "length",
     "velocity": "speed",
@@ -60,7 +60,7 @@ PLACE_QUANTITIES = {
 
 
 def place_motion(system: System, trajectory: Trajectory, where: str, marker: Marker) -> PlaceMotion:
-    """Return the motion of a marker; on a flexible body, a position or number refers to a kept node.
+    """Return the motion of a marker; on a flexible body, a position or node number refers to a kept node.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def place_motion(system: System, trajectory: Trajectory, where: str, marker: Mar
 
 
 def small_place(small: SmallMotions, where: str, marker: Marker) -> SmallPlace:
-    """Return the point of a marker with its linearised motion; on a flexible body, positions refer to kept nodes.
+    """Return the linearised motion of a marker; on a flexible body, a position refers to kept nodes.
 
     A node whose rotation is not kept rotates with the frame of its body's file.
 
@@ -95,14 +95,14 @@ def small_place(small: SmallMotions, where: str, marker: Marker) -> SmallPlace:
 
 
 def is_at_node(system: System, marker: Marker) -> bool:
-    """Return whether a marker refers to kept nodes of a flexible body, with the axes of its frame."""
+    """Return whether a marker is at kept nodes of a flexible body, with axes of the body frame."""
     name = body_name(marker.body)
     body = next((each for each in system.bodies if each.name == name), None)
     return isinstance(body, FlexibleBody) and marker.address is not None
 
 
 def found_nodes(system: System, where: str, marker: Marker) -> tuple[FlexibleBody, FoundNodes]:
-    """Return the flexible body of a marker and the kept nodes it refers to; `ModelError` if there are none."""
+    """Return a marker's flexible body and the kept nodes at which it is; `ModelError` if there are none."""
     body = system.body(body_name(marker.body))
     assert isinstance(body, FlexibleBody)  # ensured by `is_at_node`
     assert marker.address is not None
@@ -110,7 +110,7 @@ def found_nodes(system: System, where: str, marker: Marker) -> tuple[FlexibleBod
 
 
 def found_at(body: FlexibleBody, where: str, address: Address, *, of_stress: bool = False) -> FoundNodes:
-    """Return the kept nodes at an address; `ModelError` with the nearest ones if there are none."""
+    """Return the kept nodes at an address; `ModelError` states the nearest ones if there are none."""
     try:
         return address.find(body.reduced, where, of_stress=of_stress, body=body.name)
     except BodyError as error:
@@ -118,14 +118,14 @@ def found_at(body: FlexibleBody, where: str, address: Address, *, of_stress: boo
 
 
 def node_marker(system: System, where: str, marker: Marker) -> MarkerData:
-    """Return the marker at kept nodes of a flexible body, in the frame of the engine (mean axes)."""
+    """Return the marker at kept nodes of a flexible body, in the engine's frame (mean axes)."""
     body, found = found_nodes(system, where, marker)
     shape = node_shape(body.moved, found.rows, is_stiffened=body.is_stiffened)
     return MarkerData(find_body(system, where, body.name), shape)
 
 
 def require_turning(system: System, where: str, marker: Marker) -> None:
-    """Raise `ModelError` if a marker is at a node without kept rotation, where it would show that of the frame."""
+    """Raise `ModelError` for a node whose rotations were not kept, because only its frame would be measured."""
     if not is_at_node(system, marker):
         return
     body, found = found_nodes(system, where, marker)
@@ -138,7 +138,7 @@ def require_turning(system: System, where: str, marker: Marker) -> None:
 
 
 def frame_marker(system: System, where: str, marker: Marker) -> MarkerData:
-    """Return a marker with the undeformed axes of the file's frame of a flexible body, in the engine's frame."""
+    """Return a marker with the axes of a flexible body's file frame, given in the engine's frame."""
     name = body_name(marker.body)
     body = system.body(name)
     assert isinstance(body, FlexibleBody)
@@ -147,7 +147,7 @@ def frame_marker(system: System, where: str, marker: Marker) -> MarkerData:
 
 
 def nearest_node(body: FlexibleBody, position: Array, *, where: str = "place", tolerance: float = TOLERANCE) -> int:
-    """Return the row of the kept node at a position in mesh axes, as the mesh was drawn.
+    """Return the row of the kept node at a position in mesh axes of the undeformed mesh.
 
     Raises
     ------
@@ -205,7 +205,7 @@ class PlaceSensor:
         return Measurement(self.name, trajectory.t, columns, units)
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return x, y, z and size as functions of small motions, in axes that rotate with the steady motion."""
+        """Return x, y, z and size as linear functions of small motions, in axes that rotate with the steady motion."""
         where = f"sensor {self.name!r}"
         value = self.measure(small.system, small.now).columns
         if self.relative_to is None:
@@ -227,7 +227,7 @@ class PlaceSensor:
 
 
 def absolute_rows(small: SmallMotions, place: SmallPlace, quantity: str) -> Rows:
-    """Return three rows of a quantity of a point, in axes that rotate with the steady motion."""
+    """Return three rows for a quantity of a point, in axes that rotate with the steady motion."""
     if quantity == "rotation-vector":
         return place.rotation.mapped(inverse_left_jacobian(place.axes))
     if quantity == "angular-velocity":
@@ -239,12 +239,12 @@ def absolute_rows(small: SmallMotions, place: SmallPlace, quantity: str) -> Rows
 
 
 def inverse_left_jacobian(A: Array) -> Array:
-    """Return the derivative of the rotation vector of a matrix by a small rotation multiplied from the left, (3, 3)."""
+    """Return the derivative of a matrix's rotation vector by a small rotation multiplied from the left, (3, 3)."""
     return np.asarray(np.linalg.inv(left_jacobian(rotation_log(A))), dtype=float)
 
 
 def relative_rows(place: SmallPlace, other: SmallPlace, quantity: str) -> Rows:
-    """Return three rows of a quantity of a point relative to another point; both have no relative motion now.
+    """Return three rows for a quantity of a point relative to another point that has no relative motion at present.
 
     d(Aᵀ (p - p_o)) = Aᵀ (dp - dp_o + (p - p_o) × theta_o)
     """
@@ -337,7 +337,7 @@ class AngleSensor:
         return Measurement(self.name, trajectory.t, {"angle": angle}, {"angle": "rad"})
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the angle by small motions: (C (Y · dD) - S (X · dD)) / (C² + S²), dD = (theta_B - theta_A) × D."""
+        """Return the angle for small motions: (C (Y · dD) - S (X · dD))/(C² + S²), dD = (theta_B - theta_A) × D."""
         a, b = (
             small_place(small, f"sensor {self.name!r}: {key}", marker)
             for key, marker in (("marker_a", self.marker_a), ("marker_b", self.marker_b))
@@ -349,7 +349,7 @@ class AngleSensor:
         return scalar_columns({"angle": (b.rotation - a.rotation).mapped(across)}, {"angle": "rad"})
 
     def counted_angle(self, system: System) -> CountedAngle:
-        """Return the angle whose turns a run counts, for the undeformed bodies."""
+        """Return the angle that a run counts through full turns, between undeformed bodies."""
         ends = [
             frame_marker(system, where, marker) if is_at_node(system, marker) else find_marker(system, where, marker)
             for marker, where in (
@@ -365,7 +365,7 @@ class AngleSensor:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class DisplacementSensor:
-    """Elastic displacement of an interface or node of a flexible body, in axes of its frame B, from all modes.
+    """Elastic displacement of an interface or node of a flexible body in body axes, from all modes.
 
     Parameters
     ----------
@@ -386,7 +386,7 @@ class DisplacementSensor:
         return Measurement(self.name, trajectory.t, columns, units)
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return x, y, z and size as functions of small motions."""
+        """Return x, y, z and size as linear functions of small motions."""
         body, shape = self.shape_of(small.system)
         q = small.now.body(body.name).q[0]
         rows = small.coordinates(body.name).mapped(shape.shapes(q)[:3])
@@ -394,7 +394,7 @@ class DisplacementSensor:
         return vector_linear(rows, shape.deformation(q)[:3], small.system.units.length_symbol, least=least)
 
     def shape_of(self, system: System) -> tuple[FlexibleBody, MarkerShape]:
-        """Return the body and the marker of the sensor, in the frame of its file."""
+        """Return the body and the marker of the sensor, in the frame of the body's file."""
         name, where = body_name(self.marker.body), f"sensor {self.name!r}: marker"
         if is_at_node(system, self.marker):
             body, found = found_nodes(system, where, self.marker)

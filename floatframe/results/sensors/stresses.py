@@ -28,13 +28,13 @@ from floatframe.results.trajectory import Trajectory
 __all__ = ["ElongationSensor", "StrainGauge", "StressSensor", "VonMisesSensor", "address_of"]
 
 UNLOADED = "von Mises' stress has no slope where there is no stress"
-#: the von Mises stress is the root of sᵀ P s, s = xx, yy, zz, yz, xz, xy; this is the block of the first three
+#: the von Mises stress is the root of sᵀ P s, s = xx, yy, zz, yz, xz, xy; this is the block of P for xx, yy, zz
 MISES = np.array([[1, -0.5, -0.5], [-0.5, 1, -0.5], [-0.5, -0.5, 1]])
-ROUNDING = 1e-12  #: relative to the terms of the sum; smaller stresses are rounding errors
+ROUNDING = 1e-12  #: stress relative to the terms of its sum below which it is a rounding error
 
 
 def flexible_body(system: System, sensor: str, name: str) -> FlexibleBody:
-    """Return a flexible body of the system; `ModelError` with the nearest name if there is none."""
+    """Return a flexible body of the system; `ModelError` suggests the closest name if it does not exist."""
     choices = [body.name for body in system.bodies if isinstance(body, FlexibleBody)]
     for body in system.bodies:
         if body.name == name and isinstance(body, FlexibleBody):
@@ -45,7 +45,7 @@ def flexible_body(system: System, sensor: str, name: str) -> FlexibleBody:
 def modes_at(
     body: FlexibleBody, sensor: str, position: Array | None, point: str | None, *, address: Address | None = None
 ) -> Array:
-    """Return the stress modes at one kept node, by position or address, or at a named stress point, (6, n_q)."""
+    """Return the stress modes, (6, n_q), at a kept node given by position or address, or at a named stress point."""
     reduced = body.reduced
     if point is None:
         given = Address(position=position) if address is None else address
@@ -66,7 +66,7 @@ def modes_at(
 
 
 def address_of(sensor: "StressSensor | StrainGauge | VonMisesSensor") -> Address | None:
-    """Return the address on the surface at which a sensor measures; None: a stress point, or the whole body.
+    """Return the surface address at which a sensor measures; None for a stress point or the whole body.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def address_of(sensor: "StressSensor | StrainGauge | VonMisesSensor") -> Address
 
 
 def require_one_place(sensor: "StressSensor | StrainGauge") -> None:
-    """Raise `ModelError` unless a sensor has either a stress point, or one place on the surface."""
+    """Raise `ModelError` unless a sensor has either a stress point or one position on the surface."""
     if (address_of(sensor) is None) == (sensor.point is None):
         raise ModelError(
             f"sensor {sensor.name!r}: expected either a position or a stress point, or a node, element or set"
@@ -91,14 +91,14 @@ def require_one_place(sensor: "StressSensor | StrainGauge") -> None:
 
 
 def with_position(sensor: "StressSensor | StrainGauge") -> None:
-    """Validate and freeze the position of a sensor, if it has one."""
+    """Check and freeze the position of a sensor, if it has one."""
     if sensor.position is not None:
         position = array_of_shape(f"sensor {sensor.name!r}: position", sensor.position, (3,))
         object.__setattr__(sensor, "position", position)
 
 
 def von_mises_rows(modes: Array, q: Array, coordinates: Rows) -> Rows | None:
-    """Return the row of the von Mises stress about the stress modes @ q, (6,); None if that stress is zero."""
+    """Return the derivative of the von Mises stress at stress modes @ q, (6,); None if the stress is zero."""
     stress = modes @ q
     value = float(von_mises(stress[None])[0])
     if value <= ROUNDING * float(np.linalg.norm(modes) * np.linalg.norm(q)):
@@ -111,7 +111,7 @@ def von_mises_rows(modes: Array, q: Array, coordinates: Rows) -> Rows | None:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class StressSensor:
-    """Stress at a node or stress point: six components in axes of the body frame, and the von Mises stress.
+    """Stress at a node or stress point: six components in body axes, and the von Mises stress.
 
     If several points are meant (an element, a set, the skin around a node of a beam or shell), the one with the largest
     von Mises stress during the motion is measured.
@@ -150,7 +150,7 @@ class StressSensor:
         require_one_place(self)
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
-        """Return the components and the von Mises stress over time."""
+        """Return the stress components and the von Mises stress over time."""
         body = flexible_body(system, self.name, self.body)
         require_same_modes(trajectory, self.body, body.reduced)
         modes, places = self.modes_of(body, trajectory)
@@ -161,7 +161,7 @@ class StressSensor:
         return Measurement(self.name, trajectory.t, columns, units, places)
 
     def modes_of(self, body: FlexibleBody, trajectory: Trajectory) -> tuple[Array, tuple[str, ...]]:
-        """Return stress modes, (6, n_q), and description of the point; of several points, that of largest stress."""
+        """Return stress modes, (6, n_q), and description of the point; of several points, of the most stressed."""
         address = address_of(self)
         if address is None:
             return modes_at(body, self.name, None, self.point), ()
@@ -174,7 +174,7 @@ class StressSensor:
         return np.asarray(modes[row]), (f"{found.description()}; measured at node {body.reduced.node_name(row)}",)
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the components as functions of small motions, and the von Mises stress if the stress is not zero."""
+        """Return stress components, and the von Mises stress unless it is zero, as functions of small motions."""
         body = flexible_body(small.system, self.name, self.body)
         (modes, _), q = self.modes_of(body, small.now), small.coordinates(self.body)
         rows = q.mapped(modes)
@@ -190,7 +190,7 @@ class StressSensor:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class VonMisesSensor:
-    """The largest von Mises stress of a body, or of a part of it, over its kept nodes, and the node of this stress.
+    """The largest von Mises stress over the kept nodes of a body, or of a part of it, and the node where it occurs.
 
     Parameters
     ----------
@@ -216,7 +216,7 @@ class VonMisesSensor:
         address_of(self)
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
-        """Return the largest stress over time, and the number of its node in the user's mesh.
+        """Return the largest stress over time and the number of its node in the user's mesh.
 
         If there are no numbers (an older file), the column is named as the index in the model. If instances have equal
         numbers, a further column contains the index of the instance.
@@ -243,7 +243,7 @@ class VonMisesSensor:
         return Measurement(self.name, trajectory.t, columns, units, (*place, *words), numbers)
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the von Mises stress as a function of small motions, at the node where it is largest now."""
+        """Return the von Mises stress as a linear function of small motions, at the node where it is largest now."""
         body = flexible_body(small.system, self.name, self.body)
         units = dict(self.measure(small.system, small.now).units)
         address = address_of(self)
@@ -258,7 +258,7 @@ class VonMisesSensor:
 
 
 def node_words(reduced: ReducedBody, row: int) -> str:
-    """Return name and position (mesh axes) of a kept node, as text."""
+    """Return name and position (mesh axes) of a kept node as text."""
     x = reduced.frame.origin + reduced.frame.axes @ reduced.nodes[row]
     return f"node {reduced.node_name(row)} at [{', '.join(f'{value:.6g}' for value in x)}]"
 
@@ -319,14 +319,14 @@ class StrainGauge:
         return Measurement(self.name, trajectory.t, {"strain": strain}, {"strain": "-"})
 
     def strain_modes(self, body: FlexibleBody) -> Array:
-        """Return the strain per modal coordinate, (n_q,)."""
+        """Return the strain for a unit of each modal coordinate, (n_q,)."""
         modes = modes_at(body, self.name, None, self.point, address=address_of(self))
         x, y, z = self.direction @ body.reduced.frame.axes
         along = np.array([x * x, y * y, z * z, 2 * y * z, 2 * x * z, 2 * x * y]) @ modes
         return np.asarray(((1 + self.poisson) * along - self.poisson * modes[:3].sum(axis=0)) / self.young)
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the strain as a function of small motions."""
+        """Return the strain as a linear function of small motions."""
         body = flexible_body(small.system, self.name, self.body)
         row = small.coordinates(self.body).mapped(self.strain_modes(body))
         return scalar_columns({"strain": row}, {"strain": "-"})
@@ -336,7 +336,7 @@ class StrainGauge:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class ElongationSensor:
-    """An extensometer: change of the distance between two nodes, divided by the distance; needs no stress modes.
+    """An extensometer: change of distance between two nodes divided by the distance; it needs no stress modes.
 
     It is of first order, like the strains of the body: e · (u_b - u_a) / |d| along the undeformed line d = |d| e. A
     local rotation by theta moves b by |d| theta across the line, and back along it by |d| theta²/2. First-order
@@ -370,7 +370,7 @@ class ElongationSensor:
                 object.__setattr__(self, key, array_of_shape(f"sensor {self.name!r}: {key}", given, (3,)))
 
     def ends(self, body: FlexibleBody) -> tuple[FoundNodes, FoundNodes]:
-        """Return the kept nodes at both ends; for an element or set, the mean of its nodes is used."""
+        """Return the kept nodes at both ends; an element or set stands for the mean of its nodes."""
         a, b = (
             found_at(
                 body,
@@ -390,7 +390,7 @@ class ElongationSensor:
         return Measurement(self.name, trajectory.t, {"strain": strain}, {"strain": "-"})
 
     def line(self, body: FlexibleBody) -> tuple[Array, Array]:
-        """Return the undeformed line from node to node, (3,), and its derivative by the modal coordinates, (3, n_q)."""
+        """Return the undeformed vector from node to node, (3,), and its derivative by q, (3, n_q)."""
         reduced: ReducedBody = body.reduced
         a, b = (each.rows for each in self.ends(body))
         if np.array_equal(a, b):
@@ -399,7 +399,7 @@ class ElongationSensor:
         return np.asarray(reduced.nodes[b].mean(axis=0) - reduced.nodes[a].mean(axis=0)), by_q
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the strain as a function of small motions."""
+        """Return the strain as a linear function of small motions."""
         body = flexible_body(small.system, self.name, self.body)
         d, by_q = self.line(body)
         row = small.coordinates(self.body).mapped(d @ by_q / (d @ d))

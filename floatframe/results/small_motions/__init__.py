@@ -1,1 +1,1 @@
-"""Small motions about a steady motion: linearised markers, coordinates and wrenches, and outputs of sensors."""
+"""Small motions about a steady motion: linearised markers, coordinates and wrenches, and sensor outputs."""

@@ -1,4 +1,4 @@
-"""Derivatives of joint-coordinate rates by body velocities, used to name free and driven coordinates."""
+"""Derivatives of joint coordinate rates by body velocities, used to name free and prescribed coordinates."""
 
 import numpy as np
 
@@ -17,12 +17,12 @@ __all__ = ["coordinate_rows", "driven_coordinates"]
 
 
 def driven_coordinates(system: System) -> tuple[str, ...]:
-    """Return the names "joint.coordinate" of the joint coordinates with a prescribed motion."""
+    """Return the names "joint.coordinate" of joint coordinates whose motion is prescribed."""
     return tuple(f"{joint.name}.{name}" for joint in system.joints for name in getattr(joint, "motions", {}))
 
 
 def coordinate_rows(system: System, compiled: CompiledSystem, work: Work, state: State) -> dict[str, Array]:
-    """Return d(rate)/d(velocities of small motions, body axes) of all joint coordinates, (n_u,), by "joint.coordinate".
+    """Return derivatives of all joint coordinate rates by body velocities (body axes), (n_u,), by "joint.coordinate".
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def coordinate_rows(system: System, compiled: CompiledSystem, work: Work, state:
 
 
 def sliding_row(compiled: CompiledSystem, work: Work, k: int, marker_b: MarkerData) -> Array:
-    """Return the row of the rate along deformed line k: n·(v_B - v_A)/|r'|, with A fixed in the line, (n_u,)."""
+    """Return the row for the rate along deformed line k, n·(v_B - v_A)/|r'|, with A fixed in the line, (n_u,)."""
     model = compiled.model
     m = int(model.lines.marker[k])
     i = int(model.markers.body[m])

@@ -1,4 +1,4 @@
-"""The motion of a marker as a linear function of the small motions of its body."""
+"""The motion of a marker as a linear function of its body's small motions."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ __all__ = ["marker_jacobian"]
 
 
 def marker_jacobian(compiled: CompiledSystem, work: Work, data: MarkerData) -> Array:
-    """Return the Jacobian, (6, 6 + n), of a marker's motion (ground axes) by the motion of its body (body axes)."""
+    """Return the Jacobian, (6, 6 + n), from body motion (body axes) to the motion of a marker (ground axes)."""
     model, i = compiled.model, data.body
     q = work.state.q[int(model.bodies.q0[i]) : int(model.bodies.q0[i + 1])]
     return np.kron(np.eye(2), work.state.R[i]) @ data.shape.jacobian(q)

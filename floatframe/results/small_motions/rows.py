@@ -18,11 +18,11 @@ __all__ = ["LinearColumns", "Rows", "joined"]
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Coefficients of outputs, each (n_rows, ...)."""
+    """Coefficients of linear outputs, each (n_rows, ...)."""
 
     x: Array  #: coefficients of small motions, (n_rows, n_x)
-    v: Array  #: coefficients of their rates, (n_rows, n_x)
-    a: Array  #: coefficients of their second rates, (n_rows, n_x)
+    v: Array  #: coefficients of the rates of small motions, (n_rows, n_x)
+    a: Array  #: coefficients of the second rates of small motions, (n_rows, n_x)
     w: Array  #: coefficients of wrenches, (n_rows, n_w)
 
     def __add__(self, other: "Rows") -> "Rows":
@@ -38,7 +38,7 @@ class Rows:
         return len(self.x)
 
     def __getitem__(self, chosen: int | slice | list[int]) -> "Rows":
-        """Return some of the rows."""
+        """Return the selected rows."""
         part = slice(chosen, chosen + 1) if isinstance(chosen, int) else chosen
         return Rows(self.x[part], self.v[part], self.a[part], self.w[part])
 
@@ -49,7 +49,7 @@ class Rows:
 
     @property
     def rate(self) -> "Rows":
-        """The rows of y'; only for rows without rates of second order."""
+        """The rows of the rate y', which exist only for rows without second rates."""
         assert not self.a.any()  # small motions have no third rates
         assert not self.w.any()
         return Rows(np.zeros_like(self.x), self.x, self.v, self.w)
@@ -64,6 +64,6 @@ def joined(parts: list[Rows]) -> Rows:
 class LinearColumns:
     """The linearised outputs of a sensor: columns with the names and units of its measurement."""
 
-    columns: Mapping[str, Rows]  #: one row for each column
+    columns: Mapping[str, Rows]  #: coefficients of each column, as one row
     units: Mapping[str, str]
-    not_linear: Mapping[str, str]  #: other columns of its measurement, with the reason why they are not linear here
+    not_linear: Mapping[str, str]  #: columns of the measurement that are not linear here, with the reason

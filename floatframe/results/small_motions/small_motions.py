@@ -32,12 +32,12 @@ __all__ = ["BaseColumn", "InputForce", "SmallMotions", "SmallPlace"]
 
 @dataclass(frozen=True, eq=False)
 class BaseColumn:
-    """The motion that an input prescribes: a rigid motion of the ground side of some connections (none for a drive)."""
+    """The motion prescribed by an input: a rigid motion of the ground side of some connections (none for a drive)."""
 
-    moved: frozenset[str] = frozenset()  #: names of connections
-    translation: Array | None = None  #: in ground axes, (3,); None: zero
+    moved: frozenset[str] = frozenset()  #: names of the connections that move
+    translation: Array | None = None  #: translation, ground axes, (3,); None: zero
     rotation: Array | None = None  #: rotation vector, ground axes, (3,); None: zero
-    about: Array | None = None  #: a point that the rotation leaves at rest, in ground axes, (3,); None: the origin
+    about: Array | None = None  #: centre of the rotation, ground axes, (3,); None: the origin
 
     def at(self, point: Array) -> Array:
         """Return translation and rotation at a point, ground axes, (6,)."""
@@ -49,11 +49,11 @@ class BaseColumn:
 
 @dataclass(frozen=True, eq=False)
 class InputForce:
-    """Force and moment of a unit input at an interface of a flexible body, or a load case of the body."""
+    """Force and moment of a unit input at an interface of a flexible body, or a load case on the body."""
 
     body: str
-    interface: str  #: empty for a load case
-    wrench: Array  #: ground axes, (6,)
+    interface: str  #: name of the interface, empty for a load case
+    wrench: Array  #: force and moment, ground axes, (6,)
     load_case: str = ""
 
 
@@ -61,24 +61,24 @@ class InputForce:
 class SmallPlace:
     """A point with axes, and its linearised motion."""
 
-    position: Array  #: ground axes, (3,)
-    axes: Array  #: columns, (3, 3)
-    moved: Rows  #: its translation, as three rows
-    rotation: Rows  #: rotation of its axes in ground axes, as three rows
+    position: Array  #: position of the point, ground axes, (3,)
+    axes: Array  #: axes at the point as columns, (3, 3)
+    moved: Rows  #: linearised translation of the point, as three rows
+    rotation: Rows  #: linearised rotation of the axes in ground axes, as three rows
 
 
 @dataclass(frozen=True, eq=False)
 class SmallMotions:
-    """A steady motion, and the small motions about it."""
+    """A steady motion with the small motions about it."""
 
     system: System
     compiled: CompiledSystem
     work: Work  #: working arrays, evaluated at the steady motion
     state: State  #: state in the frames of the engine
-    omega: Array  #: of the steady rotation, ground axes, (3,) [rad/s]
-    now: Trajectory  #: the steady motion as a trajectory with one time, which sensors measure
-    bases: tuple[BaseColumn, ...] = ()  #: for each input
-    forces: tuple[tuple[InputForce, ...], ...] = ()  #: at interfaces, for each input
+    omega: Array  #: angular velocity of the steady rotation, ground axes, (3,) [rad/s]
+    now: Trajectory  #: the steady motion as a trajectory with one time, for sensors
+    bases: tuple[BaseColumn, ...] = ()  #: motion of the ground for each input
+    forces: tuple[tuple[InputForce, ...], ...] = ()  #: forces at interfaces for each input
 
     @property
     def n_u(self) -> int:
@@ -102,7 +102,7 @@ class SmallMotions:
 
     @property
     def speed_scale(self) -> float:
-        """Largest speed of the steady motion, zero at rest [length/s]."""
+        """Largest speed in the steady motion, zero at rest [length/s]."""
         return float(np.linalg.norm(self.omega)) * self.compiled.length
 
     def by_motion(self, x: Array) -> Rows:
@@ -114,17 +114,17 @@ class SmallMotions:
         return Rows(whole, zero, zero, np.zeros((len(x), self.n_w)))
 
     def by_wrench(self, rows: Sequence[int] | slice, factor: float = 1.0) -> Rows:
-        """Return rows of wrench components multiplied by a factor."""
+        """Return rows with wrench components multiplied by a factor."""
         w = factor * np.eye(self.n_w)[rows]
         zero = np.zeros((len(w), self.n_x))
         return Rows(zero, zero, zero, w)
 
     def velocity(self, rows: Rows) -> Rows:
-        """Return rows of the absolute velocity of a point from rows of its translation."""
+        """Return rows of a point's absolute velocity from the rows of its translation."""
         return rows.rate + rows.mapped(tilde(self.omega))
 
     def acceleration(self, rows: Rows) -> Rows:
-        """Return rows of the absolute acceleration of a point from rows of its translation."""
+        """Return rows of a point's absolute acceleration from the rows of its translation."""
         return self.velocity(self.velocity(rows))
 
     def pose(self, end: MarkerData) -> tuple[Array, Array]:
@@ -132,7 +132,7 @@ class SmallMotions:
         return marker_pose(end, self.state, n_q_of(self.system))
 
     def place(self, end: MarkerData, connection: str = "") -> SmallPlace:
-        """Return a marker with its linearised motion; on the ground, it moves with the bases of its connection."""
+        """Return a marker's linearised motion; on the ground it follows the moving bases of its connection."""
         position, axes = self.pose(end)
         x = np.zeros((6, self.n_x))
         if end.body >= 0:
@@ -145,28 +145,28 @@ class SmallMotions:
         return SmallPlace(position, axes, rows[:3], rows[3:])
 
     def unknowns(self, body: int) -> slice:
-        """Return the range of the small motions of a body."""
+        """Return the index range of a body's small motions."""
         u0 = self.compiled.model.bodies.u0
         return slice(int(u0[body]), int(u0[body + 1]))
 
     def of_file(self, name: str) -> tuple[Rows, Array]:
-        """Return rows of the small motions, (6 + n_q), of a body in the frame of its file, and R_GB of that frame."""
+        """Return rows of a body's small motions in the frame of its file, (6 + n_q), and R_GB of that frame."""
         i = self.compiled.body_names.index(name)
         x = np.zeros((6 + int(self.compiled.model.bodies.n_q[i]), self.n_x))
         x[:, self.unknowns(i)] = small_motions_of_file(self.compiled, self.state.q)[i]
         return self.by_motion(x), rotation_matrix(self.now.body(name).p[0])
 
     def coordinates(self, name: str) -> Rows:
-        """Return n_q rows of the modal coordinates of a body in the frame of its file."""
+        """Return n_q rows of a body's modal coordinates in the frame of its file."""
         return self.of_file(name)[0][6:]
 
     def frame_place(self, name: str) -> SmallPlace:
-        """Return the frame of a body's file with its linearised motion."""
+        """Return the linearised motion of a body's file frame."""
         rows, R = self.of_file(name)
         return SmallPlace(self.now.body(name).r[0], R, rows[:3].mapped(R), rows[3:6].mapped(R))
 
     def joint_coordinate(self, joint: str, coordinate: str, where: str) -> Rows:
-        """Return one row of the change of a joint coordinate; `ModelError` with the nearest name if there is none."""
+        """Return one row with the change of a joint coordinate; `ModelError` with the closest name if missing."""
         rows = coordinate_rows(self.system, self.compiled, self.work, self.state)
         name = f"{joint}.{coordinate}"
         if name not in rows:
@@ -179,7 +179,7 @@ class SmallMotions:
         return self.by_motion(x)
 
     def rigid(self, base: BaseColumn) -> Array:
-        """Return the small motions, (n_u,), of all bodies that move rigidly with a base."""
+        """Return the small motions of all bodies, (n_u,), that move rigidly together with a base."""
         x = np.zeros(self.n_u)
         for i, (r, R) in enumerate(zip(self.work.state.r, self.work.state.R, strict=True)):
             u0 = self.unknowns(i).start
@@ -188,12 +188,12 @@ class SmallMotions:
         return x
 
     def wrench(self, connection: str) -> slice:
-        """Return the range of the wrench of a connection in all wrenches."""
+        """Return the index range of a connection's wrench."""
         c = self.compiled.connection_names.index(connection)
         w0 = self.compiled.model.connections.w0
         return slice(int(w0[c]), int(w0[c + 1]))
 
     @property
     def largest_wrench(self) -> float:
-        """Largest component of all wrenches now, relative to which rounding errors are judged."""
+        """Largest present component of all wrenches, the reference for rounding errors."""
         return float(np.abs(self.work.state.w).max(initial=0.0))
