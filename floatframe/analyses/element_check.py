@@ -1,4 +1,4 @@
-"""Validation of the law of an element: array sizes, values, derivatives and balance of its forces."""
+"""Validation of an element's law: array sizes, values, derivatives, and equilibrium of its wrenches."""
 
 from dataclasses import dataclass
 
@@ -25,18 +25,18 @@ from floatframe.results.element_motion import placed_law
 
 __all__ = ["ElementCheck", "check_element"]
 
-N_SAMPLES = 3  #: number of samples (motions at which the law is evaluated); the first is the assembled state
-NEAR = 1e-3  #: distance of the other samples from the first, relative to the size of the system, or in rad
-MOVING = 0.1  #: velocities of the other samples, in system sizes per unit of time, or in rad per unit of time
-DERIVATIVE = 1e-5  #: smallest reported error of a derivative, relative to the largest derivative in its row
-ROUNDING = 1e-9  #: rounding error of values, relative to their size
+N_SAMPLES = 3  #: number of motions at which the law is evaluated; the first is the assembled state at rest
+NEAR = 1e-3  #: distance of the other motions from the first, relative to the size of the system, or in rad
+MOVING = 0.1  #: velocities of the other motions, in system sizes per unit of time, or in rad per unit of time
+DERIVATIVE = 1e-5  #: smallest reported error of a derivative, relative to the largest derivative in the same row
+ROUNDING = 1e-9  #: rounding error of values, relative to their magnitude
 AXES = "xyz"
 
 
 @dataclass(frozen=True)
 @checked_fields(ModelError)
 class ElementCheck:
-    """The findings on an element.
+    """The findings about an element.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class ElementCheck:
 
 
 def check_element(system: System, name: str, state: State | None = None) -> ElementCheck:
-    """Check the law of an element at a state (default: as assembled) and two motions near it.
+    """Check the law of an element at a state (default: assembled) and at two motions near it.
 
     (1) in Python, with arrays of the exact sizes, the function stays within them and raises no error
     (2) all outputs are finite numbers, reproducible, and equal to those of the compiled function
@@ -107,7 +107,7 @@ def check_element(system: System, name: str, state: State | None = None) -> Elem
 
 
 def values_of(placed: PlacedLaw, inputs: Array) -> Array:
-    """Return all outputs of the law, called as by the engine."""
+    """Return all outputs of the law, called in the same way as by the engine."""
     n_all = placed.n_out + len(placed.law.outputs)
     values = called_law(placed.value.address, placed.head, np.asarray(placed.law.data), inputs[None], n_all)[0]
     raise_errors_of([placed.value])
@@ -115,7 +115,7 @@ def values_of(placed: PlacedLaw, inputs: Array) -> Array:
 
 
 def placed_inputs(system: System, placed: PlacedLaw) -> Array:
-    """Return the inputs of the law with its markers as assembled and at rest, (n,)."""
+    """Return the inputs of the law for assembled markers at rest, (n,)."""
     compiled = compiled_system(system)
     n_q = np.asarray(compiled.model.bodies.n_q)
     parts = [np.zeros(1)]
@@ -126,7 +126,7 @@ def placed_inputs(system: System, placed: PlacedLaw) -> Array:
 
 
 def sample_inputs(system: System, placed: PlacedLaw, state: State | None) -> list[Array]:
-    """Return the inputs of the law at the samples, (n,) each."""
+    """Return the inputs of the law for each of the motions, (n,) each."""
     compiled = compiled_system(system)
     made = consistent_motion(system, state)
     work = new_work(compiled.model)
@@ -155,7 +155,7 @@ def sample_inputs(system: System, placed: PlacedLaw, state: State | None) -> lis
 
 
 def told_in_python(placed: PlacedLaw, inputs: Array, where: str) -> list[str]:
-    """Return faults of the function in Python, checks (1) and (2)."""
+    """Return errors of the function called in Python, checks (1) and (2)."""
     law, n = placed.law, len(placed.markers)
     function = getattr(law.function, "py_func", law.function)
     results = []
@@ -190,7 +190,7 @@ def told_in_python(placed: PlacedLaw, inputs: Array, where: str) -> list[str]:
 
 
 def balance(placed: PlacedLaw, values: Array, where: str) -> list[str]:
-    """Return faults of the wrenches, check (3)."""
+    """Return errors in the equilibrium of the wrenches, check (3)."""
     law, n = placed.law, len(placed.markers)
     wrench = values[: 6 * n].reshape(n, 6)
     found = []
@@ -207,7 +207,7 @@ def balance(placed: PlacedLaw, values: Array, where: str) -> list[str]:
 
 
 def own_slopes(placed: PlacedLaw, inputs: Array) -> Array:
-    """Return the derivatives used by the engine, (n_out, n_columns)."""
+    """Return the derivatives that the engine uses, (n_out, n_columns)."""
     n_columns = placed.columns_of_marker * len(placed.markers) + len(placed.states) + len(placed.multipliers)
     address = placed.slopes.address
     data = np.concatenate([placed.law.data, placed.sizes])
@@ -217,13 +217,13 @@ def own_slopes(placed: PlacedLaw, inputs: Array) -> Array:
 
 
 def differences(placed: PlacedLaw, inputs: Array) -> Array:
-    """Return the same from finite differences; markers on the ground do not move."""
+    """Return the same derivatives from finite differences; markers on the ground do not move."""
     slopes = difference_slopes(placed.value.address, placed.head, placed.law.data, inputs, placed.sizes)
     return without_ground(placed, slopes[: placed.n_out])
 
 
 def without_ground(placed: PlacedLaw, slopes: Array) -> Array:
-    """Return derivatives without those by markers on the ground, which are not needed."""
+    """Return derivatives without columns of markers on the ground, which are not needed."""
     for m, marker in enumerate(placed.markers):
         if marker.body < 0:
             slopes[:, placed.columns_of_marker * m : placed.columns_of_marker * (m + 1)] = 0.0
@@ -231,7 +231,7 @@ def without_ground(placed: PlacedLaw, slopes: Array) -> Array:
 
 
 def relative_error(n: int, own: Array, other: Array) -> Array:
-    """Return differences of derivatives relative to the largest in their row, above rounding of all wrenches."""
+    """Return differences of derivatives relative to the largest in the row, apart from rounding of all wrenches."""
     scale = np.maximum(np.abs(own), np.abs(other)).max(axis=1, initial=0.0, keepdims=True)
     of_wrenches = scale[: 6 * n]
     of_wrenches[:] = np.maximum(of_wrenches, ROUNDING / DERIVATIVE * of_wrenches.max(initial=0.0))
@@ -240,7 +240,7 @@ def relative_error(n: int, own: Array, other: Array) -> Array:
 
 
 def wrong_slopes(placed: PlacedLaw, own: Array, other: Array, where: str) -> list[str]:
-    """Return the worst derivative if it is wrong, check (4)."""
+    """Return the derivative with the largest error if it is wrong, check (4)."""
     error = relative_error(len(placed.markers), own, other)
     error = np.where(np.isfinite(own), error, np.inf)
     if error.max(initial=0.0) <= DERIVATIVE:
@@ -257,7 +257,7 @@ def wrong_slopes(placed: PlacedLaw, own: Array, other: Array, where: str) -> lis
 
 
 def wrong_dependence(placed: PlacedLaw, slopes: Array, where: str) -> list[str]:
-    """Return constraints with forbidden dependences, check (5)."""
+    """Return constraints that depend on forbidden quantities, check (5)."""
     found = []
     n, n_z, per = len(placed.markers), len(placed.states), placed.columns_of_marker
     for j, holds in enumerate(placed.law.holds):
@@ -282,7 +282,7 @@ def wrong_dependence(placed: PlacedLaw, slopes: Array, where: str) -> list[str]:
 
 
 def row_name(placed: PlacedLaw, k: int) -> str:
-    """Return the name of an output of the law, as text."""
+    """Return the name of output k of the law."""
     n, law = len(placed.markers), placed.law
     if k < 6 * n:
         return f"{'force' if k % 6 < 3 else 'moment'} {AXES[k % 3]} on marker {k // 6 + 1}"
@@ -291,7 +291,7 @@ def row_name(placed: PlacedLaw, k: int) -> str:
 
 
 def column_name(placed: PlacedLaw, k: int) -> str:
-    """Return the name of a variation, as text."""
+    """Return the name of input variation k."""
     n, law, per = len(placed.markers), placed.law, placed.columns_of_marker
     if k < per * n:
         kinds = ("position", "rotation", "velocity", "angular velocity", "acceleration", "angular acceleration")

@@ -1,4 +1,4 @@
-"""Equilibrium at rest, or in a steady rotation about an axis fixed in space.
+"""Equilibrium at rest, or in steady rotation about an axis that is fixed in space.
 
 The solution is followed along a flow that ends in the equilibrium, with growing implicit steps (pseudo-transient
 continuation):
@@ -72,21 +72,22 @@ __all__ = ["Equilibrium", "static_equilibrium", "steady_rotation"]
 
 log = logging.getLogger(__name__)
 
-LARGEST_TURN = 0.5  #: in one step: rotation [rad], and translation relative to the size of the system
-FASTEST_GROWTH, LEAST_GROWTH = 30.0, 2.0  #: factors of tau in one step, while the residual decreases or stagnates
+LARGEST_TURN = 0.5  #: largest motion in one step: rotation [rad], and translation relative to the size of the system
+#: factors by which tau grows in one step if the residual decreases, and if it stagnates
+FASTEST_GROWTH, LEAST_GROWTH = 30.0, 2.0
 #: ratio of the last residual to the present one below which the residual counts as increasing, and tau is reduced
 STANDING = 0.9
-#: ratio of other forces to those of springs as assembled below which only springs move the system
+#: ratio of other forces to the assembled spring forces below which only springs move the system
 STANDING_SPRINGS = 1e-9
 ROUNDING = 32 * np.finfo(float).eps  #: relative rounding error of a position or rotation, as it affects springs
-STANDSTILL = 1e-200  #: relative to the first residual; smaller ones are taken as zero
-LONG_STEP = 1e4  #: step of states relative to the first step from which states that do not change are at rest
-LONGEST_STEP = 1e10  #: longest step of states, in units of time
-SLOWER = 1e-6  #: largest relative loss of speed per revolution in a steady rotation
-HELD = 1e-6  #: rate of a joint constraint, relative to that of the rotation, above which the joint does not allow it
+STANDSTILL = 1e-200  #: residual, relative to the first one, below which it counts as zero
+LONG_STEP = 1e4  #: step size of element states, relative to the first step, from which unchanged states are at rest
+LONGEST_STEP = 1e10  #: longest step of element states, in units of time
+SLOWER = 1e-6  #: largest relative loss of speed per revolution that a steady rotation may have
+HELD = 1e-6  #: rate of a joint constraint, relative to the rotation, above which the joint prevents the rotation
 CLOSED = 1e-10  #: largest constraint error of a joint, relative to the size of the system
-#: steps in which unbalanced forces, constraint errors or changes of states have to fall to half their least value. Of
-#: all equilibria of the tests, a free spinning body and a beam far above buckling needed most, 28 and 29
+#: number of steps in which unbalanced forces, constraint errors or changes of states must fall to half their minimum.
+#: The slowest equilibria of the tests, a free spinning body and a beam far above buckling, needed 28 and 29
 PATIENCE = 40
 
 
@@ -94,7 +95,7 @@ PATIENCE = 40
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class Equilibrium:
-    """A state in which all forces balance.
+    """A state in which all forces are in equilibrium.
 
     Parameters
     ----------
@@ -128,21 +129,21 @@ class Equilibrium:
 
 @dataclass(eq=False)
 class StatesAtRest:
-    """States of elements approaching rest, step (4), and the unknowns of their equations; not those of user forces."""
+    """Element states that approach rest in step (4), and the unknowns of their equations; without user forces."""
 
-    solved: IntArray  #: indices of the states of elements among all states
-    rows: IntArray  #: rows of their values
-    equations: IntArray  #: rows of multipliers that hold nothing
-    sizes: Array  #: typical magnitudes of states and these multipliers
-    own: NDArray[np.bool_]  #: whether each row belongs to them, (n_w,)
-    names: tuple[str, ...]  #: names of states and these multipliers, with their elements
-    change: Array = field(default_factory=lambda: np.full(1, np.inf))  #: last change of each, relative to its magnitude
+    solved: IntArray  #: indices of the element states among all states
+    rows: IntArray  #: rows of the values of these states
+    equations: IntArray  #: rows of multipliers without constraint
+    sizes: Array  #: typical sizes of these states and multipliers
+    own: NDArray[np.bool_]  #: whether each row belongs to these states and multipliers, (n_w,)
+    names: tuple[str, ...]  #: names of these states and multipliers, with their elements
+    change: Array = field(default_factory=lambda: np.full(1, np.inf))  #: last change of each, relative to its size
     first_step: float = 0.0
     last_step: float = 0.0
 
     @classmethod
     def of(cls, compiled: CompiledSystem) -> "StatesAtRest":
-        """Return the states of a system."""
+        """Return the element states of a system."""
         model = compiled.model
         solved = np.arange(int(model.laws.state0[0]), len(model.states.row))
         rows, equations = model.states.row[solved], model.laws.equation
@@ -160,19 +161,19 @@ class StatesAtRest:
         return cls(solved, rows, equations, sizes, own, names)
 
     def prepare(self, work: Work, w: Array, tau: float) -> None:
-        """Begin a step at the unknowns w."""
+        """Begin a step from the unknowns w."""
         step = min(float(np.sqrt(tau)), LONGEST_STEP)
         work.states.base[self.solved] = w[self.rows]
         work.states.kappa[self.solved] = step
         self.first_step, self.last_step = self.first_step or step, step
 
     def follow(self, w: Array, dw: Array) -> None:
-        """Record a step."""
+        """Record the change dw of the unknowns in a step."""
         at = np.concatenate([self.rows, self.equations])
         self.change = np.abs(dw[at]) / np.maximum(self.sizes, np.abs(w[at]))
 
     def are_at_rest(self, tolerance: float) -> bool:
-        """Return whether a long step has changed nothing."""
+        """Return whether a long step has changed no state."""
         if not len(self.sizes):
             return True
         is_long = self.last_step >= min(LONG_STEP * self.first_step, LONGEST_STEP) > 0
@@ -187,14 +188,14 @@ class StatesAtRest:
 
 @dataclass(eq=False)
 class Progress:
-    """Minima of the decreasing quantities on the way to an equilibrium, and when they last halved."""
+    """Smallest values so far of the quantities that decrease towards an equilibrium, and the last times they halved."""
 
-    #: least forces, constraint errors and changes of states
+    #: smallest unbalanced forces, constraint errors and changes of states so far
     smallest: Array = field(default_factory=lambda: np.full(3, np.inf))
     iteration: int = 0
 
     def has_ended(self, iteration: int, values: tuple[float, float, float]) -> bool:
-        """Record the values after an iteration; return whether none has fallen to half its least value for too long."""
+        """Record the values after an iteration; return whether none has halved for too many steps."""
         falls = np.array(values) < 0.5 * self.smallest
         if falls.any():
             self.smallest[falls] = np.array(values)[falls]
@@ -204,11 +205,11 @@ class Progress:
 
 @dataclass(frozen=True, eq=False)
 class FlowFailure:
-    """The end of the flow without an equilibrium."""
+    """The end of the flow if it reaches no equilibrium."""
 
     iteration: int
-    has_stood: bool  #: whether it has stagnated for the allowed number of steps
-    error: float  #: unbalanced forces divided by the acting forces
+    has_stood: bool  #: whether it has stagnated for the permitted number of steps
+    error: float  #: unbalanced forces relative to the acting forces
     state: State
     W: tuple[Array, ...]
     forces: Array
@@ -222,7 +223,7 @@ def static_equilibrium(
     max_iterations: int = 200,
     formulation: str = "absolute",
 ) -> Equilibrium:
-    """Return the equilibrium at rest near a state (default: the assembled bodies), under all forces of the system.
+    """Return the equilibrium at rest near a state (default: the assembled bodies) under all forces of the system.
 
     Parameters
     ----------
@@ -261,7 +262,7 @@ def steady_rotation(
     max_iterations: int = 200,
     formulation: str = "absolute",
 ) -> Equilibrium:
-    """Return the state in which the whole system rotates like a rigid body about an axis fixed in space.
+    """Return the state in which the whole system rotates as a rigid body about an axis fixed in space.
 
     Parameters
     ----------
@@ -427,7 +428,7 @@ def steady_rotation(
 def without_slowing(
     compiled: CompiledSystem, work: Work, W: tuple[Array, ...], parts: Linearized, forces: Array
 ) -> tuple[Array, float]:
-    """Return unbalanced forces without those that slow the rotation, and the relative rate of slowing [1/s].
+    """Return unbalanced forces without the part that slows the rotation, and the relative rate of slowing [1/s].
 
     A freely spinning rotor is slowed by the damping of its bearings, which no steady motion balances. With s the
     velocities of the rotation, forces f = f' + c M s, f'·s = 0, slow it at the rate c. They are returned unchanged if
@@ -453,7 +454,7 @@ def is_driven_turn(model: Model) -> NDArray[np.bool_]:
 
 
 def words_of(led: LoadPathEnd, is_stable: bool) -> str:
-    """Return a description of where increasing loads have led; empty if they were not tried."""
+    """Return a description of the end of the load path; empty if increasing loads were not tried."""
     if led.n_solves == 0:
         return ""
     if led.p == 1.0 and not is_stable:
@@ -464,7 +465,7 @@ def words_of(led: LoadPathEnd, is_stable: bool) -> str:
 def led_by_loads(
     compiled: CompiledSystem, work: Work, omega: Array, center: Array, state: State, w: Array
 ) -> tuple[LoadPathEnd, bool]:
-    """Return where increasing loads lead, and whether that is near a stable equilibrium of the system."""
+    """Return the state that increasing loads reach, and whether it is near a stable equilibrium of the system."""
     model, resting = compiled.model, compiled.resting_model
     if len(state.u) + len(w) > LARGEST:
         return LoadPathEnd(state, w, 0.0, 0), False
@@ -502,7 +503,7 @@ def led_by_loads(
 
 
 def wrenches_by_law(model: Model, parts: Linearized, gaps: Array, others: NDArray[np.bool_]) -> Array:
-    """Return the change of wrenches to those of the laws of springs, bushings etc. at this state, (n_w,).
+    """Return the change of wrenches that makes springs, bushings etc. satisfy their laws at this state, (n_w,).
 
     Only for connections without constraints and states, whose rows V dw = -g have no other unknowns.
     """
@@ -518,7 +519,7 @@ def wrenches_by_law(model: Model, parts: Linearized, gaps: Array, others: NDArra
 
 
 def notes_at(system: System, work: Work, state: State, u_dot: Array, w: Array) -> tuple[ValidityNote, ...]:
-    """Return, and log, notes on bodies beyond the linear range of their frame in a state of the engine."""
+    """Return and log notes on bodies that exceed the linear range of their frame in a state of the engine."""
     watch = ValidityWatch(system)
     rows, _ = observed_state(compiled_system(system), work, state, u_dot, w, 0.0)
     for note in watch.observe(rows):
@@ -527,7 +528,7 @@ def notes_at(system: System, work: Work, state: State, u_dot: Array, w: Array) -
 
 
 def turning(compiled: CompiledSystem, state: State, omega: Array, center: Array) -> tuple[State, Array]:
-    """Return the state with the velocities of a rotation of all bodies about an axis, and the accelerations, (n_u,)."""
+    """Return the state with velocities of a common rotation about an axis, and the accelerations, (n_u,)."""
     u, u_dot = np.zeros_like(state.u), np.zeros_like(state.u)
     for i, u0 in enumerate(compiled.model.bodies.u0[:-1]):
         v = np.cross(omega, state.r[i] - center)
@@ -538,7 +539,7 @@ def turning(compiled: CompiledSystem, state: State, omega: Array, center: Array)
 
 
 def _tangent(model: Model, work: Work, omega: Array) -> tuple[Linearized, tuple[Array, ...]]:
-    """Return rows and wrenches, and for each body the derivative of the residual along steady rotations."""
+    """Return rows and wrenches, and each body's derivative of the residual along steady rotations."""
     parts = linearized(model, work, 0.0, 0.0, 1.0)
     if not work.state.u.any():
         return parts, parts.H
@@ -554,7 +555,7 @@ def _tangent(model: Model, work: Work, omega: Array) -> tuple[Linearized, tuple[
 
 
 def size_of(W: tuple[Array, ...], forces: Array) -> float:
-    """Return the norm of forces with W⁻¹; for one mass, force divided by the root of the mass; nan without mass."""
+    """Return the norm of forces with W⁻¹ (for one mass: force over root of mass); nan without mass."""
     total, first = 0.0, 0
     for block in W:
         f = forces[first : first + len(block)]
@@ -564,7 +565,7 @@ def size_of(W: tuple[Array, ...], forces: Array) -> float:
 
 
 def forces_at_work(compiled: CompiledSystem, work: Work, parts: Linearized, W: tuple[Array, ...]) -> float:
-    """Return the norm of the forces of joints, springs, weight and deformation, as for the residual."""
+    """Return the norm of joint, spring, weight and elastic forces, in the same norm as the residual."""
     bodies, residual = compiled.model.bodies, work.bodies.residual
     reactions = parts.J.T @ work.state.w if len(work.state.w) else np.zeros_like(residual)
     elastic = np.zeros_like(residual)
@@ -575,7 +576,7 @@ def forces_at_work(compiled: CompiledSystem, work: Work, parts: Linearized, W: t
 
 
 def rounding_of(compiled: CompiledSystem, parts: Linearized, state: State) -> Array:
-    """Return the residual of the rows due to rounding of positions, (n_w,); it is large for stiff springs."""
+    """Return the rounding error of each row's residual due to positions, (n_w,); large for stiff springs."""
     reach = np.ones(len(state.u))
     for i, u0 in enumerate(compiled.model.bodies.u0[:-1]):
         reach[u0 : u0 + 3] = compiled.length + np.abs(state.r[i]).max()
@@ -585,7 +586,7 @@ def rounding_of(compiled: CompiledSystem, parts: Linearized, state: State) -> Ar
 
 
 def rounding_of_inertia(model: Model, mass: tuple[Array, ...], state: State, omega: Array, center: Array) -> Array:
-    """Return the inertia forces of a rotation due to rounding of positions, (n_u,); large far from the origin."""
+    """Return rounding errors of a rotation's inertia forces due to positions, (n_u,); large far from the origin."""
     forces = np.zeros(len(state.u))
     for i, block in enumerate(mass):
         u = slice(int(model.bodies.u0[i]), int(model.bodies.u0[i + 1]))
@@ -599,7 +600,7 @@ def _total_mass(W: tuple[Array, ...]) -> float:
 
 
 def largest_motion(compiled: CompiledSystem, y: Array, *, only_turns: bool = False) -> float:
-    """Return the largest translation, relative to the size of the system, or rotation of a body."""
+    """Return the largest translation (relative to the size of the system) or rotation of a body."""
     largest = 0.0
     for u0 in compiled.model.bodies.u0[:-1]:
         way = 0.0 if only_turns else float(np.linalg.norm(y[u0 : u0 + 3])) / compiled.length
@@ -614,7 +615,7 @@ def worst_body(compiled: CompiledSystem, W: tuple[Array, ...], forces: Array) ->
 
 
 def _require_rotation(compiled: CompiledSystem, work: Work, omega: Array) -> None:
-    """Raise `ModelError` that names the joint which the rotation would violate."""
+    """Raise `ModelError` with the joint that prevents the rotation."""
     from floatframe.engine.kernels.entry import rates_of_constraints
 
     if not omega.any() or not len(work.state.w):

@@ -1,4 +1,4 @@
-"""Inverse kinematics: joint coordinates that bring markers to given positions and orientations, within limits.
+"""Inverse kinematics: joint coordinates within limits that bring markers to given positions and orientations.
 
 The unknowns are small motions of all bodies (without modes) that the joints allow. With the errors e of the targets,
 their rows J, the constraint rows G of joints and couplers, and the rows X of the joint coordinates x, one iteration
@@ -45,19 +45,22 @@ from floatframe.results.small_motions.marker_jacobian import marker_jacobian
 __all__ = ["ReachedPose", "Target", "inverse_kinematics"]
 
 FREE = 1e-9  #: singular value of the scaled constraint rows below which a motion is allowed
-MOST_TURN = 0.5  #: in one iteration: rotation [rad], and translation relative to the size of the system
-WITHIN = 1e-12  #: amount by which a coordinate may be beyond its limit, in rad or relative to the size of the system
-PLACED = 1e-9  #: the same, for the pose in which the search begins
-AT_LIMIT = 1e-7  #: the same, for a coordinate that is reported at its limit, or relative to its magnitude
-MOST_RETURNS = 10  #: largest number of Newton iterations to bring a coordinate back to its limit
-ROUNDING = 4 * np.finfo(float).eps  #: of a coordinate, relative to the distance of bodies from the origin
-NO_WAY = 1e-11  #: size of an iteration below which the search has ended
+MOST_TURN = 0.5  #: largest motion in one iteration: rotation [rad], and translation relative to the size of the system
+#: distance of a coordinate beyond its limit that is permitted, in rad or relative to the size of the system
+WITHIN = 1e-12
+PLACED = 1e-9  #: the same distance, for the pose at which the search begins
+#: distance from its limit, absolute or relative to its size, at which a coordinate is reported to be at its limit
+AT_LIMIT = 1e-7
+MOST_RETURNS = 10  #: largest number of Newton iterations that bring a coordinate back to its limit
+#: rounding error of a coordinate, relative to the distance of bodies from the origin
+ROUNDING = 4 * np.finfo(float).eps
+NO_WAY = 1e-11  #: size of an iteration below which the search ends
 
 
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class Target:
-    """Desired position or orientation of a marker, or both, in ground axes.
+    """Desired position, orientation or both of a marker, in ground axes.
 
     Parameters
     ----------
@@ -118,7 +121,7 @@ def inverse_kinematics(
     tolerance: float = 1e-10,
     max_iterations: int = 200,
 ) -> ReachedPose:
-    """Return the pose near the assembled one in which markers reach their targets, or are as near as joints allow.
+    """Return the pose near the assembled one in which markers reach their targets, or come as near as joints allow.
 
     Bodies keep their initial deformation; prescribed motions are evaluated at t = 0. Another solution, such as the
     other bend of an elbow, is found from another initial position of the bodies.
@@ -149,7 +152,7 @@ def inverse_kinematics(
 
 
 class Search:
-    """A search, with its targets and limits."""
+    """State of a search, with its targets and limits."""
 
     def __init__(self, system: System, goals: list[Target], limits: dict[str, tuple[float | None, float | None]]):
         where = "inverse_kinematics"
@@ -201,7 +204,7 @@ class Search:
             )
 
     def values(self, state: State, before: Mapping[str, float]) -> dict[str, float]:
-        """Return all joint coordinates at a state; angles are counted on from those before."""
+        """Return all joint coordinates at a state; angles are counted on from the values before."""
         found: dict[str, float] = {}
         for joint, each, place in self.coordinates(state):
             name, value = f"{joint}.{each.name}", float(each.value(place))
@@ -211,7 +214,7 @@ class Search:
         return found
 
     def coordinates(self, state: State) -> Iterator[tuple[str, RowCoordinate, RelativePlace]]:
-        """Yield the name of the joint, the coordinate, and its place at a state, for all joint coordinates."""
+        """Yield joint name, coordinate name and coordinate at a state, for all joint coordinates."""
         placed = self.compiled.placed
         for joint in self.system.joints:
             if isinstance(joint, SlidingJoint):
@@ -224,11 +227,11 @@ class Search:
                 yield joint.name, each, RelativePlace(A_a, A_b, r_b - r_a)
 
     def limited(self, values: Mapping[str, float]) -> Array:
-        """Return the coordinates that have limits, in rad or relative to the size of the system, (n,)."""
+        """Return the coordinates that have limits, (n,), in rad or relative to the size of the system."""
         return np.array([values[name] for name in self.names]) / self.sizes
 
     def errors(self, state: State) -> tuple[Array, float, float]:
-        """Return weighted errors (distances relative to the system size), largest distance, and largest rotation."""
+        """Return weighted errors (distances relative to the system size), largest distance and largest rotation."""
         parts, far, turned = [], 0.0, 0.0
         for at, r, R, weight in self.goals:
             x, A = marker_pose(at, state, self.n_q)
@@ -242,7 +245,7 @@ class Search:
         return np.concatenate(parts), far, turned
 
     def rows(self, state: State) -> tuple[Array, Array, Array]:
-        """Return N, J N and X N at a state, step (1)."""
+        """Return N, J N and X N at a state, by step (1)."""
         compiled, work, length = self.compiled, self.work, self.compiled.length
         model = compiled.model
         set_iterate(work, state)
@@ -270,7 +273,7 @@ class Search:
         return N, np.concatenate(J), X
 
     def within(self, state: State, before: Mapping[str, float]) -> State:
-        """Return the state with coordinates brought back to their limits and restored joint constraints, step (3)."""
+        """Return the state after coordinates return to their limits and joints are closed, by step (3)."""
         model = self.compiled.model
         noise = ROUNDING * float(np.abs(state.r).max()) / self.compiled.length
         for _ in range(MOST_RETURNS):
@@ -284,7 +287,7 @@ class Search:
         return state
 
     def run(self, tolerance: float, most: int) -> ReachedPose:
-        """Return the resulting pose."""
+        """Search, and return the pose that was reached."""
         compiled = self.compiled
         state, values, mu = self.state, self.values(self.state, {}), 1e-3
         error, far, turned = self.errors(state)
@@ -327,7 +330,7 @@ class Search:
 
 
 def least_within(A: Array, e: Array, mu: float, X: Array, lower: Array, upper: Array) -> Array:
-    """Return the a that minimises |A a - e|² + mu |a|² with lower <= X a <= upper, (n,), by Lawson and Hanson's method.
+    """Return the minimum a of |A a - e|² + mu |a|² for lower <= X a <= upper, (n,), by Lawson and Hanson's method.
 
     With H = AᵀA + mu 1 = L Lᵀ and z = Lᵀ a - L⁻¹ Aᵀ e, it is the shortest z with C z >= d, found by nonnegative least
     squares. Bounds that a = 0 violates only by rounding are taken as satisfied.

@@ -1,4 +1,4 @@
-"""Equilibrium by increasing loads, for systems in which the flow of `equilibrium` fails.
+"""Equilibrium by increasing loads, for systems in which the flow of `equilibrium` fails; p is the load fraction.
 
 At a state x0, the forces f0 are unbalanced, and the rows have errors g0. The equilibria of
 
@@ -25,37 +25,38 @@ from floatframe.model.state import State
 
 __all__ = ["LARGEST", "Balance", "LoadPathEnd", "is_left_by_none", "led_equilibrium"]
 
-FIRST, LEAST = 0.25, 1e-3  #: steps of p
-QUICK, MOST = 4, 8  #: iterations for one p: after at most QUICK, the next step is doubled; after MOST, it is abandoned
-SHRUNK = 0.5  #: ratio of the last two iterations above which one p is abandoned
-AFTER_FAILURE = 2  #: number of steps of p after a failure that are not lengthened
-LONGEST = 0.3  #: in one iteration: rotation [rad], and translation relative to the size of the system
-SETTLED = 1e-7  #: the same, for the iteration after which the last equilibrium is accepted
-#: the same on the way, absolute and relative to the first iteration of a p; the rest is left to the next p
+FIRST, LEAST = 0.25, 1e-3  #: first and smallest step of p
+#: numbers of iterations for one p: up to QUICK, the next step is doubled; above MOST, the step is rejected
+QUICK, MOST = 4, 8
+SHRUNK = 0.5  #: ratio of the last two iterations above which a step of p is rejected
+AFTER_FAILURE = 2  #: number of steps after a rejected step in which the step size does not grow
+LONGEST = 0.3  #: largest motion in one iteration: rotation [rad], and translation relative to the size of the system
+SETTLED = 1e-7  #: size of the last iteration at which the final equilibrium is accepted
+#: size of an iteration, absolute and relative to the first one, that is accepted for equilibria on the path
 ROUGH, OF_FIRST = 1e-2, 0.1
-PATIENCE, ADVANCE = 40, 0.02  #: number of solves in which p has to increase by ADVANCE
+PATIENCE, ADVANCE = 40, 0.02  #: number of solves in which p must increase by ADVANCE
 MOST_SOLVES = 300
-LARGEST = 4000  #: largest number of unknowns for this method, because the check of the flow needs dense eigenvalues
-LEAVING = 1e-9  #: relative to the fastest rate of the flow; smaller rates are rounding errors
+LARGEST = 4000  #: largest number of unknowns for this method, whose check of the flow needs dense eigenvalues
+LEAVING = 1e-9  #: growth rate, relative to the fastest rate of the flow, below which it is a rounding error
 
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """Unbalanced forces and constraint errors at a state and wrenches, and the Newton step from there."""
+    """Unbalanced forces and constraint errors at a state, with the Newton step."""
 
-    forces: Array  #: f, (n_u,)
-    gaps: Array  #: g, (n_w,)
-    #: from forces and errors to be removed to the step: (n_u,) in ground axes, (n_w,)
+    forces: Array  #: unbalanced forces f, (n_u,)
+    gaps: Array  #: constraint errors g, (n_w,)
+    #: Newton step for given forces and errors: (n_u,) in ground axes, (n_w,)
     way: Callable[[Array, Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True, eq=False)
 class LoadPathEnd:
-    """The end of the path of increasing loads."""
+    """End of the path of increasing loads."""
 
     state: State
-    w: Array  #: wrenches, (n_w,)
-    p: float  #: fraction of the loads that is balanced there; 1: near an equilibrium of the system
+    w: Array  #: wrenches of the connections, (n_w,)
+    p: float  #: load fraction in equilibrium at this state; 1: near an equilibrium of the system
     n_solves: int
 
 
@@ -66,7 +67,7 @@ def led_equilibrium(
     displaced: Callable[[State, Array], State],
     length_of: Callable[[Array], float],
 ) -> LoadPathEnd:
-    """Return the largest fraction of the loads reached, with its state and wrenches; p = 0 if none was reached.
+    """Return the largest load fraction reached, with state and wrenches; p = 0 if no load was reached.
 
     Parameters
     ----------
@@ -83,7 +84,7 @@ def led_equilibrium(
     if begun is None:
         return LoadPathEnd(state, w, 0.0, 0)
     p, step, n_solves, waiting = 0.0, FIRST, 0, 0
-    seen = [(0, 0.0)]  #: solves and p; the first entry is more than `PATIENCE` solves ago, or the beginning
+    seen = [(0, 0.0)]  #: number of solves and p; the first entry is more than `PATIENCE` solves ago, or the beginning
     while p < 1.0:
         target = min(1.0, p + step)
         x, y, at = state, w, begun if p == 0.0 else balance(state, w)
@@ -115,7 +116,7 @@ def led_equilibrium(
 
 
 def is_left_by_none(parts: Linearized, K: tuple[Array, ...], W: tuple[Array, ...]) -> bool:
-    """Return whether the flow W dx/dtau = -f, with satisfied joints, returns to an equilibrium from all nearby states.
+    """Return whether the flow W dx/dtau = -f, with closed joints, returns to an equilibrium from all nearby states.
 
     Increasing loads follow branches which the flow leaves, such as a beam that stays straight beyond its buckling load.
     The rates are the eigenvalues of [[K, -Jᵀ], [G, V]] relative to [[W, 0], [0, 0]]; a rate below zero leads away. Only

@@ -1,4 +1,4 @@
-"""A row of results at one state, and the power of loads and dampers."""
+"""A result row at one state, and the power of loads and dampers."""
 
 from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.system import CompiledSystem
@@ -12,7 +12,7 @@ __all__ = ["observed_state"]
 def observed_state(
     compiled: CompiledSystem, work: Work, state: State, u_dot: Array, w: Array, t: float
 ) -> tuple[Rows, Array]:
-    """Return the row of results at a state of the engine, and the power of loads and of dampers, (2,)."""
+    """Return the result row at a state of the engine, and the power of loads and of dampers, (2,)."""
     from floatframe.engine.kernels.entry import absolute_kernels
 
     work.state.time[...] = t

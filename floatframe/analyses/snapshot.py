@@ -1,4 +1,4 @@
-"""Single states as trajectories, so that sensors, tables and pictures of motions also work for them."""
+"""Single states as trajectories, for which sensors, tables and pictures of motions also work."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ __all__ = ["snapshot", "states_as_motion"]
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Replaces the integrator in the record of single states."""
+    """Describes single states in the record of a run, in place of an integrator."""
 
 
 def snapshot(
@@ -34,7 +34,7 @@ def snapshot(
     *,
     t: float = 0.0,
 ) -> Trajectory:
-    """Return one state as a trajectory with one time, for sensors, exports and pictures of motions.
+    """Return one state as a trajectory with one time, for sensors, exports and pictures.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def snapshot(
 
 
 def states_as_motion(system: System, states: Sequence[State]) -> Trajectory:
-    """Return a sequence of states as a trajectory at the times 0, 1, 2, ..., without forces, for pictures."""
+    """Return a sequence of states as a trajectory at times 0, 1, 2, ... without forces, for pictures."""
     compiled = compiled_system(system)
     model, work = compiled.model, new_work(compiled.model)
     still, w = np.zeros(int(model.bodies.u0[-1])), np.zeros(int(model.connections.w0[-1]))
@@ -75,6 +75,6 @@ def states_as_motion(system: System, states: Sequence[State]) -> Trajectory:
 
 
 def as_motion(system: System, rows: list[Rows], t: float, t_end: float) -> Trajectory:
-    """Return rows of results as a trajectory in memory."""
+    """Return result rows as a trajectory in memory."""
     head = head_of(system, Snapshot(), t, t_end, 1.0, 1)  # type: ignore[arg-type]
     return Trajectory(head, MemorySource(joint_rows(system, rows)), is_complete=True)

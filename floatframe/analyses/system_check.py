@@ -1,4 +1,4 @@
-"""What can be known of a system before its run: mobility, placement, frequencies, step size, ranges of its bodies."""
+"""Check of a system before its run: mobility, placement, frequencies, step size, range of its bodies."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -29,14 +29,14 @@ from floatframe.simulation.step_advice import FOLLOWED, SEEN, frequency_words, k
 
 __all__ = ["SystemVibrations", "check_system", "system_vibrations"]
 
-MOST_MOTIONS = 1500  #: largest number of independent motions whose frequencies are computed
-STILL = 1e-6  #: frequency relative to the highest, below which a motion counts as free
-NEAR = 1e-6  #: displacement relative to the size of a body, or relative change of velocities, that is not worth a word
+MOST_MOTIONS = 1500  #: largest number of independent motions for which frequencies are computed
+STILL = 1e-6  #: frequency, relative to the highest, below which a motion counts as free
+NEAR = 1e-6  #: displacement relative to the size of a body, or relative change of velocities, that is not reported
 
 
 @dataclass(frozen=True)
 class SystemVibrations:
-    """Undamped vibrations of a system at one state, with its joints, forces and springs.
+    """Undamped vibrations of a system at one state, with joints, forces and springs.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def check_system(
     state: State | None = None,
     has_fixed_steps: bool = True,
 ) -> tuple[QualityRecord, ...]:
-    """Return what can be known of a system before its run, one record for each question.
+    """Return the results of all checks of a system before its run, one record for each question.
 
     A record "fail" means that the run would be refused, "warn" that it would run with a doubtful result.
 
@@ -108,12 +108,12 @@ def record(
     name: str, title: str, verdict: Verdict, reason: str, action: str = "", value: float = np.nan,
     tolerance: float | None = None,
 ) -> QualityRecord:  # fmt: skip
-    """Return a record; what needs no remedy has none."""
+    """Return a record of a check; without a remedy if none is needed."""
     return QualityRecord(name, title, value, tolerance, verdict, reason, "" if verdict in ("pass", "info") else action)
 
 
 def mobility_record(system: System) -> QualityRecord:
-    """Return the record of mobility and redundant constraints."""
+    """Return the record about mobility and redundant constraints."""
     try:
         found = mobility(system)
     except FloatframeError as error:
@@ -134,7 +134,7 @@ def mobility_record(system: System) -> QualityRecord:
 
 
 def redundant_words(found: Mobility) -> str:
-    """Return the redundant constraints by joint, with flexible bodies and as if all were rigid."""
+    """Return the redundant constraints by joint, for flexible bodies and as if all were rigid."""
 
     def by_joint(counts: Mapping[str, int]) -> str:
         return ", ".join(f"{count} of joint {name!r}" for name, count in counts.items())
@@ -146,7 +146,7 @@ def redundant_words(found: Mobility) -> str:
 
 
 def start_records(system: System, state: State | None, made: ConsistentState, M: Array) -> Iterator[QualityRecord]:
-    """Yield the records of the start: how far the joints move the bodies, the largest speed and acceleration.
+    """Yield the records about the start: displacement of bodies by joints, largest speed and acceleration.
 
     M: mass matrix of the bodies at the start, (n_u, n_u).
     """
@@ -186,7 +186,7 @@ def start_records(system: System, state: State | None, made: ConsistentState, M:
 
 
 def by_joints_record(system: System) -> QualityRecord:
-    """Return the record of bodies without a position: where their joints put them, and what these leave as drawn."""
+    """Return the record about bodies without a position: where joints placed them, and what joints leave open."""
     bodies, parts = {body.name: body for body in placed_bodies(system)}, []
     for name, n_held in held_directions(system).items():
         at = ", ".join(f"{x:.5g}" for x in bodies[name].drawn_position)
@@ -206,7 +206,7 @@ def tangents_at(system: System, made: ConsistentState) -> Tangents:
 
 
 def system_vibrations(system: System, parts: Tangents) -> SystemVibrations | None:
-    """Return the undamped vibrations of a system at one state; None if it has too many motions, or none.
+    """Return the undamped vibrations at one state; None if there are too many motions, or none.
 
     They are those of its matrices on the motions that the joints allow, K z = omega² M z, as if it were at rest there:
     rotation and acceleration of the whole change the low ones. Motions without mass follow the others statically.
@@ -243,7 +243,7 @@ def system_vibrations(system: System, parts: Tangents) -> SystemVibrations | Non
 
 
 def vibration_record(system: System, found: SystemVibrations) -> QualityRecord:
-    """Return the record of the frequencies at the start."""
+    """Return the record about frequencies at the start."""
     hertz = 1 / system.units.time
     f, words = found.frequencies * hertz, "no vibration"
     if len(f):
@@ -257,7 +257,7 @@ def vibration_record(system: System, found: SystemVibrations) -> QualityRecord:
 
 
 def step_record(system: System, found: SystemVibrations, h: float, *, has_fixed_steps: bool) -> QualityRecord:
-    """Return the record of the step size beside the periods of the vibrations."""
+    """Return the record about the step size compared with the periods of the vibrations."""
     second, f = system.units.time_symbol, found.frequencies
     if not len(f):
         return record("step", "Step size", "pass", f"h = {h:g} {second}; there is no vibration to follow")
@@ -276,7 +276,7 @@ def step_record(system: System, found: SystemVibrations, h: float, *, has_fixed_
 
 
 def body_record(body: FlexibleBody, system: System) -> QualityRecord:
-    """Return the record of a flexible body: its modes, up to which frequency they reach, and its stiffening."""
+    """Return the record about a flexible body: modes, their highest frequency, and stiffening."""
     reduced = body.reduced
     squares = la.eigvalsh(reduced.K, reduced.M) if reduced.n_q else np.zeros(0)
     highest = float(np.sqrt(max(squares.max(initial=0.0), 0.0))) / (2 * np.pi * system.units.time)

@@ -1,4 +1,4 @@
-"""Mass, damping and stiffness matrices of the whole system at one state, from the Newton matrix.
+"""Mass, damping and stiffness matrices of the whole system at one state, computed from the Newton matrix.
 
 Small motions are described in axes that rotate with omega, in which the steady motion does not change. Every body
 rotates with these axes; it may in addition spin with a constant sigma, such as a wheel, whose inertia and forces do not
@@ -45,53 +45,53 @@ from floatframe.model.rotations import tilde
 
 __all__ = ["ROUNDING", "Inputs", "Tangents", "Wrenches", "held_rows", "settled", "tangents", "turning_matrices"]
 
-CANCELLED = 1e-10  #: magnitude of a sum, relative to its terms, below which it is a rounding error
+CANCELLED = 1e-10  #: size of a sum, relative to its terms, below which it is a rounding error
 ROUNDING = 1e-13  #: rounding error of an entry of M, C or K, relative to the terms of its sum
 RANK = 1e-10  #: singular value, relative to the largest, below which a row is redundant
-SPINLESS = 1e-12  #: magnitude of a spin, relative to the angular velocity, below which it is a rounding error
+SPINLESS = 1e-12  #: spin, relative to the angular velocity, below which it is a rounding error
 
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """Coefficients of inputs s in the equations."""
+    """Coefficients of the inputs s in the equations."""
 
-    F: Array  #: generalised forces on the bodies, body axes, (n_u, n_s)
+    F: Array  #: generalised forces on the bodies for unit inputs, body axes, (n_u, n_s)
     E: Array  #: coefficients of s in the rows, (n_w, n_s)
-    E_rate: Array  #: coefficients of s' in the rows, E', (n_w, n_s)
+    E_rate: Array  #: coefficients of the rates s' in the rows, (n_w, n_s)
 
     def beside(self, others: "Inputs") -> "Inputs":
-        """Return these inputs, followed by others."""
+        """Return these inputs followed by others."""
         return Inputs(*(np.hstack([getattr(each, name) for each in (self, others)]) for name in ("F", "E", "E_rate")))
 
 
 @dataclass(frozen=True, eq=False)
 class Tangents:
-    """Dense matrices of small motions, with unknowns in body axes, after elimination of the laws of wrenches."""
+    """Dense matrices of small motions in body axes, after elimination of the laws of wrenches."""
 
-    M: Array  #: (n_u, n_u)
-    C: Array  #: (n_u, n_u)
-    K: Array  #: (n_u, n_u)
-    G: Array  #: position constraints of the joints, (n_held, n_u)
-    J: Array  #: Jᵀ gives the forces of wrenches on bodies, (n_w, n_u)
+    M: Array  #: mass matrix, (n_u, n_u)
+    C: Array  #: damping and gyroscopic matrix, (n_u, n_u)
+    K: Array  #: stiffness matrix, (n_u, n_u)
+    G: Array  #: Jacobian of the position constraints of joints, (n_held, n_u)
+    J: Array  #: transposed map from wrenches to body forces, (n_w, n_u)
     G_x: Array  #: derivatives of all rows by positions, (n_w, n_u)
     G_v: Array  #: derivatives of all rows by velocities, (n_w, n_u)
-    G_a: Array  #: derivatives of laws of wrenches by accelerations, zero for other rows, (n_w, n_u)
+    G_a: Array  #: derivatives of wrench laws by accelerations, zero for other rows, (n_w, n_u)
     V: Array  #: derivatives of all rows by wrenches, (n_w, n_w)
     holds: NDArray[np.bool_]  #: whether a row constrains a position, (n_w,)
     rolls: NDArray[np.bool_]  #: whether a row constrains a velocity, (n_w,)
-    free: NDArray[np.bool_]  #: whether a row is a law of a wrench, (n_w,)
-    states: IntArray  #: rows of the values of states; each is followed by the row of the rate, (n_states,)
-    soft: Array  #: compliance of constraints that share their reactions, zero for other rows, (n_w,)
-    by_rows: Array  #: V_f⁺, from laws of wrenches to wrenches, (n_w, n_free)
+    free: NDArray[np.bool_]  #: whether a row is a wrench law, (n_w,)
+    states: IntArray  #: rows of the values of states; the row of the rate follows each, (n_states,)
+    soft: Array  #: compliance of constraints that share reactions, zero for other rows, (n_w,)
+    by_rows: Array  #: map V_f⁺ from wrench laws to wrenches, (n_w, n_free)
 
     def body_forces(self, inputs: Inputs) -> tuple[Array, Array]:
-        """Return the forces of inputs and of their rates on the bodies, including eliminated rows, (n_u, n_s) each."""
+        """Return body forces due to inputs and to their rates, with eliminated rows, (n_u, n_s) each."""
         to_bodies = self.J.T @ self.by_rows
         free = self.free
         return inputs.F - to_bodies @ inputs.E[free], -to_bodies @ inputs.E_rate[free]
 
     def open_wrenches(self) -> tuple[Array, Array]:
-        """Return Z, (n_w, n_open), and (Jᵀ Z)⁺, (n_open, n_u); redundant reactions share the load by their compliance.
+        """Return Z, (n_w, n_open), and (Jᵀ Z)⁺, (n_open, n_u); redundant reactions are shared by their compliance.
 
         Raises
         ------
@@ -128,7 +128,7 @@ class Tangents:
         return Z, back - repeated @ np.linalg.lstsq(by_share, weights @ Z @ back, rcond=None)[0]
 
     def wrenches(self, inputs: Inputs, Omega: Array, Omega_t: Array) -> "Wrenches":
-        """Return the coefficients of xi, xi', xi'', s and s' in dw."""
+        """Return the coefficients of xi, xi', xi'', s and s' in the wrench change dw."""
         free, D = self.free, self.full(Omega, Omega_t)
         force, force_rate = self.body_forces(inputs)
         Z, back = self.open_wrenches()
@@ -150,17 +150,17 @@ class Tangents:
 
     @property
     def of_states(self) -> NDArray[np.bool_]:
-        """Whether each row is a value, rate or algorithmic rate of a state, (n_w,)."""
+        """Whether each row is the value, rate or algorithmic rate of a state, (n_w,)."""
         return rows_of_states(self.states, len(self.V))
 
     @property
     def by_states(self) -> Inputs:
-        """The coefficients of states in the equations."""
+        """Coefficients of states in the equations."""
         zero = np.zeros((len(self.V), len(self.states)))
         return Inputs(np.zeros((self.J.shape[1], len(self.states))), self.V[:, self.states], zero)
 
     def rates_of_states(self, Omega: Array) -> tuple[Array, Array, Array]:
-        """Return the derivatives of z' by xi and xi', (n_states, n_u), and by wrenches and states, (n_states, n_w)."""
+        """Return derivatives of z' by xi and xi', (n_states, n_u), and by wrenches and states, (n_states, n_w)."""
         rows = self.states + 1
         by_wrench = -self.V[rows]
         by_wrench[:, rows] = 0.0
@@ -174,17 +174,17 @@ class Tangents:
 
 @dataclass(frozen=True, eq=False)
 class Wrenches:
-    """Coefficients of dw = x xi + v xi' + a xi'' + s s + s_rate s'."""
+    """Coefficients of the wrench change dw = x xi + v xi' + a xi'' + s s + s_rate s'."""
 
-    x: Array  #: (n_w, n_u)
-    v: Array  #: (n_w, n_u)
-    a: Array  #: (n_w, n_u)
-    s: Array  #: (n_w, n_s)
-    s_rate: Array  #: (n_w, n_s)
+    x: Array  #: coefficients of xi, (n_w, n_u)
+    v: Array  #: coefficients of xi', (n_w, n_u)
+    a: Array  #: coefficients of xi'', (n_w, n_u)
+    s: Array  #: coefficients of s, (n_w, n_s)
+    s_rate: Array  #: coefficients of s', (n_w, n_s)
 
 
 def settled(result: Array, *products: tuple[Array, Array], error: float = CANCELLED) -> Array:
-    """Return a sum of products A B, with zeros for entries that are rounding errors of cancelled terms.
+    """Return a sum of products A B in which rounding errors of cancelled terms are set to zero.
 
     error: largest magnitude of such an entry, relative to the sum of the magnitudes of its terms.
     """
@@ -193,17 +193,17 @@ def settled(result: Array, *products: tuple[Array, Array], error: float = CANCEL
 
 
 def sum_of_products(*products: tuple[Array, Array]) -> Array:
-    """Return Σ A B without rounding errors, see `settled`."""
+    """Return Σ A B without rounding errors of cancelled terms, see `settled`."""
     return settled(np.asarray(sum(A @ B for A, B in products)), *products)
 
 
 def held_rows(model: Model) -> np.ndarray:
-    """Return whether each row constrains a distance or an angle, (n_w,) bool; other rows are laws of wrenches."""
+    """Return whether each row constrains a distance or an angle, (n_w,) bool; other rows are wrench laws."""
     return is_held(model.rows.kind)
 
 
 def tangents(model: Model, work: Work) -> Tangents:
-    """Return M, C, K, G at the iterate in `work`; its wrenches give the geometric part of K."""
+    """Return M, C, K, G at the iterate in `work`, whose wrenches give the geometric part of K."""
     by_position = linearized(model, work, 0.0, 0.0, 1.0)
     C_of_bodies, G_of_velocities = by_velocities(model, work, by_position)
     by_acceleration = linearized(model, work, 1.0, 0.0, 0.0)
@@ -230,7 +230,7 @@ def tangents(model: Model, work: Work) -> Tangents:
 
 
 def rows_of_states(states: IntArray, n_w: int) -> NDArray[np.bool_]:
-    """Return whether each row is a value, rate or algorithmic rate of a state, (n_w,)."""
+    """Return whether each row is the value, rate or algorithmic rate of a state, (n_w,)."""
     found = np.zeros(n_w, dtype=bool)
     for k in range(3):
         found[states + k] = True
@@ -238,7 +238,7 @@ def rows_of_states(states: IntArray, n_w: int) -> NDArray[np.bool_]:
 
 
 def turning_matrices(model: Model, work: Work, omega: Array) -> tuple[Array, Array]:
-    """Return Omega and Omega' for the velocities in `work` and axes rotating with omega (ground axes), (n_u, n_u)."""
+    """Return Omega and Omega' for the velocities in `work`, for axes rotating with omega (ground axes), (n_u, n_u)."""
     n_u = int(model.bodies.u0[-1])
     Omega, Omega_t = np.zeros((n_u, n_u)), np.zeros((n_u, n_u))
     for i, u0 in enumerate(model.bodies.u0[:-1]):

@@ -1,1 +1,1 @@
-"""Fully driven systems: their motion, which joints and drives determine completely, and the forces it requires."""
+"""Fully driven systems, whose joints and drives determine the motion completely, and the forces that they require."""

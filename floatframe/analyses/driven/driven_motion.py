@@ -1,4 +1,4 @@
-"""One instant of a fully driven system: positions, velocities and accelerations determined by joints and drives.
+"""A fully driven system at one instant: positions, velocities and accelerations that joints and drives determine.
 
 The unknowns are the motions of the body frames; the rates of modal coordinates are zero (q' = q'' = 0). G are the
 columns of the constraint rows for these unknowns, M the masses, and P, V as in joints/rows/kinds.py:
@@ -42,35 +42,37 @@ from floatframe.model.state import State
 __all__ = ["ELASTICITY", "Elasticity", "Instant", "frozen_bodies", "quasi_static_bodies", "rigid_columns"]
 
 CLOSED = 1e-12  #: largest constraint error, relative to the size of the system
-ACCEPTED = 1e-9  #: the same, if rounding allows no smaller one
+#: constraint error, relative to the size of the system, that is accepted if rounding prevents a smaller one
+ACCEPTED = 1e-9
 MOST_ITERATIONS = 30
-FAR = 1e3  #: change of a position in one iteration, relative to the size of the system, or in rad, that ends it
-SETTLED = 1e-11  #: last change of q, relative to its magnitude
-LEAST_SHAPE = 1e-14  #: relative to the size of the system; a smaller deformation is taken as zero, if all loads vanish
+#: change of a position in one iteration, in rad or relative to the size of the system, that ends the iteration
+FAR = 1e3
+SETTLED = 1e-11  #: last change of q, relative to the size of q, at convergence
+LEAST_SHAPE = 1e-14  #: deformation, relative to the size of the system, that counts as zero if all loads vanish
 
 
 @dataclass(frozen=True, eq=False)
 class Instant:
-    """Motion of all bodies at a time."""
+    """Motion of all bodies at one time."""
 
     t: float
     state: State
-    u_dot: Array  #: (n_u,)
-    w: Array  #: wrenches of the connections on their markers A, in ground axes, (n_w,)
-    G: Array  #: constraint rows by the motions of the body frames, (n_held, 6 n_b)
+    u_dot: Array  #: accelerations, (n_u,)
+    w: Array  #: wrenches of the connections on their markers A, ground axes, (n_w,)
+    G: Array  #: derivatives of the constraint rows by motions of the body frames, (n_held, 6 n_b)
     n_iterations: int = 0
 
 
-Elasticity = Callable[[CompiledSystem, Work, State, float], Instant]  #: (compiled, work, guess, t) -> Instant
+Elasticity = Callable[[CompiledSystem, Work, State, float], Instant]  #: function (compiled, work, guess, t) -> Instant
 
 
 def rigid_scale(compiled: CompiledSystem) -> Array:
-    """Return scale lengths of translations, and 1 for rotations, (6 n_b,), which give all unknowns the same unit."""
+    """Return reference lengths for translations and 1 for rotations, (6 n_b,), which give all unknowns one unit."""
     return np.tile(np.repeat([compiled.length, 1.0], 3), len(compiled.body_names))
 
 
 def rigid_columns(compiled: CompiledSystem) -> np.ndarray:
-    """Return whether each unknown is a motion of a body frame, (n_u,) bool; the others are modes."""
+    """Return whether each unknown belongs to a body frame, (n_u,) bool; the other unknowns are modes."""
     model = compiled.model
     rigid = np.zeros(int(model.bodies.u0[-1]), dtype=bool)
     for u0 in model.bodies.u0[:-1]:
@@ -79,7 +81,7 @@ def rigid_columns(compiled: CompiledSystem) -> np.ndarray:
 
 
 def frozen_bodies(compiled: CompiledSystem, work: Work, state: State, t: float) -> Instant:
-    """Return the motion with constant modal coordinates, by steps (1)-(4).
+    """Return the motion for constant modal coordinates, by steps (1)-(4).
 
     Parameters
     ----------
@@ -123,7 +125,7 @@ def frozen_bodies(compiled: CompiledSystem, work: Work, state: State, t: float) 
 
 
 def quasi_static_bodies(compiled: CompiledSystem, work: Work, state: State, t: float) -> Instant:
-    """Return the motion with modes that balance their loads at every instant, by steps (1)-(5).
+    """Return the motion in which modes balance their loads at every instant, by steps (1)-(5).
 
     Parameters
     ----------
@@ -167,15 +169,15 @@ ELASTICITY: dict[str, Elasticity] = {"frozen": frozen_bodies, "quasi-static": qu
 
 @dataclass(frozen=True, eq=False)
 class RigidEquations:
-    """M y - Jᵀ w = forces, G y + V w = rows for the motions of the body frames, as dense matrices."""
+    """Equations of the body frames as dense matrices: M y - Jᵀ w = forces, G y + V w = rows."""
 
-    M: Array  #: (6 n_b, 6 n_b)
-    J: Array  #: (n_w, 6 n_b)
-    G: Array  #: (n_w, 6 n_b)
-    V: Array  #: (n_w, n_w)
+    M: Array  #: mass matrix, (6 n_b, 6 n_b)
+    J: Array  #: transposed map from wrenches to forces, (n_w, 6 n_b)
+    G: Array  #: derivatives of rows by motions, (n_w, 6 n_b)
+    V: Array  #: derivatives of rows by wrenches, (n_w, n_w)
 
     def solved(self, forces: Array, rows: Array) -> tuple[Array, Array]:
-        """Return y and w."""
+        """Return the solution y and w."""
         of_columns, of_rows = balanced_scales(np.diag(self.M), abs(self.J), abs(self.G), abs(self.V))
         matrix = of_rows[:, None] * np.block([[self.M, -self.J.T], [self.G, self.V]]) * of_columns
         solution = of_columns * np.linalg.solve(matrix, of_rows * np.concatenate([forces, rows]))
@@ -216,7 +218,7 @@ def rigid_equations(compiled: CompiledSystem, work: Work) -> RigidEquations:
 def closed(
     compiled: CompiledSystem, work: Work, state: State, rigid: np.ndarray, t: float
 ) -> tuple[State, RigidEquations, int]:
-    """Return the state that satisfies joints and drives by step (1), the equations at it, and the iterations."""
+    """Return the state that satisfies joints and drives by step (1), its equations, and the number of iterations."""
     model = compiled.model
     holds = is_held(model.rows.kind)
     scale = compiled.gap_sizes

@@ -1,4 +1,4 @@
-"""Inverse dynamics: the forces of drives that produce a prescribed motion, and the corresponding reactions.
+"""Inverse dynamics: the drive forces that produce a prescribed motion, with the reactions.
 
     inverse = inverse_dynamics(system, np.linspace(0, 2, 401))       # a fully driven system
     inverse.drives["main.angle"].force                               # torque over time
@@ -77,7 +77,7 @@ def inverse_dynamics(
 
 
 def drive_forces(system: System, motion: Trajectory) -> dict[str, CoordinateMotion]:
-    """Return value, rate and force of all driven coordinates during any motion of the system, by "joint.coordinate".
+    """Return value, rate and force of all driven coordinates in any motion of the system, by "joint.coordinate".
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def drive_forces(system: System, motion: Trajectory) -> dict[str, CoordinateMoti
 
 
 def with_motors(system: System, drives: Mapping[str, CoordinateMotion]) -> System:
-    """Return the system with motors instead of these drives; their forces are cubic splines over time.
+    """Return the system with motors in place of these drives; the motor forces are cubic splines over time.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def with_motors(system: System, drives: Mapping[str, CoordinateMotion]) -> Syste
 
 
 def released(joint: Any, drives: Mapping[str, CoordinateMotion]) -> Any:
-    """Return a joint without the prescribed motions that are among the drives."""
+    """Return a joint without its prescribed motions that are among the drives."""
     motions = getattr(joint, "motions", None)
     if not motions:
         return joint

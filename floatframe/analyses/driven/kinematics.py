@@ -50,13 +50,13 @@ __all__ = ["Kinematics", "SingularityGuard", "free_coordinates", "kinematics"]
 # Degrees of freedom that joints and drives leave free, and the distance of a driven system from singular positions.
 
 
-SINGULAR = 1e-6  #: smallest singular value of the scaled constraint rows (length one each) at a singular position
-FREE = 1e-7  #: singular value of the scaled constraint rows below which a motion is free
-REPORTED = 1e-6  #: smallest share of a coordinate or body in a free motion at which it is reported
+SINGULAR = 1e-6  #: singular value of the constraint rows (each of unit length) below which a position is singular
+FREE = 1e-7  #: singular value of the constraint rows (each of unit length) below which a motion is free
+REPORTED = 1e-6  #: fraction of a free motion above which a coordinate or body is reported
 
 
 def free_coordinates(system: System, state: State, *, t: float = 0.0) -> tuple[str, ...]:
-    """Return the free motions at a state that satisfies the joints: a minimal set of joint coordinates, or bodies.
+    """Return the free motions at an assembled state, as a minimal set of joint coordinates or bodies.
 
     Flexible bodies are treated as rigid.
     """
@@ -96,22 +96,22 @@ def free_coordinates(system: System, state: State, *, t: float = 0.0) -> tuple[s
 
 
 def scaled_rows(compiled: CompiledSystem, G: Array) -> Array:
-    """Return constraint rows by motions of the body frames, (n_held, 6 n_b), in one unit, scaled to length one."""
+    """Return constraint rows by frame motions, (n_held, 6 n_b), in one unit and with unit length."""
     return unit_rows(G * rigid_scale(compiled))
 
 
 class SingularityGuard:
-    """Monitors the smallest singular value of the constraints, and the sign of their determinant, during a motion."""
+    """Monitors the smallest singular value and the determinant's sign of the constraints during a motion."""
 
     def __init__(self, compiled: CompiledSystem, now: Instant) -> None:
-        """Begin at an instant; `ConvergenceError` if it is singular."""
+        """Begin at an instant; `ConvergenceError` if the position is singular."""
         self.compiled = compiled
         self.kept = np.logical_not(dependent_rows(scaled_rows(compiled, now.G)))  #: linearly independent rows
         self.sign = 0.0
         self.check(now, now.t)
 
     def check(self, now: Instant, last_t: float) -> None:
-        """Raise `ConvergenceError` at a singular position, or if one was passed since the previous time."""
+        """Raise `ConvergenceError` if the position is singular, or if a singular one was passed since the last time."""
         G = scaled_rows(self.compiled, now.G)[self.kept]
         left, values, _ = la.svd(G)
         is_square = G.shape[0] == G.shape[1]
@@ -140,16 +140,16 @@ class SingularityGuard:
 # kinematics -----------------------------------------------------------------------------------------------------------
 
 
-LARGEST_TURN = 0.25  #: largest rotation of a body between two positions; longer paths are divided [rad]
+LARGEST_TURN = 0.25  #: largest rotation of a body between two positions [rad]; longer paths are divided
 MOST_PARTS = 2000  #: largest number of parts between two times
-ROWS_KEPT = 200  #: number of rows of results between writes
+ROWS_KEPT = 200  #: number of result rows that are collected before they are written
 
 
 @dataclass(frozen=True)
 class Kinematics:
-    """Replaces the integrator in the record of a run."""
+    """Describes a kinematic analysis in the record of a run, in place of an integrator."""
 
-    elasticity: str  #: name of the treatment of flexible bodies in `ELASTICITY`
+    elasticity: str  #: name of the treatment of flexible bodies, from `ELASTICITY`
 
 
 def kinematics(
@@ -295,7 +295,7 @@ def first_instant(system: System, work: Work, state: State, t: float, elasticity
 def moved_on(
     compiled: CompiledSystem, work: Work, now: Instant, t: float, elasticity: Elasticity, guard: SingularityGuard
 ) -> Instant:
-    """Return the motion at time t, reached from the previous one in parts in which no body rotates far."""
+    """Return the motion at time t, reached from the previous one in parts with limited rotations."""
     model = compiled.model
     begin, done, n = now.t, 0.0, now.n_iterations
     parts = 0

@@ -1,4 +1,4 @@
-"""Inputs and outputs of a linearised system: loads and motions that act on it, and observed columns of sensors."""
+"""Inputs and outputs of a linearised system: loads and motions that act on it, and observed sensor columns."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -33,17 +33,17 @@ __all__ = [
 
 
 class AnyOutput(Protocol):
-    """A sensor, with its measurement over time and its linearisation."""
+    """A sensor that measures over time and can be linearised."""
 
     @property
     def name(self) -> str:
-        """Its name."""
+        """Name of the output."""
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return named columns over time."""
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the same columns as functions of small motions, as far as they are linear."""
+        """Return the same columns as functions of small motions, if they are linear."""
 
 
 AnyInput = Channel | CoordinateChannel | DriveMotion | BaseMotion | ParameterInput | ForceInput
@@ -73,7 +73,7 @@ class Column:
             object.__setattr__(self, "name", f"{self.sensor.name}.{self.column}")
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
-        """Return the column over time."""
+        """Return the values of the column over time."""
         found = self.sensor.measure(system, trajectory)
         self.require(list(found.columns))
         return Measurement(self.name, found.t, {VALUE: found.columns[self.column]}, {VALUE: found.units[self.column]})
@@ -87,7 +87,7 @@ class Column:
         return LinearColumns({VALUE: found.columns[self.column]}, {VALUE: found.units[self.column]}, {})
 
     def require(self, choices: list[str]) -> None:
-        """Raise `ModelError` with the nearest name if the sensor has no such column."""
+        """Raise `ModelError`, with the closest name, if the sensor has no such column."""
         if self.column not in choices:
             raise ModelError(
                 f"sensor {self.sensor.name!r}: no column {quoted(self.column)}{nearest(self.column, choices)}"
@@ -101,12 +101,12 @@ class Observed:
     names: tuple[str, ...]
     units: tuple[str, ...]
     rows: Rows  #: one row for each output
-    values: Array  #: values in the steady motion, (n_outputs,)
-    left_out: dict[str, str]  #: columns that are not linear about it, with the reasons
+    values: Array  #: output values in the steady motion, (n_outputs,)
+    left_out: dict[str, str]  #: columns that are not linear about the steady motion, with the reasons
 
 
 def observed(small: SmallMotions, outputs: Iterable[AnyOutput]) -> Observed:
-    """Return the columns of outputs as functions of small motions; a sensor with one column keeps its own name.
+    """Return output columns as functions of small motions; a sensor with one column gives it the sensor's name.
 
     Raises
     ------
@@ -134,12 +134,12 @@ def observed(small: SmallMotions, outputs: Iterable[AnyOutput]) -> Observed:
 
 
 def inputs_of(carried: Iterable[Named]) -> tuple[AnyInput, ...]:
-    """Return the inputs of a system, for which it stores a general type."""
+    """Return the inputs of a system, which stores them under a general type."""
     return cast(tuple[AnyInput, ...], tuple(carried))
 
 
 def outputs_of(carried: Iterable[Named]) -> tuple[AnyOutput, ...]:
-    """Return the outputs of a system, for which it stores a general type."""
+    """Return the outputs of a system, which stores them under a general type."""
     return cast(tuple[AnyOutput, ...], tuple(carried))
 
 
@@ -155,7 +155,7 @@ def require_input(channel: Any) -> None:
 
 
 def channel_unit(system: System, channel: AnyInput) -> str:
-    """Return the unit of an input."""
+    """Return the unit of an input channel."""
     if isinstance(channel, ForceInput):
         return force_input_unit(system, channel)
     return channel.force_units(system.units)

@@ -29,7 +29,7 @@ from floatframe.results.trajectory import Trajectory
 
 __all__ = ["ForceInput", "force_column", "force_input_unit", "forces_of_amplitude", "forces_with_amplitude"]
 
-#: type of force -> name of its function of time
+#: name of the function of time in each type of force
 WITH_AMPLITUDE = {PointForce: "amplitude", BodyLoad: "amplitude", JointForce: "motor"}
 
 
@@ -37,7 +37,7 @@ WITH_AMPLITUDE = {PointForce: "amplitude", BodyLoad: "amplitude", JointForce: "m
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class ForceInput:
-    """A force of the system as an input: the change of its amplitude, or of the motor of a joint force.
+    """A force of the system as an input: change of its amplitude, or of the motor of a joint force.
 
     For a point force or load case, the input is a factor; for a joint force, it is the force or torque itself.
 
@@ -53,17 +53,17 @@ class ForceInput:
     force: str
 
     def force_units(self, units: Units) -> str:
-        """Return its unit, if it is known without the system."""
+        """Return the unit of the input, if it is known without the system."""
         return "1"
 
 
 def forces_with_amplitude(system: System) -> dict[str, Any]:
-    """Return the forces, by name, whose amplitude or motor can be an input."""
+    """Return, by name, the forces whose amplitude or motor can be an input."""
     return {force.name: force for force in system.forces if isinstance(force, PointForce | BodyLoad | JointForce)}
 
 
 def force_of(system: System, channel: ForceInput) -> Any:
-    """Return the force of the input; `ModelError` with the nearest name if there is none."""
+    """Return the force of the input; `ModelError` suggests the closest name if there is none."""
     known = forces_with_amplitude(system)
     if channel.force not in known:
         names = [force.name for force in system.forces if hasattr(force, "name")]
@@ -86,7 +86,7 @@ def force_input_unit(system: System, channel: ForceInput) -> str:
 
 
 def force_column(small: SmallMotions, channel: ForceInput) -> tuple[Array, Array]:
-    """Return forces on the bodies, (n_u,), and the column in the rows, (n_w,), of the input."""
+    """Return the input's column of body forces, (n_u,), and its column in the rows, (n_w,)."""
     force = force_of(small.system, channel)
     key = WITH_AMPLITUDE[type(force)]
     given = getattr(force, key)
@@ -105,7 +105,7 @@ def force_column(small: SmallMotions, channel: ForceInput) -> tuple[Array, Array
 
 
 def forces_of_amplitude(system: System, now: Trajectory, channel: ForceInput) -> tuple[InputForce, ...]:
-    """Return the loads of the input on interfaces of a flexible body, or that it is a load case of the body."""
+    """Return the input's loads on interfaces of a flexible body, or that it is a load case on the body."""
     force = force_of(system, channel)
     if isinstance(force, BodyLoad):
         return (InputForce(body_name(force.body), "", np.zeros(6), force.load_case),)

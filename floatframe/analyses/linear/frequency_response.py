@@ -21,17 +21,18 @@ if TYPE_CHECKING:
 
 __all__ = ["FrequencyResponse", "frequency_response", "resolved_frequencies"]
 
-AROUND = 12.0  #: range around a resonance with additional points, in half-widths
-POINTS_AROUND = 40  #: even, so that none is at the middle, where an undamped response is infinite
+AROUND = 12.0  #: range with additional frequencies around a resonance, in half-widths of the resonance
+#: even number of additional frequencies, so that none is at the resonance, where an undamped response is infinite
+POINTS_AROUND = 40
 ROUNDING = 1e-12  #: rounding error of a response, relative to the largest amplitude with the same unit
-LEAST_DAMPING = 1e-4  #: least damping used for the width of a resonance, because an undamped one has zero width
+LEAST_DAMPING = 1e-4  #: smallest damping ratio for the width of a resonance, because an undamped one has zero width
 
 
 @presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class FrequencyResponse:
-    """Responses y/s at frequencies.
+    """Frequency responses y/s.
 
     Parameters
     ----------
@@ -60,11 +61,11 @@ class FrequencyResponse:
 
     @property
     def phases(self) -> Array:
-        """Phase of y/s, continuous over the frequency, starting between -180 and 180, same shape [degrees]."""
+        """Phase of y/s, continuous over frequency, initially in -180 to 180, (n_f, n_outputs, n_inputs) [degrees]."""
         return np.degrees(np.unwrap(np.angle(self.values), axis=0))
 
     def plot(self, *, axes: "Sequence[Axes] | None" = None, time_unit: float = 1.0) -> "Figure":
-        """Draw a Bode plot with a curve for each output and input: amplitudes in a panel for each unit, phases below.
+        """Draw a Bode plot with a curve for each output and input: one panel of amplitudes for each unit, phases below.
 
         Parameters
         ----------
@@ -174,7 +175,7 @@ def frequency_response(linear: LinearSystem, frequencies: Array) -> FrequencyRes
 
 
 def resolved_frequencies(linear: LinearSystem, first: float, last: float, *, n: int = 400) -> Array:
-    """Return logarithmically spaced frequencies with additional ones around each resonance in the band, (n_f,).
+    """Return logarithmically spaced frequencies with more of them around each resonance in the band, (n_f,).
 
     Parameters
     ----------

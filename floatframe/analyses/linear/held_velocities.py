@@ -1,4 +1,4 @@
-"""Velocity constraints (rolling without slip) in the equations of small motions.
+"""Velocity constraints (rolling without slip) in the equations for small motions.
 
 With xi = N z, which satisfies the position constraints, the velocity constraints are
 
@@ -25,17 +25,17 @@ from floatframe.errors import ModelError
 __all__ = ["Rolling", "rolled", "rolling"]
 
 RANK = 1e-10  #: singular value of the scaled rows below which a row is redundant
-SAME = 1e-8  #: difference of two velocity constraints, relative to their terms, below which they are the same
+SAME = 1e-8  #: difference of two velocity constraints, relative to their terms, below which they are equal
 
 
 @dataclass(frozen=True, eq=False)
 class Rolling:
-    """The motions that velocity constraints allow."""
+    """The motions that velocity constraints permit."""
 
-    S: Array  #: (n_z, n_y)
-    T: Array  #: (n_z, n_eta)
-    by_y: Array  #: E, (n_eta, n_y)
-    by_eta: Array  #: F, (n_eta, n_eta)
+    S: Array  #: motions by y, (n_z, n_y)
+    T: Array  #: motions by eta, (n_z, n_eta)
+    by_y: Array  #: rates of eta by y: E, (n_eta, n_y)
+    by_eta: Array  #: rates of eta by eta: F, (n_eta, n_eta)
 
     def places(self, n_states: int) -> Array:
         """Return the matrix from (y, eta, states) to (z, states)."""
@@ -43,7 +43,7 @@ class Rolling:
 
 
 def rolling(parts: Tangents, Omega: Array, N: Array, inputs: Inputs) -> Rolling | None:
-    """Return the split of motions N z by velocity constraints; None if there are none.
+    """Return how velocity constraints split the motions N z; None if there are no such constraints.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def rolling(parts: Tangents, Omega: Array, N: Array, inputs: Inputs) -> Rolling 
 
 
 def rolled(parts: dict[str, Array], roll: Rolling, n_states: int) -> dict[str, Array]:
-    """Return matrices over (y, eta, states) from those over (z, states), see the module."""
+    """Return matrices for (y, eta, states) from matrices for (z, states), see the module docstring."""
     one, zero = np.eye(n_states), np.zeros
     n_z, n_y = roll.S.shape
     n_eta = roll.T.shape[1]
@@ -104,7 +104,7 @@ def rolled(parts: dict[str, Array], roll: Rolling, n_states: int) -> dict[str, A
         return second @ A_2, second @ C_2 + first @ A_1, second @ B_2 + first @ B_1 + zeroth @ A_0
 
     def with_eta(rows: Array, own: Array) -> Array:
-        """Return rows of y and states with those of eta between them."""
+        """Return rows of y and states with rows of eta between them."""
         return np.vstack([rows[:n_y], own, rows[n_y:]])
 
     M, C, K = by_x(*(left @ parts[name] for name in "MCK"))

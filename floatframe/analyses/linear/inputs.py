@@ -1,4 +1,4 @@
-"""Inputs of a linearised system: forces along channels, motions of drives and bases, parameters of user forces.
+"""Inputs of a linearised system: forces along channels, motions of drives and bases, user force parameters.
 
 With the value s of the input, each type enters the equations of `system_matrices` in its own way:
 
@@ -52,7 +52,7 @@ __all__ = [
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class DriveMotion:
-    """The prescribed motion of a joint coordinate as an input: its change about the steady value, or its rates.
+    """The prescribed motion of a joint coordinate as an input: its change from the steady value, or its rates.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class DriveMotion:
         require_input_rate(f"input {self.name!r}", self.rate)
 
     def force_units(self, units: Units) -> str:
-        """Return its unit."""
+        """Return the unit of the input."""
         return rate_unit(units, self.coordinate.startswith("angle"), self.rate)
 
 
@@ -83,7 +83,7 @@ class DriveMotion:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class BaseMotion:
-    """A motion of the base of a system, the ground side of its joints, springs and bushings.
+    """A motion of the base: of the ground side of joints, springs and bushings.
 
     Several bases are several inputs, each with its `joints`; coordinates of these joints in couplers and user forces
     are included. All other parts of the ground stay at rest: gravity, and the reference of sensors.
@@ -122,7 +122,7 @@ class BaseMotion:
         require_input_rate(where, self.rate)
 
     def force_units(self, units: Units) -> str:
-        """Return its unit."""
+        """Return the unit of the input."""
         return rate_unit(units, self.quantity == "rotation", self.rate)
 
 
@@ -130,7 +130,7 @@ class BaseMotion:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class ParameterInput:
-    """A parameter of the expressions of a user force as an input: its change about its value.
+    """A parameter of a user force's expressions as an input: its change from its present value.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ class ParameterInput:
     parameter: str
 
     def force_units(self, units: Units) -> str:
-        """Return its unit, that of the parameter, which is unknown."""
+        """Return the unit of the input, which is unknown for a parameter."""
         return "1"
 
 
@@ -158,17 +158,17 @@ def require_input_rate(where: str, rate: int) -> None:
 
 
 def input_rate(channel: Any) -> int:
-    """Return the order of the derivative that is the input; 0 for forces."""
+    """Return which derivative of a motion is the input; 0 for forces."""
     return channel.rate if isinstance(channel, DriveMotion | BaseMotion) else 0
 
 
 def base_columns(system: System, inputs: Sequence[Any]) -> tuple[BaseColumn, ...]:
-    """Return the motion of the ground for each input: of some connections, or none."""
+    """Return, for each input, the motion of the ground at some connections, or none."""
     return tuple(base_column(system, each) if isinstance(each, BaseMotion) else BaseColumn() for each in inputs)
 
 
 def interface_forces(system: System, now: Trajectory, inputs: Sequence[Any]) -> tuple[tuple[InputForce, ...], ...]:
-    """Return the loads of each input on interfaces of flexible bodies, in a steady motion."""
+    """Return the loads of each input on interfaces of flexible bodies in a steady motion."""
     found = []
     for channel in inputs:
         if isinstance(channel, ForceInput):
@@ -186,7 +186,7 @@ def interface_forces(system: System, now: Trajectory, inputs: Sequence[Any]) -> 
 
 
 def base_column(system: System, base: BaseMotion) -> BaseColumn:
-    """Return the motion of a base; `ModelError` if it refers to an object that is not on the ground, or to none."""
+    """Return the motion of a base; `ModelError` if it names an object that is not on the ground, or none."""
     compiled = compiled_system(system)
     model, names = compiled.model, compiled.connection_names
     on_ground = {
@@ -219,7 +219,7 @@ def input_columns(small: SmallMotions, channels: Sequence[Any]) -> Inputs:
 
 
 def column_of(small: SmallMotions, k: int, channel: Any) -> tuple[Array, Array, Array]:
-    """Return the column of input k: body forces, (n_u,), and columns of input and its rate in the rows, (n_w,)."""
+    """Return the column of input k: body forces, (n_u,), and row columns for input and rate, (n_w,)."""
     F, E, E_rate = np.zeros(small.n_u), np.zeros(small.n_w), np.zeros(small.n_w)
     if isinstance(channel, DriveMotion):
         E = drive_rows(small, channel)
@@ -237,7 +237,7 @@ def column_of(small: SmallMotions, k: int, channel: Any) -> tuple[Array, Array, 
 
 
 def free_row(small: SmallMotions, channel: CoordinateChannel) -> int | None:
-    """Return the row of the force along a free coordinate, force + Q = 0; None if there is none, as in screws.
+    """Return the force row of a free coordinate, force + Q = 0; None if there is none, as in screws.
 
     A force in this row is an internal force of the joint, like that of a `JointForce`.
     """
@@ -250,7 +250,7 @@ def free_row(small: SmallMotions, channel: CoordinateChannel) -> int | None:
 
 
 def drive_rows(small: SmallMotions, drive: DriveMotion) -> Array:
-    """Return the rates of rows at rest while one drive moves at unit rate and all others are at rest, (n_w,)."""
+    """Return row rates while one drive moves at unit rate and everything else is at rest, (n_w,)."""
     from floatframe.engine.kernels.entry import rates_of_constraints
 
     system = small.system
@@ -282,7 +282,7 @@ def drive_rows(small: SmallMotions, drive: DriveMotion) -> Array:
 
 
 def base_rows(small: SmallMotions, base: BaseColumn, channel: BaseMotion) -> tuple[Array, Array]:
-    """Return E and E' of a base from the rows by its markers, P of joints/rows/kinds.py."""
+    """Return E and E' of a base from the rows' derivatives P by its markers (joints/rows/kinds.py)."""
     from floatframe.engine.kernels.entry import evaluate_and_linearize
 
     if small.is_turning:
@@ -311,7 +311,7 @@ def base_rows(small: SmallMotions, base: BaseColumn, channel: BaseMotion) -> tup
 
 
 def moved_markers(small: SmallMotions, base: BaseColumn) -> list[int]:
-    """Return the markers on the ground that a base moves; coordinates of joints in couplers move with their joints."""
+    """Return the ground markers that a base moves; coordinates of joints in couplers move with their joints."""
     model, names = small.compiled.model, small.compiled.connection_names
     owners = [names[c] if c >= 0 else "" for c in model.markers.connection]
     user_forces = [force for force in small.system.forces if isinstance(force, UserForce)]
@@ -324,7 +324,7 @@ def moved_markers(small: SmallMotions, base: BaseColumn) -> list[int]:
 
 
 def parameter_rows(small: SmallMotions, channel: ParameterInput) -> Array:
-    """Return -∂f/∂p in the rows of a user force, (n_w,), from the derivative by a state that replaces p."""
+    """Return -∂f/∂p in the rows of a user force, (n_w,), by differentiation with a state in place of p."""
     forces = [force for force in small.system.forces if isinstance(force, UserForce)]
     names = [force.name for force in forces]
     if channel.force not in names:

@@ -1,4 +1,4 @@
-"""Linearisation of a system about an equilibrium or a steady motion, in coordinates that satisfy the joints.
+"""Linearisation of a system about an equilibrium or steady motion, in coordinates that satisfy the joints.
 
 With N a basis of the motions allowed by the joints (G N = 0), and the matrices of `tangents`:
 
@@ -70,10 +70,10 @@ if TYPE_CHECKING:
 __all__ = ["LinearSystem", "NamedMotions", "linearize"]
 
 RANK = 1e-10  #: singular value of the scaled rows below which a row is redundant
-NOISE = 1e-10  #: relative to the largest component of a motion; smaller ones are rounding errors
-#: motion of a joint, by that of bodies that move as far as the farthest, below which it is a state of last choice
+NOISE = 1e-10  #: component, relative to the largest component of a motion, below which it is a rounding error
+#: joint motion, relative to the largest motion of a body, below which the joint coordinate is a state of last choice
 FAINT = 1e-6
-#: largest distance of a state from rest, or its change per unit of time, relative to its size, in a steady motion
+#: largest distance of an element state from rest, or change per unit of time, relative to its size, in a steady motion
 STEADY = 1e-6
 TINY = float(np.finfo(float).tiny)
 MASSLESS = 1e-12  #: eigenvalue of the scaled mass matrix below which a motion has no mass
@@ -81,18 +81,18 @@ MASSLESS = 1e-12  #: eigenvalue of the scaled mass matrix below which a motion h
 
 @dataclass(frozen=True, eq=False)
 class NamedMotions:
-    """Motions with names, as rows over the independent motions z."""
+    """Named motions, as rows for the independent motions z."""
 
     names: tuple[str, ...]
     units: tuple[str, ...]
-    rows: Array  #: (n_names, n_z)
-    #: joint coordinates 0, modal coordinates 1, motions of body frames 2, joint coordinates that hardly move 3
+    rows: Array  #: coefficients of the named motions, (n_names, n_z)
+    #: kind: 0 joint coordinates, 1 modal coordinates, 2 body frame motions, 3 joint coordinates that hardly move
     ranks: tuple[int, ...]
     time_unit: str
 
 
 def empty() -> Array:
-    """Return the placeholder of a matrix of zeros whose size is not yet known."""
+    """Return a placeholder for a zero matrix whose size is not yet known."""
     return np.zeros((0, 0))
 
 
@@ -100,7 +100,7 @@ def empty() -> Array:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class LinearSystem:
-    """Small motions z about a steady motion, with n_s inputs s, and outputs y.
+    """Linear equations for small motions z about a steady motion, with n_s inputs s and outputs y.
 
     M z'' + C z' + K z = B s + B_rate s' + B_acceleration s''
     y = L z + L_rate z' + L_acceleration z'' + D s + D_rate s' + D_acceleration s''
@@ -194,18 +194,18 @@ class LinearSystem:
 
     @property
     def n_z(self) -> int:
-        """Number of independent motions (the mobility, including modes of flexible bodies), without states."""
+        """Number of independent motions (mobility including modes), without states."""
         return int(self.M.shape[0]) - len(self.states)
 
     def bodies(self) -> Iterator[tuple[slice, Array]]:
-        """Yield the rows of N and the mass matrix of each body."""
+        """Yield the rows of N and the mass matrix for each body."""
         first = 0
         for mass in self.body_masses:
             yield slice(first, first + len(mass)), mass
             first += len(mass)
 
     def with_mass(self) -> tuple["LinearSystem", Array]:
-        """Return the system without its massless motions, which follow the others statically, and z per its motions.
+        """Return the system without massless motions, which follow the others statically, and z by its motions.
 
         The direct effect of inputs on outputs through these motions is added to D, D_rate and D_acceleration. Third
         rates of inputs, and damping along massless motions, are neglected.
@@ -228,7 +228,7 @@ class LinearSystem:
         return replace(self, **parts, Y=self.Y + self.N @ by_input[0], motions=motions, coordinates=()), T
 
     def motions_with_and_without_mass(self) -> tuple[Array, Array]:
-        """Return bases of z: motions with mass (orthonormal with respect to it) with states, and massless motions."""
+        """Return bases of z: motions with mass (orthonormal in mass) and states, then massless motions."""
         n, n_states = self.n_z, len(self.states)
         dynamic, static = massive_and_massless(self.M[:n, :n])
         return la.block_diag(dynamic, np.eye(n_states)), np.pad(static, ((0, n_states), (0, 0)))
@@ -242,16 +242,16 @@ class LinearSystem:
         return np.asarray(self.state_space().D)
 
     def kept_inputs(self) -> list[tuple[int, int]]:
-        """Return (input, r) for each derivative of s that a state space needs as a state, with its input."""
+        """Return (input, r) for each derivative of s that a state space needs as a state."""
         return [(k, r) for k, rate in enumerate(self.input_rates) for r in range(rate) if self.sees_input(k, rate - 1)]
 
     def sees_input(self, k: int, most: int) -> bool:
-        """Return whether the equations depend on a derivative of s of input k up to order `most`; False below zero."""
+        """Return whether the equations contain a derivative of input k of order 0 to `most`; False if most < 0."""
         parts = [(self.B, self.D), (self.B_rate, self.D_rate), (self.B_acceleration, self.D_acceleration)]
         return any(part[:, k].any() for pair in parts[: most + 1] for part in pair)
 
     def state_space(self) -> "StateSpace":
-        """Return A, B, C, D over (z, z_dot) of the motions with mass, then the states, as `scipy.signal.StateSpace`.
+        """Return A, B, C, D for z and z_dot of motions with mass, then element states, as `scipy.signal.StateSpace`.
 
         An input that is a velocity or acceleration adds its integrals as states (see `kept_inputs`), if the equations
         depend on them.
@@ -299,7 +299,7 @@ class LinearSystem:
         return StateSpace(A, B, C, D)
 
     def require_states(self) -> None:
-        """Raise `ModelError` if the equations would require a derivative of a motion that is an input."""
+        """Raise `ModelError` if the equations need a derivative of a prescribed motion that is an input."""
         for k, rate in enumerate(self.input_rates):
             above = (self.B_rate, self.B_acceleration)[rate:] if rate < 2 else ()
             is_force = rate == 0 and not self.Y[:, k].any()
@@ -311,7 +311,7 @@ class LinearSystem:
                 )
 
     def response(self, frequencies: Array) -> Array:
-        """Return the frequency response y/s at frequencies [Hz], (n_frequencies, n_outputs, n_inputs), complex.
+        """Return the complex frequency response y/s, (n_frequencies, n_outputs, n_inputs), at frequencies [Hz].
 
         At frequency zero, a constant velocity or acceleration has an unlimited displacement; the response is infinite
         if an output depends on it.
@@ -336,7 +336,7 @@ class LinearSystem:
         return H
 
     def response_at_rest(self) -> Array:
-        """Return the response at frequency zero if inputs are rates: the coefficient of s^r in the series of y."""
+        """Return the response at frequency zero for rate inputs: the coefficient of s^r in the series of y."""
         by_order: list[Array] = []
         z: list[Array] = []
         for order, (B, D) in enumerate(zip((self.B, self.B_rate, self.B_acceleration),
@@ -371,7 +371,7 @@ def linearize(
     outputs: Sequence[AnyOutput] | None = None,
     formulation: str = "absolute",
 ) -> LinearSystem:
-    """Linearise a system about an equilibrium, a steady rotation or steady running.
+    """Linearise a system about an equilibrium, a steady rotation or a steady running motion.
 
     Parameters
     ----------
@@ -482,19 +482,19 @@ def linearize(
 
 @dataclass(frozen=True, eq=False)
 class NamedStates:
-    """States of elements and user forces in their order."""
+    """States of elements and user forces in order."""
 
     names: tuple[str, ...]
     units: tuple[str, ...]
 
     def behind(self, roll: Rolling, unit: str) -> "NamedStates":
-        """Return these states after the displacements along velocity constraints (`eta` of `held_velocities`)."""
+        """Return these states preceded by displacements along velocity constraints (`eta` of `held_velocities`)."""
         n = len(roll.by_eta)
         return NamedStates((*(f"rolled way {k + 1}" for k in range(n)), *self.names), (*(unit,) * n, *self.units))
 
 
 def require_slow_states(compiled: CompiledSystem) -> None:
-    """Raise `ModelError` if rates of states of an element may depend on accelerations, which would change M."""
+    """Raise `ModelError` if rates of element states may depend on accelerations, which would change M."""
     for each in compiled.laws:
         if each.law.accelerations and each.law.states:
             raise ModelError(
@@ -504,7 +504,7 @@ def require_slow_states(compiled: CompiledSystem) -> None:
 
 
 def states_of(system: System, compiled: CompiledSystem, work: Work, parts: Tangents) -> NamedStates:
-    """Return the states of user forces and elements; `ModelError` if one of them is not at rest."""
+    """Return the states of user forces and elements; `ModelError` if a state is not at rest."""
     found = [
         (f"{force.name}.{name}", "") for force in system.forces if isinstance(force, UserForce) for name in force.states
     ]
@@ -523,14 +523,14 @@ def states_of(system: System, compiled: CompiledSystem, work: Work, parts: Tange
 
 
 def rates_of_states(small: SmallMotions, parts: Tangents, Omega: Array) -> Rows:
-    """Return the rates of states as functions of small motions."""
+    """Return rates of states as linear functions of small motions."""
     by_place, by_rate, by_wrench = parts.rates_of_states(Omega)
     rows = small.by_motion(by_place)
     return Rows(rows.x, small.by_motion(by_rate).x, rows.a, by_wrench)
 
 
 def with_states(parts: dict[str, Array], n_states: int) -> dict[str, Array]:
-    """Return the matrices over motions and states.
+    """Return the matrices extended from motions to motions and states.
 
     The given matrices have the states as their last inputs, and the rates of the states, L z + L_rate z' +
     L_acceleration z'' + D s, as their last outputs.
@@ -556,7 +556,7 @@ def with_states(parts: dict[str, Array], n_states: int) -> dict[str, Array]:
 def motions_of_inputs(
     small: SmallMotions, parts: Tangents, by_inputs: Inputs, N: Array, K_z: Array, D_0: Array, moves: NDArray[np.bool_]
 ) -> tuple[Array, Array]:
-    """Return Y and the magnitudes of its terms, (n_u, n_s): G Y + E = 0, without force along motions that K_z resists.
+    """Return Y with G Y + E = 0 and the sizes of its terms, (n_u, n_s), without force along motions that K_z resists.
 
     Y begins as a rigid motion if a base carries the whole system, and otherwise as the smallest solution of
     G Y + E = 0. A motion allowed by the joints is then added, which removes the forces.
@@ -591,7 +591,7 @@ def motions_of_inputs(
 
 
 def without_rounding(N: Array, force: Array, D: Array, Y: Array, size: Array) -> Array:
-    """Return Nᵀ (force - D Y), with zeros for entries that are rounding errors of cancelled terms.
+    """Return Nᵀ (force - D Y) with entries set to zero that are rounding errors of cancelled terms.
 
     Parameters
     ----------
@@ -604,7 +604,7 @@ def without_rounding(N: Array, force: Array, D: Array, Y: Array, size: Array) ->
 def named_motions(
     system: System, by_bodies: Array, of_joints: dict[str, Array], N: Array, n_states: int
 ) -> NamedMotions:
-    """Return the moving joint coordinates, the modal coordinates, and the motions of body frames, as rows over z."""
+    """Return moving joint coordinates, modal coordinates and body frame motions as rows for z."""
     length, found = system.units.length_symbol, []
     sizes = compiled_system(system).motion_lengths
     N, by_bodies = without_noise(N, sizes), without_noise(by_bodies, sizes)
@@ -628,13 +628,13 @@ def named_motions(
 
 
 def modes_among_motions(system: System) -> NDArray[np.bool_]:
-    """Return which of the motions of the bodies are modal coordinates, (n_u,)."""
+    """Return which unknowns of the bodies are modal coordinates, (n_u,)."""
     u0 = compiled_system(system).model.bodies.u0
     return np.concatenate([np.arange(size) >= 6 for size in np.diff(u0)])
 
 
 def without_noise(motions: Array, sizes: Array) -> Array:
-    """Return motions of bodies over z, with zeros for rounding errors.
+    """Return body motions as functions of z, with rounding errors set to zero.
 
     An entry is a rounding error if it is small compared with the largest entry of its column, both taken as lengths.
     """
@@ -643,13 +643,13 @@ def without_noise(motions: Array, sizes: Array) -> Array:
 
 
 def seen_from(T: Array, mass: Array) -> Array:
-    """Return the mass matrix over T x, from the mass matrix over x."""
+    """Return the mass matrix for coordinates T x from the mass matrix for x."""
     by_x = np.linalg.inv(T)
     return np.asarray(by_x.T @ mass @ by_x)
 
 
 def massive_and_massless(M: Array) -> tuple[Array, Array]:
-    """Return bases of the motions with mass, (n, n_massive), and without, (n, n_massless), of a mass matrix (n, n)."""
+    """Return bases of motions with mass, (n, n_massive), and without, (n, n_massless), for a mass matrix, (n, n)."""
     scale = 1 / np.sqrt(np.maximum(np.diag(M), np.finfo(float).tiny))
     values, vectors = la.eigh(scale[:, None] * M * scale)
     is_massive = values > MASSLESS
@@ -660,7 +660,7 @@ def massive_and_massless(M: Array) -> tuple[Array, Array]:
 
 
 def allowed_motions(system: System, G: Array) -> Array:
-    """Return a basis of the null space of G, (n_u, n_z), one column for each motion of a body that stays independent.
+    """Return a basis of the null space of G, (n_u, n_z), with one column for each motion that stays independent.
 
     Some motions d follow the others i, N_i = 1 and N_d = -G_d⁺ G_i. Bodies depend before modes do, so that stiff modes
     have columns of their own: in a mixed basis, the rounding of a stiffness of 1e10 hides motions of a few hertz.

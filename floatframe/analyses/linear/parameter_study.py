@@ -1,4 +1,4 @@
-"""System modes as functions of a parameter (root locus, Campbell diagram), tracked by their shapes."""
+"""System modes as functions of a parameter (root locus, Campbell diagram); modes are tracked by their shapes."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -24,13 +24,13 @@ from floatframe.model.system import System
 
 __all__ = ["Locus", "campbell", "root_locus"]
 
-LIKE = 0.5  #: smallest squared cosine between the shapes of one mode at neighbouring values
-SAME = 1e-2  #: relative difference below which eigenvalues count as equal, so that their shapes mix
-CLOSE = 0.1  #: weight of the distance between eigenvalues, relative to the distance between shapes
-ALIKE = 0.25  #: difference between the distances of shapes below which eigenvalues decide which mode continues which
-CLEAR = 0.5  #: largest change of eigenvalues for which they decide, relative to that of the other choice
-ROUNDING = float(np.sqrt(np.finfo(float).eps))  #: error of a double eigenvalue, relative to the largest eigenvalue
-MOST_HALVINGS = 3  #: largest number of halvings of a step between values in which a mode is lost
+LIKE = 0.5  #: smallest squared cosine between the shapes of the same mode at neighbouring parameter values
+SAME = 1e-2  #: relative difference of eigenvalues below which they count as equal, so that their shapes mix
+CLOSE = 0.1  #: weight of the distance between eigenvalues, relative to the weight of the distance between shapes
+ALIKE = 0.25  #: difference of shape distances below which eigenvalues decide how modes continue
+CLEAR = 0.5  #: largest change of eigenvalues by which they decide, relative to the change for the other choice
+ROUNDING = float(np.sqrt(np.finfo(float).eps))  #: relative error of a double eigenvalue
+MOST_HALVINGS = 3  #: largest number of times that a parameter step is halved if a mode is lost
 
 
 @presented
@@ -141,31 +141,31 @@ def root_locus(
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """Modes at one value of the parameter.
+    """Modes at one parameter value.
 
     Shapes are scaled so that their squared length is the kinetic energy; states are appended with their largest share.
     """
 
     eigenvalues: Array
-    shapes: Array  #: shapes of length one, (n_u + n_states, n_modes)
+    shapes: Array  #: mode shapes of unit length, (n_u + n_states, n_modes)
     has_states: bool
 
 
 @dataclass(eq=False)
 class Branch:
-    """A followed mode at the last value at which it was found."""
+    """A tracked mode at the last parameter value at which it was found."""
 
     modes: Modes
     number: int
-    at: float | None = None  #: last value of the parameter at which the mode was found
-    is_conjugate: bool = False  #: whether the followed mode is the conjugate, with a frequency below zero
-    shape: Array = field(init=False)  #: shape of length one, separated from other modes with the same eigenvalue
+    at: float | None = None  #: last parameter value at which the mode was found
+    is_conjugate: bool = False  #: whether the tracked mode is the conjugate, with negative frequency
+    shape: Array = field(init=False)  #: shape of unit length, separated from other modes with the same eigenvalue
 
     def __post_init__(self) -> None:
         self.shape = self.modes.shapes[:, self.number]
 
     def meet(self, modes: Modes, number: int, is_conjugate: bool, value: float) -> None:
-        """Continue with a mode at a value; if several modes have its eigenvalue, project the last shape onto them."""
+        """Continue with a mode at a value; the last shape is projected onto all modes with its eigenvalue."""
         Q, own = of_same(modes, number), modes.shapes[:, number]
         if is_conjugate:
             Q, own = Q.conj(), own.conj()
@@ -176,17 +176,17 @@ class Branch:
 
     @property
     def eigenvalue(self) -> complex:
-        """The eigenvalue at the last value, with a frequency of at least zero."""
+        """The eigenvalue at the last value, with non-negative frequency."""
         return complex(self.modes.eigenvalues[self.number])
 
     @property
     def followed_eigenvalue(self) -> complex:
-        """The eigenvalue of the followed mode, whose frequency may be below zero."""
+        """The eigenvalue of the tracked mode, whose frequency may be negative."""
         return self.eigenvalue.conjugate() if self.is_conjugate else self.eigenvalue
 
     @property
     def space(self) -> Array:
-        """Orthonormal basis of the shapes with the same eigenvalue."""
+        """Orthonormal basis of all shapes with the same eigenvalue."""
         Q = of_same(self.modes, self.number)
         return Q.conj() if self.is_conjugate else Q
 
@@ -204,7 +204,7 @@ def modes_at(linear: LinearSystem) -> Modes:
 
 
 def root_of(mass: Array) -> Array:
-    """Return a square root of the mass matrix of a body, which changes continuously with the matrix.
+    """Return a square root of a body's mass matrix that depends continuously on the matrix.
 
     It is the symmetric one for motions of mass 1: in units of translations, rotations and modes, the eigenvalues of the
     matrix lie too far apart for a small or large body.
@@ -218,7 +218,7 @@ def root_of(mass: Array) -> Array:
 def follow(
     build: Callable[[float], LinearSystem], followed: list[Branch], before: float, value: float, n_halvings: int
 ) -> Modes:
-    """Follow branches to a value, in two half steps if one is lost; return all modes at the value."""
+    """Track branches to a parameter value, in two half steps if one is lost; return all modes at the value."""
     now = modes_at(build(value))
     pairs = matches(followed, now, before)
     if n_halvings and len(pairs) < sum(branch.at in (None, before) for branch in followed):
@@ -234,7 +234,7 @@ def follow(
 
 
 def matches(followed: list[Branch], now: Modes, before: float) -> list[tuple[Branch, int, bool]]:
-    """Return branches found at the last value, their modes at this value, and whether these are conjugate.
+    """Return branches present at the last value, their modes at this value, and whether these are conjugates.
 
     A branch may continue in a mode, or in its conjugate, if more than half of the mode's shape lies in the shape of the
     branch, or in the space of all shapes with the same eigenvalue. Shapes mix where eigenvalues cross or are double, as
@@ -260,16 +260,16 @@ def matches(followed: list[Branch], now: Modes, before: float) -> list[tuple[Bra
 
 
 class Distances(NamedTuple):
-    """How well each mode continues each branch, all (n_branches, n_modes)."""
+    """Measures of how well each mode continues each branch, all (n_branches, n_modes)."""
 
-    like: Array  #: part of the shape that lies in the space of the other
+    like: Array  #: squared projection of the shape on the space of the other
     shapes: Array  #: distance between shapes, 0 to 1
     values: Array  #: distance between eigenvalues, 0 to 1
-    apart: Array  #: weighted sum of both distances
+    apart: Array  #: weighted sum of the distances of shapes and eigenvalues
 
 
 def distances(alive: list[Branch], now: Modes, *, is_conjugate: bool) -> Distances:
-    """Return distances of branches from modes, or from the conjugates of modes."""
+    """Return distances between branches and modes, or between branches and conjugates of modes."""
     modes = replace(now, eigenvalues=now.eigenvalues.conj(), shapes=now.shapes.conj()) if is_conjugate else now
     last = np.array([branch.followed_eigenvalue for branch in alive])
     own = np.stack([branch.shape for branch in alive], axis=1)
@@ -283,7 +283,7 @@ def distances(alive: list[Branch], now: Modes, *, is_conjugate: bool) -> Distanc
 
 
 def undecided(like: Array, shapes: Array, last: Array, values: Array) -> Array:
-    """Return which joined pairs of branch and mode could as well be joined otherwise, (n_pairs,).
+    """Return which assigned pairs of branch and mode could be assigned otherwise just as well, (n_pairs,).
 
     Two pairs could be exchanged if their shapes are alike, their eigenvalues differ, and the eigenvalues that belong
     together are not clearly closer to each other than to the others. `values`: the eigenvalue of the mode of pair k, or
@@ -299,25 +299,25 @@ def undecided(like: Array, shapes: Array, last: Array, values: Array) -> Array:
 
 
 def differ(eigenvalues: Array, others: Array) -> np.ndarray:
-    """Return whether eigenvalues are not equal to others within their accuracy, (n, n_others)."""
+    """Return whether eigenvalues differ from others by more than their accuracy, (n, n_others)."""
     size = np.abs(eigenvalues)[:, None] + np.abs(others)
     return np.asarray(np.abs(eigenvalues[:, None] - others) > SAME * size + ROUNDING * size.max(initial=0.0))
 
 
 def of_same(modes: Modes, number: int) -> Array:
-    """Return an orthonormal basis of the shapes with the same eigenvalue as a mode."""
+    """Return an orthonormal basis of all shapes with the same eigenvalue as a mode."""
     own, size = modes.eigenvalues[number], np.abs(modes.eigenvalues)
     Q, _ = np.linalg.qr(modes.shapes[:, np.abs(modes.eigenvalues - own) <= SAME * abs(own) + ROUNDING * size.max()])
     return np.asarray(Q)
 
 
 def part_within(Q: Array, shapes: Array) -> Array:
-    """Return the squared length of the projection of each shape onto a basis, (n,)."""
+    """Return the squared length of each shape's projection onto a basis, (n,)."""
     return np.asarray((np.abs(Q.conj().T @ shapes) ** 2).sum(axis=0))
 
 
 def far(eigenvalues: Array, others: Array) -> Array:
-    """Return the distances between eigenvalues and others, relative to their magnitudes, 0 to 1, (n, n_others)."""
+    """Return distances between eigenvalues and others, 0 to 1, relative to their sizes, (n, n_others)."""
     a, b = eigenvalues[:, None], others[None]
     size = np.abs(a) + np.abs(b)
     return np.asarray(np.divide(np.abs(a - b), size, out=np.zeros(size.shape), where=size > 0))
@@ -333,7 +333,7 @@ def campbell(
     outputs: Sequence[AnyOutput] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Locus:
-    """Return frequencies and damping of a steadily rotating system over its speed, in the rotating frame.
+    """Return frequencies and damping of a steadily rotating system as functions of its speed, in the rotating frame.
 
     Parameters
     ----------
@@ -376,7 +376,7 @@ def campbell(
 
 
 def steady_values(system: System, about: Equilibrium, outputs: Sequence[AnyOutput]) -> dict[str, tuple[float, str]]:
-    """Return value and unit of every column of outputs in a steady motion; a sensor with one column keeps its own name.
+    """Return value and unit of every output column in a steady motion; a single column has the sensor's name.
 
     Raises
     ------

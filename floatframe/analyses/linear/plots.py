@@ -17,7 +17,7 @@ ROUNDING = 1e-12  #: rounding error of a response, relative to the largest ampli
 
 
 def plot_campbell(locus: Locus, ax: "Axes | None" = None, *, time_unit: float = 1.0) -> "Axes":
-    """Plot frequencies over the speed, with lines for the first three orders of the speed of rotation.
+    """Plot frequencies over rotation speed, with lines for the first three multiples of the speed.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def plot_campbell(locus: Locus, ax: "Axes | None" = None, *, time_unit: float = 
 
 
 def campbell_figure(locus: Locus, *, time_unit: float = 1.0) -> "Figure":
-    """Return the Campbell diagram, with the steady values of outputs below it in one panel for each unit.
+    """Return the Campbell diagram with steady output values below it, one panel for each unit.
 
     An output is not drawn but listed if it is zero at all speeds, compared with the largest output of the same unit.
 
@@ -91,7 +91,7 @@ def campbell_figure(locus: Locus, *, time_unit: float = 1.0) -> "Figure":
 
 
 def plot_root_locus(locus: Locus, ax: "Axes | None" = None) -> "Axes":
-    """Plot eigenvalues in the complex plane, coloured by the parameter."""
+    """Plot eigenvalues in the complex plane, coloured by parameter value."""
     ax = _axes() if ax is None else ax
     for column in locus.eigenvalues.T:
         ax.plot(column.real, column.imag, color="0.75", linewidth=1, zorder=1)

@@ -1,4 +1,4 @@
-"""The state space of a linearised system with named states: joint coordinates, modes, motions of bodies.
+"""The state space of a linearised system with named states: joint coordinates, modes, body motions.
 
 The states are x = R z and their rates, where R is a square matrix whose rows are named motions. With T = diag(R, R),
 they follow from the state space over (z, z_dot) of `LinearSystem.state_space`:
@@ -29,15 +29,15 @@ if TYPE_CHECKING:
 
 __all__ = ["WRITERS", "NamedStateSpace", "named_state_space", "write_state_space"]
 
-CLEAR = 0.02  #: smallest independent part of a motion that makes a well conditioned state
-NEW = 1e-9  #: smallest independent part that is not a rounding error, used if no motion reaches `CLEAR`
+CLEAR = 0.02  #: smallest independent part of a motion for a well-conditioned state
+NEW = 1e-9  #: independent part above rounding errors, used if no motion reaches `CLEAR`
 
 
 @presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class NamedStateSpace:
-    """A state space x_dot = A x + B u,  y = C x + D u, with the name and unit of each state, input and output.
+    """State space x_dot = A x + B u, y = C x + D u, with name and unit of each state, input and output.
 
     Parameters
     ----------
@@ -159,14 +159,14 @@ def named_state_space(linear: LinearSystem) -> NamedStateSpace:
 
 
 def kept_name(linear: LinearSystem, k: int, r: int, time_unit: str) -> tuple[str, str]:
-    """Return name and unit of the state that is an integral of input k: s itself or s'."""
+    """Return name and unit of a state that is an integral of input k: s or s'."""
     per_time = ("", f"/{time_unit}", f"/{time_unit}²")
     of_s = linear.input_units[k].removesuffix(per_time[linear.input_rates[k]])
     return f"{linear.inputs[k]} {('displacement', 'velocity')[r]}", of_s + per_time[r]
 
 
 def independent_rows(rows: Array, M: Array, motions: NamedMotions) -> list[int]:
-    """Return the indices of the rows that become states, in their order: step (2) of `named_state_space`."""
+    """Return the ordered indices of rows that become states, step (2) of `named_state_space`."""
     n = rows.shape[1]
     scaled = la.solve_triangular(la.cholesky(M, lower=True), rows.T, lower=True).T
     size = np.linalg.norm(scaled, axis=1)
@@ -190,7 +190,7 @@ def independent_rows(rows: Array, M: Array, motions: NamedMotions) -> list[int]:
 
 
 def write_state_space(linear: LinearSystem, path: Path) -> NamedStateSpace:
-    """Write A, B, C, D with names and units, and M, C, K over z, to a file.
+    """Write A, B, C, D with names and units, and M, C, K for z, to a file.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def write_state_space(linear: LinearSystem, path: Path) -> NamedStateSpace:
 
 
 def npz_bytes(arrays: dict[str, Any], words: dict[str, Any]) -> bytes:
-    """Return the bytes of an .npz file."""
+    """Return the content of an .npz file."""
     data = io.BytesIO()
     named: dict[str, Any] = {name: np.array(texts, dtype=str) for name, texts in words.items()}
     np.savez(data, **arrays, **named)
@@ -228,7 +228,7 @@ def npz_bytes(arrays: dict[str, Any], words: dict[str, Any]) -> bytes:
 
 
 def mat_bytes(arrays: dict[str, Any], words: dict[str, Any]) -> bytes:
-    """Return the bytes of a .mat file (MATLAB 5): matrices, and cell arrays of texts."""
+    """Return the content of a .mat file (MATLAB 5), with matrices and cell arrays of texts."""
     from scipy.io import savemat
 
     cells = {name: np.array([*texts, ""], dtype=object)[:-1] for name, texts in words.items()}
@@ -238,7 +238,7 @@ def mat_bytes(arrays: dict[str, Any], words: dict[str, Any]) -> bytes:
 
 
 def h5_bytes(arrays: dict[str, Any], words: dict[str, Any]) -> bytes:
-    """Return the bytes of an HDF5 file: matrices as datasets, names and units as attributes of the root."""
+    """Return the content of an HDF5 file, with matrices as datasets and names and units as root attributes."""
     import h5py
 
     data = io.BytesIO()

@@ -1,4 +1,4 @@
-"""Vibration modes of a whole system: complex eigenvalues, frequencies, damping ratios and shapes."""
+"""Vibration modes of the whole system: complex eigenvalues, frequencies, damping ratios and shapes."""
 
 from dataclasses import dataclass, field
 
@@ -14,18 +14,19 @@ from floatframe.errors import ModelError
 
 __all__ = ["SystemModes", "system_modes"]
 
-MODEL = 1e-10  #: relative error of a matrix entry, because steady motions and equilibria have about this error
-UNDAMPED = 1e-12  #: entry of the modal damping matrix, relative to the frequency, that counts as rounding error
-LOW = 1e-10  #: omega², relative to the highest one, below which modes are solved for again in their own subspace
-FREE = 1e-7  #: rate of a unit motion, relative to the highest frequency, below which the motion meets no resistance
-LEAST_BODY_MOTION = 1e-9  #: motion of bodies, relative to the change of states, below which a mode has only states
+MODEL = 1e-10  #: relative error assumed for matrix entries, as large as the errors of steady motions and equilibria
+UNDAMPED = 1e-12  #: entry of the modal damping matrix, relative to the frequency, below which it is a rounding error
+LOW = 1e-10  #: omega², relative to the highest one, below which modes are solved again in their own subspace
+FREE = 1e-7  #: rate of a unit motion, relative to the highest frequency, below which the motion has no resistance
+#: motion of bodies, relative to the change of states, below which a mode consists only of states
+LEAST_BODY_MOTION = 1e-9
 
 
 @presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class SystemModes:
-    """Modes exp(lambda t) by ascending |lambda|; only one mode of each conjugate pair is listed.
+    """Modes exp(lambda t) in ascending |lambda|; one mode represents each conjugate pair.
 
     A motion without resistance is listed as one mode with lambda = 0, although it has two eigenvalues, one for its
     position and one for its velocity.
@@ -57,7 +58,7 @@ class SystemModes:
     errors: Array = field(default_factory=lambda: np.zeros(0))
 
     def summary(self) -> Summary:
-        """Return what `repr` and notebooks show: frequency, damping and the bodies that move, of each mode."""
+        """Return the content shown by `repr` and notebooks: frequency, damping and moving bodies of each mode."""
         rows = [
             (str(k + 1), f"{f:.6g}", f"{ratio + 0.0:.3g}", self.bodies[int(np.argmax(shares))] if len(shares) else "")
             for k, (f, ratio, shares) in enumerate(
@@ -69,7 +70,7 @@ class SystemModes:
 
     @property
     def frequencies(self) -> Array:
-        """Damped frequencies Im(lambda)/2 pi, (n_modes,) [Hz]; 0 for a motion that does not oscillate."""
+        """Damped frequencies Im(lambda)/2 pi, (n_modes,) [Hz]; 0 without oscillation."""
         return np.abs(self.eigenvalues.imag) / (2 * np.pi)
 
     @property
@@ -79,7 +80,7 @@ class SystemModes:
 
     @property
     def damping_ratios(self) -> Array:
-        """-Re(lambda)/|lambda|, (n_modes,); 1 for a motion that decays without oscillation, 0 for one at rest."""
+        """Damping ratios -Re(lambda)/|lambda|, (n_modes,); 1 for decay without oscillation, 0 for lambda = 0."""
         size = np.abs(self.eigenvalues)
         return np.divide(-self.eigenvalues.real, size, out=np.zeros(len(size)), where=size > 0)
 
@@ -154,7 +155,7 @@ def system_modes(linear: LinearSystem) -> SystemModes:
 
 
 def undamped_modes(K: Array, M: Array) -> tuple[Array, Array]:
-    """Return omega², ascending, and the modes of a symmetric pencil, with low modes as accurate as high ones.
+    """Return ascending omega² and the modes of a symmetric matrix pair, low modes as accurate as high ones.
 
     Errors of the solver are proportional to the highest omega², so that much lower modes are solved for again in their
     own subspace.
@@ -177,7 +178,7 @@ def undamped_modes(K: Array, M: Array) -> tuple[Array, Array]:
 
 
 def state_matrix(system: LinearSystem, Z: Array, highest: float) -> tuple[Array, Array]:
-    """Return A of the first-order equations in the coordinates of undamped modes, and the magnitudes of its terms.
+    """Return A of the first-order equations in undamped modal coordinates, and the sizes of its terms.
 
     Velocities are divided by the highest frequency, so that the matrix is well scaled.
     """
@@ -200,7 +201,7 @@ def state_matrix(system: LinearSystem, Z: Array, highest: float) -> tuple[Array,
 
 
 def motions_beside(system: LinearSystem, Z: Array) -> Array:
-    """Return the sizes of the motions that are coupled with modes, at equal kinetic energy, (n_z, n).
+    """Return the sizes of motions coupled with each mode, at equal kinetic energy, (n_z, n).
 
     Directions of axes and of a steady rotation have the relative error `ROUNDING`, so that every motion contains
     that fraction of coupled motions. K of a free motion is then not zero, but of the order of its square, with either
@@ -214,7 +215,7 @@ def motions_beside(system: LinearSystem, Z: Array) -> Array:
 
 
 def eigenvalues_with_errors(A: Array, dA: Array) -> tuple[Array, Array, Array]:
-    """Return all eigenvalues, their eigenvectors of length one, and error bounds of the eigenvalues.
+    """Return all eigenvalues with unit eigenvectors and error bounds.
 
     The two-sided Rayleigh quotient removes the error of the solver, which is proportional to the norm of the whole
     matrix. An error dA of the matrix changes lambda by up to |w|ᵀ |dA| |v| / |wᴴ v|, with left eigenvector w and right
@@ -232,7 +233,7 @@ def eigenvalues_with_errors(A: Array, dA: Array) -> tuple[Array, Array, Array]:
 
 
 def with_motions_that_cost_nothing(A: Array, eigenvalues: Array, V: Array, errors: Array) -> tuple[Array, Array, Array]:
-    """Return one mode of each conjugate pair, and one mode with lambda = 0 for each motion without resistance.
+    """Return one mode of each conjugate pair, and a mode with lambda = 0 for each motion without resistance.
 
     Q spans the eigenvectors of zero. Motions without resistance are the null space of A within Q, without velocities.
     The two eigenvectors of such a motion are equal but for rounding, so that Q has fewer columns than there are zeros.

@@ -27,22 +27,22 @@ from floatframe.results.sensors.measurement import unit_words
 __all__ = ["CoordinateBasis", "coordinate_basis", "coordinate_names", "dependent_coordinates"]
 
 RANK = 1e-10  #: size of a column after elimination, relative to the largest, below which it is a rounding error
-NEARLY = 0.1  #: smallest column that may become dependent, relative to the largest remaining one
-MODE = 1e-3  #: scale of modal coordinates relative to joint coordinates, so that modes become dependent last
+NEARLY = 0.1  #: smallest column, relative to the largest remaining one, whose coordinate may become dependent
+MODE = 1e-3  #: scale of modal relative to joint coordinates, by which modes become dependent last
 FRAME = ("x", "y", "z", "rx", "ry", "rz")
 
 
 @dataclass(frozen=True, eq=False)
 class CoordinateBasis:
-    """Independent coordinates, and the motions of the bodies along them."""
+    """Independent coordinates, and body motions for each of them."""
 
-    names: tuple[str, ...]  #: "joint.coordinate", "body mode k", "body x"
+    names: tuple[str, ...]  #: names such as "joint.coordinate", "body mode k", "body x"
     units: tuple[str, ...]
-    N: Array  #: motions of the bodies (body axes of the engine) per coordinate, (n_u, n_z)
+    N: Array  #: body motions (body axes of the engine) for unit coordinates, (n_u, n_z)
 
 
 def coordinate_basis(system: System, state: State, G: Array, shown: tuple[Array, ...]) -> CoordinateBasis:
-    """Return the independent coordinates at a state, and the motions of the bodies along them.
+    """Return the independent coordinates at a state, and the body motions for each of them.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def coordinate_basis(system: System, state: State, G: Array, shown: tuple[Array,
 
 
 def coordinate_names(system: System) -> tuple[str, ...]:
-    """Return the names of all unknown coordinates, (n_s,), body by body: coordinates of its joint, then its modes."""
+    """Return the names of all unknown coordinates, (n_s,), for each body: its joint coordinates, then its modes."""
     parts, body_names = tree_of(system), compiled_system(system).body_names
     tree, names = parts.tree, []
     for i, body in enumerate(body_names):
@@ -94,7 +94,7 @@ def coordinate_names(system: System) -> tuple[str, ...]:
 
 
 def coordinate_units(system: System) -> tuple[str, ...]:
-    """Return the units of all unknown coordinates, (n_s,): "rad", "m" for a length, "" for a mode."""
+    """Return the units of all unknown coordinates, (n_s,): "rad", "m" for lengths, "" for modes."""
     parts = tree_of(system)
     return tuple("" if column < 0 else parts.columns[column].unit for column in parts.tree.column)
 
@@ -112,7 +112,7 @@ def free_frames(compiled: CompiledSystem, tree: Tree, N: Array, shown: tuple[Arr
 
 
 def preference(tree: Tree) -> IntArray:
-    """Return the distance of each coordinate from the ground in the tree, (n_s,); modes are nearer than any joint."""
+    """Return each coordinate's distance from the ground in the tree, (n_s,); modes count as nearer than joints."""
     depth: dict[int, int] = {-1: 0}
     for i in tree.order:
         depth[int(i)] = depth[int(tree.parent[i])] + 1
@@ -121,7 +121,7 @@ def preference(tree: Tree) -> IntArray:
 
 
 def dependent_coordinates(C: Array, preferred: IntArray) -> IntArray:
-    """Return as many columns of C as it has rank, which are dependent, by elimination with preferred pivots.
+    """Return the dependent columns of C, as many as its rank, by elimination with preferred pivots.
 
     Candidates are the columns whose remaining part is at least a tenth of the largest one. Among them, the pivot is the
     column with the highest preference, the last one of several.

@@ -33,17 +33,17 @@ from floatframe.model.system import System
 
 __all__ = ["TreeFlow", "tree_flow"]
 
-NEAR_BY = 1e-6  #: step of the finite differences for S [rad, or relative to the size of the system]
+NEAR_BY = 1e-6  #: difference step for S [rad, or relative to the size of the system]
 
-#: from a state to the state with the velocities of the rotation, and its accelerations
+#: function from a state to the same state with rotation velocities, and its accelerations
 Turning = Callable[[State], tuple[State, Array]]
 
 
 @dataclass(frozen=True, eq=False)
 class TreeFlow:
-    """Steps of a system towards an equilibrium in its coordinates; the caller provides the working arrays."""
+    """Steps of a system towards an equilibrium in joint coordinates; the caller provides the working arrays."""
 
-    model: Model  #: the model, with the contributions of elements to the equilibrium
+    model: Model  #: model in which elements use their equations for static equilibrium
     tree: Tree
     joints: JointWork
     turning: Turning
@@ -51,7 +51,7 @@ class TreeFlow:
     at_ground: IntArray  #: coordinates of joints at the ground whose rates may change in a steady rotation
 
     def wrenches(self, work: Work, state: State, u_dot: Array, w: Array) -> Array:
-        """Return w with the reactions of the joints of the tree at a motion, (n_w,); `work` then holds this iterate."""
+        """Return w with reactions of the tree joints for a motion, (n_w,); `work` then contains this iterate."""
         from floatframe.engine.tree.kernels.entry import projected
 
         set_iterate(work, state, u_dot, w)
@@ -78,7 +78,7 @@ class TreeFlow:
         return joints
 
     def step(self, work: Work, state: State, u_dot: Array, w: Array, tau: float) -> tuple[Array, Array, Array]:
-        """Return the changes of coordinates, (n_s,), bodies (ground axes), (n_u,), and wrenches, (n_w,), by (2)."""
+        """Return changes of coordinates, (n_s,), bodies (ground axes), (n_u,), and wrenches, (n_w,), by step (2)."""
         from floatframe.engine.tree.kernels.entry import motion_of_bodies, newton_step
 
         slopes = self.slopes(work, state)
@@ -101,7 +101,7 @@ class TreeFlow:
         return ds, work.state.u.copy(), dw
 
     def slopes(self, work: Work, state: State) -> tuple[Array, Array] | None:
-        """Return S and S' of a steady rotation at a state, (n_s, n_s); None if rates of joints do not change."""
+        """Return S and S' of a steady rotation at a state, (n_s, n_s); None if joint rates do not change."""
         if not len(self.at_ground):
             return None
         n_s, columns = len(self.tree.slot), self.tree.column
@@ -120,7 +120,7 @@ class TreeFlow:
         return S[0], S[1]
 
     def turning_step(self, work: Work, tau: float, S: Array, S_dot: Array) -> tuple[Array, Array]:
-        """Return the changes of coordinates and of loop-closing wrenches in a steady rotation, by dense matrices."""
+        """Return changes of coordinates and loop wrenches in a steady rotation, with dense matrices."""
         n_s = len(S)
         K, CK, M = (self.matrix(work, *weights) for weights in ((0.0, 0.0, 1.0), (0.0, 1.0, 1.0), (1.0, 0.0, 0.0)))
         K[:, :n_s] += (CK - K)[:, :n_s] @ S + M[:, :n_s] @ S_dot
@@ -133,7 +133,7 @@ class TreeFlow:
         return newton_matrix(self.model, work, self.tree, self.joints, c_m, c_d, c_k)
 
     def dense_step(self, work: Work, tau: float, M: Array, K: Array) -> tuple[Array, Array]:
-        """Return the changes of coordinates and of loop-closing wrenches by K + M/tau; nan if that is singular."""
+        """Return changes of coordinates and loop wrenches for K + M/tau; nan if the matrix is singular."""
         n_s = len(self.tree.slot)
         right = -np.concatenate([self.joints.residual, work.connections.g[self.tree.kept_row >= 0]])
         K[:n_s, :n_s] += M[:n_s, :n_s] / tau
@@ -144,7 +144,7 @@ class TreeFlow:
         return solution[:n_s], solution[n_s:]
 
     def displaced(self, work: Work, state: State, ds: Array) -> State:
-        """Return the state after the changes ds of the coordinates, (n_s,)."""
+        """Return the state after coordinates change by ds, (n_s,)."""
         from floatframe.engine.tree.kernels.entry import moved
 
         set_iterate(work, state)
@@ -159,7 +159,7 @@ class TreeFlow:
 
 
 def tree_flow(system: System, turning: Turning, *, rests: bool) -> TreeFlow:
-    """Return the flow of a system towards an equilibrium at rest, or in a steady rotation."""
+    """Return the flow of a system towards an equilibrium at rest or in steady rotation."""
     compiled, tree = compiled_system(system), tree_of(system).tree
     model, roots = compiled.resting_model, np.flatnonzero((tree.parent < 0) & (np.diff(tree.column0) > 1))
     # the rate of a single coordinate does not change

@@ -23,11 +23,11 @@ __all__ = ["Carrier", "Spin", "by_carrier", "by_spin", "carried", "moved_on", "t
 
 @dataclass(frozen=True, eq=False)
 class Carrier:
-    """A frame in steady motion."""
+    """A frame that moves steadily."""
 
-    point: Array  #: r_0, ground axes, (3,) [m]
-    velocity: Array  #: v_0, ground axes, (3,) [m/s]
-    omega: Array  #: Omega, ground axes, (3,) [rad/s]
+    point: Array  #: position r_0 of a point, ground axes, (3,) [m]
+    velocity: Array  #: velocity v_0 of the point, ground axes, (3,) [m/s]
+    omega: Array  #: angular velocity Omega, ground axes, (3,) [rad/s]
 
     def velocity_at(self, r: Array) -> Array:
         """Return the velocity of the carrier at points r, ground axes, (..., 3)."""
@@ -39,11 +39,11 @@ class Spin:
     """A body that spins relative to the carrier."""
 
     body: int
-    axis: Array  #: e, unit vector, body axes, (3,)
+    axis: Array  #: spin axis e, unit vector in body axes, (3,)
 
 
 def carried(model: Model, state: State, carrier: Carrier, spins: tuple[Spin, ...], s: Array) -> tuple[State, Array]:
-    """Return a state of the engine with the velocities of the steady motion, and the accelerations, (n_u,).
+    """Return an engine state with the velocities of the steady motion, and its accelerations, (n_u,).
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def carried(model: Model, state: State, carrier: Carrier, spins: tuple[Spin, ...
 
 
 def by_spin(model: Model, work: Work, omega: Array, spin: Spin) -> tuple[Array, Array]:
-    """Return the derivatives nu and eta of velocities and accelerations by the speed of a spin, (n_u,) each."""
+    """Return derivatives nu and eta of velocities and accelerations by the speed of a spin, (n_u,) each."""
     nu, eta = np.zeros((2, int(model.bodies.u0[-1])))
     turn = slice(int(model.bodies.u0[spin.body]) + 3, int(model.bodies.u0[spin.body]) + 6)
     nu[turn], eta[turn] = spin.axis, np.cross(work.state.R[spin.body].T @ omega, spin.axis)
@@ -70,7 +70,7 @@ def by_spin(model: Model, work: Work, omega: Array, spin: Spin) -> tuple[Array, 
 
 
 def by_carrier(model: Model, work: Work, carrier: Carrier, change: Array) -> tuple[Array, Array]:
-    """Return nu and eta for a `change` of the angular velocity of the carrier, ground axes, (n_u,) each."""
+    """Return nu and eta for a change of the carrier's angular velocity, ground axes, (n_u,) each."""
     nu, eta = np.zeros((2, int(model.bodies.u0[-1])))
     for i, u0 in enumerate(model.bodies.u0[:-1]):
         R, r = work.state.R[i], work.state.r[i]
@@ -84,7 +84,7 @@ def by_carrier(model: Model, work: Work, carrier: Carrier, change: Array) -> tup
 
 
 def moved_on(model: Model, state: State, carrier: Carrier, spins: Sequence[Array], later: float) -> tuple[State, Array]:
-    """Return the state of the engine, and its accelerations, after a time of the steady motion.
+    """Return the engine state and its accelerations after the steady motion has continued for a time.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def moved_on(model: Model, state: State, carrier: Carrier, spins: Sequence[Array
 
 
 def turned_axes(model: Model, spins: Sequence[Array], later: float) -> Array:
-    """Return the rotations from body axes after a time to axes that turned only with the carrier, (n_u, n_u)."""
+    """Return rotations from body axes at a later time to axes that rotated only with the carrier, (n_u, n_u)."""
     turned = np.eye(int(model.bodies.u0[-1]))
     for u0, spin in zip(model.bodies.u0[:-1], spins, strict=True):
         Q = rotation_exp(later * spin)

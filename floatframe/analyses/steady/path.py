@@ -1,4 +1,4 @@
-"""The path of the reference body of a steady motion, and the bodies that spin."""
+"""The path of the reference body in a steady motion, and the bodies that spin."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -26,8 +26,8 @@ class Path:
 
     body: int
     name: str
-    point: Array  #: a point of the path, ground axes, (3,) [m]
-    ahead: Array  #: direction of the motion at the point, ground axes, (3,)
+    point: Array  #: point on the path, ground axes, (3,) [m]
+    ahead: Array  #: direction of motion at the point, ground axes, (3,)
     axis: Array  #: axis of the circle, ground axes, (3,)
     speed: float
     placed_speed: float
@@ -35,12 +35,12 @@ class Path:
 
     @property
     def aside(self) -> Array:
-        """The direction to the left of the motion, (3,)."""
+        """Direction to the left of the motion, (3,)."""
         return np.cross(self.axis, self.ahead)
 
 
 def require_body(system: System, name: str) -> None:
-    """Raise `ModelError` with the nearest name if a body does not exist."""
+    """Raise `ModelError`, with the closest name, if a body does not exist."""
     names = [each.name for each in system.bodies]
     if name not in names:
         raise ModelError(f"steady_motion: no body {quoted(name)}{nearest(name, names)}")

@@ -1,4 +1,4 @@
-"""Check of whether a moving state is steady, so that small motions about it have constant coefficients.
+"""Check that a moving state is steady, so that small motions about it have constant coefficients.
 
 (1) at the state, all bodies have one velocity field v_0 + Omega × r, and forces balance the accelerations of the steady
     motion
@@ -30,19 +30,19 @@ from floatframe.model.state import State
 
 __all__ = ["require_steady"]
 
-BALANCED = 1e-5  #: largest unbalanced force, relative to the acting forces
-#: the same at the later time, with tables of roads and rails interpolated elsewhere; flanges in a curve give 1e-5
+BALANCED = 1e-5  #: largest unbalanced force, relative to the acting forces, in a steady state
+#: the same limit at a later time, with interpolated road and rail tables; flanges in a curve give 1e-5
 BALANCED_LATER = 1e-4
-LEAST = 1e-3  #: smallest value taken for the acting forces, relative to the forces that would reverse all velocities
+LEAST = 1e-3  #: smallest acting forces assumed, relative to forces that would reverse all velocities
 ALONG = 1e-6  #: largest deviation of a velocity from the common motion, relative to the largest velocity
 SAME = 1e-5  #: largest change of a matrix, relative to its largest entry; flanges in a curve give 3e-6
 ROUND = 1e-6  #: largest relative change of a mass matrix
-TURN = 1.234  #: angle by which the fastest body turns until the later time, not a fraction of a circle [rad]
+TURN = 1.234  #: rotation of the fastest body until the later time [rad], no simple fraction of a circle
 AHEAD = 0.1  #: distance travelled until the later time if nothing spins, relative to the size of the system
 MOST_ITERATIONS = 10
 NOT = "linearize: this state is not steady:"
-AT_ONCE = "use the state of steady_motion or steady_rotation"  #: advice where forces are unbalanced at the state
-#: the same where they are balanced there but not later
+AT_ONCE = "use the state of steady_motion or steady_rotation"  #: advice if forces are unbalanced at the state
+#: advice if forces are balanced at the state but not later
 LATER = (
     "what acts there changes as the system moves on, such as a torsion spring to the ground that is wound up, "
     "an uneven road, or a function of time"
@@ -51,11 +51,11 @@ LATER = (
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """The unbalanced forces at a state."""
+    """Unbalanced forces at a state."""
 
     error: float  #: unbalanced forces, relative to the acting forces
     body: str  #: body with the largest unbalanced force
-    w: Array  #: wrenches with the smallest unbalanced forces, (n_w,)
+    w: Array  #: wrenches that minimise the unbalanced forces, (n_w,)
 
 
 def require_steady(
@@ -122,7 +122,7 @@ def require_steady(
 
 
 def carrier_of(compiled: CompiledSystem, state: State, omega: Array) -> Carrier:
-    """Return the common motion of the bodies of a state that rotates with omega.
+    """Return the common motion of the bodies in a state that rotates with omega.
 
     Raises
     ------
@@ -177,7 +177,7 @@ def spins_in(compiled: CompiledSystem, state: State, omega: Array) -> list[Array
 
 
 def balance(compiled: CompiledSystem, work: Work, w: Array) -> Balance:
-    """Return the unbalanced forces at the motion in `work`, with the wrenches that make them smallest."""
+    """Return the unbalanced forces for the motion in `work`, and the wrenches that minimise them."""
     model, w = compiled.model, w.copy()
     own = rows_of_states(np.asarray(model.states.row), len(w))
     free = ~is_held(model.rows.kind) & ~own
@@ -208,7 +208,7 @@ def speed_changes(compiled: CompiledSystem, work: Work, mass: Sequence[Array]) -
 
 
 def next_wrenches(parts: Linearized, f: Array, g: Array, free: NDArray[np.bool_], unknown: NDArray[np.bool_]) -> Array:
-    """Return the smallest change of wrenches that minimises the residuals of forces and laws."""
+    """Return the smallest change of wrenches that minimises residuals of forces and laws."""
     if not unknown.any():
         return np.zeros(0)
     J, V = parts.J.toarray()[unknown], parts.V.toarray()[np.ix_(free, unknown)]
@@ -218,7 +218,7 @@ def next_wrenches(parts: Linearized, f: Array, g: Array, free: NDArray[np.bool_]
 
 
 def require_balance(found: Balance, most: float, words: str, advice: str) -> None:
-    """Raise `ModelError` with an advice if unbalanced forces, relative to the acting forces, exceed `most`."""
+    """Raise `ModelError` with an advice if unbalanced forces exceed the fraction `most` of the acting forces."""
     if not found.error <= most:
         raise ModelError(
             f"{NOT} {words} by {found.error:.2g} of the acting forces, most at body {found.body!r}; {advice}"
@@ -226,7 +226,7 @@ def require_balance(found: Balance, most: float, words: str, advice: str) -> Non
 
 
 def require_round(compiled: CompiledSystem, work: Work, later: Work, turned: Array) -> None:
-    """Raise `ModelError` with the name of a spinning body whose mass matrix changes as it turns."""
+    """Raise `ModelError` with the name of a spinning body whose mass matrix changes as it rotates."""
     masses = (linearized(compiled.model, each, 1.0, 0.0, 0.0).H for each in (work, later))
     for i, (one, two) in enumerate(zip(*masses, strict=True)):
         u = slice(int(compiled.model.bodies.u0[i]), int(compiled.model.bodies.u0[i + 1]))
@@ -241,6 +241,6 @@ def require_round(compiled: CompiledSystem, work: Work, later: Work, turned: Arr
 
 
 def body_of(compiled: CompiledSystem, motion: Array) -> str:
-    """Return the name of the body that moves most in a motion, (n_u,)."""
+    """Return the name of the body with the largest part in a motion, (n_u,)."""
     u0 = compiled.model.bodies.u0
     return compiled.body_names[int(np.argmax([np.abs(motion[a:b]).max() for a, b in pairwise(u0)]))]

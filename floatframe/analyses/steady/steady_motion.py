@@ -1,4 +1,4 @@
-"""Steady running: the state of a vehicle that runs straight or in a circle without any change in the moving frame.
+"""Steady running: the state of a vehicle in straight or circular motion that is constant in the moving frame.
 
 It is found by damped Newton steps for the equations of `equations.py`.
 """
@@ -63,10 +63,10 @@ __all__ = ["Equations", "Family", "Place", "SteadyMotion", "Step", "Trial", "ste
 
 
 SINGULAR = 1e-12  #: singular value of the scaled equations below which a motion has no resistance
-DIFFERENCE = 1e-4  #: first finite difference of an open parameter, relative to its magnitude, or of one that is zero
+DIFFERENCE = 1e-4  #: first difference step of an open parameter, relative to its size, or absolute if it is zero
 #: change of forces by such a difference, relative to the acting forces: the wanted one, the smallest and the largest
 EFFECT, LEAST_EFFECT, MOST_EFFECT = 1e-5, 1e-9, 1e-2
-MOST_DIFFERENCES = 4  #: tried for each parameter
+MOST_DIFFERENCES = 4  #: largest number of difference steps tried for each parameter
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +82,7 @@ class Family:
         return self.at(np.array(list(self.start.values()), dtype=float))
 
     def at(self, p: Array) -> System:
-        """Return the system for open parameters p, (n_p,)."""
+        """Return the system for values p of the open parameters, (n_p,)."""
         if isinstance(self.system, System):
             if self.start:
                 raise ModelError(
@@ -101,30 +101,30 @@ def timed(work: Work, t: float) -> Work:
 
 @dataclass(frozen=True, eq=False)
 class Evaluated:
-    """The equations at a trial."""
+    """The equations at a trial state."""
 
     parts: Linearized
-    D: Array  #: derivatives of the forces by xi, (n_u, n_u)
-    G: Array  #: derivatives of the rows by xi, (n_w, n_u)
-    C: Array  #: derivatives of the forces by nu, (n_u, n_u)
+    D: Array  #: derivatives of forces by xi, (n_u, n_u)
+    G: Array  #: derivatives of rows by xi, (n_w, n_u)
+    C: Array  #: derivatives of forces by nu, (n_u, n_u)
     M: Array
     G_v: Array
     f: Array  #: unbalanced forces, (n_u,)
-    g: Array  #: rows, (n_w,)
+    g: Array  #: residuals of the rows, (n_w,)
     rate: Array  #: rates of joint constraints, (n_w,)
-    W: tuple[Array, ...]  #: mass and modal stiffness of each body
+    W: tuple[Array, ...]  #: mass and modal stiffness of each body, as weights
     scale: float  #: norm of the acting forces
 
     @property
     def error(self) -> float:
-        """Unbalanced forces, relative to the acting forces."""
+        """Unbalanced forces relative to the acting forces."""
         size = size_of(self.W, self.f)
         return size / self.scale if self.scale > 0 else size
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """Values of all unknowns."""
+    """Values of all unknowns of a trial."""
 
     state: State
     w: Array
@@ -135,7 +135,7 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """A trial and its equations."""
+    """A trial with its equations."""
 
     system: System
     compiled: CompiledSystem
@@ -149,11 +149,11 @@ class Step:
     """A step of Newton's method."""
 
     x: Array  #: changes of all unknowns, (n_x,)
-    inverse: Array  #: from the residual to the changes, (n_x, n_rows)
-    sizes: Array  #: typical magnitudes of the unknowns, (n_x,)
+    inverse: Array  #: matrix from residuals to changes of unknowns, (n_x, n_rows)
+    sizes: Array  #: typical sizes of the unknowns, (n_x,)
 
     def length(self, x: Array) -> float:
-        """Return the norm of a change, scaled by the magnitudes of the unknowns."""
+        """Return the norm of a change, scaled by the typical sizes of the unknowns."""
         return float(np.linalg.norm(x / self.sizes))
 
 
@@ -168,7 +168,7 @@ class Equations:
     t: float
 
     def at(self, trial: Trial) -> Place:
-        """Return a trial, corrected to satisfy its joints, with its equations."""
+        """Return a trial, corrected so that joints are closed, with its equations."""
         system = self.family.at(trial.p)
         compiled, work = compiled_system(system), timed(new_work(compiled_system(system).model), self.t)
         if len(trial.w) != int(compiled.model.connections.w0[-1]):
@@ -179,7 +179,7 @@ class Equations:
         return Place(system, compiled, work, trial, self.evaluated(compiled, work, trial))
 
     def moved(self, here: Place, x: Array) -> Trial:
-        """Return a trial after the changes x of its unknowns."""
+        """Return a trial after a change x of its unknowns."""
         trial, model = here.trial, here.compiled.model
         _, unknowns, _ = self.used_rows(here.compiled)
         n_u, n_s = len(here.now.f), len(self.spins)
@@ -197,7 +197,7 @@ class Equations:
         )
 
     def change(self, here: Place, step: Step) -> float:
-        """Return the largest of the changes of a step, relative to the magnitudes of the unknowns."""
+        """Return the largest change of an unknown in a step, relative to its typical size."""
         trial, model, length = here.trial, here.compiled.model, here.compiled.length
         after = self.moved(here, step.x)
         dw, of_states = after.w - trial.w, np.concatenate([model.states.row, model.laws.equation]).astype(int)
@@ -217,7 +217,7 @@ class Equations:
         return float(max(changes))
 
     def evaluated(self, compiled: CompiledSystem, work: Work, trial: Trial) -> Evaluated:
-        """Return the residuals (2) with their derivatives by motions."""
+        """Return residuals (2) with their derivatives by motions."""
         from floatframe.engine.kernels.entry import rates_of_constraints
 
         model = compiled.model
@@ -242,11 +242,11 @@ class Equations:
         )  # fmt: skip
 
     def fastest(self, trial: Trial, length: float) -> float:
-        """Return the speed of the system, or of points turned by its fastest spin if it stands."""
+        """Return the speed of the system, or at rest the largest speed due to spins."""
         return self.path.speed or (float(np.abs(trial.s).max(initial=0.0)) or 1.0) * length
 
     def used_rows(self, compiled: CompiledSystem) -> tuple[IntArray, IntArray, IntArray]:
-        """Return the rows that are equations, the unknowns of connections, and the rows that constrain positions."""
+        """Return the rows that are equations, the connection unknowns, and the rows that constrain positions."""
         model = compiled.model
         n_w = int(model.connections.w0[-1])
         steps, rates = np.zeros(n_w, dtype=bool), np.zeros(n_w, dtype=bool)
@@ -255,7 +255,7 @@ class Equations:
         return np.flatnonzero(~steps), np.flatnonzero(~rates), np.flatnonzero(is_held_position(model.rows.kind))
 
     def gauges(self, compiled: CompiledSystem, trial: Trial) -> tuple[Array, Array]:
-        """Return the distances of the reference body from its point, ahead and aside, and their derivatives by xi."""
+        """Return distances of the reference body from its point, ahead and aside, and their derivatives by xi."""
         i, n_u = self.path.body, int(compiled.model.bodies.u0[-1])
         u0 = int(compiled.model.bodies.u0[i])
         directions = [] if not self.path.speed else [self.path.ahead]
@@ -304,7 +304,7 @@ class Equations:
         return Step(inverse @ self.residual(here), inverse, sizes)
 
     def sizes(self, compiled: CompiledSystem, trial: Trial, now: Evaluated, unknowns: IntArray) -> Array:
-        """Return typical magnitudes of the unknowns of a step; 1 for parameters, as their effect gives their size."""
+        """Return typical sizes of the unknowns in a step; 1 for parameters, whose effect determines their size."""
         model = compiled.model
         motions = np.ones(len(now.f))
         force = max(float(np.abs(trial.w).max(initial=0.0)), weight_of(now), 1e-300)
@@ -320,7 +320,7 @@ class Equations:
         return np.concatenate([motions, w[unknowns], others, np.ones(len(trial.p))])
 
     def by_numbers(self, trial: Trial, now: Evaluated, rows: IntArray, held: IntArray, n_gaps: int) -> list[Array]:
-        """Return the derivatives by the open parameters, step (4)."""
+        """Return derivatives by the open parameters from differences, step (4)."""
         columns = []
         for k, value in enumerate(trial.p):
             h = DIFFERENCE * (abs(value) or 1.0)
@@ -340,7 +340,7 @@ class Equations:
         return columns
 
     def is_closed(self, here: Place) -> bool:
-        """Whether joint constraints and their rates are satisfied."""
+        """Whether joint constraints are satisfied in positions and rates."""
         compiled, now, size = here.compiled, here.now, here.compiled.gap_sizes
         pace = self.fastest(here.trial, compiled.length) / compiled.length
         noise = rounding_of(compiled, now.parts, here.trial.state)
@@ -350,7 +350,7 @@ class Equations:
 
 
 def largest(values: Array) -> float:
-    """Return the largest magnitude of values; 0 if there are none."""
+    """Return the largest absolute value; 0 if there are no values."""
     return float(np.abs(values).max(initial=0.0))
 
 
@@ -360,7 +360,7 @@ def weight_of(now: Evaluated) -> float:
 
 
 def turned_forces(compiled: CompiledSystem, f: Array) -> Array:
-    """Return the derivative of forces f on the bodies (body axes) that rotate with the bodies, (n_u, n_u)."""
+    """Return derivatives, by body rotation, of forces f that rotate with their bodies (body axes), (n_u, n_u)."""
     by_turn = np.zeros((len(f), len(f)))
     for u0 in compiled.model.bodies.u0[:-1]:
         for k in (u0, u0 + 3):
@@ -369,7 +369,7 @@ def turned_forces(compiled: CompiledSystem, f: Array) -> Array:
 
 
 def smallest_inverse(A: Array, rows: Array, columns: Array, n_p: int) -> tuple[Array, Array]:
-    """Return the matrix from b to the smallest x that minimises |A x - b|, and the magnitudes of x.
+    """Return the matrix from b to the minimum-norm x that minimises |A x - b|, and the sizes of x.
 
     Parameters
     ----------
@@ -395,8 +395,8 @@ def smallest_inverse(A: Array, rows: Array, columns: Array, n_p: int) -> tuple[A
 # steady running: the state of a vehicle that runs straight or in a circle without any change in the moving frame ------
 
 
-SETTLED = 1e-7  #: last change of all unknowns, relative to their magnitudes
-STUCK = 1e-4  #: change of all unknowns, relative to their magnitudes, below which a constant residual ends the search
+SETTLED = 1e-7  #: largest last change of an unknown at convergence, relative to its size
+STUCK = 1e-4  #: change of unknowns, relative to their sizes, below which a constant residual ends the search
 SHORTEST = 1e-4  #: smallest damping factor of a Newton step
 
 
@@ -404,11 +404,11 @@ SHORTEST = 1e-4  #: smallest damping factor of a Newton step
 class SteadyMotion:
     """A system in steady running."""
 
-    system: System  #: the system with the values found for its open parameters
-    equilibrium: Equilibrium  #: the steady state; `linearize(system, equilibrium)` gives small motions about it
+    system: System  #: system with the values found for its open parameters
+    equilibrium: Equilibrium  #: steady state; `linearize(system, equilibrium)` gives small motions about it
     speed: float  #: speed of the reference body [m/s]
-    curvature: float  #: curvature of its path, positive about the axis [1/m]
-    found: Mapping[str, float]  #: values of the open parameters, by name
+    curvature: float  #: curvature of the path, positive about the axis [1/m]
+    found: Mapping[str, float]  #: values found for the open parameters, by name
     spins: Mapping[str, float]  #: speeds of spinning bodies about their axes, relative to the moving frame [rad/s]
 
 
@@ -495,7 +495,7 @@ class Search:
     tolerance: float
 
     def run(self, state: State, w: Array, s: Array, carrier: Carrier, max_iterations: int) -> SteadyMotion:
-        """Return the steady motion near a trial."""
+        """Search the steady motion near a trial and return it."""
         equations, path = self.equations, self.equations.path
         here = equations.at(Trial(state, w, s, carrier, np.array(list(equations.family.start.values()), dtype=float)))
         errors, is_stuck = [np.inf], False
@@ -525,7 +525,7 @@ class Search:
         )  # fmt: skip
 
     def followed(self, here: Place, step: Step) -> Place | None:
-        """Return the trial after a damped step; damping ensures that the simplified Newton step decreases.
+        """Return the trial after a damped step, for which the simplified Newton step decreases.
 
         This is the natural monotonicity test: the next step, with the same matrix, must be shorter.
         """
@@ -546,7 +546,7 @@ class Search:
         return there
 
     def result(self, here: Place, iteration: int) -> SteadyMotion:
-        """Return the result at a converged trial."""
+        """Return the result for a converged trial."""
         equations, path, compiled, trial = self.equations, self.equations.path, here.compiled, here.trial
         state, u_dot = carried(compiled.model, trial.state, trial.carrier, equations.spins, trial.s)
         notes = notes_at(here.system, here.work, state, u_dot, trial.w)

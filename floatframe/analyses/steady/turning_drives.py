@@ -15,11 +15,11 @@ from floatframe.model.system import System
 
 __all__ = ["turning_with"]
 
-SAME = 1e-9  #: difference below which two rates are equal, relative to the speed
+SAME = 1e-9  #: difference of two rates, relative to the speed, below which they are equal
 
 
 def turning_with(system: System, omega: Array) -> System:
-    """Return the system with prescribed angles relative to the ground that rotate with omega from t = 0 on.
+    """Return the system in which prescribed angles relative to the ground rotate with omega from t = 0.
 
     Every drive keeps its angle at t = 0. The system is returned unchanged if omega is zero, or if all drives already
     rotate with omega.
