@@ -11,11 +11,11 @@ from floatframe.errors import ModelError
 
 __all__ = ["Array", "array_of_shape", "number", "rotation_of", "unit_vector"]
 
-ORTHONORMAL_DEFECT = 1e-6  #: largest |R.T R - 1| that counts as rounding of typed numbers
+ORTHONORMAL_DEFECT = 1e-6  #: largest |R.T R - 1| that is accepted as rounding of typed numbers
 
 
 def array_of_shape(where: str, values: Any, shape: tuple[int, ...]) -> Array:
-    """Return a read-only float64 copy; raise `ModelError` that names `where` if shape or values are invalid."""
+    """Return a read-only float64 copy; raise `ModelError` with `where` if shape or values are invalid."""
     try:
         array = np.array(values, dtype=np.float64, order="C")
     except (TypeError, ValueError, OverflowError):
@@ -29,7 +29,7 @@ def array_of_shape(where: str, values: Any, shape: tuple[int, ...]) -> Array:
 
 
 def number(where: str, value: Any, *, at_least: float | None = None, above: float | None = None) -> float:
-    """Return a finite float, or an unset default unchanged; raise `ModelError` if it is no number or out of bounds."""
+    """Return a finite float, or an unset default unchanged; raise `ModelError` if it is not a number within bounds."""
     try:
         result = value if isinstance(value, Quantity) else float(value)
     except (TypeError, ValueError, OverflowError):
@@ -44,7 +44,7 @@ def number(where: str, value: Any, *, at_least: float | None = None, above: floa
 
 
 def unit_vector(where: str, values: Any) -> Array:
-    """Return the read-only unit vector along three given numbers, (3,)."""
+    """Return the read-only unit vector in the direction of three given numbers, (3,)."""
     vector = array_of_shape(where, values, (3,))
     length = np.linalg.norm(vector)
     if length == 0:

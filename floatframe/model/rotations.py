@@ -38,10 +38,10 @@ __all__ = [
     "tilde",
 ]
 
-SERIES_BELOW = 0.25  #: limit of the squared angle
-NEAR_FULL_TURN = 1e-6  #: |theta| minus full turns, below which the direction of theta is lost to rounding
+SERIES_BELOW = 0.25  #: squared angle below which series are used
+NEAR_FULL_TURN = 1e-6  #: distance of |theta| from full turns below which rounding destroys the direction of theta
 TERMS = 10
-CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])  #: times Euler parameters: those of the inverse rotation
+CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])  #: factors on Euler parameters that give the inverse rotation
 
 
 def cross(a: Array, b: Array) -> Array:
@@ -112,7 +112,7 @@ def euler_parameter_product(p: Array, other: Array) -> Array:
 
 
 def euler_parameter_rates(p: Array, omega_B: Array) -> Array:
-    """Return p_dot = 1/2 p * (0, omega_B), (4,) [1/s]; omega_B, (3,) [rad/s], is in body axes."""
+    """Return p_dot = 1/2 p * (0, omega_B), (4,) [1/s], for omega_B, (3,) [rad/s], in body axes."""
     w, v = p[0], np.asarray(p[1:])
     return 0.5 * np.array([-(v @ omega_B), *(w * np.asarray(omega_B) + np.cross(v, omega_B))])
 
@@ -140,7 +140,7 @@ def series_of_rate(x: Array, first: int) -> Array:
 
 
 def quotients(x: Array) -> tuple[Array, Array, Array]:
-    """Return s, a, b for the square x of an angle."""
+    """Return s, a, b as functions of the squared angle x."""
     x = np.asarray(x) * 1.0
     is_small = np.abs(x) < SERIES_BELOW
     if np.all(is_small):
@@ -154,7 +154,7 @@ def quotients(x: Array) -> tuple[Array, Array, Array]:
 
 
 def rates_of_quotients(x: Array) -> tuple[Array, Array]:
-    """Return da, db for the square x of an angle."""
+    """Return da, db as functions of the squared angle x."""
     x = np.asarray(x) * 1.0
     is_small = np.abs(x) < SERIES_BELOW
     t = np.sqrt(np.where(is_small, 1.0, x))
@@ -166,7 +166,7 @@ def rates_of_quotients(x: Array) -> tuple[Array, Array]:
 
 
 def polynomial(theta: Array, first: Array, second: Array) -> Array:
-    """Return 1 + first S + second S², (..., 3, 3)."""
+    """Return the matrix 1 + first S + second S², (..., 3, 3), S = tilde(theta)."""
     S = tilde(theta)
     return np.eye(3) + first[..., None, None] * S + second[..., None, None] * (S @ S)
 
@@ -191,7 +191,7 @@ def right_jacobian(theta: Array) -> Array:
 
 
 def spin_rate(theta: Array, rate: Array, second: Array) -> Array:
-    """Return the rate of the angular velocity L(theta) rate of exp(theta), (..., 3), in the axes at the start.
+    """Return the rate of angular velocity L(theta) rate of exp(theta), (..., 3), in the initial axes.
 
     It is L second + (theta · rate) (da theta × rate + db theta × (theta × rate)) + b rate × (theta × rate).
     """
@@ -220,7 +220,7 @@ def rotation_vector(p: Array) -> Array:
 
 
 def rotations_between(p: Array, other: Array) -> Array:
-    """Return the rotation vectors, (..., 3) [rad], that lead from orientations `other` to p, both (..., 4)."""
+    """Return the rotation vectors, (..., 3) [rad], from orientations `other` to p, both (..., 4)."""
     return rotation_vector(euler_parameter_product(other * CONJUGATE, p))
 
 

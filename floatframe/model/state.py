@@ -1,4 +1,4 @@
-"""The state of a system: positions and velocities of its bodies."""
+"""The state of a system, given by positions and velocities of its bodies."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -31,7 +31,7 @@ T = TypeVar("T")
 
 
 def in_units_of(units: Units, part: Any) -> Any:
-    """Return a part of a system (a dataclass) with its defaults, also nested ones, in the units of the system."""
+    """Return a part of a system (a dataclass) whose defaults, also in nested parts, are in the units of the system."""
     of_angle = bool(getattr(part, "is_angular", False))
     changed = {}
     for each in fields(part):
@@ -43,7 +43,7 @@ def in_units_of(units: Units, part: Any) -> Any:
 
 
 def held_in_units(units: Units, value: Any) -> Any:
-    """Return the value of a field with its defaults in the units of the system, or the value itself if it has none."""
+    """Return a field value whose defaults are in units of the system; a value without defaults is unchanged."""
     if isinstance(value, Marker):
         return value
     if is_dataclass(value) and not isinstance(value, type):
@@ -65,11 +65,11 @@ REDUNDANT = ("refuse", "minimum-norm")
 
 
 class Named(Protocol):
-    """A sensor, channel or event, which a system carries for measurement, linearisation or a run."""
+    """A sensor, channel or event that a system carries for measurement, linearisation or a run."""
 
     @property
     def name(self) -> str:
-        """Unique name."""
+        """Unique name of the object."""
 
 
 @presented
@@ -77,7 +77,7 @@ class Named(Protocol):
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class System:
-    """Bodies, the joints between them and the forces on them.
+    """Bodies with joints and forces between them.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ class System:
                 )
 
     def summary(self) -> Summary:
-        """Return what `repr` and notebooks show: bodies with their mass and modes, and the names of all else."""
+        """Return the content shown by `repr` and notebooks: bodies with mass and modes, names of all other parts."""
         rows = [("units", self.units.name)]
         kinds = ("joints", "couplers", "forces", "elements", "sensors", "inputs", "outputs", "events", "fmus")
         for kind in (*kinds, "controllers"):
@@ -198,7 +198,7 @@ class System:
         return {}
 
     def derived(self, make: "Callable[[System], T]") -> "T":
-        """Return what a function makes of this system: made at the first call, and kept as long as the system."""
+        """Return the result of a function of this system, computed at the first call and kept with the system."""
         if make not in self._derived:
             self._derived[make] = make(self)
         return cast(T, self._derived[make])
@@ -210,7 +210,7 @@ class System:
         return tuple(source for source in (self.source, *sources, *self.data_files) if source)
 
     def body(self, name: str) -> Body:
-        """Return the body of that name; raise `ModelError` with the known names if there is none."""
+        """Return the body with this name; raise `ModelError` with the known names if it does not exist."""
         for body in self.bodies:
             if body.name == name:
                 return body

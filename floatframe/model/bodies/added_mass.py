@@ -73,7 +73,7 @@ class AddedMass:
 
 
 def second_moments(J: Any) -> Any:
-    """Return ∫ x xᵀ = tr(J)/2 1 - J of an inertia tensor J, (3, 3), of numbers or terms."""
+    """Return the second moment ∫ x xᵀ = tr(J)/2 1 - J for an inertia tensor J, (3, 3), of numbers or terms."""
     return 0.5 * np.trace(J) * np.eye(3) - J
 
 
@@ -136,7 +136,7 @@ def with_masses(body: ReducedBody, masses: Sequence[AddedMass]) -> ReducedBody:
 
 
 def with_particle(geometric: GeometricStiffness, k: int, m: float, c: Array, rho: Array) -> GeometricStiffness:
-    """Return the geometric stiffness including the inertia loads of a particle at rho from the node of interface k.
+    """Return the geometric stiffness with the inertia loads of a particle at rho from the node of interface k.
 
     Its unit loads (see `GeometricStiffness`) are forces at the particle: a force f, and the moment rho × f, at the
     node.

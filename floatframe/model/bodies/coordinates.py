@@ -34,7 +34,7 @@ class JointCoordinate:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class AxialDistance:
-    """Distance of the point of marker B from that of marker A along an axis of A; its force acts at the point of B.
+    """Distance of marker B's point from marker A's point along an axis of A; its force acts at the point of B.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class AxialDistance:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class AxialAngle:
-    """Angle of marker B about an axis of A, zero as assembled; its rate is the angular velocity along the axis.
+    """Angle of marker B about an axis of A, zero when assembled; its rate is the angular velocity along the axis.
 
     It is intended for markers that rotate relative to each other about that axis. If the axis of B tilts by a small
     angle, value and rate are inconsistent by the square of this angle.

@@ -127,7 +127,7 @@ class FlexibleBody:
 
     @property
     def drawn_position(self) -> Array:
-        """The given position; the ground origin for a body without one, before its joints place it, (3,) [m]."""
+        """The given position (3,) [m]; for a body without one, the ground origin until its joints place it."""
         return np.zeros(3) if self.position is None else self.position
 
     @property
@@ -137,12 +137,12 @@ class FlexibleBody:
 
     @property
     def mean_axes(self) -> MeanAxes | None:
-        """Mean axes in which a stiffened body with another frame is computed; None: in the frame of its file."""
+        """Mean axes in which the engine computes a stiffened body; None if it uses the frame of the file."""
         return mean_axes(self.reduced) if self.is_stiffened else None
 
     @property
     def moved(self) -> ReducedBody:
-        """The reduced body in the frame in which its motion is computed."""
+        """The reduced body in the frame in which the engine computes its motion."""
         axes = self.mean_axes
         return self.reduced if axes is None else axes.reduced
 

@@ -22,4 +22,4 @@ class Ground:
     name: str = "ground"
 
 
-GROUND = Ground()  #: the only instance
+GROUND = Ground()  #: the only instance of the ground

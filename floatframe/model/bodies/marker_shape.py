@@ -1,4 +1,4 @@
-"""A marker in its body: its position, its motion due to the modes, and its motion with the body.
+"""A marker relative to its body: undeformed position, motion due to the modes, and motion with the body.
 
 q are the modal coordinates. K_P is the second-order part for a stiffened body (docs/theory.md §7). In body axes:
 
@@ -47,28 +47,29 @@ __all__ = [
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class MarkerShape:
-    """A marker in its body."""
+    """A marker relative to its body: position, axes and shape functions."""
 
-    position: Array  #: undeformed, body frame, (3,)
-    triad: Array  #: undeformed axes as columns, body frame, (3, 3)
-    #: displacement and rotation due to q, undeformed, (6, n); None: the marker does not deform
+    position: Array  #: position on the undeformed body, body frame, (3,)
+    triad: Array  #: axes on the undeformed body as columns, body frame, (3, 3)
+    #: displacement and rotation for unit modes, undeformed, (6, n); None: the marker does not deform
     psi: Array | None = None
-    bend: Array | None = None  #: K_P of a stiffened body, symmetric in the modes, (6, n, n); None: zero
+    #: geometric change K_P of the shapes of a stiffened body, symmetric in the modes, (6, n, n); None: zero
+    bend: Array | None = None
 
     def shapes(self, q: Array) -> Array:
-        """Return Psi(q), (..., 6, n)."""
+        """Return the shapes Psi(q) of the deformed body, (..., 6, n)."""
         if self.psi is None:
             return np.zeros((6, q.shape[-1]))
         return self.psi if self.bend is None else self.psi - bent(self.bend, q)
 
     def deformation(self, q: Array) -> Array:
-        """Return displacement and rotation vector, (..., 6)."""
+        """Return displacement and rotation vector due to the modes, (..., 6)."""
         if self.psi is None:
             return np.zeros((*q.shape[:-1], 6))
         return rotated(self.psi if self.bend is None else self.psi - 0.5 * bent(self.bend, q), q)
 
     def rates(self, q: Array, q_dot: Array, q_ddot: Array) -> tuple[Array, Array]:
-        """Return first and second rate of `deformation`, (..., 6) each."""
+        """Return first and second rates of `deformation`, (..., 6) each."""
         shapes = self.shapes(q)
         second = rotated(shapes, q_ddot)
         if self.bend is not None:
@@ -76,14 +77,14 @@ class MarkerShape:
         return rotated(shapes, q_dot), second
 
     def pose(self, q: Array) -> tuple[Array, Array]:
-        """Return rho, (..., 3), and axes, (..., 3, 3), in the body."""
+        """Return position rho, (..., 3), and axes, (..., 3, 3), in the deformed body."""
         if self.psi is None:
             return self.position, self.triad
         d = self.deformation(q)
         return self.position + d[..., :3], rotation_exp(d[..., 3:]) @ self.triad
 
     def jacobian(self, q: Array) -> Array:
-        """Return translation and rotation per small motion (dx, dtheta, dq) of the body, (6, 6 + n), at q, (n,)."""
+        """Return the Jacobian of translation and rotation by small motions (dx, dtheta, dq), (6, 6 + n), at q, (n,)."""
         d = self.deformation(q)
         J = np.zeros((6, 6 + len(q)))
         J[:3, :3] = J[3:, 3:6] = np.eye(3)
@@ -96,13 +97,13 @@ class MarkerShape:
 
 
 def bent(K: Array, x: Array) -> Array:
-    """Return Σ_l K [a, k, l] x_l, (..., 6, n)."""
+    """Return the product Σ_l K [a, k, l] x_l, (..., 6, n)."""
     n = K.shape[-1]
     return (x @ K.reshape(6 * n, n).T).reshape(*x.shape[:-1], 6, n)
 
 
 def bending_of(reduced: ReducedBody, name: str) -> Array:
-    """Return K_P of an interface, (6, n_q, n_q); zero if the body has none, or excludes loads of this interface."""
+    """Return K_P of an interface, (6, n_q, n_q); zero if the body has none or excludes loads on this interface."""
     if reduced.geometric is None:
         return np.zeros((6, reduced.n_q, reduced.n_q))
     place = [interface.name for interface in reduced.interfaces].index(name)
@@ -110,14 +111,14 @@ def bending_of(reduced: ReducedBody, name: str) -> Array:
 
 
 def interface_shape(reduced: ReducedBody, name: str, *, is_stiffened: bool) -> MarkerShape:
-    """Return the marker at an interface, with its axes; `BodyError` if there is no such interface."""
+    """Return the marker at an interface with the interface's axes; `BodyError` if it does not exist."""
     interface = reduced.interface(name)
     bend = bending_of(reduced, name) if is_stiffened else None
     return MarkerShape(interface.position, interface.triad, np.asarray(interface.Psi), bend)
 
 
 def node_shape(reduced: ReducedBody, nodes: int | IntArray, *, is_stiffened: bool) -> MarkerShape:
-    """Return the marker at a kept node, or of the mean motion of several nodes, with the axes of the body frame.
+    """Return the marker at a kept node, or for the mean motion of several nodes, with the axes of the body frame.
 
     A single node rotates if its rotation is kept (`ReducedBody.kept`), otherwise it does not rotate (`is_turning`).
     Several nodes rotate by the mean rotation of their translations (an RBE3 with equal weights), or not at all if they
@@ -134,7 +135,7 @@ def node_shape(reduced: ReducedBody, nodes: int | IntArray, *, is_stiffened: boo
 
 
 def rotation_of_nodes(reduced: ReducedBody, rows: IntArray) -> Array:
-    """Return the (mean) rotation of one or several nodes due to the modes, (3, n_q); zero if it is unknown."""
+    """Return the rotation shapes of a node, or the mean of several nodes, (3, n_q); zero if they are unknown."""
     if not is_turning(reduced, rows):
         return np.zeros((3, reduced.n_q))
     if len(rows) == 1:
@@ -146,7 +147,7 @@ def rotation_of_nodes(reduced: ReducedBody, rows: IntArray) -> Array:
 
 
 def is_turning(reduced: ReducedBody, rows: IntArray) -> bool:
-    """Return whether the rotation of a node is kept, or several nodes have a mean rotation."""
+    """Return whether a node has kept rotations, or several nodes define a mean rotation."""
     if len(rows) == 1:
         return reduced.kept is not None and reduced.kept.of_node(int(rows[0])) is not None
     return are_spread(np.asarray(reduced.nodes[rows]))
@@ -155,11 +156,11 @@ def is_turning(reduced: ReducedBody, rows: IntArray) -> bool:
 class MotionInBody(NamedTuple):
     """Motion of a marker relative to its body, in body axes."""
 
-    rho: Array  #: from the frame origin, (..., 3)
+    rho: Array  #: position relative to the frame origin, (..., 3)
     rho_dot: Array
     rho_ddot: Array
-    axes: Array  #: columns, (..., 3, 3)
-    spin: Array  #: angular velocity, (..., 3)
+    axes: Array  #: axes as columns, (..., 3, 3)
+    spin: Array  #: angular velocity relative to the body, (..., 3)
     spin_dot: Array
 
 
@@ -180,27 +181,27 @@ def motion_in_body(shape: MarkerShape, q: Array, q_dot: Array, q_ddot: Array) ->
 class BodyFrameMotion(NamedTuple):
     """Motion of a body frame."""
 
-    r: Array  #: ground axes, (..., 3)
-    R: Array  #: R_GB, (..., 3, 3)
-    v: Array  #: ground axes, (..., 3)
-    omega: Array  #: body axes, (..., 3)
-    v_dot: Array  #: ground axes, (..., 3)
+    r: Array  #: position of the frame origin, ground axes, (..., 3)
+    R: Array  #: rotation matrix R_GB, (..., 3, 3)
+    v: Array  #: velocity of the frame origin, ground axes, (..., 3)
+    omega: Array  #: angular velocity, body axes, (..., 3)
+    v_dot: Array  #: acceleration of the frame origin, ground axes, (..., 3)
     alpha: Array  #: rate of omega, body axes, (..., 3)
 
 
 class MarkerMotion(NamedTuple):
     """Motion of a marker in ground axes."""
 
-    position: Array  #: (..., 3)
+    position: Array  #: position of the marker, (..., 3)
     velocity: Array
     acceleration: Array
-    axes: Array  #: columns, (..., 3, 3)
+    axes: Array  #: axes as columns, (..., 3, 3)
     omega: Array  #: angular velocity, (..., 3)
     alpha: Array  #: angular acceleration, (..., 3)
 
 
 def marker_motion(body: BodyFrameMotion, own: MotionInBody) -> MarkerMotion:
-    """Return the motion of a marker from the motion of its body frame and its motion relative to the body."""
+    """Return a marker's motion from the motion of its body frame and its motion relative to the body."""
     R, omega, alpha = body.R, body.omega, body.alpha
     arm = cross(omega, own.rho)
     relative = cross(alpha, own.rho) + cross(omega, arm) + 2 * cross(omega, own.rho_dot) + own.rho_ddot

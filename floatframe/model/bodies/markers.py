@@ -19,7 +19,7 @@ class Named(Protocol):
 
     @property
     def name(self) -> str:
-        """Its name."""
+        """Name of the object."""
 
 
 @frozen_copies
@@ -74,13 +74,13 @@ class Marker:
 
     @staticmethod
     def of_name(name: str) -> "Marker":
-        """Return the marker that "body" or "body.interface" names, so that a text may stand for it."""
+        """Return the marker for a text "body" or "body.interface"."""
         body, _, interface = name.partition(".")
         return Marker(body, interface or None)
 
     @property
     def address(self) -> Address | None:
-        """The place on a flexible body where it is no interface; None: it is one, or the body itself."""
+        """The address of the marker on a flexible body; None if the marker is an interface or the body itself."""
         if self.position is None and self.node is None and self.element is None and self.set is None:
             return None
         try:
@@ -89,7 +89,7 @@ class Marker:
             raise ModelError(f"marker on {body_name(self.body)!r}: {error}") from error
 
 
-#: a marker, or a body (or its name), which is then placed where the other marker of the joint is
+#: a marker, or a body (or its name), whose marker is then placed at the joint's other marker
 Place = Marker | Named | str
 
 

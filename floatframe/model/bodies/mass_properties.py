@@ -20,11 +20,11 @@ __all__ = ["MassProperties", "combined", "mass_properties", "point_mass"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class MassProperties:
-    """Mass, centre of mass and inertia tensor about it, in the axes of the body frame."""
+    """Mass, centre of mass, and inertia tensor about the centre of mass, in the axes of the body frame."""
 
-    mass: float  #: [kg]
-    center_of_mass: Array  #: (3,) [m]
-    inertia: Array  #: about the centre of mass, products of inertia with their sign, I_xy = -∫ x y, (3, 3) [kg m²]
+    mass: float  #: mass of the body [kg]
+    center_of_mass: Array  #: centre of mass, (3,) [m]
+    inertia: Array  #: inertia tensor about the centre of mass, off-diagonal I_xy = -∫ x y, (3, 3) [kg m²]
 
     @property
     def arguments(self) -> dict[str, Any]:
@@ -87,14 +87,14 @@ def mass_properties(
 def point_mass(
     mass: float, position: Array | tuple[float, float, float], inertia: Array | None = None
 ) -> MassProperties:
-    """Return the properties of a small mass at a position, with or without an inertia of its own."""
+    """Return the properties of a small mass at a position, optionally with its own inertia."""
     own = np.zeros((3, 3)) if inertia is None else array_of_shape("point_mass: inertia", inertia, (3, 3))
     m = number("point_mass: mass", mass, above=0.0)
     return MassProperties(m, array_of_shape("point_mass: position", position, (3,)), own)
 
 
 def combined(*parts: MassProperties) -> MassProperties:
-    """Return the total properties of parts that are fixed to each other."""
+    """Return the total properties of parts that are rigidly connected."""
     if not parts:
         raise ModelError("combined: expected at least one part, got none")
     m = sum(part.mass for part in parts)
@@ -104,5 +104,5 @@ def combined(*parts: MassProperties) -> MassProperties:
 
 
 def steiner(d: Array) -> Array:
-    """Return d·d 1 - d dᵀ, (3, 3)."""
+    """Return the matrix d·d 1 - d dᵀ, (3, 3)."""
     return np.asarray(d @ d * np.eye(3) - np.outer(d, d))

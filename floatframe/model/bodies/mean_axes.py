@@ -41,27 +41,28 @@ from floatframe.model.rotations import (
 
 __all__ = ["FrameMotion", "MeanAxes", "mean_axes"]
 
-EPSILON = np.cross(np.eye(3)[:, None], np.eye(3)[None])  #: (a × b)_i = EPSILON_ijk a_j b_k, (3, 3, 3)
+#: permutation symbol, (a × b)_i = EPSILON_ijk a_j b_k, (3, 3, 3)
+EPSILON = np.cross(np.eye(3)[:, None], np.eye(3)[None])
 _made: WeakKeyDictionary[ReducedBody, "MeanAxes | None"] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
 class FrameMotion:
-    """Motion of a body frame and of the modal coordinates in it; arrays may have any number of time dimensions."""
+    """Motion of a body frame and its modal coordinates; arrays may have any number of time dimensions."""
 
-    r: Array  #: origin, ground axes, (..., 3) [m]
-    p: Array  #: Euler parameters, (..., 4)
-    q: Array  #: (..., n_q)
-    v: Array  #: ground axes, (..., 3) [m/s]
-    omega: Array  #: axes of the frame, (..., 3) [rad/s]
-    q_dot: Array  #: (..., n_q)
-    v_dot: Array  #: ground axes, (..., 3) [m/s²]
-    omega_dot: Array  #: axes of the frame, (..., 3) [rad/s²]
-    q_ddot: Array  #: (..., n_q)
+    r: Array  #: position of the origin, ground axes, (..., 3) [m]
+    p: Array  #: Euler parameters of the frame, (..., 4)
+    q: Array  #: modal coordinates, (..., n_q)
+    v: Array  #: velocity of the origin, ground axes, (..., 3) [m/s]
+    omega: Array  #: angular velocity, axes of the frame, (..., 3) [rad/s]
+    q_dot: Array  #: rates of the modal coordinates, (..., n_q)
+    v_dot: Array  #: acceleration of the origin, ground axes, (..., 3) [m/s²]
+    omega_dot: Array  #: angular acceleration, axes of the frame, (..., 3) [rad/s²]
+    q_ddot: Array  #: second rates of the modal coordinates, (..., n_q)
 
     @property
     def of_frame(self) -> BodyFrameMotion:
-        """The motion of the frame alone."""
+        """The motion of the frame without the modal coordinates."""
         return BodyFrameMotion(self.r, rotation_matrix(self.p), self.v, self.omega, self.v_dot, self.omega_dot)
 
 
@@ -69,18 +70,18 @@ class FrameMotion:
 class MeanAxes:
     """A stiffened body in mean axes, with the transformations to and from the frame of its file."""
 
-    reduced: ReducedBody  #: in mean axes B', which are parallel to those of the file while undeformed
-    Z: Array  #: q = Z q', (n_q, n_q)
-    frame: MarkerShape  #: the point c_p with the axes of B, in B'
-    point: Array  #: c_p in B, (3,) [m]
+    reduced: ReducedBody  #: the body in mean axes B', which are parallel to the file's axes in the undeformed body
+    Z: Array  #: transformation of modal coordinates, q = Z q', (n_q, n_q)
+    frame: MarkerShape  #: the point c_p with the axes of B, as a marker in B'
+    point: Array  #: position of c_p in B, (3,) [m]
 
     @cached_property
     def inverse(self) -> Array:
-        """Inverse of Z, (n_q, n_q)."""
+        """Inverse of Z, (n_q, n_q), from file to mean-axis coordinates."""
         return np.asarray(np.linalg.inv(self.Z))
 
     def to_file(self, motion: FrameMotion) -> FrameMotion:
-        """Return a motion, given in mean axes, in the frame of the file."""
+        """Convert a motion in mean axes to the frame of the file."""
         q = motion.q
         own = motion_in_body(self.frame, q, motion.q_dot, motion.q_ddot)
         at = marker_motion(motion.of_frame, own)
@@ -100,7 +101,7 @@ class MeanAxes:
         )
 
     def to_mean(self, motion: FrameMotion) -> FrameMotion:
-        """Return a motion, given in the frame of the file, in mean axes."""
+        """Convert a motion in the frame of the file to mean axes."""
         q, q_dot, q_ddot = (x @ self.inverse.T for x in (motion.q, motion.q_dot, motion.q_ddot))
         own = motion_in_body(self.frame, q, q_dot, q_ddot)
         at = marker_motion(motion.of_frame, motion_in_body(MarkerShape(self.point, np.eye(3)), q, q_dot, q_ddot))
@@ -123,7 +124,7 @@ class MeanAxes:
         )
 
     def small_motions(self, q: Array) -> Array:
-        """Return the matrix, (6 + n_q, 6 + n_q), from small motions in mean axes to the file frame, at q', (n_q,).
+        """Return the matrix from small motions in mean axes to the file frame, (6 + n_q, 6 + n_q), at q', (n_q,).
 
         Both consist of translation and rotation of the frame in its own axes, and of modal coordinates.
         """
@@ -152,7 +153,7 @@ def mean_axes(reduced: ReducedBody) -> MeanAxes | None:
 
 
 def made_mean_axes(reduced: ReducedBody) -> MeanAxes:
-    """Return a reduced body in mean axes, and the motion of its file's frame in them by steps (1) to (4)."""
+    """Return a reduced body in mean axes, and its file frame's motion in these axes, by steps (1) to (4)."""
     x, y, z = ((float(a), float(b), float(c)) for a, b, c in reduced.frame.axes.T)
     mean, change = converted(reduced, TisserandFrame(axes=(x, y, z)))
     at = reduced.frame.at
@@ -184,7 +185,7 @@ def turn_of_mean_axes(reduced: ReducedBody) -> tuple[Array, Array]:
 
 
 def place_of_point(reduced: ReducedBody, point: Array, linear: Array, second: Array) -> tuple[Array, Array]:
-    """Return the linear and second-order position of a point of B in mean axes, exp(theta) (c_p - s(q)/m), step (1).
+    """Return, by step (1), the position exp(theta) (c_p - s(q)/m) of a point of B in mean axes, to second order.
 
     The rotation vector theta of B in the mean axes is the negative of `turn_of_mean_axes`.
     """
@@ -199,10 +200,10 @@ def place_of_point(reduced: ReducedBody, point: Array, linear: Array, second: Ar
 
 
 def axial(V: Array) -> Array:
-    """Return Σ o × f for V = Σ f oᵀ: (3, ...) from (3, 3, ...)."""
+    """Return Σ o × f for V = Σ f oᵀ; (3, ...) from (3, 3, ...)."""
     return np.asarray(np.einsum("abc,cb...->a...", EPSILON, V))
 
 
 def both_orders(form: Array) -> Array:
-    """Return the sum of a form (..., k, l) and its transpose."""
+    """Return the sum of a form (..., k, l) and its transpose in the last two axes."""
     return np.asarray(form + np.swapaxes(form, -1, -2))

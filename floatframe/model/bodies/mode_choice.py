@@ -1,4 +1,4 @@
-"""A reduced body with some or none of its modes, which is stiffer, for comparisons."""
+"""A reduced body with a subset of its modes, which is stiffer, for comparisons."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,7 +14,7 @@ __all__ = ["frozen_to_rigid", "with_modes", "without_modes"]
 
 
 def with_modes(body: ReducedBody, modes: Sequence[int]) -> ReducedBody:
-    """Return the body with the modes of these numbers (from zero), in their order.
+    """Return the body with only the modes of these numbers (from zero), in this order.
 
     Mass, inertia, interfaces and nodes stay. Stress points, the columns of the mode set and the data for another body
     frame are left out. Results then have fewer modes than the file, so films of them need this body.
@@ -67,7 +67,7 @@ def with_modes(body: ReducedBody, modes: Sequence[int]) -> ReducedBody:
 
 
 def without_modes(body: ReducedBody, modes: Sequence[int]) -> ReducedBody:
-    """Return the body without the modes of these numbers."""
+    """Return the body without the modes with these numbers."""
     off = {int(k) for k in modes}
     if any(not 0 <= k < body.n_q for k in off):
         raise ModelError(f"without_modes: body {body.name!r} has modes 0 to {body.n_q - 1}, got {sorted(off)}")
@@ -75,5 +75,5 @@ def without_modes(body: ReducedBody, modes: Sequence[int]) -> ReducedBody:
 
 
 def frozen_to_rigid(body: ReducedBody) -> ReducedBody:
-    """Return the body without modes: rigid, with its mass, inertia and interfaces."""
+    """Return the body without any modes: a rigid body with the same mass, inertia and interfaces."""
     return with_modes(body, [])

@@ -15,7 +15,7 @@ from floatframe.model.shapes.shape import Geometry, Shape, shape_tuple
 
 __all__ = ["RigidBody"]
 
-#: relative excess of one principal moment over the sum of the other two, up to which it is taken as rounding
+#: relative excess of a principal moment over the sum of the other two that is accepted as rounding
 TRIANGLE_DEFECT = 1e-6
 
 
@@ -103,7 +103,7 @@ class RigidBody:
 
     @property
     def drawn_position(self) -> Array:
-        """The given position; the ground origin for a body without one, before its joints place it, (3,) [m]."""
+        """The given position (3,) [m]; for a body without one, the ground origin until its joints place it."""
         return np.zeros(3) if self.position is None else self.position
 
     @property

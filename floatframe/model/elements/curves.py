@@ -23,7 +23,7 @@ __all__ = ["function_at", "function_integral_at", "function_numbers", "grid_at",
 
 
 def function_numbers(function: TimeFunction) -> list[float]:
-    """Return n, n beginnings of pieces, n integrals up to these beginnings, and n rows of coefficients."""
+    """Return n, the n starts of pieces, the n integrals up to these starts, and n rows of coefficients."""
     begins, pieces = function.begins, function.pieces
     lengths = np.diff(begins)
     parts = [piece_integral(c, length) for c, length in zip(pieces[:-1], lengths, strict=True)]
@@ -32,7 +32,7 @@ def function_numbers(function: TimeFunction) -> list[float]:
 
 
 def piece_integral(c: Array, x: float) -> float:
-    """Return the integral of a piece from its beginning to a distance x after it."""
+    """Return the integral of a piece from its start to a distance x after the start."""
     value = sum(c[k] * x ** (k + 1) / (k + 1) for k in range(6))
     if c[6] != 0.0:
         omega, phase = c[7], c[8]
@@ -42,7 +42,7 @@ def piece_integral(c: Array, x: float) -> float:
 
 @register_jitable
 def piece_of(data, at, x):
-    """Return the index of the piece that is valid at x: the last that begins at or before x, else the first."""
+    """Return the index of the piece for x: the last one that starts at or before x, else the first."""
     low, high = 0, int(data[at]) - 1
     while low < high:
         middle = (low + high + 1) // 2
@@ -55,7 +55,7 @@ def piece_of(data, at, x):
 
 @register_jitable
 def function_at(data, at, x):
-    """Return the value at x of the function that begins at data[at]."""
+    """Return the value at x of the function stored from data[at] on."""
     n, k = int(data[at]), piece_of(data, at, x)
     y, c = x - data[at + 1 + k], at + 1 + 2 * n + 9 * k
     value = 0.0 * y
@@ -68,7 +68,7 @@ def function_at(data, at, x):
 
 @register_jitable
 def function_integral_at(data, at, x):
-    """Return the integral, from the beginning of the first piece to x, of the function that begins at data[at]."""
+    """Return the integral to x, from the start of the first piece, of the function stored from data[at] on."""
     n, k = int(data[at]), piece_of(data, at, x)
     y, c = x - data[at + 1 + k], at + 1 + 2 * n + 9 * k
     value = 0.0 * y
@@ -84,7 +84,7 @@ def function_integral_at(data, at, x):
 
 
 def grid_numbers(where: str, x: Sequence[float], y: Sequence[float], values: Sequence[Sequence[float]]) -> list[float]:
-    """Return n_x, n_y, x, y and the values row by row; `ModelError` with `where` if they are inconsistent.
+    """Return n_x, n_y, x, y and values row by row; `ModelError` with `where` if they are inconsistent.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def grid_numbers(where: str, x: Sequence[float], y: Sequence[float], values: Seq
 
 @register_jitable
 def interval_of(data, at, n, x):
-    """Return the index of the interval that contains x, of n increasing numbers from data[at] on; else the nearest."""
+    """Return the index of the interval around x, or nearest to it, between n increasing numbers from data[at] on."""
     low, high = 0, n - 2
     while low < high:
         middle = (low + high + 1) // 2
@@ -129,7 +129,7 @@ def part_of(data, at, x):
 
 @register_jitable
 def grid_at(data, at, x, y):
-    """Return the value at (x, y) of the grid that begins at data[at]: bilinear, constant beyond its edges."""
+    """Return the bilinear value at (x, y) of the grid stored from data[at] on; constant beyond its edges."""
     n_x, n_y = int(data[at]), int(data[at + 1])
     at_x, at_y = at + 2, at + 2 + n_x
     i, j = interval_of(data, at_x, n_x, x), interval_of(data, at_y, n_y, y)

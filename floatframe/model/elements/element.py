@@ -38,26 +38,26 @@ __all__ = [
 ]  # fmt: skip
 
 TANGENTS = ("differences", "complex")
-#: components of a wrench that act
+#: components that a wrench may have
 ACTS = {"wrench": (0, 1, 2, 3, 4, 5), "force": (0, 1, 2), "moment": (3, 4, 5), "none": ()}
 
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """The markers of an element in the assembled configuration, in ground axes."""
+    """The markers of an element in the assembled position, ground axes."""
 
-    r: Array  #: (n, 3) [m]
+    r: Array  #: positions of the markers, (n, 3) [m]
     A: Array  #: axes as columns, (n, 3, 3)
     on_ground: tuple[bool, ...]  #: whether each marker is on the ground
-    units: Units  #: of the system
+    units: Units  #: units of the system
 
 
 @dataclass(frozen=True)
 class GapSpring:
-    """The spring k xⁿ of a contact with depth x."""
+    """The contact spring k xⁿ for a penetration depth x."""
 
-    stiffness: float  #: k [N/mⁿ], for an angle [N m/radⁿ]
-    exponent: float = 1.0  #: n
+    stiffness: float  #: stiffness k [N/mⁿ], for an angle [N m/radⁿ]
+    exponent: float = 1.0  #: exponent n of the depth
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "stiffness", number("law: gaps: stiffness", self.stiffness, above=0.0))
@@ -69,7 +69,7 @@ class GapSpring:
 @dataclass(frozen=True, eq=False, kw_only=True)
 @checked_fields(ModelError)
 class ElementLaw:
-    """The contribution of an element to the equations of motion; its function is described in the module docstring.
+    """The terms of an element in the equations of motion; its function is described in the module docstring.
 
     Parameters
     ----------
@@ -250,7 +250,7 @@ def require_length(where: str, values: Sequence[Any], names: str, named: Sequenc
 
 
 class Element:
-    """Base class of elements; users derive frozen dataclasses from it.
+    """Base class of elements, from which users derive frozen dataclasses.
 
     The fields are the keys of the system file; `name` comes first. The markers are all fields that contain a marker or
     a sequence of markers, in the order of the fields, unless `markers` is overridden.
@@ -265,18 +265,18 @@ class Element:
             """The markers that the element connects, on bodies or the ground."""
 
     def law(self, placed: Placed) -> ElementLaw:
-        """Return the law of the element, for the markers in the assembled configuration."""
+        """Return the law of the element for markers in the assembled position."""
         raise ModelError(f"{type(self).__name__}: expected a method law(placed) that returns an ElementLaw")
 
     def events(self) -> Sequence[Any]:
-        """Return the events of the element, as `floatframe.Event` on "NAME.OUTPUT"; none by default.
+        """Return events of the element, as `floatframe.Event` on "NAME.OUTPUT"; by default none.
 
         Events are evaluated after blocks of steps, in Python; `ElementLaw.stops` has no such cost.
         """
         return ()
 
     def small_angles(self) -> Callable[[Array], Array] | None:
-        """Return the deviation of its angles from small angles, as a function of motion.
+        """Return a function of motion that measures how far angles exceed the range of small angles; by default None.
 
         By default none: any size is allowed.
 
@@ -286,7 +286,7 @@ class Element:
         return None
 
     def drawn(self) -> Sequence[MarkerShapes | Stretched | Arrow]:
-        """Return the shapes, fixed to its markers, by which it is drawn in films and pages; by default none."""
+        """Return the shapes, fixed to markers, with which films and pages draw the element; by default none."""
         return ()
 
 
@@ -307,7 +307,7 @@ def fields_of(element: Any) -> list[Any]:
 
 
 def markers_in(value: Any) -> list[Marker]:
-    """Return a marker, or those of a sequence that contains only markers, as a list."""
+    """Return a marker, or a sequence of only markers, as a list; an empty list for other values."""
     if isinstance(value, Marker):
         return [value]
     is_list = isinstance(value, list | tuple) and all(isinstance(one, Marker) for one in value)

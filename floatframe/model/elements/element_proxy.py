@@ -1,4 +1,4 @@
-"""An element that stands for another one whose law an event or a switching function changes."""
+"""An element that replaces another one whose law is changed by an event or a switching function."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ __all__ = ["ElementProxy"]
 
 @dataclass(frozen=True, eq=False)
 class ElementProxy(Element):
-    """Replaces an element, with the same name, markers and unknowns; subclasses change its law."""
+    """Replaces an element with the same name, markers and unknowns; subclasses change the law."""
 
     element: Element
 
@@ -21,22 +21,22 @@ class ElementProxy(Element):
 
         @property
         def name(self) -> str:
-            """Its name."""
+            """Name of the replaced element."""
             return self.element.name
 
     @property
     def markers(self) -> tuple[Marker, ...]:
-        """Its markers."""
+        """Markers of the replaced element."""
         return markers_of(self.element)
 
     def events(self) -> Sequence[Any]:
-        """Return its events."""
+        """Return the events of the replaced element."""
         return self.element.events()
 
     def small_angles(self) -> Callable[[Array], Array] | None:
-        """Return the deviation of its angles from small angles."""
+        """Return the measure of small angles of the replaced element."""
         return self.element.small_angles()
 
     def drawn(self) -> Any:
-        """Return its shapes."""
+        """Return the shapes of the replaced element."""
         return self.element.drawn()

@@ -68,7 +68,7 @@ __all__ = ["ExpressionElement", "tape_at", "tape_numbers"]
 # Expressions in laws of elements: the tape of an expression in `data`, evaluated for real and complex numbers.
 
 
-WHOLE = 16  #: largest exponent for which a power is computed as a product
+WHOLE = 16  #: largest exponent for which a power is computed by multiplication
 
 
 def tape_numbers(tape: Tape, functions_at: Sequence[int]) -> list[float]:
@@ -81,7 +81,7 @@ def tape_numbers(tape: Tape, functions_at: Sequence[int]) -> list[float]:
 
 @register_jitable
 def power(x, y):
-    """Return x to the power y; whole exponents by products, so that a complex step is exact for all x."""
+    """Return x to the power y; integer exponents by multiplication, so that complex steps are exact for all x."""
     n = int(abs(y.real) + 0.5)
     if abs(y.real) != n or n > WHOLE or y.imag != 0.0:
         return x**y
@@ -154,7 +154,7 @@ def of_two(op, x, y):
 
 @register_jitable
 def tape_at(data, at, inputs, results):
-    """Return the value of the tape that begins at data[at]; the results of its operations are written to `results`."""
+    """Return the value of the tape stored from data[at] on; results of its operations are written to `results`."""
     n = int(data[at])
     for k in range(n):
         o = at + 1 + 4 * k
@@ -177,9 +177,10 @@ def tape_at(data, at, inputs, results):
 # expressions ----------------------------------------------------------------------------------------------------------
 
 
-SEEN = ("x", "y", "z", "rx", "ry", "rz", "vx", "vy", "vz", "wx", "wy", "wz")  #: quantities of a marker
-GIVEN = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")  #: loads on a marker
-SMALL = 1e-4  #: squared sine of an angle below which its series is used
+#: quantities of a marker that expressions may use
+SEEN = ("x", "y", "z", "rx", "ry", "rz", "vx", "vy", "vz", "wx", "wy", "wz")
+GIVEN = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")  #: loads on a marker that expressions may give
+SMALL = 1e-4  #: squared sine of an angle below which a series is used
 
 
 @register_jitable
@@ -194,7 +195,7 @@ def in_axes_of_first(x, v):
 
 @register_jitable
 def write_rotation(x, m, out, o):
-    """Write the rotation vector of marker m relative to the first, in axes of both, shorter than pi."""
+    """Write the rotation vector, shorter than pi, of marker m relative to the first marker; same in axes of both."""
     c0 = in_axes_of_first(x, (x[m, 3], x[m, 6], x[m, 9]))
     c1 = in_axes_of_first(x, (x[m, 4], x[m, 7], x[m, 10]))
     c2 = in_axes_of_first(x, (x[m, 5], x[m, 8], x[m, 11]))
@@ -211,7 +212,7 @@ def write_rotation(x, m, out, o):
 
 @register_jitable
 def write_quantities(x, m, out, o):
-    """Write the twelve quantities of marker m."""
+    """Write the twelve motion quantities of marker m."""
     d = (x[m, 0] - x[0, 0], x[m, 1] - x[0, 1], x[m, 2] - x[0, 2])
     w = (x[0, 15], x[0, 16], x[0, 17])
     v = (
@@ -266,18 +267,20 @@ def expression_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class ExpressionElement(Element):
-    """Forces, states and outputs as expressions of the motion of markers relative to the first; see the module."""
+    """Forces, states and outputs as expressions of marker motion relative to the first marker; see the module."""
 
     name: str
-    places: Mapping[str, Marker]  #: markers, by their names in expressions
-    forces: Mapping[str, str] = field(default_factory=dict)  #: expressions for b_Fx, ..., b_Mz
+    places: Mapping[str, Marker]  #: markers by their names in expressions
+    forces: Mapping[str, str] = field(default_factory=dict)  #: expressions for the loads b_Fx, ..., b_Mz
     states: Mapping[str, float] = field(default_factory=dict)  #: initial values of the states
     rates: Mapping[str, str] = field(default_factory=dict)  #: expressions for the rates of the states
-    terms: Mapping[str, str] = field(default_factory=dict)  #: expressions that others, and later terms, use by name
+    #: named expressions that all others, and later terms, may use
+    terms: Mapping[str, str] = field(default_factory=dict)
     outputs: Mapping[str, str] = field(default_factory=dict)  #: expressions for the outputs
     output_units: Mapping[str, str] = field(default_factory=dict)
     parameters: Mapping[str, float] = field(default_factory=dict)
-    functions: Mapping[str, TimeFunction] = field(default_factory=dict, metadata=NOT_OF_TIME)  #: of one variable
+    #: functions of one variable by name
+    functions: Mapping[str, TimeFunction] = field(default_factory=dict, metadata=NOT_OF_TIME)
     energy: str | None = None  #: name of the output that is the stored energy
     power_lost: str | None = None  #: name of the output that is the dissipated power
 
@@ -304,17 +307,17 @@ class ExpressionElement(Element):
 
     @property
     def markers(self) -> tuple[Marker, ...]:
-        """The markers, in order."""
+        """Markers in order."""
         return tuple(self.places.values())
 
     @property
     def inputs(self) -> list[str]:
-        """Names of the inputs of expressions, in order."""
+        """Names of the inputs of expressions in order."""
         seen = [f"{place}_{each}" for place in list(self.places)[1:] for each in SEEN]
         return ["t", *seen, *self.states]
 
     def parts_of_time(self) -> TimeParts:
-        """Return the parts of the expressions that depend only on time; terms may be functions of time."""
+        """Return the parts of the expressions that depend only on time; terms may be such functions."""
         parts = TimeParts()
         numbers, known = {key: k for k, key in enumerate(self.functions)}, self.inputs
         of_time: dict[int, OfTime] = {0: np.asarray}

@@ -26,7 +26,7 @@ __all__ = [
 
 @register_jitable
 def direction_of(x, a, data, at):
-    """Return in ground axes the direction whose components in the axes of marker a begin at data[at]."""
+    """Return a direction in ground axes, given in marker a's axes by three numbers from data[at] on."""
     c0, c1, c2 = data[at], data[at + 1], data[at + 2]
     return (
         x[a, 3] * c0 + x[a, 4] * c1 + x[a, 5] * c2,
@@ -72,7 +72,7 @@ def line_between(x, a, b):
 
 @register_jitable
 def axial_motion(x, a, b, e):
-    """Return the distance of marker b from marker a along e, a direction that rotates with marker a, and its rate."""
+    """Return the distance of marker b from marker a along e, and its rate; e rotates with marker a."""
     d = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
     v = x[b, 12] - x[a, 12], x[b, 13] - x[a, 13], x[b, 14] - x[a, 14]
     turned = vector_product((x[a, 15], x[a, 16], x[a, 17]), e)
@@ -81,7 +81,7 @@ def axial_motion(x, a, b, e):
 
 @register_jitable
 def add_axial_force(wrench, x, a, b, force, e):
-    """Add a force along e at the point of marker b, on the body of b, and the opposite force there on the body of a."""
+    """Add a force along e at the point of marker b to body b, and the opposite force at the same point to body a."""
     f = force * e[0], force * e[1], force * e[2]
     m = vector_product((x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]), f)
     for k in range(3):
@@ -91,7 +91,7 @@ def add_axial_force(wrench, x, a, b, force, e):
 
 
 def angle_numbers(axis: Array, A_a: Array, A_b: Array) -> list[float]:
-    """Return the data of `angle_about`: the axis and a normal in the axes of marker a, and that normal in those of b.
+    """Return data for `angle_about`: the axis and a normal in axes of marker a, and the same normal in axes of b.
 
     axis: in the axes of marker a; A_a, A_b: axes of the assembled markers, (3, 3), at which the angle is zero.
     """
@@ -103,7 +103,7 @@ def angle_numbers(axis: Array, A_a: Array, A_b: Array) -> list[float]:
 
 @register_jitable
 def angle_about(x, a, b, data, at):
-    """Return the angle of marker b relative to a about the axis in `data`, in -pi .. pi, zero as assembled."""
+    """Return the angle of b relative to a about the axis in `data`, in -pi .. pi, zero when assembled."""
     e, u = direction_of(x, a, data, at), direction_of(x, a, data, at + 3)
     d = direction_of(x, b, data, at + 6)
     c, s = inner_product(u, d), inner_product(vector_product(e, u), d)

@@ -21,7 +21,7 @@ from floatframe.model.elements.element import Element
 
 __all__ = ["element_class"]
 
-#: wings of floatframe in which packages of elements are sought first
+#: packages of floatframe in which elements are searched first
 OWN = ("floatframe.components", "floatframe.model")
 
 
@@ -61,7 +61,7 @@ EXPECTED = 'expected ELEMENTS = {"name": "module:Class"} in its __init__.py'
 
 @contextmanager
 def searched(folder: Path | None) -> Iterator[None]:
-    """Append a folder to the module search path of Python within a `with` block."""
+    """Append a folder to Python's module search path within a `with` block."""
     added = None if folder is None else str(folder.resolve())
     if added is None or added in sys.path:
         yield
@@ -94,7 +94,7 @@ def package_named(name: str, package: str) -> ModuleType:
 
 
 def class_at(name: str, place: str, package: str) -> type[Element]:
-    """Return the class at "module:Class"."""
+    """Return the class that a text "module:Class" names."""
     where = f"type of element {quoted(name)}"
     module_name, _, class_name = place.partition(":")
     try:

@@ -1,4 +1,4 @@
-"""Functions for laws with a complex tangent, which use one formula for real and for complex numbers.
+"""Functions for laws with complex-step derivatives, valid for real and for complex numbers.
 
 A step along the imaginary axis gives derivatives without rounding errors, if a law consists of smooth functions of
 complex numbers. These include sqrt, exp, log, sin, cos, tan, arctan, sinh, cosh and tanh of NumPy. Comparisons use the

@@ -23,7 +23,7 @@ class SwitchedOff(ElementProxy):
     """Replaces an element; it has no effect."""
 
     def law(self, placed: Placed) -> ElementLaw:
-        """Return its law while it is off."""
+        """Return the law of the element while it is off."""
         return law_switched_off(self.element.law(placed))
 
 
@@ -37,7 +37,7 @@ def law_switched_off(law: ElementLaw) -> ElementLaw:
 
 
 def off_at_start(events: Sequence[Any]) -> frozenset[str]:
-    """Return the forces, couplers and elements that the first event which names them switches on."""
+    """Return the forces, couplers and elements that are off at the start, because their first event is to switch on."""
     first: dict[str, bool] = {}
     for event in events:
         for name in event.switch_on:
@@ -48,7 +48,7 @@ def off_at_start(events: Sequence[Any]) -> frozenset[str]:
 
 
 def times_off(events: Sequence[Any], happened: Sequence[Mapping[str, Any]], t: Array, name: str) -> NDArray[np.bool_]:
-    """Return, for each of the times t, (n_t,), whether an element is switched off by the events that have happened."""
+    """Return, for each time t, (n_t,), whether past events have switched an element off."""
     is_off = np.full(len(t), name in off_at_start(events))
     for event in happened:
         if name in (*event["switch_on"], *event["switch_off"]):
@@ -58,7 +58,7 @@ def times_off(events: Sequence[Any], happened: Sequence[Mapping[str, Any]], t: A
 
 @njit
 def still(t, x, z, lam, data, wrench, z_dot, g, outputs):
-    """Write the outputs of an element without effect."""
+    """Write zero outputs for an element without effect."""
     for k in range(lam.shape[0]):
         g[k] = lam[k]
 

@@ -17,8 +17,8 @@ from floatframe.model.functions.time_functions import NOT_OF_TIME, TimeFunction
 
 __all__ = ["AXES", "DEFORMATIONS", "Bushing"]
 
-DEFORMATIONS = ("x", "y", "z", "rx", "ry", "rz")  #: deformations in the order of the matrix rows
-#: share of the rotation of B relative to A that each choice of axes includes
+DEFORMATIONS = ("x", "y", "z", "rx", "ry", "rz")  #: deformations in the order of rows in the matrices
+#: fraction of the relative rotation that each choice of axes includes
 AXES = {"a": 0.0, "b": 1.0, "half way": 0.5}
 
 
@@ -99,18 +99,18 @@ class Bushing:
 
     @property
     def has_angles(self) -> bool:
-        """Whether its rotation vector affects it."""
+        """Whether rotations have an effect on the bushing."""
         of_rotations = [self.stiffness[3:], self.damping[3:], self.damping[:, 3:], self.preload[3:]]
         return any(part.any() for part in of_rotations) or any(key.startswith("r") for key in self.characteristics)
 
     @property
     def counts_turns(self) -> bool:
-        """Whether rotations beyond half a turn affect it, and are counted."""
+        """Whether rotations beyond half a turn have an effect and are counted."""
         return self.has_angles and self.axes != "half way"
 
 
 def six_by_six(where: str, values: Array) -> Array:
-    """Return a (6, 6) matrix from the complete matrix or its diagonal."""
+    """Return a (6, 6) matrix from a complete matrix or from its diagonal."""
     if np.shape(values) == (6,):
         values = np.diag(array_of_shape(where, values, (6,)))
     return array_of_shape(where, values, (6, 6))

@@ -1,4 +1,4 @@
-"""Loads on bodies: gravity, a force at a point, and a load spread over a body.
+"""Loads on bodies: gravity, a force at a point, and a distributed load.
 
 Evaluated in `floatframe.engine.kernels.evaluation`.
 """
@@ -24,7 +24,7 @@ __all__ = ["BodyLoad", "Gravity", "PointForce"]
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class Gravity:
-    """A uniform gravitational acceleration, which acts on every particle of the deformed bodies.
+    """A uniform gravitational acceleration on every particle of the deformed bodies.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Gravity:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class BodyLoad:
-    """A load case of a flexible body times an amplitude; it rotates with the body.
+    """A load case of a flexible body, multiplied by an amplitude; it rotates with the body.
 
     Its resultant acts on the undeformed body, and its modal forces act on the modes. The first-order change of its
     torque due to the deformation is neglected.

@@ -20,7 +20,7 @@ SLOW = Quantity(1e-3, SPEED)
 
 
 def exact_dissipation(e: float) -> float:
-    """Return the h for which two bodies separate with e times their approach speed.
+    """Return the dissipation factor h for which bodies separate with e times their approach speed.
 
     With f = k xⁿ (1 + h x_dot/v_0), the energy integral over the contact, v dv/(1 + h v/v_0) = -(k/m) xⁿ dx, from v_0
     to -e v_0 gives h (1 + e) = log((1 + h)/(1 - h e)), for any k, n, m.
@@ -40,7 +40,7 @@ def exact_dissipation(e: float) -> float:
     return float(brentq(defect, low, high, xtol=1e-14, rtol=1e-14)) if defect(low) < 0 else low
 
 
-#: h as a function of the coefficient of restitution e, by name
+#: functions from the coefficient of restitution e to the dissipation factor h, by name
 DISSIPATIONS = {
     "exact": exact_dissipation,
     "hunt-crossley": lambda e: 1.5 * (1 - e),
@@ -50,7 +50,7 @@ DISSIPATIONS = {
 
 
 def hertz_stiffness(modulus: float, radius: float, other_radius: float | None = None) -> float:
-    """Return k in f = k x^(3/2): 4/3 E* sqrt(R*), for a sphere on a plane or on another sphere.
+    """Return k of the Hertz force f = k x^(3/2), 4/3 E* sqrt(R*), for a sphere on a plane or another sphere.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def hertz_stiffness(modulus: float, radius: float, other_radius: float | None = 
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class SphereContact:
-    """Contact of a sphere about the point of marker B with a plane through, or a sphere about, the point of marker A.
+    """Contact of a sphere around marker B with a plane through marker A, or with a sphere around marker A.
 
     f = k xⁿ (1 + h x_dot/v_0) for a depth x > 0, and never negative; v_0 is the approach speed at the start of each
     contact. Friction is mu f V/sqrt(|V|² + v_s²) against the slip velocity V. Without radius_a the contact is with a
@@ -151,7 +151,7 @@ class SphereContact:
 
     @property
     def coefficients(self) -> dict[str, float]:
-        """Numbers for the kernels, by the field names of `kernels.model.Contacts`."""
+        """Numbers for the kernels, by field names of `kernels.model.Contacts`."""
         k = self.stiffness
         if k is None:
             assert self.modulus is not None  # checked above

@@ -134,7 +134,7 @@ class JointForce:
 
     @property
     def is_angular(self) -> bool:
-        """Whether the coordinate is an angle, which joints indicate in its name."""
+        """Whether the coordinate is an angle, according to the joint's name for it."""
         return self.coordinate.startswith("angle")
 
     def __post_init__(self) -> None:

@@ -104,7 +104,7 @@ class UserForce:
         self._either(where)
 
     def _either(self, where: str) -> None:
-        """Raise `ModelError` unless there are expressions for everything, or one function."""
+        """Raise `ModelError` unless either all expressions or one function are given."""
         if self.function is not None:
             if not callable(self.function):
                 raise ModelError(f"{where}: function: expected a callable, got {self.function!r}")

@@ -1,4 +1,4 @@
-"""A small language for forces and control, `-k*phi - c*phi_dot + table(t)`, compiled to a tape of operations.
+"""A small language for forces and control, such as `-k*phi - c*phi_dot + table(t)`, compiled to a list of operations.
 
 It has numbers, names, + - * / ** (or ^), comparisons < <= > >=, `a if x < b else c`, and the functions of `FUNCTIONS`.
 The text is parsed by Python's own parser and never executed; nothing beyond this list is allowed. The kernels evaluate
@@ -16,7 +16,7 @@ from floatframe.errors import ModelError
 
 __all__ = ["CONSTANTS", "FUNCTIONS", "Tape", "compile_expression"]
 
-#: codes of the operations on the tape in the kernels: without operands, with one operand, with two
+#: codes of the operations in the kernels: without operand, with one operand, with two operands
 CONSTANT, INPUT, CALL, SELECT = range(4)
 NEGATIVE, SIN, COS, TAN, ASIN, ACOS, ATAN, SINH, COSH, TANH, EXP, LOG, SQRT, ABS, SIGN = range(4, 19)
 ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, ATAN2, LESS, MIN, MAX = range(19, 28)
@@ -31,12 +31,12 @@ OPERATORS: dict[type, int] = {
     ast.Add: ADD, ast.Sub: SUBTRACT, ast.Mult: MULTIPLY, ast.Div: DIVIDE, ast.Pow: POWER, ast.BitXor: POWER,
 }  # fmt: skip
 MOST_OPERATIONS = 500
-LONGEST_TEXT = 10_000  #: characters
+LONGEST_TEXT = 10_000  #: largest number of characters
 
 
 @dataclass
 class Tape:
-    """Operations in order, with code, operands (indices of earlier operations, or of an input) and constant."""
+    """Operations in order, each with code, operands (indices of earlier operations or inputs) and constant."""
 
     op: list[int] = field(default_factory=list)
     a: list[int] = field(default_factory=list)
@@ -61,7 +61,7 @@ def compile_expression(
     functions: Mapping[str, int] | None = None,
     switches: Mapping[str, str] | None = None,
 ) -> Tape:
-    """Return the tape of an expression.
+    """Return the compiled operations of an expression.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ class Writer:
     tape: Tape
 
     def refuse(self, node: ast.AST, words: str, hint: str = "") -> ModelError:
-        """Return the error about a node."""
+        """Return the error about a node of the syntax tree."""
         column = getattr(node, "col_offset", 0) + 1
         return ModelError(f"{self.where}: {words} at column {column} of {quoted(self.text)}{hint}")
 
@@ -196,7 +196,7 @@ class Writer:
         return self.tape.add(code, *operands)
 
     def compare(self, node: ast.AST) -> int:
-        """Write a comparison: 1 if it holds, 0 if not."""
+        """Write a comparison, whose value is 1 if it is true, else 0."""
         if not isinstance(node, ast.Compare) or len(node.ops) != 1:
             raise self.refuse(node, f"expected one comparison such as x < 1, got {quoted(ast.unparse(node))}")
         a, b = self.write(node.left), self.write(node.comparators[0])

@@ -1,4 +1,4 @@
-"""Motions of several coordinates through many values by splines, as fast as limits on speed and acceleration allow.
+"""Spline motions of several coordinates through given values, as fast as limits of speed and acceleration allow.
 
 A spline through the same values in s times the time has 1/s of the speed and 1/s² of the acceleration everywhere. If
 only the values are given, the smallest s for which no coordinate exceeds a limit follows directly, and some coordinate
@@ -19,12 +19,12 @@ from floatframe.model.functions.time_functions import TimeFunction
 
 __all__ = ["PathMotion", "largest_size", "limit_of", "path_motion", "rest_to_rest_spline"]
 
-#: conditions of zero derivatives at both ends for each degree, as in scipy.interpolate.make_interp_spline
+#: end conditions of zero derivatives for each degree, as in scipy.interpolate.make_interp_spline
 ENDS = {3: [(1, 0.0)], 5: [(1, 0.0), (2, 0.0)]}
 
 
 def rest_to_rest_spline(t: Array, values: Array, degree: int = 3) -> TimeFunction:
-    """Return the spline through a table that starts and ends at rest, and is constant before and after.
+    """Return the spline through a table that starts and ends at rest, and is constant outside the table.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def rest_to_rest_spline(t: Array, values: Array, degree: int = 3) -> TimeFunctio
 
 
 def largest_size(function: TimeFunction, order: int) -> float:
-    """Return the largest magnitude of a derivative of a function without sines, between its first and last knot.
+    """Return the largest absolute derivative of a function without sines, from its first to its last knot.
 
     It is found at the ends of pieces, and where the next derivative is zero within a piece.
     """
@@ -74,7 +74,7 @@ class PathMotion(NamedTuple):
     """Prescribed motions of several coordinates along one path."""
 
     motions: dict[str, TimeFunction]  #: motion of each coordinate, by name
-    t: Array  #: time at which each of the values is reached, (n,) [s]
+    t: Array  #: time at which each value is reached, (n,) [s]
 
 
 def path_motion(

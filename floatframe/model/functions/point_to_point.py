@@ -15,7 +15,7 @@ from floatframe.model.functions.time_functions import N_COEFFICIENTS, TimeFuncti
 
 __all__ = ["quintic", "trapezoid", "trapezoids_together"]
 
-LEAST_EXCESS = 1e-9  #: relative amount by which a duration may be shorter than the minimum, because of rounding
+LEAST_EXCESS = 1e-9  #: relative amount by which a duration may be below the minimum, because of rounding
 
 
 def quintic(
@@ -77,7 +77,7 @@ def trapezoid(
     t_start: float = 0.0,
     duration: float | None = None,
 ) -> TimeFunction:
-    """Return the motion with constant acceleration, constant speed and constant deceleration, from rest to rest.
+    """Return the rest-to-rest motion with constant acceleration, constant speed and constant deceleration.
 
     A short distance has no part with constant speed: the speed profile is a triangle. If the duration is longer than
     the minimum, the speed is the lower of the two that take this time.
@@ -143,7 +143,7 @@ def trapezoid(
 
 
 def shortest_time(h: float, v: float, a: float, d: float) -> float:
-    """Return the shortest time for a distance h with the limits speed v, acceleration a, deceleration d, all > 0."""
+    """Return the shortest time for a distance h with limits v, a, d > 0 of speed, acceleration and deceleration."""
     inverse = 1 / a + 1 / d
     return h / v + v * inverse / 2 if v * v * inverse < 2 * h else math.sqrt(2 * h * inverse)
 
@@ -155,7 +155,7 @@ def trapezoids_together(
     acceleration: float | Mapping[str, float],
     t_start: float = 0.0,
 ) -> dict[str, TimeFunction]:
-    """Return trapezoids of several coordinates that start and end together, as fast as the slowest coordinate allows.
+    """Return trapezoidal motions that start and end together, as fast as the slowest coordinate allows.
 
     Parameters
     ----------

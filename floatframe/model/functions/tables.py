@@ -1,4 +1,4 @@
-"""Functions of time from tables of positions, or of accelerations, which are integrated twice exactly.
+"""Functions of time from tables of positions, or of accelerations that are integrated twice exactly.
 
 A cubic spline through samples of a position oscillates about the original acceleration: it overshoots at every jump of
 its slope. A quantity known as an acceleration should therefore remain one. `acceleration_table` interpolates it
@@ -26,7 +26,7 @@ __all__ = [
 
 
 def checked_table(where: str, t: Array, values: Array, least: int) -> tuple[Array, Array]:
-    """Return times and values as arrays; raise `ModelError` unless they are enough, finite, and at increasing times."""
+    """Return times and values as arrays; raise `ModelError` unless they are enough, finite and at increasing times."""
     t, values = np.array(t, dtype=float), np.array(values, dtype=float)
     if t.ndim != 1 or t.shape != values.shape or len(t) < least:
         raise ModelError(
@@ -43,7 +43,7 @@ def checked_table(where: str, t: Array, values: Array, least: int) -> tuple[Arra
 
 
 def between(t: Array, coefficients: Array, first: tuple[float, ...], last: tuple[float, ...]) -> TimeFunction:
-    """Return the piecewise function between times t, with polynomials before and after the table.
+    """Return the piecewise function between times t, extended by polynomials before and after the table.
 
     coefficients: (n_t - 1, degree + 1), of 1, x, x², … from the start of each piece. `first` and `last` are polynomials
     about t[0], valid before it, and about t[-1], valid after it.
@@ -58,14 +58,14 @@ def between(t: Array, coefficients: Array, first: tuple[float, ...], last: tuple
 
 
 def linear_table(t: Array, values: Array) -> TimeFunction:
-    """Return straight lines through a table, constant beyond its ends. For forces only: a motion may have no kinks."""
+    """Return linear interpolation of a table, constant outside; only for forces, because motions must be smooth."""
     t, values = checked_table("linear table", t, values, 2)
     slopes = np.diff(values) / np.diff(t)
     return between(t, np.column_stack([values[:-1], slopes]), (values[0],), (values[-1],))
 
 
 def monotone_table(t: Array, values: Array) -> TimeFunction:
-    """Return the monotone cubic through a table (PCHIP): no overshoot, smooth rate, acceleration jumps at the samples.
+    """Return the monotone cubic spline (PCHIP) of a table: no overshoot, smooth rate, acceleration jumps at points.
 
     Beyond its ends it continues along its tangents.
     """
@@ -94,7 +94,7 @@ def quintic_table(t: Array, values: Array) -> TimeFunction:
 
 
 def acceleration_table(t: Array, values: Array, position: float = 0.0, velocity: float = 0.0) -> TimeFunction:
-    """Return the position whose acceleration is the linear interpolation of a table, integrated twice exactly.
+    """Return the position whose acceleration interpolates a table linearly, by exact double integration.
 
     With slope s of a piece and time x from its start: a = a0 + s x, v = v0 + a0 x + s x²/2, u = u0 + v0 x + a0 x²/2 + s
     x³/6. v and u at each start are those at the end of the previous piece. The acceleration is zero before and after

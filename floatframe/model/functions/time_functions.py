@@ -27,11 +27,11 @@ __all__ = [
     "table",
 ]
 
-#: coefficients of a piece: six of the polynomial in t - t_k, then amplitude, angular frequency, phase
+#: coefficients of a piece: six of a polynomial in t - t_k, then amplitude, angular frequency and phase of a sine
 N_COEFFICIENTS = 9
 MOST_PIECES = 20000
 
-#: metadata of fields of forces and elements whose functions do not depend on time
+#: metadata of fields whose functions do not depend on time
 NOT_OF_TIME = {"of_time": False}
 
 
@@ -39,7 +39,7 @@ NOT_OF_TIME = {"of_time": False}
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class TimeFunction:
-    """A piecewise function; the first piece also holds before its start, and the last one has no end.
+    """A piecewise function; the first piece also applies before its start, and the last one has no end.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class TimeFunction:
         object.__setattr__(self, "pieces", frozen(pieces))
 
     def jumps(self, order: int) -> tuple[Array, Array]:
-        """Return the times at which the value (order 0), rate or second rate jumps, and the jumps, (n,) each.
+        """Return the times at which the derivative of an order (0: value) jumps, and the jumps, (n,) each.
 
         A jump must exceed 1e-9 of the magnitudes of the numbers on both sides, unless these are negligible (denormal).
         """
@@ -80,14 +80,14 @@ class TimeFunction:
         return float(self.at(np.array([t]), order)[0])
 
     def at(self, t: Array, order: int = 0) -> Array:
-        """Return the values at times t, (n_t,), or their derivatives of an order."""
+        """Return the values, or derivatives of an order, at times t, (n_t,)."""
         t = np.asarray(t, dtype=float)
         k = np.maximum(np.searchsorted(self.begins, t, side="right") - 1, 0)
         return at_pieces(self.pieces[k], t - self.begins[k], order)
 
 
 def at_pieces(c: Array, x: Array | float, order: int = 0) -> Array:
-    """Return the values of pieces c, (n, 9), or their derivatives, at times x, (n,), from their starts."""
+    """Return values or derivatives of pieces c, (n, 9), at times x, (n,), since their starts."""
     smooth = np.zeros(len(c))
     for k in range(5, order - 1, -1):  # Horner's scheme
         smooth = smooth * x + perm(k, order) * c[:, k]
@@ -96,7 +96,7 @@ def at_pieces(c: Array, x: Array | float, order: int = 0) -> Array:
 
 
 def piece_sizes(c: Array, x: Array | float, order: int) -> Array:
-    """Return the sums of the magnitudes of the terms of `at_pieces`, (n,), which scale their rounding errors."""
+    """Return the sums of absolute terms in `at_pieces`, (n,), to which rounding errors are proportional."""
     c, x = np.abs(c), np.abs(x)
     terms = np.zeros(len(c))
     for k in range(5, order - 1, -1):
@@ -113,12 +113,12 @@ def one_piece(coefficients: list[float], sine: tuple[float, float, float] = (0.0
 
 
 def constant(value: float) -> TimeFunction:
-    """Return a constant."""
+    """Return a constant function."""
     return one_piece([number("constant: value", value)])
 
 
 def polynomial_of_time(coefficients: list[float]) -> TimeFunction:
-    """Return c_0 + c_1 t + c_2 t² + ..., up to t⁵."""
+    """Return the polynomial c_0 + c_1 t + c_2 t² + ..., up to t⁵."""
     if not 1 <= len(coefficients) <= 6:
         raise ModelError(f"polynomial: expected one to six coefficients, c_0 first, got {len(coefficients)}")
     return one_piece([number("polynomial: coefficients", c) for c in coefficients])
@@ -148,7 +148,7 @@ def smooth_step(t_start: float, t_end: float, first: float, last: float) -> Time
 
 
 def cycloidal_spin_up(omega: float, duration: float) -> TimeFunction:
-    """Return the angle omega (t²/(2T) + (T/(2 pi))² (cos(2 pi t/T) - 1)/T) until T, then omega (t - T/2).
+    """Return omega (t²/(2T) + (T/(2 pi))² (cos(2 pi t/T) - 1)/T) until T, then omega (t - T/2): a gradual spin-up.
 
     Its rate rises from zero to omega without a jump of the acceleration (the spin-up of rotating beams).
     """
@@ -161,7 +161,7 @@ def cycloidal_spin_up(omega: float, duration: float) -> TimeFunction:
 
 
 def piecewise(t: Sequence[float], pieces: Sequence[TimeFunction]) -> TimeFunction:
-    """Return a function composed of others: piece k from t[k] on, as a function of the time since t[k].
+    """Return a function that follows pieces[k] from t[k] on, evaluated at the time since t[k].
 
     The first piece also holds before t[0], and the last one has no end. Values may jump between pieces (for forces). A
     prescribed motion must not jump in value or rate, and is then rejected.
@@ -194,7 +194,7 @@ def piecewise(t: Sequence[float], pieces: Sequence[TimeFunction]) -> TimeFunctio
 
 
 def moved_piece(c: Array, x: float) -> Array:
-    """Return the coefficients of a piece with its origin moved to a time x after its start."""
+    """Return the coefficients of a piece whose origin moves to a time x after its start."""
     row = np.array(c)
     smooth = np.concatenate([c[:6], np.zeros(3)])[None, :]
     row[:6] = [at_pieces(smooth, x, k)[0] / factorial(k) for k in range(6)]
@@ -203,7 +203,7 @@ def moved_piece(c: Array, x: float) -> Array:
 
 
 def table(t: Array, values: Array) -> TimeFunction:
-    """Return the cubic spline through a table (not-a-knot); beyond its ends it continues along its tangents."""
+    """Return the cubic spline (not-a-knot) of a table, which continues along its end tangents."""
     from scipy.interpolate import CubicSpline
 
     t, values = np.array(t, dtype=float), np.array(values, dtype=float)
@@ -220,7 +220,7 @@ def table(t: Array, values: Array) -> TimeFunction:
 
 
 def sampled(function: Callable[[float], float], t_start: float, t_end: float, tolerance: float) -> TimeFunction:
-    """Return a spline of a Python function; knots are doubled until the error between them is below the tolerance.
+    """Return a spline of a Python function; the number of knots doubles until errors between them are below tolerance.
 
     Raises
     ------

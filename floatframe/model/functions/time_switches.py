@@ -1,4 +1,4 @@
-"""Times at which an expression jumps as a function of time: comparisons of time-dependent terms, and tables with jumps.
+"""Times at which an expression jumps as a function of time: comparisons of time terms, and tables with jumps.
 
 `10 if t < 0.3 else 0` jumps at 0.3, `f(2*t - 1)` where 2 t - 1 passes a jump of f, `sign(sin(50*t))` at every zero of
 the sine, `min(5, tan(t))` at every pole of the tangent, `atan2(sin(t), cos(t))` once a turn. Each is a switch: a
@@ -51,8 +51,8 @@ from floatframe.model.functions.time_functions import TimeFunction
 
 __all__ = ["OfTime", "Switch", "TimeParts", "switch_times", "time_parts"]
 
-OfTime = Callable[[Array], Array]  #: values at times, (n_t,)
-Switch = Callable[[Array], NDArray[np.bool_]]  #: true or false at times, (n_t,)
+OfTime = Callable[[Array], Array]  #: function from times to values, (n_t,)
+Switch = Callable[[Array], NDArray[np.bool_]]  #: function from times to truth values, (n_t,)
 
 OPERATIONS: dict[int, Callable[..., Array]] = {
     NEGATIVE: np.negative, SIN: np.sin, COS: np.cos, TAN: np.tan, ASIN: np.arcsin, ACOS: np.arccos, ATAN: np.arctan,
@@ -64,15 +64,15 @@ MOST_HALVINGS = 120
 
 
 class TimeParts(NamedTuple):
-    """Parts of expressions that depend only on time."""
+    """Parts of an expression that depend only on time."""
 
     switches: tuple[Switch, ...] = ()
     phases: tuple[OfTime, ...] = ()  #: arguments of sines and cosines [rad]
     value: OfTime | None = None  #: value of the last expression; None if it does not depend only on time
-    values: tuple[OfTime, ...] = ()  #: those of all expressions that depend only on time
+    values: tuple[OfTime, ...] = ()  #: values of all expressions that depend only on time
 
     def __add__(self, other: "TimeParts") -> "TimeParts":  # type: ignore[override]
-        """Return the parts of both, with the value of the second."""
+        """Return the parts of both expressions, with the value of the second."""
         return TimeParts(
             self.switches + other.switches, self.phases + other.phases, other.value, self.values + other.values
         )
@@ -131,54 +131,54 @@ def time_parts(tape: Tape, inputs: Mapping[int, OfTime], functions: Sequence[Tim
 
 
 def constant_at(c: float, t: Array) -> Array:
-    """Return a constant at times."""
+    """Return a constant for each time."""
     return np.full(np.shape(t), c)
 
 
 def called(function: OfTime, x: OfTime, t: Array) -> Array:
-    """Return a function of a function of time."""
+    """Return a table function of a function of time."""
     return function(x(t))
 
 
 def chosen(test: OfTime, yes: OfTime, no: OfTime, t: Array) -> Array:
-    """Return one of two functions of time, selected by a third."""
+    """Return one of two functions of time, selected by a third function."""
     return np.where(test(t) != 0.0, yes(t), no(t))
 
 
 def applied(operation: Callable[..., Array], operands: Sequence[OfTime], t: Array) -> Array:
-    """Return an operation on functions of time."""
+    """Return an operation applied to functions of time."""
     with np.errstate(all="ignore"):
         return np.asarray(operation(*(each(t) for each in operands)), dtype=float)
 
 
 def is_true(value: OfTime, t: Array) -> NDArray[np.bool_]:
-    """Return where a comparison is true."""
+    """Return the times at which a comparison is true."""
     return value(t) != 0.0
 
 
 def is_beyond(value: OfTime, level: float, t: Array) -> NDArray[np.bool_]:
-    """Return where a function of time has reached a level."""
+    """Return the times at which a function has reached a level."""
     return value(t) >= level
 
 
 def is_positive(value: OfTime, t: Array) -> NDArray[np.bool_]:
-    """Return where a denominator is above zero. At a zero it is as just before: times of change are no zeros."""
+    """Return the times at which a denominator is positive; at a zero it has the sign from just before."""
     v = value(t)
     return np.where(v == 0.0, value(np.nextafter(t, -np.inf)), v) > 0.0
 
 
 def is_behind(y: OfTime, x: OfTime, t: Array) -> NDArray[np.bool_]:
-    """Return where a point is in the third quadrant, one of whose sides is the cut of atan2."""
+    """Return the times at which a point is in the third quadrant, next to the branch cut of atan2."""
     return (y(t) < 0.0) & (x(t) < 0.0)
 
 
 def is_below(value: OfTime, t: Array) -> NDArray[np.bool_]:
-    """Return where a function of time is zero or below it."""
+    """Return the times at which a function is zero or negative."""
     return value(t) <= 0.0
 
 
 def switch_times(switches: Sequence[Switch], t: Array) -> list[float]:
-    """Return, in rising order, the first time after each change of a switch within the times t, (n_t,)."""
+    """Return, in ascending order, the first times after changes of switches, among times t, (n_t,)."""
     found: set[float] = set()
     for switch in switches:
         is_on = switch(t)

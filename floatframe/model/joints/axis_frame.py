@@ -14,7 +14,7 @@ __all__ = ["axis_in_b", "checked_axes", "checked_motions", "normals_of", "turnin
 
 
 def normals_of(axis: Array) -> tuple[Array, Array]:
-    """Return two unit vectors, each (3,), normal to the axis and to each other; with the axis they are right-handed."""
+    """Return two unit vectors normal to the axis, (3,) each, that form a right-handed frame with it."""
     helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
     first = np.cross(axis, helper)
     first /= np.linalg.norm(first)
@@ -22,12 +22,12 @@ def normals_of(axis: Array) -> tuple[Array, Array]:
 
 
 def axis_in_b(axis: Array, axis_b: Array | None, A_a: Array, A_b: Array) -> Array:
-    """Return the axis in the axes of marker B, (3,): as given, or the same direction in the assembled position."""
+    """Return the axis in axes of marker B, (3,): the given one, or the same direction in the assembled position."""
     return A_b.T @ A_a @ axis if axis_b is None else axis_b
 
 
 def turning_frame(axis: Array, axis_b: Array, A_a: Array, A_b: Array) -> tuple[Array, Array, Array]:
-    """Return directions x, z of A with x × z = axis, and y of B, which lies along z at angle zero (as assembled).
+    """Return x, z of A with x × z = axis, and y of B, which is parallel to z at angle zero (when assembled).
 
     If a given axis of B has another direction as assembled, y is the direction normal to it that is nearest to z.
     """

@@ -56,7 +56,7 @@ class Limits:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class CoordinateCoupler:
-    """Enforces a linear relation between coordinates: Σ a_k x_k = c; one constraint.
+    """A linear relation between coordinates, Σ a_k x_k = c, which is one constraint.
 
     A pair of gears with z_1 and z_2 teeth and external mesh on a fixed frame: z_1 phi_1 + z_2 phi_2 = c. On a carrier,
     the angles are those of the joints with the carrier. A rack on a pinion of radius r: x - r phi = c. The reaction is
@@ -120,5 +120,5 @@ class CoordinateCoupler:
 
     @property
     def acts(self) -> bool:
-        """Whether it enforces its relation from the start, rather than after an event or at a stop."""
+        """Whether the relation applies from the start, rather than after an event or at a stop."""
         return self.engaged and self.limits is None

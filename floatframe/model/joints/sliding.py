@@ -19,7 +19,7 @@ from floatframe.model.joints.rows import LINE, LINE_FREE, LINE_TURN, MOMENT, NO_
 
 __all__ = ["SlidingJoint"]
 
-ALONG, ACROSS, UPWARD = range(3)  #: parts of LINE rows
+ALONG, ACROSS, UPWARD = range(3)  #: directions of LINE rows
 
 
 @frozen_copies
@@ -97,7 +97,7 @@ class SlidingJoint:
         return MOMENT if self.is_aligned else NO_MOMENT
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows, given the assembled axes, (3, 3), of the line (A_a, x along it) and of marker B (A_b)."""
+        """Return the rows from assembled axes, (3, 3), of the line (A_a, x along the line) and of marker B (A_b)."""
         if "distance" in self.motions:
             own = Row(LINE, part=ALONG, motion=self.motions["distance"])
         else:
@@ -107,7 +107,7 @@ class SlidingJoint:
 
 
 def line_triad(where: str, points: Array, normal: Array | None) -> tuple[Array, Array]:
-    """Return positions along a straight line of points, (n,), and its axes as columns, x along it, (3, 3).
+    """Return positions along a straight line of points, (n,), and line axes as columns, x along the line, (3, 3).
 
     Raises
     ------

@@ -41,7 +41,7 @@ __all__ = [
     "Wheel",
 ]
 
-#: for the system file: the fields of each class are its keys
+#: shape classes by name in a system file, with their fields as keys
 GEOMETRIES = {
     "box": Box,
     "sphere": Sphere,

@@ -1,4 +1,4 @@
-"""The drawing of an element: shapes fixed to its markers, parts stretched between two markers, arrows.
+"""The picture of an element: shapes fixed to its markers, parts stretched between two markers, arrows.
 
 `Element.drawn()` returns a tuple of these; markers are given by their indices in `Element.markers`.
 """
@@ -19,8 +19,8 @@ __all__ = ["STRETCHED", "Arrow", "MarkerShapes", "Stretched", "StretchedPiece"]
 
 Z = np.array([0.0, 0.0, 1.0])
 SPRING, OUTER, INNER = "#2a7f62", "#5d6f80", "#b9c3cc"
-TURNS, A_TURN, WIRE = 7, 20, 8  #: coil: turns, points per turn, points around the wire
-STRETCH, FIRST, SECOND = "stretch", "first", "second"  #: how a part follows its two markers
+TURNS, A_TURN, WIRE = 7, 20, 8  #: numbers for a coil: turns, points per turn, points around the wire
+STRETCH, FIRST, SECOND = "stretch", "first", "second"  #: ways in which a part follows its two markers
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,9 +28,9 @@ class MarkerShapes:
     """A shape in the axes of a marker of the element, or in ground axes."""
 
     shape: Shape
-    marker: int | None = 0  #: index in `Element.markers`; None: the ground, as for a road or track
-    is_default: bool = False  #: whether it is hidden if the body of its marker has shapes of its own
-    is_in_metres: bool = False  #: whether its numbers are in metres, independent of the units of the system
+    marker: int | None = 0  #: index in `Element.markers`; None: fixed to the ground, such as a road or track
+    is_default: bool = False  #: whether the shape is hidden if the body of its marker has its own shapes
+    is_in_metres: bool = False  #: whether its numbers are in metres, whatever the units of the system
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +40,8 @@ class Stretched:
     kind: str = "coil"
     first: int = 0  #: index of the marker at its start
     second: int = 1  #: index of the marker at its end
-    radius: float | None = None  #: None: 0.06 of the assembled length [m]
-    color: str | None = None  #: None: the colour of its kind
+    radius: float | None = None  #: radius of the part [m]; None: 0.06 of the assembled length
+    color: str | None = None  #: colour; None: the default colour for its kind
 
     def __post_init__(self) -> None:
         if self.kind not in STRETCHED:
@@ -52,19 +52,19 @@ class Stretched:
             object.__setattr__(self, "color", color_of(self.color))
 
     def pieces(self, length: float) -> "tuple[StretchedPiece, ...]":
-        """Return its parts for an assembled length [m]."""
+        """Return the pieces of the part for an assembled length [m]."""
         return STRETCHED[self.kind](self.radius or 0.06 * length, length, self.color)
 
 
 @dataclass(frozen=True, eq=False)
 class Arrow:
-    """An arrow at a marker along three outputs of the element, with a length proportional to them."""
+    """An arrow at a marker for three outputs of the element, with proportional length."""
 
-    #: names of the components in `ElementLaw.outputs`; None: the force of the element on the body of the marker
+    #: names of the components in `ElementLaw.outputs`; None: the element's force on the marker's body
     outputs: tuple[str, str, str] | None = None
     marker: int = 0  #: index of the marker at which it starts
-    is_in_marker_axes: bool = False  #: whether the components are in marker axes; otherwise in ground axes
-    #: outputs that give the position of its start in ground axes; None: the marker
+    is_in_marker_axes: bool = False  #: whether the components are in marker axes rather than ground axes
+    #: outputs with the start position in ground axes; None: the position of the marker
     at: tuple[str, str, str] | None = None
     color: str = "#c2452d"
 

@@ -17,7 +17,7 @@ __all__ = ["Plane", "Road", "Terrain", "Track"]
 
 ASPHALT, PAINT, SOIL, RAIL, SLEEPER, BED = "#8a9097", "#f3f4f2", "#b7b9a8", "#7d6d63", "#b0a596", "#c2bdb4"
 MOST_SLEEPERS = 1200
-#: head, web and foot of a rail, in units of its height; the origin is the centre of the top of the head
+#: head, web and foot of a rail relative to its height; the origin is the centre of the top of the head
 RAIL_OUTLINE = np.array(
     [(-0.21, -0.02), (-0.18, 0.0), (0.18, 0.0), (0.21, -0.02), (0.21, -0.2), (0.06, -0.26), (0.05, -0.84),
      (0.43, -0.93), (0.43, -1.0), (-0.43, -1.0), (-0.43, -0.93), (-0.05, -0.84), (-0.06, -0.26), (-0.21, -0.2)]
@@ -28,8 +28,8 @@ RAIL_OUTLINE = np.array(
 class Plane:
     """A flat, unlimited ground with a grid."""
 
-    normal: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: upwards, (3,)
-    step: float | None = None  #: distance between grid lines; None: a round number that suits the machine [m]
+    normal: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: upward normal, (3,)
+    step: float | None = None  #: distance between grid lines [m]; None: a round number that suits the machine
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "normal", unit_vector("plane: normal", self.normal))
@@ -37,7 +37,7 @@ class Plane:
             object.__setattr__(self, "step", number("plane: step", self.step, above=0.0))
 
     def pieces(self) -> tuple[Piece, ...]:
-        """Return nothing: the extent of the drawing depends on the moving bodies."""
+        """Return no pieces, because the extent of the drawn plane depends on the moving bodies."""
         return ()
 
 
@@ -45,8 +45,8 @@ class Plane:
 class Terrain:
     """Uneven ground: heights over a grid."""
 
-    x: Array  #: increasing grid coordinates, (n,) [m]
-    y: Array  #: (m,) [m]
+    x: Array  #: increasing x coordinates of the grid, (n,) [m]
+    y: Array  #: increasing y coordinates of the grid, (m,) [m]
     z: Array  #: heights, (n, m) [m]
 
     def __post_init__(self) -> None:
@@ -59,7 +59,7 @@ class Terrain:
         put(self, "z", array_of_shape("terrain: z", self.z, (len(self.x), len(self.y))))
 
     def pieces(self) -> tuple[Piece, ...]:
-        """Return its surface."""
+        """Return the surface of the terrain."""
         X, Y = np.meshgrid(self.x, self.y, indexing="ij")
         nodes = np.stack([X, Y, self.z], axis=-1).reshape(-1, 3)
         return (Piece(nodes, grid_triangles(len(self.x), len(self.y)), color=SOIL, is_ground=True),)
@@ -70,9 +70,9 @@ class Road:
     """A road along a curve on its surface, with painted edges and a broken centre line."""
 
     points: Array  #: points on the centre line of the surface, (n, 3) [m]
-    width: float  #: [m]
-    up: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: (3,)
-    is_painted: bool = True  #: whether lines are painted on it
+    width: float  #: width of the road [m]
+    up: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: upward direction, (3,)
+    is_painted: bool = True  #: whether lines are painted on the road
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -81,7 +81,7 @@ class Road:
         put(self, "up", unit_vector("road: up", self.up))
 
     def pieces(self) -> tuple[Piece, ...]:
-        """Return surface and lines."""
+        """Return the surface and the painted lines of the road."""
         w, line, lift = self.width / 2, min(0.12, 0.02 * self.width), 2e-4 * self.width
         found = [band(self.points, self.up, -w, w, 0.0, ASPHALT)]
         if self.is_painted:
@@ -98,12 +98,12 @@ class Road:
 class Track:
     """Two rails on sleepers along a curve; its points lie midway between the tops of the rails."""
 
-    points: Array  #: (n, 3) [m]
+    points: Array  #: points of the track centre line, (n, 3) [m]
     gauge: float  #: distance between the centres of the rail heads [m]
-    cant: Array | None = None  #: height of the left rail above the right one: one number, or one per point [m]
-    up: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: (3,)
-    rail_height: float | None = None  #: None: 0.115 of the gauge [m]
-    sleeper_distance: float | None = None  #: None: 0.4 of the gauge [m]
+    cant: Array | None = None  #: height of the left rail above the right one [m], for the whole track or for each point
+    up: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: upward direction, (3,)
+    rail_height: float | None = None  #: height of the rails [m]; None: 0.115 of the gauge
+    sleeper_distance: float | None = None  #: distance between sleepers [m]; None: 0.4 of the gauge
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -119,7 +119,7 @@ class Track:
             raise ModelError(f"track: cant: expected less than the gauge {self.gauge:g}")
 
     def pieces(self) -> tuple[Piece, ...]:
-        """Return both rails, the sleepers and their bed."""
+        """Return both rails, the sleepers and the ballast."""
         assert self.rail_height is not None  # __post_init__ has set it
         h, gauge = self.rail_height, self.gauge
         axes = self.axes
@@ -172,7 +172,7 @@ def cants(given: Any, n: int) -> Array:
 
 
 def way_of(points: Array) -> Array:
-    """Return the length of a line up to each of its points, (n,)."""
+    """Return the arc length of a line at each of its points, (n,)."""
     return np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))]
 
 

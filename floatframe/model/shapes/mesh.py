@@ -16,8 +16,8 @@ __all__ = ["Mesh", "mesh_file"]
 class Mesh:
     """A surface of triangles."""
 
-    nodes: Array  #: (n, 3) [m]
-    triangles: IntArray  #: (n_triangles, 3)
+    nodes: Array  #: nodes of the surface, (n, 3) [m]
+    triangles: IntArray  #: node indices of each triangle, (n_triangles, 3)
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -36,7 +36,7 @@ class Mesh:
             )
 
     def pieces(self) -> tuple[Piece, ...]:
-        """Return its surface."""
+        """Return the surface as a piece."""
         return (Piece(self.nodes, self.triangles),)
 
 

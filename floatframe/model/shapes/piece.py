@@ -11,15 +11,15 @@ __all__ = ["Piece", "joined", "shifted"]
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """Triangles or lines of one colour, in the axes of their carrier."""
+    """Triangles or lines of one colour, in the axes of the object that carries them."""
 
-    nodes: Array  #: (n, 3) [m]
-    #: anticlockwise when seen from outside
+    nodes: Array  #: nodes of the piece, (n, 3) [m]
+    #: node indices of each triangle, anticlockwise when seen from outside
     triangles: IntArray = field(default_factory=lambda: np.zeros((0, 3), np.int64))
-    segments: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))  #: end points of lines
-    color: str = ""  #: "#rrggbb"; "": the colour of the shape, or of its carrier
+    segments: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))  #: node indices of line segments
+    color: str = ""  #: colour "#rrggbb"; "": the colour of the shape or of its carrier
     opacity: float = 1.0
-    is_ground: bool = False  #: whether it is ignored in the size of the picture
+    is_ground: bool = False  #: whether the piece is ignored for the size of the picture
 
 
 def shifted(piece: Piece, position: Array, R: Array) -> Piece:

@@ -21,7 +21,7 @@ SIGNS = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)],
 class Box:
     """A box about the origin."""
 
-    size: Array  #: edges along x, y, z, (3,) [m]
+    size: Array  #: edge lengths along x, y, z, (3,) [m]
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "size", array_of_shape("box: size", self.size, (3,)))
@@ -29,7 +29,7 @@ class Box:
             raise ModelError(f"box: size: expected three edges above 0, got {self.size.tolist()}")
 
     def pieces(self) -> tuple[Piece, ...]:
-        """Return its surface."""
+        """Return the surface of the box."""
         return (box_piece(self.size),)
 
 
@@ -40,9 +40,9 @@ class Extrusion:
     The outline lies in the plane normal to the axis: for axis z its pairs are (x, y), for x (y, z), for y (z, x).
     """
 
-    profile: Array  #: corners, (n, 2) [m]
-    length: float  #: [m]
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: (3,)
+    profile: Array  #: corners of the outline, (n, 2) [m]
+    length: float  #: length of the extrusion [m]
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: axis of the extrusion, (3,)
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -51,7 +51,7 @@ class Extrusion:
         put(self, "axis", unit_vector("extrusion: axis", self.axis))
 
     def pieces(self) -> tuple[Piece, ...]:
-        """Return its surface."""
+        """Return the surface of the extrusion."""
         outline = self.profile
         x_, y_ = outline.T
         if x_ @ np.roll(y_, -1) - y_ @ np.roll(x_, -1) < 0:

@@ -13,17 +13,17 @@ from floatframe.model.shapes.piece import Piece
 
 __all__ = ["Cylinder", "Revolution", "Sphere", "axes_about", "points_2", "revolved"]
 
-AROUND = 48  #: number of nodes of a circle
+AROUND = 48  #: number of nodes around a circle
 
 
 @dataclass(frozen=True, eq=False)
 class Cylinder:
     """A cylinder centred at the origin; with `end_radius` it is a cone, with `inner_radius` a pipe."""
 
-    radius: float  #: [m]
-    length: float  #: [m]
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: (3,)
-    end_radius: float | None = None  #: radius at the end to which the axis points; None: the same [m]
+    radius: float  #: outer radius [m]
+    length: float  #: length along the axis [m]
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: axis of the cylinder, (3,)
+    end_radius: float | None = None  #: radius at the end to which the axis points [m]; None: equal to `radius`
     inner_radius: float = 0.0  #: inner radius of a pipe [m]
 
     def __post_init__(self) -> None:
@@ -41,7 +41,7 @@ class Cylinder:
             )
 
     def pieces(self) -> tuple[Piece, ...]:
-        """Return its surface."""
+        """Return the surface of the cylinder."""
         r_2, h, r_i = self.radius if self.end_radius is None else self.end_radius, self.length / 2, self.inner_radius
         profile = [(r_i, -h), (self.radius, -h), (r_2, h), (r_i, h)]
         return (revolved(np.array(profile), self.axis, is_closed=r_i > 0),)
@@ -52,7 +52,7 @@ class Revolution:
     """A solid of revolution, given by a profile of radius and axial position, in drawing order."""
 
     profile: Array  #: radius and axial position, (n, 2) [m]
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: (3,)
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: axis of revolution, (3,)
     is_closed: bool = False  #: whether the last point is connected to the first, as for a ring
 
     def __post_init__(self) -> None:
@@ -63,7 +63,7 @@ class Revolution:
         put(self, "axis", unit_vector("revolution: axis", self.axis))
 
     def pieces(self) -> tuple[Piece, ...]:
-        """Return its surface."""
+        """Return the surface of the solid."""
         return (revolved(self.profile, self.axis, is_closed=self.is_closed),)
 
 
@@ -71,13 +71,13 @@ class Revolution:
 class Sphere:
     """A sphere about the origin."""
 
-    radius: float  #: [m]
+    radius: float  #: radius of the sphere [m]
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "radius", number("sphere: radius", self.radius, above=0.0))
 
     def pieces(self) -> tuple[Piece, ...]:
-        """Return its surface."""
+        """Return the surface of the sphere."""
         angle = np.linspace(-np.pi / 2, np.pi / 2, AROUND // 2 + 1)
         profile = self.radius * np.stack([np.maximum(np.cos(angle), 0.0), np.sin(angle)], axis=1)
         return (revolved(profile, np.array([0.0, 0.0, 1.0])),)
@@ -100,7 +100,7 @@ def revolved(profile: Array, axis: Array, *, is_closed: bool = False, around: in
 
 
 def axes_about(axis: Array) -> tuple[Array, Array, Array]:
-    """Return right-handed axes whose third is along the given axis, (3,) each."""
+    """Return right-handed axes whose third axis has the given direction, (3,) each."""
     z = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
     helper = np.eye(3)[int(np.argmin(np.abs(z)))]
     x = np.cross(helper, z)

@@ -17,7 +17,7 @@ from floatframe.model.shapes.piece import Piece, shifted
 __all__ = ["Geometry", "Shape", "shape_tuple"]
 
 COLOR = re.compile(r"#[0-9a-fA-F]{6}")
-#: names that may be used for colours
+#: colour names that may be used
 NAMED = {
     "steel": "#9aa7b3", "aluminium": "#c3cad0", "dark": "#3b4249", "black": "#24272b", "white": "#eef0f1",
     "red": "#c4473a", "orange": "#d98a3d", "yellow": "#d9b84a", "green": "#5f9a63",
@@ -43,12 +43,13 @@ class Shape:
     """
 
     geometry: Geometry
-    #: position of its origin [m] in the axes of the body (flexible: of its mesh), of the interface, or of the ground
+    #: position of its origin [m] in axes of the body (flexible: of its mesh), the interface, or the ground
     position: Array = field(default_factory=lambda: np.zeros(3))
     rotation_vector: Array = field(default_factory=lambda: np.zeros(3))  #: rotation relative to these axes, (3,) [rad]
-    color: str | None = None  #: "#rrggbb" or a name in `NAMED`; None: the colour of its kind, else of its body
-    opacity: float = 1.0  #: 0 < opacity <= 1
-    interface: str | None = None  #: interface of a flexible body to which it is fixed; None: the frame of the body
+    #: colour "#rrggbb" or a name in `NAMED`; None: the default for its kind, else for its body
+    color: str | None = None
+    opacity: float = 1.0  #: opacity, above 0 and at most 1
+    interface: str | None = None  #: interface of a flexible body that carries the shape; None: the body frame
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -63,7 +64,7 @@ class Shape:
             put(self, "color", color_of(self.color))
 
     def pieces(self) -> tuple[Piece, ...]:
-        """Return its pieces in the axes of its carrier, with its colour and opacity if they have none."""
+        """Return the pieces in axes of the carrier; those without colour or opacity get the shape's."""
         R = rotation_exp(self.rotation_vector)
         return tuple(
             replace(

@@ -17,15 +17,15 @@ __all__ = ["Line", "Tube", "along", "points_3", "swept"]
 # sweeps ---------------------------------------------------------------------------------------------------------------
 
 
-AROUND = 16  #: number of nodes of the circle of a tube
+AROUND = 16  #: number of nodes around the circle of a tube
 
 
 @dataclass(frozen=True, eq=False)
 class Tube:
     """A round bar along a line of points."""
 
-    points: Array  #: (n, 3) [m]
-    radius: float  #: [m]
+    points: Array  #: points on the centre line, (n, 3) [m]
+    radius: float  #: radius of the tube [m]
     is_closed: bool = False  #: whether the last point is connected to the first
 
     def __post_init__(self) -> None:
@@ -33,7 +33,7 @@ class Tube:
         object.__setattr__(self, "radius", number("tube: radius", self.radius, above=0.0))
 
     def pieces(self) -> tuple[Piece, ...]:
-        """Return its surface."""
+        """Return the surface of the tube."""
         angle = 2 * np.pi * np.arange(AROUND) / AROUND
         circle = self.radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
         axes = carried_axes(self.points, is_closed=self.is_closed)
@@ -104,14 +104,14 @@ def points_3(where: str, values: Any, least: int) -> Array:
 class Line:
     """Straight lines from point to point."""
 
-    points: Array  #: (n, 3) [m]
+    points: Array  #: points of the line, (n, 3) [m]
     is_closed: bool = False  #: whether the last point is connected to the first
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", points_3("line: points", self.points, 2))
 
     def pieces(self) -> tuple[Piece, ...]:
-        """Return its lines."""
+        """Return the line segments."""
         n = len(self.points)
         ends = np.stack([np.arange(n), np.arange(1, n + 1) % n], axis=1)
         return (Piece(self.points, segments=ends if self.is_closed else ends[:-1]),)

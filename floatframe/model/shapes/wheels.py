@@ -23,7 +23,7 @@ class Wheel:
 
     radius: float  #: radius of the tread [m]
     width: float  #: width of the tyre [m]
-    rim_radius: float | None = None  #: None: 0.64 of the radius [m]
+    rim_radius: float | None = None  #: radius of the rim [m]; None: 0.64 of the radius
     n_spokes: int = 5
     axis: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: axis of rotation, (3,)
 
@@ -61,7 +61,7 @@ class Wheel:
         return (*found, joined(marks))
 
     def spokes(self, r: float, w: float) -> Piece:
-        """Return the spokes."""
+        """Return the spokes of the wheel."""
         thickness = max(0.1, 0.9 / self.n_spokes) * r * 0.4
         spoke = box_piece(np.array([0.75 * r, thickness, 0.34 * w]), (0.54 * r, 0.0, 0.0), RIM)
         return around(spoke, self.axis, self.n_spokes)
@@ -73,8 +73,8 @@ class RailWheel:
 
     radius: float  #: radius of the tread at the origin [m]
     flange_side: int = 1  #: 1: flange at the end to which the axis points, -1: at the other end, 0: no flange
-    width: float | None = None  #: None: 0.3 of the radius [m]
-    flange_height: float | None = None  #: None: 0.06 of the radius [m]
+    width: float | None = None  #: width of the wheel [m]; None: 0.3 of the radius
+    flange_height: float | None = None  #: height of the flange [m]; None: 0.06 of the radius
     conicity: float = 0.05  #: conicity of the drawn tread
     axis: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: axis of rotation, (3,)
 

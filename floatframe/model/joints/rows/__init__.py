@@ -116,13 +116,14 @@ class Row:
     """One row of a joint."""
 
     kind: int  #: code, see `ROW_KINDS`
-    x: Array = field(default_factory=lambda: ZERO)  #: direction in the axes of marker A, (3,); POINT, ARM, ROD: ground
+    #: direction in axes of marker A, (3,); for POINT, ARM and ROD in ground axes
+    x: Array = field(default_factory=lambda: ZERO)
     y: Array = field(default_factory=lambda: ZERO)  #: direction in the axes of marker B, (3,)
-    c: float = 0.0  #: held value, or slope of a screw
+    c: float = 0.0  #: constrained value, or slope of a screw
     z: Array = field(default_factory=lambda: ZERO)  #: second direction in the axes of marker A, (3,)
     u: Array = field(default_factory=lambda: ZERO)  #: second direction in the axes of marker B, (3,)
-    part: int = FORCE  #: part of the wrench: FORCE, MOMENT or MOMENT_B; for DOT: the part that contains its reaction
-    motion: TimeFunction | None = None  #: prescribed motion of the held quantity; None: constant c
+    part: int = FORCE  #: part of the wrench in the row, FORCE, MOMENT or MOMENT_B; for DOT the part with its reaction
+    motion: TimeFunction | None = None  #: prescribed value of the constrained quantity; None: the constant c
     coordinate: RowCoordinate | None = None  #: coordinate of the joint to which the row belongs
 
     @property
@@ -132,17 +133,17 @@ class Row:
 
 
 def point_rows() -> tuple[Row, ...]:
-    """Return the three rows that make the points of two markers coincide."""
+    """Return three rows that keep the points of two markers together."""
     return tuple(Row(POINT, axis) for axis in np.eye(3))
 
 
 def arm_rows() -> tuple[Row, ...]:
-    """Return the three rows that balance the wrenches on two markers at different points."""
+    """Return three rows that balance the wrench between two markers at different points."""
     return tuple(Row(ARM, axis) for axis in np.eye(3))
 
 
 def orientation_rows(R_AB: Array, part: int = MOMENT) -> tuple[Row, ...]:
-    """Return the three rows that fix the rotation from marker axes B to A.
+    """Return three rows that fix the rotation R_AB from marker axes B to A.
 
     They are x_A·y' = y_A·z' = z_A·x' = 0, where the axes x', y', z' fixed in B coincide with x_A, y_A, z_A.
     """
@@ -152,7 +153,7 @@ def orientation_rows(R_AB: Array, part: int = MOMENT) -> tuple[Row, ...]:
 
 
 def slide_row(axis: Array, motions: Mapping[str, TimeFunction], name: str) -> Row:
-    """Return the row of a free distance along an axis of A: prescribed, or force-free."""
+    """Return the row of a distance along an axis of A, either prescribed or without force."""
     own = RowCoordinate(name, PUSH, axis)
     if name in motions:
         return Row(SLIDE, axis, motion=motions[name], coordinate=own)
@@ -160,7 +161,7 @@ def slide_row(axis: Array, motions: Mapping[str, TimeFunction], name: str) -> Ro
 
 
 def turn_row(axis: Array, frame: tuple[Array, Array, Array], part: int, motions: Mapping, name: str) -> Row:
-    """Return the row of a free angle about an axis of A: prescribed, or moment-free.
+    """Return the row of an angle about an axis of A, either prescribed or without moment.
 
     frame: two directions of A, normal to the axis, with x × z along it, and the direction of B that is along z at angle
     zero.
@@ -173,7 +174,7 @@ def turn_row(axis: Array, frame: tuple[Array, Array, Array], part: int, motions:
 
 
 def turn_row_b(axis: Array, axis_b: Array, z: Array, motions: Mapping, name: str) -> Row:
-    """Return the row of a free angle about an axis of B: prescribed, or moment-free.
+    """Return the row of an angle about an axis of B, either prescribed or without moment.
 
     z: direction of B, normal to its axis, that is along the axis of A at angle zero.
     """
@@ -184,7 +185,7 @@ def turn_row_b(axis: Array, axis_b: Array, z: Array, motions: Mapping, name: str
 
 
 def loaded_row(row: Row) -> Row:
-    """Return the row of a free coordinate along which forces act, in place of the force-free row."""
+    """Return the row of a free coordinate along which forces act, which replaces the row without force."""
     own = row.coordinate
     assert own is not None
     assert kind_of(row.kind).is_free

@@ -32,7 +32,7 @@ class RelativePlace(NamedTuple):
 
     A_a: Array  #: axes of A, (..., 3, 3)
     A_b: Array  #: axes of B, (..., 3, 3)
-    d: Array  #: from the point of A to that of B, (..., 3)
+    d: Array  #: vector from the point of A to the point of B, (..., 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,12 +41,12 @@ class RowCoordinate:
 
     name: str  #: name of the coordinate in its joint
     kind: int  #: PUSH, TWIST, TWIST_B or SPAN
-    #: axis of a distance; for an angle a direction normal to the axis x × z, (3,)
+    #: axis of a distance; for an angle, a direction normal to the axis x × z, (3,)
     x: Array = field(default_factory=lambda: ZERO)
-    y: Array = field(default_factory=lambda: ZERO)  #: direction of the other marker, (3,)
-    #: direction of the marker with the axis, from which the angle of y is measured, (3,)
+    y: Array = field(default_factory=lambda: ZERO)  #: direction fixed in the other marker, (3,)
+    #: direction in the marker with the axis, from which the angle of y is measured, (3,)
     z: Array = field(default_factory=lambda: ZERO)
-    #: parts of the wrench that act along the coordinate, with factors
+    #: parts of the wrench that act along the coordinate, with their factors
     parts: tuple[tuple[int, float], ...] = ((FORCE, 1.0),)
 
     @property
@@ -55,7 +55,7 @@ class RowCoordinate:
         return kind_of(self.kind).is_angle
 
     def direction(self, place: RelativePlace) -> Array:
-        """Return E, (..., 3)."""
+        """Return the direction E of the coordinate, (..., 3)."""
         if self.kind == PUSH:
             return place.A_a @ self.x
         if self.kind == SPAN:
@@ -63,7 +63,7 @@ class RowCoordinate:
         return (place.A_b if self.kind == TWIST_B else place.A_a) @ cross(self.x, self.z)
 
     def value(self, place: RelativePlace) -> Array:
-        """Return the value, (...,); angles are between -pi and pi."""
+        """Return the value of the coordinate, (...,); angles are between -pi and pi."""
         if not self.is_angle:
             return dot(self.direction(place), place.d)
         A, B = (place.A_b, place.A_a) if self.kind == TWIST_B else (place.A_a, place.A_b)
@@ -75,6 +75,6 @@ class RowCoordinate:
         return turning if self.is_angle else slip
 
     def force(self, place: RelativePlace, w: Array) -> Array:
-        """Return the force or torque, (...,), that acts to increase the coordinate, from the wrench w, (..., size)."""
+        """Return the force or torque along the coordinate, (...,), from the wrench w, (..., size)."""
         own = np.sum([factor * w[..., part : part + 3] for part, factor in self.parts], axis=0)
         return -dot(own, self.direction(place))

@@ -1,4 +1,4 @@
-"""The meaning of each kind of joint row, as one record that all other code consults.
+"""The meaning of each kind of joint row, as one record that all other code uses.
 
 The unknown of a joint between markers A and B is a wrench in ground axes: the force F on A (with the opposite force on
 B), the moment M on A, and the moment N whose opposite acts on B. A joint has as many rows as unknowns. No row of a body
@@ -95,28 +95,28 @@ __all__ = [
     "kind_of",
 ]
 
-#: codes of the kinds in the kernels; SPRING rows belong to spring-dampers
+#: codes of the kinds of rows in the kernels; SPRING rows belong to spring-dampers
 POINT, DOT, GAUGE, SPRING, TURN, SLIDE, DISTANCE, SCREW, GAUGE_B, THREAD, ARM, ROD, PUSH, TWIST = range(14)
 RIM_HEIGHT, ROLL, RIM, COUPLE, PART, SPAN, TURN_B, TWIST_B, LINE, LINE_TURN, LINE_FREE = range(14, 25)
 EQUAL_TURN, BISECTOR, LAW_LENGTH, LAW_ANGLE, LAW_RATE, RELEASED = range(25, 31)
-NOTHING, POSITION, VELOCITY = range(3)  #: quantity that a row holds
-FORCE, MOMENT, MOMENT_B = 0, 3, 6  #: indices at which the parts F, M, N start in the unknown wrench
-NO_MOMENT = -1  #: replaces the index of a part if no moment acts
+NOTHING, POSITION, VELOCITY = range(3)  #: quantity that a row constrains
+FORCE, MOMENT, MOMENT_B = 0, 3, 6  #: indices at which force F and moments M, N start in the unknown wrench
+NO_MOMENT = -1  #: replaces an index if no moment acts
 
 
 @dataclass(frozen=True)
 class RowKind:
-    """Meaning of a kind of row."""
+    """The meaning of a kind of row."""
 
     code: int  #: code in the kernels
     name: str  #: description of its effect
     holds: int = NOTHING  #: NOTHING (the row defines the wrench), POSITION or VELOCITY
-    #: whether the held quantity is a length (VELOCITY: length over time); otherwise it is an angle
+    #: whether the constrained quantity is a length (VELOCITY: length per time) rather than an angle
     is_length: bool = False
-    is_angle: bool = False  #: whether its measured coordinate is an angle
-    can_yield: bool = False  #: whether redundant rows share their load if the system requests it
-    is_loaded: bool = False  #: whether forces act along its coordinate
-    is_free: bool = False  #: whether it leaves a coordinate free, along which a force may act
+    is_angle: bool = False  #: whether the measured coordinate is an angle
+    can_yield: bool = False  #: whether redundant rows of this kind share reactions if the system requests it
+    is_loaded: bool = False  #: whether forces act along the coordinate
+    is_free: bool = False  #: whether the row leaves a coordinate free, along which a force may act
 
 
 ROW_KINDS = (
@@ -163,20 +163,20 @@ def kind_of(code: int) -> RowKind:
 
 
 def is_held(codes: IntArray) -> NDArray[np.bool_]:
-    """Return which rows hold a position or a velocity, given their codes, (n,)."""
+    """Return which rows constrain a position or a velocity, from their codes, (n,)."""
     return HOLDS[codes] != NOTHING
 
 
 def is_held_position(codes: IntArray) -> NDArray[np.bool_]:
-    """Return which rows hold a position, given their codes, (n,)."""
+    """Return which rows constrain a position, from their codes, (n,)."""
     return HOLDS[codes] == POSITION
 
 
 def is_held_velocity(codes: IntArray) -> NDArray[np.bool_]:
-    """Return which rows hold a velocity but no position, given their codes, (n,)."""
+    """Return which rows constrain only a velocity, from their codes, (n,)."""
     return HOLDS[codes] == VELOCITY
 
 
 def is_held_length(codes: IntArray) -> NDArray[np.bool_]:
-    """Return which rows hold a position in the unit of length, given their codes, (n,)."""
+    """Return which rows constrain a length, from their codes, (n,)."""
     return (HOLDS[codes] == POSITION) & IS_LENGTH[codes]
