@@ -13,14 +13,14 @@ from fe_models.foundation.records import checked_fields
 
 __all__ = ["PointMass", "RigidLink", "Spring"]
 
-ROUNDING = 1e-14  #: entries of lever arms below this, relative to the lever, are zero
-SYMMETRIC = 1e-9  #: relative asymmetry of a given matrix that counts as rounding
+ROUNDING = 1e-14  #: size of an entry over the lever length, below which it counts as zero
+SYMMETRIC = 1e-9  #: relative asymmetry of a given matrix up to which it is rounding
 
 
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class PointMass:
-    """A rigid piece that a node carries.
+    """Rigid piece attached to a node.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class PointMass:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class Spring:
-    """A linear spring between two nodes. It acts at one point, to which both nodes are connected rigidly.
+    """Linear spring between two nodes. It acts at one point, to which both nodes are rigidly connected.
 
     The spring force is stiffness @ d, where d is the motion of the second node's side relative to the first node's side
     at that point: six components in the axes of the triad. Rigid-body motion therefore causes no force, wherever the
@@ -116,7 +116,7 @@ class Spring:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class RigidLink:
-    """Nodes that move rigidly with one node (RBE2 inside the body); their dofs are eliminated.
+    """Rigid link (RBE2 inside a body): followers move rigidly with a leader node, and their dofs are eliminated.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ class RigidLink:
 
 
 def point_slices(nodes: Array, masses: tuple[PointMass, ...]) -> Slices:
-    """Return the point masses as slices, which the six dofs of their nodes move."""
+    """Return the point masses as slices that the six dofs of their nodes move."""
     n = len(masses)
     at = np.array([item.node for item in masses], dtype=np.int64)
     offset = np.array([item.offset for item in masses]).reshape(n, 3)
@@ -161,13 +161,13 @@ def point_slices(nodes: Array, masses: tuple[PointMass, ...]) -> Slices:
 
 
 def spring_matrix(nodes: Array, spring: Spring, matrix: Array) -> tuple[Array, IntArray]:
-    """Return Bᵀ matrix B, (12, 12), with d = B u over the twelve dofs of both nodes, and these dofs."""
+    """Return Bᵀ matrix B, (12, 12), with d = B u for the twelve dofs u of both nodes, and the dof numbers."""
     B, dofs = spring_motion(nodes, spring)
     return B.T @ matrix @ B, dofs
 
 
 def spring_motion(nodes: Array, spring: Spring) -> tuple[Array, IntArray]:
-    """Return B in d = B u, (6, 12), the motion of the second side relative to the first, and the dofs of u."""
+    """Return B in d = B u, (6, 12), where d is the motion of the second side relative to the first, and dof numbers."""
     first, second = (nodes[node] for node in spring.nodes)
     half = (second - first) / 2
     levers = (half, -half) if spring.point is None else (spring.point - first, spring.point - second)

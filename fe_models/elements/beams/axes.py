@@ -8,7 +8,7 @@ from fe_models.meshes.line_mesh import LineMesh
 
 __all__ = ["LineGeometry", "line_geometry"]
 
-PARALLEL = 1e-6  #: sine of the angle between a line and its orientation vector below which the y axis is undefined
+PARALLEL = 1e-6  #: sine of the angle between a line and its orientation vector, below which the y axis is undefined
 
 
 class LineGeometry:

@@ -68,7 +68,7 @@ def section_of(item: BeamProperty) -> SectionProperties:
 def assign_properties(
     mesh: LineMesh, properties: BeamProperty | Mapping[str, BeamProperty]
 ) -> tuple[tuple[BeamProperty, ...], IntArray]:
-    """Return the properties in use, and the index of the property of every line, (n_lines,)."""
+    """Return the properties in use, and the property index of each line, (n_lines,)."""
     if isinstance(properties, BeamProperty):
         return (properties,), np.zeros(len(mesh.lines), np.int64)
     number = np.full(len(mesh.lines), -1, np.int64)

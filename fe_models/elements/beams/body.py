@@ -36,7 +36,7 @@ def beam_body(
     springs: Iterable[Spring] = (),
     links: Iterable[RigidLink] = (),
 ) -> FEBody:
-    """Make the body of a frame of straight Timoshenko beams with six dofs per node and consistent mass.
+    """Return the body of a frame of straight Timoshenko beams with six dofs per node and consistent mass.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def beam_body(
 
 
 def assembled(parts: list[tuple[IntArray, Array]], n_dof: int) -> sp.csc_array:
-    """Assemble element matrices, (n, d, d) over dofs (n, d), into a sparse matrix."""
+    """Assemble element matrices, (n, d, d), with dof numbers, (n, d), into a sparse matrix."""
     if not parts:
         return sp.csc_array((n_dof, n_dof))
     rows = [np.repeat(dofs, dofs.shape[1], axis=1).ravel() for dofs, _ in parts]
@@ -141,7 +141,7 @@ def assembled(parts: list[tuple[IntArray, Array]], n_dof: int) -> sp.csc_array:
 
 
 def skin_rows(nodes: Array, points: Array, mover: IntArray) -> sp.csr_array:
-    """Return the matrix that maps dofs of nodes to translations of skin points, (3 n_skin, 6 n_nodes)."""
+    """Return the matrix from dofs of nodes to translations of skin points, (3 n_skin, 6 n_nodes)."""
     n = len(points)
     if n == 0:
         return sp.csr_array((0, 6 * len(nodes)))
@@ -155,7 +155,7 @@ def skin_rows(nodes: Array, points: Array, mover: IntArray) -> sp.csr_array:
 def _node_volumes(
     n_nodes: int, length: Array, of_line: IntArray, sections: tuple[SectionProperties, ...], skin: Skin
 ) -> Array | None:
-    """Assign half of the volume of every line to the ring of points at each end, (n_nodes + n_skin,) [m³]."""
+    """Assign half of the volume of each line to the ring of points at each end, (n_nodes + n_skin,) [m³]."""
     volumes = np.zeros(n_nodes + len(skin.points))
     for number, section in enumerate(sections):
         lines = np.flatnonzero(of_line == number)
@@ -166,7 +166,7 @@ def _node_volumes(
 
 
 def line_orientations(mesh: LineMesh, used: tuple[BeamProperty, ...], of_line: IntArray) -> Array:
-    """Return the vector towards y of every line from the mesh, else from its property, else NaN, (n_lines, 3)."""
+    """Return the vector towards y for each line, from the mesh or from its property; NaN if none, (n_lines, 3)."""
     own = [(np.nan,) * 3 if item.orientation is None else item.orientation for item in used]
     of_property = np.array(own, dtype=float).reshape(-1, 3)[of_line]
     if mesh.orientations is None:

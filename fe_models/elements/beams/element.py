@@ -1,4 +1,4 @@
-"""The straight two-node Timoshenko beam element in local axes: interpolation and stiffness.
+"""Straight two-node Timoshenko beam element in local axes: interpolation and stiffness.
 
 The local dofs at both ends are u_x u_y u_z theta_x theta_y theta_z of the centroid, with x along the axis and xi = x/L
 in 0..1. Without distributed load, the equilibrium EI theta'' + kappa G A (v' - theta) = 0, kappa G A (v' - theta)' = 0
@@ -24,7 +24,7 @@ def shear_parameter(EI: Array, GA_s: Array, L: Array) -> Array:
 
 
 def bending_shapes(xi: Array, Phi: Array, L: Array) -> tuple[Array, Array]:
-    """Return shape functions of deflection and rotation for v_1 theta_1 v_2 theta_2, (n, n_points, 4) each.
+    """Return shape functions of deflection and rotation over v_1 theta_1 v_2 theta_2, (n, n_points, 4) each.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def bending_shapes(xi: Array, Phi: Array, L: Array) -> tuple[Array, Array]:
 
 
 def interpolation(xi: Array, Phi_y: Array, Phi_z: Array, L: Array, shear_center: Array) -> Array:
-    """Return the motion (u, theta) of the centroid at points xi for unit local dofs, (n, n_points, 6, 12).
+    """Return the motion (u, theta) of the centroid at points xi per unit local dof, (n, n_points, 6, 12).
 
     Parameters
     ----------
@@ -79,11 +79,11 @@ def interpolation(xi: Array, Phi_y: Array, Phi_z: Array, L: Array, shear_center:
 
 
 def _about_shear_center(N: Array, shear_center: Array) -> Array:
-    """Take the interpolation as that of the shear centre, and return that of the centroid."""
+    """Transform an interpolation of the shear centre to that of the centroid."""
     if not np.any(shear_center):
         return N
     y_s, z_s = np.asarray(shear_center).T
-    to_shear_center = np.tile(np.eye(12), (len(y_s), 1, 1))  # of the nodal dofs
+    to_shear_center = np.tile(np.eye(12), (len(y_s), 1, 1))  # maps nodal dofs to the shear centre
     for first in (0, 6):
         to_shear_center[:, first + 1, first + 3] = -z_s
         to_shear_center[:, first + 2, first + 3] = y_s
@@ -117,7 +117,7 @@ def local_stiffness(EA: Array, GJ: Array, EIy: Array, EIz: Array, Phi_y: Array, 
 
 
 def stiffness_about_shear_center(K: Array, shear_center: Array) -> Array:
-    """Return the stiffness over dofs of the centroid if torsion and shear act at the shear centre, (n, 12, 12)."""
+    """Return the stiffness over dofs of the centroid for torsion and shear about the shear centre, (n, 12, 12)."""
     if not np.any(shear_center):
         return K
     y_s, z_s = np.asarray(shear_center).T
@@ -129,7 +129,7 @@ def stiffness_about_shear_center(K: Array, shear_center: Array) -> Array:
 
 
 def end_forces_at_centroid(f: Array) -> Array:
-    """Return section forces N Vy Vz Mx My Mz at both ends from the nodal forces of an element, (n, 2, 6, k).
+    """Return section forces N Vy Vz Mx My Mz at both ends from element nodal forces, (n, 2, 6, k).
 
     The face at the second end has the normal +x, so its section forces equal the nodal forces. At the first end they
     are the negative of the nodal forces.

@@ -16,17 +16,17 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["Elements", "gauss_points"]
 
-N_GAUSS = 4  #: exact up to degree 7; the square of a cubic has degree 6
+N_GAUSS = 4  #: number of Gauss points; exact up to degree 7, and the square of a cubic has degree 6
 
 
 def gauss_points() -> tuple[Array, Array]:
-    """Return the positions of the slices, 0 to 1, and their weights, which sum to 1."""
+    """Return the positions of the slices, from 0 to 1, and their weights with sum 1."""
     xi, weights = np.polynomial.legendre.leggauss(N_GAUSS)
     return (xi + 1) / 2, weights / 2
 
 
 class Elements:
-    """All beam elements of a mesh, as arrays: stiffness and slices."""
+    """All beam elements of a mesh as arrays: stiffness and slices."""
 
     def __init__(
         self,
@@ -47,7 +47,8 @@ class Elements:
         L = geometry.length
         Phi_y, Phi_z = shear_parameter(E * Iz, G * A_sy, L), shear_parameter(E * Iy, G * A_sz, L)
         K = local_stiffness(E * A, G * J, E * Iy, E * Iz, Phi_y, Phi_z, L)
-        self.K_local = stiffness_about_shear_center(K, shear_center)  #: over local dofs of the centroid, (n, 12, 12)
+        #: stiffness over local dofs of the centroid, (n, 12, 12)
+        self.K_local = stiffness_about_shear_center(K, shear_center)
         self.mass_per_length = rho * A + per_line([p.added_mass for p in used])
         zero = np.zeros_like(L)
         has_rotary = np.array([p.rotary_inertia for p in used], dtype=bool)[of_line]
@@ -64,7 +65,7 @@ class Elements:
         return np.asarray((K + K.transpose(0, 2, 1)) / 2)
 
     def slices(self, dofs: IntArray) -> Slices:
-        """Return the slices at the Gauss points."""
+        """Return the slices at the Gauss points, with these dof numbers."""
         geometry, n, p = self.geometry, len(self.N), N_GAUSS
         R = geometry.R[:, None]
         motion = self.N @ geometry.T[:, None]

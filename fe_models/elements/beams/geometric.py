@@ -31,19 +31,19 @@ __all__ = [
 
 @dataclass(frozen=True, eq=False)
 class BeamLines:
-    """Data of the lines of a frame that the geometric stiffness needs."""
+    """Line data for the geometric stiffness of a frame."""
 
-    slices: Slices  #: slices at the Gauss points of every line
-    xi: Array  #: Gauss points, 0 to 1, (p,)
-    weights: Array  #: Gauss weights, which sum to 1, (p,)
-    length: Array  #: (n,) [m]
+    slices: Slices  #: slices at the Gauss points of each line
+    xi: Array  #: Gauss points from 0 to 1, (p,)
+    weights: Array  #: Gauss weights with sum 1, (p,)
+    length: Array  #: lengths of the lines, (n,) [m]
     x: Array  #: unit vectors along the axes, (n, 3)
-    levers: Array  #: from the nodes to the ends of the axis, (n, 2, 3) [m]
-    polar_radius2: Array  #: (Iy + Iz)/A, (n,) [m²]
+    levers: Array  #: vectors from the nodes to the ends of the axis, (n, 2, 3) [m]
+    polar_radius2: Array  #: squared polar radius of gyration (Iy + Iz)/A, (n,) [m²]
 
 
 def slice_couples(slices: Slices, loads: MassLoads) -> tuple[Array, Array]:
-    """Return the force and V = Σ f oᵀ about the centre of each slice, (k, n, p, 3) and (k, n, p, 3, 3).
+    """Return the force, (k, n, p, 3), and V = Σ f oᵀ, (k, n, p, 3, 3), about the centre of each slice.
 
     f = A (c + o) + b per unit mass. The first moment of o over a slice is zero, so that V = A E with E = ∫ o oᵀ dm.
     """
@@ -53,7 +53,7 @@ def slice_couples(slices: Slices, loads: MassLoads) -> tuple[Array, Array]:
 
 
 def slice_forces(slices: Slices, loads: MassLoads) -> Array:
-    """Return the consistent forces on the dofs of the elements, Σ motionᵀ (force, moment) over slices, (n, d, k)."""
+    """Return the consistent forces on the element dofs, Σ motionᵀ (force, moment) over the slices, (n, d, k)."""
     force, V = slice_couples(slices, loads)
     wrench = np.concatenate([force, axial(V)], axis=-1)
     k, n, p, _ = wrench.shape
@@ -62,7 +62,7 @@ def slice_forces(slices: Slices, loads: MassLoads) -> Array:
 
 
 def line_geometric_stiffness(lines: BeamLines, end_forces: Array, loads: MassLoads) -> Array:
-    """Return the geometric stiffness of every line over the dofs of its nodes, (n, 12, 12), for one load.
+    """Return the geometric stiffness of each line over the dofs of its nodes, (n, 12, 12), for one load.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def point_geometric_stiffness(points: Slices, loads: MassLoads) -> Array:
 
 
 def spring_geometric_stiffness(nodes: Array, spring: Spring, u: Array) -> Array:
-    """Return the geometric stiffness of a spring over the dofs of its nodes, (12, 12), in the state u, (12,).
+    """Return the geometric stiffness of a spring, (12, 12), over the dofs of its nodes in the state u, (12,).
 
     The point on each side moves by d_i = u_i + (R_i - 1) l_i. The axes of the spring rotate with the mean rotation
     theta of its sides. The second-order term of its extension Rᵀ (d_2 - d_1) is therefore -theta × d + ½ [theta_2 ×
@@ -139,7 +139,7 @@ def spring_geometric_stiffness(nodes: Array, spring: Spring, u: Array) -> Array:
     first, second = (nodes[node] for node in spring.nodes)
     point = (first + second) / 2 if spring.point is None else np.asarray(spring.point)
     force = spring_matrix(nodes, spring, np.asarray(spring.stiffness))[0] @ u
-    S = force[6:9]  # force on the second node; the force on the first is opposite
+    S = force[6:9]  # force on the second node; the force on the first node is opposite
     levers = point - first, point - second
     M = force[9:] - np.cross(levers[1], S)
     turns = np.eye(12)[3:6], np.eye(12)[9:]
@@ -152,7 +152,7 @@ def spring_geometric_stiffness(nodes: Array, spring: Spring, u: Array) -> Array:
 
 
 def differentiation(xi: Array) -> Array:
-    """Return D with f'(xi_p) = Σ D_pq f(xi_q) for polynomials of degree < p, (p, p)."""
+    """Return the matrix D of derivatives, (p, p): f'(xi_p) = Σ D_pq f(xi_q) for polynomials of degree < p."""
     powers = np.arange(len(xi))
     values = xi[:, None] ** powers
     slopes = powers * xi[:, None] ** np.maximum(powers - 1, 0)

@@ -21,7 +21,7 @@ __all__ = ["NodeIndices", "line_interface", "node_interface"]
 @dataclass(frozen=True)
 @checked_fields(ArgumentError)
 class NodeIndices:
-    """Selection of nodes by their index in the mesh.
+    """Selection of nodes by their indices in the mesh.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class NodeIndices:
     nodes: tuple[int, ...]
 
     def members(self, mesh: AnyMesh) -> IntArray:
-        """Return these nodes, ascending."""
+        """Return these nodes in ascending order."""
         nodes = np.unique(np.asarray(self.nodes, dtype=np.int64))
         if nodes.size == 0 or nodes.min() < 0 or nodes.max() >= len(mesh.nodes):
             raise InterfaceError(f"nodes {list(self.nodes)[:5]}: expected some of 0..{len(mesh.nodes) - 1}")
@@ -48,7 +48,7 @@ def line_interface(
     reference: ArrayLike | None = None,
     triad: ArrayLike | None = None,
 ) -> Interface:
-    """Make an interface at nodes of a frame.
+    """Return an interface at nodes of a frame.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def node_interface(
     triad: ArrayLike | None,
     weights: Array,
 ) -> Interface:
-    """Make an interface at nodes with rotations; `weights`, (n_nodes,), are used by the kind "distributing"."""
+    """Return an interface at nodes with rotations; kind "distributing" uses `weights`, (n_nodes,)."""
     try:
         nodes = selection.members(mesh)
     except InterfaceError as error:
@@ -95,7 +95,7 @@ def node_interface(
 
 
 def line_weights(mesh: LineMesh) -> Array:
-    """Assign half of the length of every line to each of its nodes, (n_nodes,) [m]."""
+    """Assign half of the length of each line to each of its nodes, (n_nodes,) [m]."""
     ends = mesh.nodes[mesh.lines]
     weights = np.zeros(len(mesh.nodes))
     np.add.at(weights, mesh.lines.ravel(), np.repeat(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / 2, 2))

@@ -1,4 +1,4 @@
-"""Sections and material as the laws of a straight beam without a mesh (`BeamLine`)."""
+"""Laws of a straight beam without a mesh (`BeamLine`), from sections and material."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -23,7 +23,7 @@ def beam_line(
     taper: Callable[[float], Section] | None = None,
     breaks: tuple[float, ...] = (),
 ) -> BeamLine:
-    """Return mass and stiffness per length of a straight beam along x; its local y and z axes are those of the body.
+    """Return mass and stiffness per length of a straight beam along x; its local axes are the axes of the body.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Rigid links inside a body: nodes that follow other nodes lose their dofs."""
+"""Rigid links inside a body: the dofs of followers are eliminated."""
 
 from collections.abc import Iterable
 

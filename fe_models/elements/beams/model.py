@@ -30,13 +30,13 @@ __all__ = ["BeamModel"]
 class BeamModel:
     """Element model of a frame (`fe_body.ElementModel`); six dofs per node come first, then three per skin node."""
 
-    nodes: Array  #: of the mesh, (n_nodes, 3) [m]
+    nodes: Array  #: nodes of the mesh, (n_nodes, 3) [m]
     #: slices of the lines if there are lines, then of the point masses if there are point masses
     pieces: tuple[Slices, ...]
     geometry: LineGeometry
-    K_local: Array  #: (n_lines, 12, 12)
-    dofs: IntArray  #: of the nodes of each line, (n_lines, 12)
-    of_line: IntArray  #: section of each line, (n_lines,)
+    K_local: Array  #: stiffness of each line over local dofs, (n_lines, 12, 12)
+    dofs: IntArray  #: dofs of the nodes of each line, (n_lines, 12)
+    of_line: IntArray  #: section index of each line, (n_lines,)
     sections: tuple[SectionProperties, ...]
     skin: Skin
     springs: tuple[Spring, ...] = ()
@@ -49,7 +49,7 @@ class BeamModel:
 
     @property
     def has_nodal_stress(self) -> bool:
-        """Whether the body has a skin that shows stress."""
+        """Whether the body has skin nodes with stress."""
         return len(self.skin.points) > 0
 
     @property
@@ -104,7 +104,7 @@ class BeamModel:
         return np.concatenate([np.zeros((self.n_nodes, 6, k)), stress])
 
     def stress_at_end(self, lines: IntArray, forces: Array) -> Array:
-        """Return the stress at the section points of lines of one section, (n, n_points, 6, k) [Pa], mesh axes.
+        """Return the stress at the section points of lines with the same section, (n, n_points, 6, k) [Pa], mesh axes.
 
         Parameters
         ----------
@@ -116,7 +116,7 @@ class BeamModel:
         section = self.sections[self.of_line[lines[0]]]
         y_s, z_s = section.shear_center
         about = np.array(forces)
-        about[:, 3] += z_s * about[:, 1] - y_s * about[:, 2]  # torsion about the shear centre
+        about[:, 3] += z_s * about[:, 1] - y_s * about[:, 2]  # torsional moment about the shear centre
         table = np.einsum("ncs,psf->npcf", _stress_directions(self.geometry.R[lines]), section.stress)
         n, n_points = table.shape[:2]
         return np.asarray((table.reshape(n, 6 * n_points, 6) @ about).reshape(n, n_points, 6, -1))
@@ -127,11 +127,11 @@ class BeamModel:
 
     @property
     def has_geometric_stiffness(self) -> bool:
-        """True: section forces, masses and springs give a geometric stiffness."""
+        """Return True: section forces, masses and springs have a geometric stiffness."""
         return True
 
     def mass_forces(self, loads: MassLoads) -> Array:
-        """Return consistent forces and moments of loads per unit mass, with section couples, (n_mesh_dof, k)."""
+        """Return consistent forces and moments of loads per unit mass, including section couples, (n_mesh_dof, k)."""
         forces = np.zeros((self.n_mesh_dof, loads.k))
         for piece in self.pieces:
             np.add.at(forces, piece.dofs, slice_forces(piece, loads))
@@ -148,7 +148,7 @@ class BeamModel:
         return forces
 
     def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Array) -> Array:
-        """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), of states u under these loads, by `elements.beams.geometric`."""
+        """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), for states u under these loads, by `elements.beams.geometric`."""
         for columns in (u, Phi):
             self._require_rows("geometric_stiffness", columns)
         K = np.zeros((loads.k, Phi.shape[1], Phi.shape[1]))
@@ -170,7 +170,7 @@ class BeamModel:
         return (K + K.transpose(0, 2, 1)) / 2
 
     def _node_forces(self, u: Array) -> Array:
-        """Return the forces and moments of the nodes on each line, mesh axes, (n_lines, 12, k)."""
+        """Return forces and moments that the nodes exert on each line, mesh axes, (n_lines, 12, k)."""
         T = self.geometry.T
         return np.asarray(T.transpose(0, 2, 1) @ (self.K_local @ (T @ np.asarray(u)[self.dofs])))
 
@@ -187,7 +187,7 @@ class BeamModel:
 
 
 def _stress_directions(R: Array) -> Array:
-    """Return components xx yy zz yz xz xy in mesh axes of unit local sigma_xx, tau_xy, tau_xz, (n, 6, 3)."""
+    """Return stress xx yy zz yz xz xy in mesh axes for unit local sigma_xx, tau_xy, tau_xz, (n, 6, 3)."""
     x, y, z = R[:, :, 0], R[:, :, 1], R[:, :, 2]
     columns = []
     for other in (None, y, z):

@@ -16,10 +16,10 @@ __all__ = ["SectionPoints", "section_points"]
 
 @dataclass(frozen=True, eq=False)
 class SectionPoints:
-    """Section points at both ends of some lines. Each end shows the stress of its own element, without averaging."""
+    """Section points at both ends of some lines. Each has the stress of its own element, without averaging."""
 
     model: BeamModel
-    lines: IntArray  #: (n_lines,)
+    lines: IntArray  #: indices of the chosen lines, (n_lines,)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "lines", frozen(self.lines, np.int64))
@@ -36,7 +36,7 @@ class SectionPoints:
 
     @property
     def positions(self) -> Array:
-        """Undeformed, mesh axes, (n_points, 3) [m]."""
+        """Undeformed positions in mesh axes, (n_points, 3) [m]."""
         geometry = self.model.geometry
         return frozen(
             np.concatenate(
@@ -49,7 +49,7 @@ class SectionPoints:
         )
 
     def stress(self, u: Array) -> Array:
-        """Return the stress of columns over the mesh dofs, (n_points, 6, k) [Pa], xx yy zz yz xz xy in mesh axes."""
+        """Return the stress for columns over the mesh dofs, (n_points, 6, k) [Pa], xx yy zz yz xz xy in mesh axes."""
         forces = self.model.section_forces(u)
         return np.concatenate(
             [

@@ -9,12 +9,13 @@ from fe_models.foundation.arrays import Array, IntArray, frozen
 
 __all__ = ["SectionProperties", "normal_stress"]
 
-FORCES = ("N", "Vy", "Vz", "Mx", "My", "Mz")  #: section forces at the centroid, on the face with normal +x
+#: components of the section force at the centroid, on the face with normal +x
+FORCES = ("N", "Vy", "Vz", "Mx", "My", "Mz")
 
 
 @dataclass(frozen=True, eq=False)
 class SectionProperties:
-    """A homogeneous cross-section in its principal axes y, z through the centroid; x along the beam.
+    """Homogeneous cross-section in its principal axes y, z through the centroid; x is along the beam.
 
     Raises
     ------
@@ -30,11 +31,12 @@ class SectionProperties:
     A_sz: float  #: shear area along z, kappa_z A [m²]
     points: Array  #: stress recovery points (y, z), which are also the vertices of the outline, (n_points, 2) [m]
     stress: Array  #: (sigma_xx, tau_xy, tau_xz) at the points for unit `FORCES`, (n_points, 3, 6) [1/m², 1/m³]
-    loops: tuple[IntArray, ...] = ()  #: outline: points of the outer loop anticlockwise in (y, z), then of holes
+    #: outline: point indices of the outer loop, anticlockwise in (y, z), then of the holes
+    loops: tuple[IntArray, ...] = ()
     cap: IntArray = field(default_factory=lambda: np.zeros((0, 3), np.int64))  #: triangles of the face with normal +x
     shear_center: tuple[float, float] = (0.0, 0.0)  #: (y, z) of the shear centre [m]
-    shows_shear: bool = True  #: whether `stress` contains the shear stress of shear forces and torsion
-    is_outline_known: bool = True  #: whether the points are those of the true section; False: of an assumed rectangle
+    shows_shear: bool = True  #: whether `stress` includes shear stress due to shear forces and torsion
+    is_outline_known: bool = True  #: whether the points are on the true section; False: on an assumed rectangle
 
     def __post_init__(self) -> None:
         for name in ("A", "Iy", "Iz", "J", "A_sy", "A_sz"):
@@ -54,12 +56,12 @@ class SectionProperties:
 
     @property
     def J_polar(self) -> float:
-        """Polar second moment Iy + Iz, which gives the rotary inertia about x [m⁴]."""
+        """Polar second moment of area Iy + Iz, which determines the rotary inertia about x [m⁴]."""
         return self.Iy + self.Iz
 
 
 def normal_stress(points: Array, A: float, Iy: float, Iz: float) -> Array:
-    """Return the stress coefficients of sigma_xx = N/A + My z/Iy - Mz y/Iz; the shear rows are zero, (n, 3, 6)."""
+    """Return coefficients of sigma_xx = N/A + My z/Iy - Mz y/Iz, (n, 3, 6); the shear rows are zero."""
     y, z = np.asarray(points).T
     stress = np.zeros((len(y), 3, 6))
     stress[:, 0, 0] = 1 / A

@@ -1,4 +1,4 @@
-"""Cross-sections of beams: closed forms for common shapes, and a general section given by its properties.
+"""Cross-sections of beams: closed forms for common shapes, and a general section with given properties.
 
 Local axes: x along the beam; y and z are principal axes through the centroid. Widths are along y, heights along z.
 Shear areas kappa A are Cowper's (1966) for circle, ring, rectangle, and thin-walled I and box sections along their
@@ -40,20 +40,20 @@ NOT_SIMPLE = "section: outline: expected a simple polygon, anticlockwise in (y, 
 
 
 def circle_points(radius: float, n: int) -> Array:
-    """Return n points on a circle, anticlockwise from the y axis, (n, 2)."""
+    """Return n points on a circle, (n, 2), anticlockwise from the y axis."""
     angle = 2 * np.pi * np.arange(n) / n
     return radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
 def ring_cap(n: int) -> IntArray:
-    """Return the triangles between an outer loop 0..n-1 and an inner loop n..2n-1, (2 n, 3), anticlockwise."""
+    """Return triangles between outer loop 0..n-1 and inner loop n..2n-1, (2 n, 3), anticlockwise."""
     i = np.arange(n)
     j = (i + 1) % n
     return np.concatenate([np.stack([i, j, n + j], axis=1), np.stack([i, n + j, n + i], axis=1)])
 
 
 def triangulate_polygon(points: Array) -> IntArray:
-    """Return triangles of a simple anticlockwise polygon by cutting ears, (n - 2, 3).
+    """Return triangles of a simple anticlockwise polygon by ear clipping, (n - 2, 3).
 
     An ear is a convex corner whose triangle holds no other vertex.
 
@@ -96,7 +96,7 @@ def _is_flat(points: Array, rest: list[int]) -> bool:
 
 
 def _any_inside(triangle: Array, points: Array) -> bool:
-    """Whether a point lies inside the triangle or on its edges."""
+    """Return whether a point is inside the triangle or on its edges."""
     a, b, c = triangle
     size = _area(a, b, c)
     return any(min(_area(a, b, p), _area(b, c, p), _area(c, a, p)) >= -1e-12 * size for p in points)
@@ -105,11 +105,11 @@ def _any_inside(triangle: Array, points: Array) -> bool:
 # sections -------------------------------------------------------------------------------------------------------------
 
 
-N_CIRCLE = 16  #: points of a circular outline; they miss the largest bending stress by at most 2 %
+N_CIRCLE = 16  #: number of points of a circular outline; the largest bending stress is at most 2 % too low
 
 
 class Section(Protocol):
-    """A shape that can compute its section properties."""
+    """Shape that can compute its section properties."""
 
     def properties(self, nu: float) -> SectionProperties:
         """Return area, second moments, torsion constant, shear areas for Poisson's ratio nu, outline and stress."""
@@ -187,10 +187,10 @@ class Rectangle:
         A, Iy, Iz = b * h, b * h**3 / 12, h * b**3 / 12
         points = rectangle_points(b, h)
         stress = normal_stress(points, A, Iy, Iz)
-        for k, side in ((1, 1), (5, -1)):  # middle of the sides y = ± b/2: tau_xz = 3 V / (2 A)
+        for k, side in ((1, 1), (5, -1)):  # mid-points of the sides y = ± b/2: tau_xz = 3 V / (2 A)
             stress[k, 2, 2] = 1.5 / A
             stress[k, 2, 3] = side * rectangle_torsion_stress(b, h)
-        for k, side in ((3, 1), (7, -1)):  # z = ± h/2
+        for k, side in ((3, 1), (7, -1)):  # mid-points of the sides z = ± h/2
             stress[k, 1, 1] = 1.5 / A
             stress[k, 1, 3] = -side * rectangle_torsion_stress(h, b)
         A_s = 10 * (1 + nu) / (12 + 11 * nu) * A
@@ -211,7 +211,7 @@ class Rectangle:
 @dataclass(frozen=True)
 @checked_fields(ArgumentError)
 class BoxSection:
-    """Rectangular hollow section, given by its outer sides; webs are along z.
+    """Rectangular hollow section, given by its outer dimensions; the webs are along z.
 
     Parameters
     ----------
@@ -251,7 +251,7 @@ class BoxSection:
         # first moments of one half of the box, for a force along z
         S_corner, S_web = b_m / 2 * t_f * h_m / 2, b_m / 2 * t_f * h_m / 2 + t_w * h_m**2 / 8
         S_flange = h_m / 2 * t_w * b_m / 2 + t_f * b_m**2 / 8  # first moments for a force along y
-        for first in (0, 8):  # corners belong to the webs: shear flow from a force along z only
+        for first in (0, 8):  # corners belong to the webs, which have shear flow only for a force along z
             for k, side in ((0, 1), (1, 1), (2, 1), (4, -1), (5, -1), (6, -1)):
                 stress[first + k, 2, 2] = (S_web if k in (1, 5) else S_corner) / (Iy * t_w)
                 stress[first + k, 2, 3] = side * bredt_w
@@ -343,7 +343,7 @@ class ISection:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class GeneralSection:
-    """A section given by its properties, in principal axes.
+    """Section with given properties in principal axes.
 
     Shear stress is not recovered. The outline is drawn, and its vertices show the normal stress.
 
@@ -412,7 +412,7 @@ SECTIONS: dict[str, type] = {
     "box": BoxSection,
     "i": ISection,
     "general": GeneralSection,
-}  #: shape of each name in a job file
+}  #: section class of each shape name in a job file
 
 
 def require_lengths(section: object) -> None:
@@ -454,13 +454,13 @@ def round_properties(r_o: float, r_i: float, nu: float) -> SectionProperties:
 
 
 def rectangle_points(b: float, h: float) -> Array:
-    """Return corners and middles of the sides, anticlockwise from the corner (b/2, -h/2), (8, 2)."""
+    """Return corners and mid-points of the sides, (8, 2), anticlockwise from the corner (b/2, -h/2)."""
     y, z = b / 2, h / 2
     return np.array([(y, -z), (y, 0), (y, z), (0, z), (-y, z), (-y, 0), (-y, -z), (0, -z)])
 
 
 def i_shear_coefficient(h: float, t_w: float, b: float, t_f: float, nu: float) -> float:
-    """Return Cowper's kappa of a thin-walled I section along its web; h is measured between flange mid-lines."""
+    """Return Cowper's shear coefficient of a thin-walled I section along its web; h is between flange mid-lines."""
     m, n2 = 2 * b * t_f / (h * t_w), (b / h) ** 2
     return (
         10 * (1 + nu) * (1 + 3 * m) ** 2 / (_web_terms(m, nu) + 30 * n2 * (m + m**2) + 5 * nu * n2 * (8 * m + 9 * m**2))
@@ -468,7 +468,7 @@ def i_shear_coefficient(h: float, t_w: float, b: float, t_f: float, nu: float) -
 
 
 def box_shear_coefficient(h: float, t_webs: float, b: float, t_f: float, nu: float) -> float:
-    """Return Cowper's kappa of a thin-walled box along its webs, whose total thickness is t_webs."""
+    """Return Cowper's shear coefficient of a thin-walled box along its webs; t_webs is their total thickness."""
     m, n2 = 2 * b * t_f / (h * t_webs), (b / h) ** 2
     return 10 * (1 + nu) * (1 + 3 * m) ** 2 / (_web_terms(m, nu) + 10 * n2 * ((3 + nu) * m + 3 * m**2))
 

@@ -1,4 +1,4 @@
-"""The skin of a frame: section outlines swept along the lines. Its nodes are drawn, and show section stress."""
+"""Skin of a frame: section outlines swept along the lines. Its nodes are drawn and have the section stress."""
 
 from dataclasses import dataclass
 
@@ -10,15 +10,15 @@ from fe_models.foundation.arrays import Array, IntArray, frozen
 
 __all__ = ["Skin", "make_skin"]
 
-SAME = 1e-9  #: relative tolerance for the ends and axes of two lines that continue each other
+SAME = 1e-9  #: relative tolerance for ends and axes of two lines to count as continuous
 
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """Rings of section points at the ends of the lines. Lines that continue each other share a ring."""
+    """Rings of section points at the ends of the lines. Continuous lines share a ring."""
 
-    points: Array  #: (n_skin, 3) [m]
-    mover: IntArray  #: node of the mesh that moves each point rigidly, (n_skin,)
+    points: Array  #: positions of the skin points, (n_skin, 3) [m]
+    mover: IntArray  #: mesh node that each point follows rigidly, (n_skin,)
     triangles: IntArray  #: triangles between points, normals outward, (n_tri, 3)
     line_of: IntArray  #: line of each triangle, (n_tri,)
     ring_start: IntArray  #: index of the first point of the ring at both ends of each line, (n_lines, 2)
@@ -43,7 +43,7 @@ def make_skin(
     size = float(np.linalg.norm(np.ptp(nodes, axis=0))) or 1.0
     rings: dict[
         tuple[int, int], list[tuple[Array, Array, int, int]]
-    ] = {}  # (node, section) -> line ends that have no continuation yet
+    ] = {}  # line ends without continuation so far, by (node, section)
     points, mover, triangles = [], [], []
     line_of: list[IntArray] = []
     start = np.zeros((len(lines), 2), np.int64)
@@ -78,7 +78,7 @@ def make_skin(
             triangles.append(_side(start[line], loop, turn))
             line_of.append(np.full(len(triangles[-1]), line))
     for first, ends in uses.items():
-        if len(ends) == 1:  # the line has no continuation here: close the end with a cap
+        if len(ends) == 1:  # a line without continuation here is closed by a cap
             line, end = ends[0]
             cap = sections[of_line[line]].cap + first
             triangles.append(cap if end == 1 else cap[:, ::-1])
@@ -93,7 +93,7 @@ def make_skin(
 
 
 def _side(start: IntArray, loop: IntArray, turn: int) -> IntArray:
-    """Return the triangles between two rings of a loop; turn = -1: the loop is a hole, its normals point inward."""
+    """Return the triangles between two rings of a loop; turn = -1 is a hole, whose normals point inward."""
     a, b = start[0] + loop, start[1] + loop
     a_next, b_next = np.roll(a, -1), np.roll(b, -1)
     side = np.concatenate([np.stack([a, a_next, b_next], axis=1), np.stack([a, b_next, b], axis=1)])

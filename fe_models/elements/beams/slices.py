@@ -1,4 +1,4 @@
-"""Rigid slices: a body as a set of rigid pieces, each with a mass, second moments and six motions.
+"""Rigid slices: a body as a set of rigid pieces, each with mass, second moments and six motions.
 
 A beam is a row of rigid cross-sections; a point mass is one slice. A slice at c with mass m, second moments E = ∫ o oᵀ
 dm (o: offset from c) and motion u + theta × o contributes to the Gram matrix of a = [1, c, u_x, u_y, u_z]
@@ -18,19 +18,19 @@ from fe_models.foundation.arrays import Array, IntArray, frozen
 
 __all__ = ["Slices", "second_moments"]
 
-CHUNK = 2000  #: number of elements processed at once
+CHUNK = 2000  #: number of elements processed at a time
 
 
 @dataclass(frozen=True, eq=False)
 class Slices:
-    """Rigid slices of n elements, p slices per element, moved by the d dofs of the element."""
+    """Rigid slices of n elements, with p slices per element that the d element dofs move."""
 
-    position: Array  #: (n, p, 3) [m]
-    mass: Array  #: (n, p) [kg]
+    position: Array  #: position of each slice, (n, p, 3) [m]
+    mass: Array  #: mass of each slice, (n, p) [kg]
     axes: Array  #: principal axes of E as columns, mesh axes, (n, p, 3, 3)
     moments: Array  #: principal values of E, (n, p, 3) [kg m²]
-    motion: Array  #: (u, theta) of the slices in mesh axes for unit dofs, (n, p, 6, d)
-    dofs: IntArray  #: of the mesh, (n, d)
+    motion: Array  #: motion (u, theta) of the slices in mesh axes per unit dof, (n, p, 6, d)
+    dofs: IntArray  #: dof numbers in the mesh, (n, d)
 
     def __post_init__(self) -> None:
         for name in ("position", "mass", "axes", "moments", "motion"):
@@ -73,6 +73,6 @@ class Slices:
 
 
 def second_moments(J: Array) -> tuple[Array, Array]:
-    """Return principal values, (3,), and axes, (3, 3), of E = tr(J)/2 1 - J, for an inertia tensor J [kg m²]."""
+    """Return principal values, (3,), and axes, (3, 3), of E = tr(J)/2 1 - J, given an inertia tensor J [kg m²]."""
     J = np.asarray(J, dtype=float)
     return np.linalg.eigh(np.trace(J) / 2 * np.eye(3) - J)

@@ -13,14 +13,14 @@ _ODD = np.arange(1.0, 400.0, 2.0)
 
 
 def rectangle_torsion_constant(b: float, h: float) -> float:
-    """Return J of a rectangle with sides b and h [m⁴]: (l t³/3) (1 - 192 t/(pi⁵ l) Σ_odd tanh(n pi l/(2 t)) / n⁵)."""
+    """Return the torsion constant J of a rectangle [m⁴]: (l t³/3) (1 - 192 t/(pi⁵ l) Σ_odd tanh(n pi l/(2 t)) / n⁵)."""
     t, length = min(b, h), max(b, h)
     series = (np.tanh(_ODD * np.pi * length / (2 * t)) / _ODD**5).sum()
     return float(length * t**3 / 3 * (1 - 192 * t / (np.pi**5 * length) * series))
 
 
 def rectangle_torsion_stress(b: float, h: float) -> float:
-    """Return the shear stress in the middle of the side y = b/2 for a unit torque [1/m³].
+    """Return the shear stress at the mid-point of the side y = b/2 for a unit torque [1/m³].
 
     This is -∂psi/∂y = b (1 - (8/pi²) Σ_odd 1 / (n² cosh(n pi h/(2 b)))), divided by J. It is the maximum if b <= h.
     """

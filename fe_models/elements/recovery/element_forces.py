@@ -33,7 +33,7 @@ Values = Callable[[Array, IntArray], Array]
 
 
 def beam_strains(model: BeamModel, rows: slice) -> Values:
-    """Return eps gamma_y gamma_z kappa_x kappa_y kappa_z at both ends of lines: section forces divided by stiffness.
+    """Return strains eps gamma_y gamma_z kappa_x kappa_y kappa_z at line ends: section forces over stiffness.
 
     kappa_x is the twist per length from torsion about the shear centre. A section without shear deformation has zero
     gamma.
@@ -121,7 +121,7 @@ SPRING = ("fx", "fy", "fz", "mx", "my", "mz")
 
 @dataclass(frozen=True, eq=False)
 class ElementGroup:
-    """Elements of one kind, and the forces or strains in them.
+    """Elements of one kind, and their forces or strains.
 
     "beam force": on the face with normal local +x, about the centroid, in local axes, at both ends
     (`BeamModel.section_forces`). "shell resultant": in local axes, averaged over the points of the stiffness
@@ -131,10 +131,10 @@ class ElementGroup:
     """
 
     quantity: str
-    part: str  #: cell type, and the part in a body of several parts; "" if not needed
-    names: tuple[str, ...]  #: the user's name of each element; if it has no number, "part 1 3" with its index
-    numbers: IntArray  #: the user's numbers, -1 for none, (n,)
-    groups: Mapping[str, IntArray]  #: elements that belong to each set of the user
+    part: str  #: cell type, and name of the part if the body has several; "" if not needed
+    names: tuple[str, ...]  #: user's name of each element; without number "part 1 3", which ends with its index
+    numbers: IntArray  #: user's number of each element, (n,); -1: none
+    groups: Mapping[str, IntArray]  #: elements of the group in each set of the user
     components: tuple[str, ...]
     dimensions: tuple[Dimensions, ...]  #: dimensions of each component
     #: function of columns over the mesh dofs and of elements, (n, n_components, k)
@@ -150,7 +150,7 @@ class ElementGroup:
         return len(self.names)
 
     def members(self, at: str | int, *, is_only: bool) -> IntArray:
-        """Return the elements with this name or number; none if the group has none.
+        """Return the elements with this name or number; None if the group has none.
 
         Parameters
         ----------
@@ -170,23 +170,23 @@ class ElementGroup:
 
 @dataclass(frozen=True)
 class _Place:
-    """Position of the element model of a part in the body."""
+    """Position of the element model of a part in its body."""
 
     part: str
-    rows: slice  #: rows among the mesh dofs
+    rows: slice  #: rows of the element model among the mesh dofs
     first_node: int
     n_nodes: int
 
 
 def element_groups(body: FEBody) -> tuple[ElementGroup, ...]:
-    """Return the groups of elements of a body whose forces are known; none for bare matrices."""
+    """Return the groups of elements of a body that can compute forces; none for bare matrices."""
     if body.element_model is None:
         return ()
     return tuple(_groups(body, body.element_model, _Place("", slice(None), 0, len(body.nodes))))
 
 
 def _groups(body: FEBody, model: object, at: _Place) -> Iterator[ElementGroup]:
-    """Yield the groups of an element model."""
+    """Yield the element groups of an element model."""
     if isinstance(model, WeldedModel):
         first = np.cumsum([0, *model.n_nodes]).tolist()
         for k, (each, rows) in enumerate(zip(model.parts, mesh_rows(model.n_mesh_dof), strict=True)):
@@ -253,17 +253,17 @@ def _named_cells(part: str, model: SolidModel, kind: str) -> tuple[tuple[str, ..
 
 
 def _triangles(body: FEBody, at: _Place, element_of: IntArray, count: int) -> IntArray:
-    """Return a surface triangle of the body for each element of a part, -1 if it has none, (count,)."""
+    """Return one surface triangle of the body for each element of a part, (count,); -1 if it has none."""
     found = np.full(count, NONE)
     inside = (body.surface >= at.first_node) & (body.surface < at.first_node + at.n_nodes)
     own = np.flatnonzero(inside.all(axis=1))
-    if len(own) == len(element_of):  # otherwise another part shares the nodes, and the owner of a triangle is unknown
+    if len(own) == len(element_of):  # otherwise other parts share the nodes, and the owner of a triangle is unknown
         found[element_of[::-1]] = own[::-1]
     return found
 
 
 def _named(body: FEBody, part: str, triangles: IntArray) -> tuple[tuple[str, ...], IntArray, Mapping[str, IntArray]]:
-    """Return names, numbers and sets of elements from the triangle of each element."""
+    """Return names, numbers and sets of elements, given a triangle of each element."""
     numbering = body.numbering
     numbers = np.full(len(triangles), NONE)
     has = triangles != NONE

@@ -34,21 +34,21 @@ __all__ = ["ElementPoints", "element_points"]
 FACES = {"top": TOP, "bottom": BOTTOM}
 ENDS = ("A", "B")
 ALL, BORDERS = "all", "borders"
-NOTE = "stress points"  #: key of the provenance
+NOTE = "stress points"  #: provenance key for stress points
 
 
 @dataclass(frozen=True, eq=False)
 class BeamEnds:
-    """Section points at both ends of lines, one section after the other."""
+    """Section points at both ends of lines, section by section."""
 
     model: BeamModel
-    lines: IntArray  #: (n,)
+    lines: IntArray  #: indices of the lines, (n,)
     names: tuple[str, ...]
     positions: Array
-    rows: slice  #: rows among the mesh dofs
+    rows: slice  #: rows of the element model among the mesh dofs
 
     def stress(self, u: Array) -> Array:
-        """Return the stress of step (1), (n_points, 6, k) [Pa]."""
+        """Step (1): return the stress, (n_points, 6, k) [Pa]."""
         forces = self.model.section_forces(u[self.rows])
         parts = []
         for own in lines_by_section(self.model, self.lines):
@@ -59,16 +59,16 @@ class BeamEnds:
 
 @dataclass(frozen=True, eq=False)
 class ShellCorners:
-    """Corners of cells, first at the top and then at the bottom of each cell."""
+    """Corners of cells, for each cell first at the top and then at the bottom."""
 
     cells: ShellCells
-    chosen: IntArray  #: (n,)
+    chosen: IntArray  #: indices of the chosen cells, (n,)
     names: tuple[str, ...]
     positions: Array
-    rows: slice  #: rows among the mesh dofs
+    rows: slice  #: rows of the element model among the mesh dofs
 
     def stress(self, u: Array) -> Array:
-        """Return the stress of step (2), (n_points, 6, k) [Pa]."""
+        """Step (2): return the stress, (n_points, 6, k) [Pa]."""
         of_mesh, k = np.asarray(u[self.rows]), np.shape(u)[1]
         parts = []
         for rows in self.cells.chunks():
@@ -82,17 +82,17 @@ class ShellCorners:
 
 @dataclass(frozen=True, eq=False)
 class SolidNodes:
-    """Nodes of solid cells of one type, cell after cell."""
+    """Nodes of solid cells of one type, cell by cell."""
 
     model: SolidModel
     kind: str
-    chosen: IntArray  #: (n,)
+    chosen: IntArray  #: indices of the chosen cells, (n,)
     names: tuple[str, ...]
     positions: Array
-    rows: slice  #: rows among the mesh dofs
+    rows: slice  #: rows of the element model among the mesh dofs
 
     def stress(self, u: Array) -> Array:
-        """Return the stress of step (3), (n_points, 6, k) [Pa]: nodal stress of the cells with nodes of their own."""
+        """Step (3): return the stress, (n_points, 6, k) [Pa]: nodal stress without averaging between cells."""
         mesh, cells = self.model.mesh, self.model.mesh.cells[self.kind][self.chosen]
         of_mesh = u[self.rows].reshape(len(mesh.nodes), 3, -1)[cells.ravel()]
         apart = Mesh(mesh.nodes[cells.ravel()], {self.kind: np.arange(cells.size).reshape(cells.shape)})
@@ -109,16 +109,16 @@ class SolidNodes:
 
 @dataclass(frozen=True, eq=False)
 class MaterialBorders:
-    """Nodes where solid cells of several materials meet, one point for each material."""
+    """Nodes on borders between materials of solid cells, with one point for each material."""
 
     model: SolidModel
-    members: tuple[IntArray, ...]  #: nodes of the borders of each material
+    members: tuple[IntArray, ...]  #: border nodes of each material
     names: tuple[str, ...]
     positions: Array
-    rows: slice  #: rows among the mesh dofs
+    rows: slice  #: rows of the element model among the mesh dofs
 
     def stress(self, u: Array) -> Array:
-        """Return the stress of step (4), (n_points, 6, k) [Pa]."""
+        """Step (4): return the stress, (n_points, 6, k) [Pa]."""
         model, parts = self.model, []
         for material, nodes in enumerate(self.members):
             shown = np.full(len(model.mesh.nodes), material)
@@ -135,7 +135,7 @@ Points = BeamEnds | ShellCorners | SolidNodes | MaterialBorders
 
 @dataclass(frozen=True, eq=False)
 class ElementPoints:
-    """Stress points of elements, after the existing ones of the body (`fe_models.body.fe_body.StressPointModel`)."""
+    """Stress points of elements, after existing stress points of the body."""
 
     parts: tuple[Points, ...]
     before: StressPointModel | None = None
@@ -153,13 +153,13 @@ class ElementPoints:
         return frozen(np.concatenate([*own, *(part.positions for part in self.parts)]))
 
     def stress(self, u: Array) -> Array:
-        """Return the stress of columns over the mesh dofs, (n_points, 6, k) [Pa], xx yy zz yz xz xy in mesh axes."""
+        """Return the stress for columns over the mesh dofs, (n_points, 6, k) [Pa], xx yy zz yz xz xy in mesh axes."""
         own = [] if self.before is None else [self.before.stress(u)]
         return np.concatenate([*own, *(part.stress(np.asarray(u)) for part in self.parts)])
 
 
 def element_points(body: FEBody, at: Iterable[int | str] = (ALL,)) -> FEBody:
-    """Return the body with stress points at beam ends, shell corners and nodes of solid cells, each of its own element.
+    """Return the body with stress points of single elements at beam ends, shell corners and nodes of solid cells.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def element_points(body: FEBody, at: Iterable[int | str] = (ALL,)) -> FEBody:
 
 
 def lines_by_section(model: BeamModel, lines: IntArray) -> list[IntArray]:
-    """Return the lines in groups of one section each."""
+    """Return the lines in groups with the same section."""
     of_line = np.asarray(model.of_line)[lines]
     return [lines[of_line == number] for number in np.unique(of_line)]
 
@@ -273,7 +273,7 @@ def solid_nodes(body: FEBody, group: ElementGroup, model: SolidModel, rows: IntA
 
 
 def material_borders(body: FEBody, group: ElementGroup) -> list[MaterialBorders]:
-    """Return the borders of the solid model of a group, once for all cell types of the group.
+    """Return the material borders of the solid model of a group, once for all its cell types.
 
     None if there are none.
     """

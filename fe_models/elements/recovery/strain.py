@@ -41,7 +41,7 @@ def nodal_strain(body: FEBody, u: Array, nodes: IntArray) -> Array:
 
 
 def put(found: Array, rows: IntArray, model: object, u: Array, nodes: IntArray, where: str) -> None:
-    """Write the strain at nodes of an element model into rows of `found`."""
+    """Write the strain at nodes of one element model into rows of `found`."""
     if not len(nodes):
         return
     if isinstance(model, WeldedModel):
@@ -73,7 +73,7 @@ def put(found: Array, rows: IntArray, model: object, u: Array, nodes: IntArray, 
 
 
 def require(ok: bool, where: str, nodes: IntArray) -> None:
-    """Raise `BodyError` unless the strain at these nodes is known."""
+    """Raise `BodyError` if the strain at some of these nodes is unknown."""
     if not ok:
         raise BodyError(
             f"{where}: strain: node {int(nodes[0])} is of no solid, shell or skin of a beam; ask for its stress, or "
@@ -82,7 +82,7 @@ def require(ok: bool, where: str, nodes: IntArray) -> None:
 
 
 def section_of_skin(model: BeamModel) -> IntArray:
-    """Return the section of each point of the skin, (n_skin,); a ring only joins lines of one section."""
+    """Return the section of each skin point, (n_skin,); a ring joins only lines with the same section."""
     found = np.zeros(len(model.skin.points), np.int64)
     for line, number in enumerate(np.asarray(model.of_line).tolist()):
         for start in model.skin.ring_start[line].tolist():
@@ -91,7 +91,7 @@ def section_of_skin(model: BeamModel) -> IntArray:
 
 
 def shell_strain(where: str, group: ShellCells, resultants: Array, rows: slice, height: float) -> Array:
-    """Return the strain of cells at one height, (n, p, 6, k), in the same form as `ShellCells.stress`."""
+    """Return the strain of cells at one height, (n, p, 6, k), in the form of `ShellCells.stress`."""
     stress = group.stress(resultants, rows, height)
     of_law = np.zeros((len(group.laws), 6, 6))
     for number in np.unique(group.law[rows]):
@@ -112,7 +112,7 @@ def shell_strain(where: str, group: ShellCells, resultants: Array, rows: slice, 
 
 
 def isotropic_compliance(E: float, G: float) -> Array:
-    """Return the matrix that maps stress to strain, (6, 6) [1/Pa]; nu = E/(2 G) - 1."""
+    """Return the (6, 6) matrix from stress to strain [1/Pa]; nu = E/(2 G) - 1."""
     S = np.diag([1 / E] * 3 + [1 / G] * 3)
     S[:3, :3] -= (E / (2 * G) - 1) / E * (1 - np.eye(3))
     return S

@@ -145,7 +145,7 @@ def _frame(
     name: str,
     units: Units,
 ) -> tuple[FEBody, IntArray] | None:
-    """Return stiffeners, masses and springs as one body, and the mesh node of each of its nodes."""
+    """Return stiffeners, masses and springs as one body, and the mesh node at each of its nodes."""
     lines = mesh.lines if stiffeners is not None else np.zeros((0, 2), np.int64)
     ends = [lines.ravel(), np.array([item.node for item in masses], dtype=np.int64)]
     ends += [np.array(spring.nodes, dtype=np.int64) for spring in springs]
@@ -189,7 +189,7 @@ def _used_nodes(mesh: ShellMesh, frame_nodes: IntArray, links: tuple[RigidLink, 
 
 
 def _require_cells(mesh: ShellMesh, warp_limit: float) -> None:
-    """Raise `ShellError` that lists every cell without area, folded, or warped beyond the limit."""
+    """Raise `ShellError` with a list of all cells that have no area, are folded, or are warped beyond the limit."""
     if not mesh.n_cells:
         raise ShellError("shell: expected triangles or quads, got none")
     problems = []
@@ -260,7 +260,7 @@ def shell_interface(
     reference: ArrayLike | None = None,
     triad: ArrayLike | None = None,
 ) -> Interface:
-    """Make an interface at nodes of a shell, which have rotations.
+    """Return an interface at nodes of a shell, which have rotations.
 
     Parameters
     ----------

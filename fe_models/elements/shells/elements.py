@@ -23,7 +23,7 @@ __all__ = ["CellPlanes", "ShellCells", "cell_planes", "shell_cells"]
 
 @dataclass(frozen=True, eq=False)
 class CellPlanes:
-    """The planes of n cells of one type with c corners.
+    """Planes of n cells of one type with c corners.
 
     The corners of the plane are connected to the nodes by rigid arms: normal to the plane where four nodes are warped,
     and along the offset of the middle surface. u_corner = u_node + theta_node × lever, so rigid motion is always exact.
@@ -32,12 +32,12 @@ class CellPlanes:
     R: Array  #: local axes x, y, z (normal) as columns, mesh axes, (n, 3, 3)
     corners: Array  #: corners of the middle surface, mesh axes, (n, c, 3) [m]
     levers: Array  #: vectors from node to corner, mesh axes, (n, c, 3) [m]
-    xy: Array  #: corners in local axes about their mean, (n, c, 2) [m]
-    warp: Array  #: distance of the nodes of a quad from its plane, (n,) [m]
+    xy: Array  #: corners in local axes relative to their mean, (n, c, 2) [m]
+    warp: Array  #: distance of the corner nodes of a quad from its plane, (n,) [m]
 
     @property
     def T(self) -> Array:
-        """Map from nodal dofs to local corner dofs, u_x u_y u_z theta_x theta_y theta_z each, (n, 6c, 6c)."""
+        """Map from nodal dofs to local corner dofs, (n, 6c, 6c): u_x u_y u_z theta_x theta_y theta_z at each corner."""
         n, c = self.levers.shape[:2]
         T = np.zeros((n, 6 * c, 6 * c))
         Rt = self.R.transpose(0, 2, 1)
@@ -52,7 +52,7 @@ class CellPlanes:
 
 
 def cell_planes(nodes: Array, cells: IntArray, offset: Array, direction: Array) -> CellPlanes:
-    """Return the planes of cells of three or four nodes.
+    """Return the planes of cells with three or four nodes.
 
     (1) z is normal to both diagonals of a quad, or to the sides of a triangle, right-handed in the order of the nodes
     (2) x is the direction projected onto the plane; without a direction it is the first side of a triangle, or for a
@@ -98,21 +98,23 @@ def _unit(v: Array) -> Array:
 # elements -------------------------------------------------------------------------------------------------------------
 
 
-CHUNK = 500  #: number of cells whose operators are held at once
-LEAST_ANGLE = 5.0  #: smallest angle between the direction of a layup and the normal of a cell [degree]
+CHUNK = 500  #: number of cells whose operators are in memory at a time
+LEAST_ANGLE = 5.0  #: smallest angle between the reference direction of a layup and the normal of a cell [degree]
 #: gamma of quads, relative to the shear modulus; docs/shells.md shows the error of larger and smaller values
 DRILLING = 0.1
-DRILLING_SHARE = {"triangle": 1.0, "quad": 0.3}  #: share of the drilling rotations in the displacement of the sides
+#: contribution of the drilling rotations to the displacement of the sides
+DRILLING_SHARE = {"triangle": 1.0, "quad": 0.3}
 STRAIN_DEGREE = {"triangle": 2, "quad": 3}
-MASS_DEGREE = {"triangle": 4, "quad": 5}  #: covers squares of quadratic fields, times the area element
+#: quadrature degree for the mass: squares of quadratic fields times the area element
+MASS_DEGREE = {"triangle": 4, "quad": 5}
 
 
 @dataclass(frozen=True, eq=False)
 class ShellCells:
-    """Cells of one type, with their planes, thicknesses and laws."""
+    """Shell cells of one type, with their planes, thicknesses and laws."""
 
     kind: str
-    cells: IntArray  #: nodes, (n, c)
+    cells: IntArray  #: corner nodes of each cell, (n, c)
     planes: CellPlanes
     laws: tuple[ShellLaw, ...]
     law: IntArray  #: index of the law of each cell, (n,)
@@ -123,7 +125,7 @@ class ShellCells:
         return self.by_law(lambda law: law.thickness, slice(None))
 
     def by_law(self, value: Callable[[ShellLaw], Any], rows: slice) -> Array:
-        """Evaluate a function of the law for each of some cells, (n, ...)."""
+        """Evaluate a function of the law for each of the given cells, (n, ...)."""
         return np.array([value(law) for law in self.laws], dtype=float)[self.law[rows]]
 
     @property
@@ -132,12 +134,12 @@ class ShellCells:
         return (6 * self.cells[:, :, None] + np.arange(6)).reshape(len(self.cells), -1)
 
     def chunks(self) -> Iterator[slice]:
-        """Yield slices of rows whose operators fit in memory."""
+        """Yield slices of cells whose operators fit in memory."""
         for begin in range(0, len(self.cells), CHUNK):
             yield slice(begin, min(begin + CHUNK, len(self.cells)))
 
     def strains(self, rows: slice) -> FlatStrains:
-        """Return strain operators in local axes, over the dofs of the nodes, at the points of `STRAIN_DEGREE`."""
+        """Return strain operators in local axes over nodal dofs, at the points of the rule `STRAIN_DEGREE`."""
         planes = self.planes[rows]
         law = FlatLaw(
             A=self.by_law(lambda law: law.A, rows),
@@ -170,7 +172,7 @@ class ShellCells:
         return (K + K.transpose(0, 2, 1)) / 2
 
     def slices(self, rows: slice) -> Slices:
-        """Return pieces of the normal as rigid slices, with mass per area and its second moment along the normal.
+        """Return segments of the normal as rigid slices, with mass per area and its second moment along the normal.
 
         A point moves by u + theta × z n, z in -t/2..t/2, so the drilling rotation does not move it. The second moment
         is t²/12 for one material. Layers may have their centre of mass away from the middle surface.
@@ -208,7 +210,7 @@ class ShellCells:
         return np.asarray(jacobians(flat_shape(self.kind, points).gradients, self.planes.xy)[1] @ w)
 
     def corner_masses(self) -> Array:
-        """Return ∫ N_i rho t dA of each corner, (n, c) [kg], with the bilinear or linear N_i."""
+        """Return ∫ N_i rho t dA at each corner, (n, c) [kg], with bilinear or linear shape functions N_i."""
         points, w = flat_quadrature(self.kind, MASS_DEGREE[self.kind])
         shape = flat_shape(self.kind, points)
         _, det = jacobians(shape.gradients, self.planes.xy)
@@ -234,7 +236,7 @@ class ShellCells:
         return np.asarray((self.elasticity(rows)[:, None] @ values)[:, :, :8])
 
     def internal_forces(self, u: Array, rows: slice) -> Array:
-        """Return K u of some cells over the dofs of their nodes, (n, 6 c, k) [N, N m]."""
+        """Return K u of some cells over their nodal dofs, (n, 6 c, k) [N, N m]."""
         strains = self.strains(rows)
         n, p, _, d = strains.B.shape
         flat = strains.B.reshape(n, p * N_STRAINS, d)
@@ -243,11 +245,11 @@ class ShellCells:
         return np.asarray(flat.transpose(0, 2, 1) @ resultants.reshape(n, p * N_STRAINS, -1))
 
     def corner_resultants(self, u: Array, rows: slice) -> Array:
-        """Return the resultants extrapolated linearly to the corners, (n, c, 8, k)."""
+        """Return the resultants, extrapolated linearly to the corners, (n, c, 8, k)."""
         return np.einsum("cp,npsk->ncsk", corner_extrapolation(self.kind), self.resultants(u, rows))
 
     def stress(self, resultants: Array, rows: slice, height: float) -> Array:
-        """Return the stress at one height of the thickness, (n, ..., 6, k) [Pa], xx yy zz yz xz xy in mesh axes.
+        """Return the stress at a height in the thickness, (n, ..., 6, k) [Pa], xx yy zz yz xz xy in mesh axes.
 
         sigma = Q (eps + z kappa) of the layer at this height (of the lower layer where two meet). Transverse shear
         follows from equilibrium (`fe_models.elements.shells.laminate`). One material gives N/t + 12 z M/t³ and 3 Q/(2
@@ -303,7 +305,7 @@ def shell_cells(
 
 
 def translations(planes: CellPlanes, N: Array, E: Array, shape: FlatShape, share: float) -> Array:
-    """Return translations of the middle surface for unit dofs of the nodes, mesh axes, (n, p, 3, c, 6).
+    """Return translations of the middle surface per unit nodal dof, mesh axes, (n, p, 3, c, 6).
 
     u = Σ N_i (u_i + theta_i × lever_i) - 1/8 Σ_sides E_k (theta_j - theta_i) × (x_j - x_i). On each side this is the
     parabola of the cubic through the ends with their rotations, normal to the plane (bending) and in it (drilling). So
@@ -339,7 +341,7 @@ def translations(planes: CellPlanes, N: Array, E: Array, shape: FlatShape, share
 
 
 def corner_extrapolation(kind: str) -> Array:
-    """Return the matrix from values at the strain points to values at the corners, linear or bilinear, (c, p)."""
+    """Return the matrix from values at the strain points to values at the corners, (c, p), linear or bilinear."""
     points, _ = flat_quadrature(kind, STRAIN_DEGREE[kind])
     if kind == "triangle":
         corners = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
@@ -362,7 +364,7 @@ def stress_directions(R: Array) -> Array:
 
 
 def _times_blocks(B: Array, planes: CellPlanes) -> Array:
-    """Return B T, block by block: B over local dofs of the corners becomes B over dofs of the nodes."""
+    """Return B T block by block: B is over local corner dofs, B T over nodal dofs."""
     n, p, s, d = B.shape
     c = d // 6
     blocks = B.reshape(n, p * s, c, 6)

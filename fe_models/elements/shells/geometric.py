@@ -28,9 +28,10 @@ from fe_models.foundation.arrays import Array, frozen
 
 __all__ = ["cell_geometric_stiffness"]
 
-N_FIELDS = 15  #: u,1 u,2 theta,1 theta,2 theta, with three components each
-FIRST, SECOND = np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1])  #: components xx yy zz yz xz xy
-PRODUCT_BYTES = 1.5e6  #: memory of the products that a thread holds at once; they must stay in its cache
+N_FIELDS = 15  #: number of fields u,1 u,2 theta,1 theta,2 theta, with three components each
+#: indices of the components xx yy zz yz xz xy
+FIRST, SECOND = np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1])
+PRODUCT_BYTES = 1.5e6  #: size of the products that a thread has at a time; they must fit in its cache [bytes]
 
 
 def cell_geometric_stiffness(cells: ShellCells, rows: slice, u: Array, loads: MassLoads, Phi: Array) -> Array:
@@ -74,7 +75,7 @@ def cell_geometric_stiffness(cells: ShellCells, rows: slice, u: Array, loads: Ma
 
 
 def _missing_shear(cells: ShellCells, rows: slice, forces: Array, Q: Array, weights: Array) -> Array:
-    """Return the part of the weighted shear force, (m, p, 2, k), that Q lacks to balance the nodal forces.
+    """Return the part of the weighted shear force, (m, p, 2, k), that Q lacks for balance with the nodal forces.
 
     It is the gradient of Σ c_i N_i, where ∫ (Q + ∇ Σ c_j N_j)·∇N_i = f_z,i at every corner i. The constant in c is free
     and set to zero.
@@ -87,14 +88,14 @@ def _missing_shear(cells: ShellCells, rows: slice, forces: Array, Q: Array, weig
     across = np.einsum("na,ncaj->ncj", planes.R[:, :, 2], forces.reshape(n, c, 6, k)[:, :, :3])
     missing = across - np.einsum("npca,npaj->ncj", dN, Q)
     laplacian = np.einsum("npca,npda,np->ncd", dN, dN, weights)
-    # makes the matrix regular; the constant in c stays zero
+    # makes the matrix regular; the constant part of c remains zero
     laplacian += laplacian.trace(axis1=1, axis2=2)[:, None, None] / c
     gradient = np.einsum("npca,ncj->npaj", dN, np.linalg.solve(laplacian, missing))
     return np.asarray(weights[:, :, None, None] * gradient)
 
 
 def _contracted(fields: Array, units: Array, weights: Array) -> Array:
-    """Return the sum of weights_r,j fieldsᵀ U_r fields over all points and unit works r, (k, n, n), for k states j.
+    """Return Σ weights_r,j fieldsᵀ U_r fields over all points and unit works r, (k, n, n), for k states j.
 
     The products of the fields do not depend on the state. They are computed once, for some points at a time, and one
     matrix product with the weights of all states sums over the points.
@@ -144,7 +145,7 @@ def _symmetric_units() -> Array:
 
 
 def _fields(cells: ShellCells, rows: slice) -> Array:
-    """Return gradients of u and theta, and theta, in local axes, for unit dofs of the nodes, (m, p, 15, 6 c)."""
+    """Return gradients of u and theta, and theta, in local axes per unit nodal dof, (m, p, 15, 6 c)."""
     planes = cells.planes[rows]
     points, _ = flat_quadrature(cells.kind, STRAIN_DEGREE[cells.kind])
     shape = flat_shape(cells.kind, points)

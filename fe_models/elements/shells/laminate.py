@@ -31,18 +31,18 @@ __all__ = ["ShellLaw", "layer_axes_stress", "shell_law"]
 
 @dataclass(frozen=True, eq=False)
 class ShellLaw:
-    """Stiffness and mass per area of a shell, in layup axes."""
+    """Stiffness and mass per area of a shell in layup axes."""
 
-    layers: tuple[Layer, ...]  #: empty where only the stiffness is known
+    layers: tuple[Layer, ...]  #: layers; empty if only the stiffness is known
     z: Array  #: faces of the layers, bottom to top, (n_layers + 1,) [m]
-    A: Array  #: (3, 3) [N/m]
-    B: Array  #: (3, 3) [N]
-    D: Array  #: (3, 3) [N m]
-    third: Array  #: ∫ Q z³ dz, (3, 3) [N m²]
-    H: Array  #: transverse shear, (2, 2) [N/m]
-    mass: float  #: per area [kg/m²]
+    A: Array  #: membrane stiffness, (3, 3) [N/m]
+    B: Array  #: coupling of membrane and bending, (3, 3) [N]
+    D: Array  #: bending stiffness, (3, 3) [N m]
+    third: Array  #: third moment ∫ Q z³ dz, (3, 3) [N m²]
+    H: Array  #: transverse shear stiffness, (2, 2) [N/m]
+    mass: float  #: mass per area [kg/m²]
     centre: float  #: height of the centre of mass above the middle surface [m]
-    spread: float  #: second moment of the mass along the normal about its centre, divided by the mass [m²]
+    spread: float  #: second moment of the mass about its centre along the normal, over the mass [m²]
 
     @property
     def thickness(self) -> float:
@@ -51,7 +51,7 @@ class ShellLaw:
 
     @property
     def bending(self) -> Array:
-        """D* = D - B A⁻¹ B, the matrix from curvatures to moments without membrane forces, (3, 3) [N m]."""
+        """Matrix from curvatures to moments without membrane forces, D* = D - B A⁻¹ B, (3, 3) [N m]."""
         return np.asarray(self.D - self.B @ np.linalg.solve(self.A, self.B))
 
     @property
@@ -62,7 +62,7 @@ class ShellLaw:
 
     @property
     def nu(self) -> float:
-        """Poisson's ratio of the elasticity averaged over all directions [-]."""
+        """Poisson's ratio of the elasticity averaged over all in-plane directions [-]."""
         A = self.A
         across = A[0, 0] + A[1, 1] + 6 * A[0, 1] - 4 * A[2, 2]
         return float(across / (3 * A[0, 0] + 3 * A[1, 1] + 2 * A[0, 1] + 4 * A[2, 2]))
@@ -75,11 +75,11 @@ class ShellLaw:
         return C
 
     def layer_at(self, z: float) -> int:
-        """Return the index of the layer at a height [m]; where two layers meet, of the lower one."""
+        """Return the index of the layer at a height [m]; at a border, of the lower layer."""
         return int(np.clip(np.searchsorted(self.z, z - 1e-9 * self.thickness, side="right") - 1, 0, len(self.z) - 2))
 
     def stress(self, z: float, layer: int) -> Array:
-        """Return S, (5, 8) [1/m, 1/m²], from N, M, Q to sigma_x sigma_y tau_xy tau_xz tau_yz in layup axes.
+        """Return the matrix S from N, M, Q to sigma_x sigma_y tau_xy tau_xz tau_yz in layup axes, (5, 8) [1/m, 1/m²].
 
         Parameters
         ----------
@@ -102,7 +102,7 @@ class ShellLaw:
 
 
 def _given_law(item: StiffnessProperty) -> ShellLaw:
-    """Return the law of given matrices; the unknown ∫ Q z³ dz is zero, as for layers symmetric about the middle."""
+    """Return the law of given matrices; the unknown ∫ Q z³ dz is set to zero, as for symmetric layups."""
     C, half = np.array(item.stiffness), item.thickness / 2
     return ShellLaw(
         layers=(),
@@ -119,7 +119,7 @@ def _given_law(item: StiffnessProperty) -> ShellLaw:
 
 
 def shell_law(item: AnyShellProperty) -> ShellLaw:
-    """Return stiffness and mass per area of a shell of one material, of layers, or of given matrices."""
+    """Return stiffness and mass per area of a shell with one material, with layers, or with given matrices."""
     if isinstance(item, StiffnessProperty):
         return _given_law(item)
     layers = item.layers if isinstance(item, LaminateProperty) else (Layer(item.material, item.thickness),)
@@ -163,7 +163,7 @@ def shell_law(item: AnyShellProperty) -> ShellLaw:
 
 
 def shear_flow(layers: tuple[Layer, ...], z: Array, A: Array, B: Array, D: Array) -> Callable[[float, int], Array]:
-    """Return the function F of height and layer, (2, 2) [1/m], from Q_x, Q_y to tau_xz, tau_yz.
+    """Return a function of height and layer: the matrix F from Q_x, Q_y to tau_xz, tau_yz, (2, 2) [1/m].
 
     It follows from sigma = Q (z - A⁻¹ B) D*⁻¹ M, so that -∫ sigma,a dz = f M,a;
     tau_xz = f_11 Q_x + f_32 Q_y, tau_yz = f_31 Q_x + f_22 Q_y.
@@ -187,7 +187,7 @@ def shear_flow(layers: tuple[Layer, ...], z: Array, A: Array, B: Array, D: Array
 
 
 def rotated_elasticity(material: AnyMaterial, angle: float) -> Array:
-    """Return the plane stress elasticity in layup axes, (3, 3) [Pa], rows xx yy xy, shear strain doubled.
+    """Return the plane stress elasticity in layup axes, (3, 3) [Pa], rows xx yy xy, engineering shear strain.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ def strain_turn(angle: float) -> Array:
 
 
 def cosine_sine(angle: float) -> tuple[float, float]:
-    """Return cosine and sine of an angle [degree], exact at multiples of 90."""
+    """Return cosine and sine of an angle [degree]; they are exact at multiples of 90."""
     quarter = round(angle / 90)
     rest = np.deg2rad(angle - 90 * quarter)
     c, s = float(np.cos(rest)), float(np.sin(rest))

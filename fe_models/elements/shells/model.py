@@ -20,7 +20,7 @@ from fe_models.foundation.threads import n_threads, one_blas_thread
 
 __all__ = ["ShellModel"]
 
-AHEAD = 2  #: chunks of cells for each thread whose results may be pending
+AHEAD = 2  #: number of chunks of cells per thread whose results may be pending
 TOP, MIDDLE, BOTTOM = 0.5, 0.0, -0.5  #: heights in the thickness, z/t
 
 
@@ -34,7 +34,7 @@ class ShellModel:
 
     @property
     def has_nodal_stress(self) -> bool:
-        """True: the stress is known at skin points, and in the middle surface at nodes."""
+        """Return True: the stress is known at skin points, and in the middle surface at nodes."""
         return True
 
     @property
@@ -71,7 +71,7 @@ class ShellModel:
         return self.means_of_corners(u, ShellCells.stress)
 
     def means_of_corners(self, u: Array, values: Callable[[ShellCells, Array, slice, float], Array]) -> Array:
-        """Return the averages of six values of the cells at the nodes, as for `nodal_stress`, (n, 6, k).
+        """Return six values of the cells, averaged at the nodes as for `nodal_stress`, (n, 6, k).
 
         Parameters
         ----------
@@ -98,18 +98,18 @@ class ShellModel:
 
     @property
     def has_geometric_stiffness(self) -> bool:
-        """True: stress resultants and masses give a geometric stiffness."""
+        """Return True: stress resultants and masses have a geometric stiffness."""
         return True
 
     def mass_forces(self, loads: MassLoads) -> Array:
-        """Return consistent forces and moments of loads per unit mass, with couples of normals, (n_mesh_dof, k)."""
+        """Return consistent forces and moments of loads per unit mass, with couples along normals, (n_mesh_dof, k)."""
         forces = np.zeros((self.n_mesh_dof, loads.k))
         for dofs, part in self._of_chunks(lambda group, rows: slice_forces(group.slices(rows), loads)):
             np.add.at(forces, dofs, part)
         return forces
 
     def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
-        """Return K u of all cells, (n_mesh_dof, k) [N, N m]; only of the cells at `nodes` if these are given."""
+        """Return K u of all cells, or only of cells at `nodes` if these are given, (n_mesh_dof, k) [N, N m]."""
         self._require_rows("internal_forces", u)
         forces = np.zeros(np.shape(u))
         for dofs, part in self._of_chunks(lambda group, rows: group.internal_forces(np.asarray(u), rows), nodes):
@@ -117,7 +117,7 @@ class ShellModel:
         return forces
 
     def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Array) -> Array:
-        """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), of states u under these loads, by `elements.shells.geometric`."""
+        """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), for states u under these loads, by `elements.shells.geometric`."""
         for columns in (u, Phi):
             self._require_rows("geometric_stiffness", columns)
         u, Phi = np.asarray(u), np.asarray(Phi)
@@ -129,7 +129,7 @@ class ShellModel:
     def _of_chunks(
         self, work: Callable[[ShellCells, slice], Array], nodes: IntArray | None = None
     ) -> Iterator[tuple[IntArray, Array]]:
-        """Yield, for chunks of the cells (or of those at some nodes), their dofs and the result of `work`, in threads.
+        """Yield dofs and result of `work` for chunks of all cells, or of the cells at some nodes, in threads.
 
         The chunks come in order, so that sums are bitwise reproducible. Only a few results wait in memory.
         """

@@ -13,7 +13,7 @@ __all__ = ["orient_normals"]
 
 
 def orient_normals(mesh: ShellMesh) -> ShellMesh:
-    """Return the mesh with the normals of neighbouring cells on one side, by reversing the nodes of some cells.
+    """Return the mesh with normals of neighbouring cells on the same side; the nodes of some cells are reversed.
 
     Two cells are neighbours if they are the only two cells on an edge. In each connected part the first cell keeps its
     normal, and the others follow. A part that cannot be oriented, such as a Möbius strip, keeps one seam. An edge of

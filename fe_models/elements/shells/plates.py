@@ -1,4 +1,4 @@
-"""Stiffness of shell elements in their plane: quadrilateral and triangle."""
+"""In-plane, bending and shear strains of flat shell elements: quadrilateral and triangle."""
 
 import numpy as np
 
@@ -88,7 +88,7 @@ def _between(low: Array, high: Array, x: Array) -> Array:
 
 
 def _condensed_modes(xy: Array, points: Array, det: Array, weights: Array, law: FlatLaw, operators: Array) -> Array:
-    """Return the contribution of the internal modes to eps_x eps_y gamma_xy and the drilling strain, (n, p, 4, 24).
+    """Return the contribution of internal modes to eps_x eps_y gamma_xy and the drilling strain, (n, p, 4, 24).
 
     The internal vectors a minimise the energy: a = -(∫ Gᵀ C G)⁻¹ ∫ Gᵀ (C B u + N_kappa). C holds A and the drilling
     stiffness; N_kappa = B kappa is the membrane force of the curvatures of unsymmetric layups.
@@ -142,7 +142,7 @@ CORNER_STRAINS = np.array(
     ],
     dtype=float,
 )
-LEAST_BETA_0 = 0.01  #: lower bound, reached where nu is near 1/2
+LEAST_BETA_0 = 0.01  #: lower bound of beta_0, reached where nu is near 1/2
 
 
 def triangle_strains(xy: Array, law: FlatLaw) -> FlatStrains:

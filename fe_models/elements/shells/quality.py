@@ -9,28 +9,28 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["WARP_LIMIT", "CellQuality", "cell_quality"]
 
-WARP_LIMIT = 20.0  #: angle between the two halves of a quad beyond which it is rejected [degree]
-FLAT = 1e-9  #: area relative to the square of the cell size below which the cell has no area
+WARP_LIMIT = 20.0  #: angle between the two halves of a quad above which the cell is rejected [degree]
+FLAT = 1e-9  #: area over the square of the cell size, below which the cell has no area
 
 
 @dataclass(frozen=True, eq=False)
 class CellQuality:
     """Quality measures of the cells of one type."""
 
-    area: Array  #: (n,) [m²]
-    is_degenerate: NDArray[np.bool_]  #: cells without area, (n,)
-    is_folded: NDArray[np.bool_]  #: quads with an inner angle of 180 degrees or more, (n,)
-    warp: Array  #: largest angle between two halves of a quad, over both diagonals, (n,) [degree]
-    aspect: Array  #: longest side divided by shortest side, (n,)
+    area: Array  #: area of each cell, (n,) [m²]
+    is_degenerate: NDArray[np.bool_]  #: whether a cell has no area, (n,) bool
+    is_folded: NDArray[np.bool_]  #: whether a quad has an inner angle of 180 degrees or more, (n,) bool
+    warp: Array  #: largest angle between two halves of a quad, for both diagonals, (n,) [degree]
+    aspect: Array  #: longest side over shortest side, (n,)
 
 
 def cell_quality(nodes: Array, cells: IntArray) -> CellQuality:
-    """Measure cells of three or four nodes, (n, 3) or (n, 4)."""
+    """Measure the quality of cells with three or four nodes, (n, 3) or (n, 4)."""
     X = nodes[cells]
     c = cells.shape[1]
     sides = np.roll(X, -1, axis=1) - X
     length = np.linalg.norm(sides, axis=2)
-    # normals of the triangle at each corner, with twice its area as length
+    # normals of the triangle at each corner, whose length is twice its area
     corner_normals = np.cross(np.roll(sides, 1, axis=1), sides)
     if c == 3:
         vector = corner_normals[:, 0] / 2

@@ -31,18 +31,20 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["SectionRotations", "own_axes", "rotations_of_sections"]
 
-SMOOTH = np.cos(np.deg2rad(40.0))  #: angle between normals at a node above which its wall counts as folded
+#: cosine of the angle between normals at a node, below which the wall counts as folded
+SMOOTH = np.cos(np.deg2rad(40.0))
 ALONG = 0.1  #: share of the lines at a node along an axis, above which no section rotates independently about it
-APART = 0.1  #: sine of the angle between two axes below which they count as the same
-ON_LINE = 1e-6  #: lever relative to the length of the line below which a section lies on the line
+APART = 0.1  #: sine of the angle between two axes, below which they count as the same axis
+ON_LINE = 1e-6  #: lever over the length of the line, below which a section lies on the line
 
 
 @dataclass(frozen=True, eq=False)
 class SectionRotations:
     """Map from shell nodes to the frame nodes on them, and the independent rotations of sections."""
 
-    place: sp.csr_array  #: maps dofs of the shell, then own dofs, to dofs of the frame, (6 n_frame, 6 n_shell + n_own)
-    own: IntArray  #: (node of the frame, component 3-5) of the own dofs, (n_own, 2)
+    #: map from dofs of the shell, then independent rotations, to dofs of the frame, (6 n_frame, 6 n_shell + n_own)
+    place: sp.csr_array
+    own: IntArray  #: (frame node, component 3-5) of the independent rotations, (n_own, 2)
 
 
 def section_rotations(axes: list[Array], nodes: IntArray, n_shell: int) -> SectionRotations:
@@ -87,7 +89,7 @@ def section_rotations(axes: list[Array], nodes: IntArray, n_shell: int) -> Secti
 def own_axes(
     lines: IntArray, directions: Array, levers: Array, normals: Array, is_held: NDArray[np.bool_]
 ) -> list[Array]:
-    """Return the axes about which the sections at each node rotate independently, orthonormal, (3, k), k = 0..2.
+    """Return the axes about which sections at a node rotate independently, (3, k), orthonormal, k = 0..2.
 
     (1) possible axes: normal to the lines at the node, because the wall transmits its twist to the lines
     (2) desired axes: the normal of a smooth wall, and the levers of lines that continue beyond the node (where a line
@@ -134,7 +136,7 @@ def own_axes(
 
 
 def rotations_of_sections(model: ShellModel, beams: BeamModel, nodes: IntArray, held: IntArray) -> SectionRotations:
-    """Return the independent section rotations; there are none at held nodes, or where a line leaves the shell.
+    """Return the independent section rotations; none at fixed nodes, or where a line leaves the shell.
 
     Parameters
     ----------
@@ -158,14 +160,14 @@ def rotations_of_sections(model: ShellModel, beams: BeamModel, nodes: IntArray, 
 
 
 def _along_cells(model: ShellModel, lines: IntArray) -> NDArray[np.bool_]:
-    """Return which pairs of nodes form an edge of a cell, (n_lines,)."""
+    """Return whether the nodes of each line form an edge of a cell, (n_lines,) bool."""
     ends = np.sort(np.concatenate([cell_edges(tuple(group.cells for group in model.groups)).nodes, lines]), axis=1)
     number = ends @ [model.n_nodes, 1]
     return np.isin(number[len(number) - len(lines) :], number[: len(number) - len(lines)])
 
 
 def _normals(model: ShellModel, nodes: IntArray) -> Array:
-    """Return the normal of the wall at some nodes, with either sign, (n, 3); NaN where walls meet at a fold."""
+    """Return the normal of the wall at some nodes, up to its sign, (n, 3); NaN where walls meet at a fold."""
     spread = np.zeros((model.n_nodes, 3, 3))
     for group in model.groups:
         n = group.planes.R[:, :, 2]

@@ -12,11 +12,11 @@ __all__ = ["FlatShape", "flat_quadrature", "flat_shape"]
 
 @dataclass(frozen=True, eq=False)
 class FlatShape:
-    """Shape functions at some points: N of the corners, and E of the sides (1 at its mid-point, 0 on other sides)."""
+    """Shape functions at given points: N of the corners, and E of the sides (1 at its mid-point, 0 on other sides)."""
 
-    values: Array  #: N, (n_points, n_corners)
+    values: Array  #: values of N, (n_points, n_corners)
     gradients: Array  #: gradients of N with respect to the reference coordinates, (n_points, n_corners, 2)
-    side_values: Array  #: E, (n_points, n_sides)
+    side_values: Array  #: values of E, (n_points, n_sides)
     side_gradients: Array  #: gradients of E with respect to the reference coordinates, (n_points, n_sides, 2)
     sides: IntArray  #: first and second corner of each side, (n_sides, 2)
 
@@ -58,7 +58,7 @@ QUAD_CORNERS = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
 
 @cache
 def flat_quadrature(kind: str, degree: int) -> tuple[Array, Array]:
-    """Return points, (n_points, 2), and weights of a rule in reference coordinates, exact for that degree.
+    """Return points, (n_points, 2), and weights of a rule in reference coordinates that is exact for this degree.
 
     Triangles use the mid-points of the sides up to degree 2, else a rule of scikit-fem. Quads use products of Gauss
     points, exact for that degree in each direction.

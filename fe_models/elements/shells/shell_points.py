@@ -1,4 +1,4 @@
-"""Stress at the centres of chosen cells: as named points (`fe_body.StressPointModel`), and in layers."""
+"""Stress at the centres of chosen cells, as named points (`fe_body.StressPointModel`), and in layers."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -20,9 +20,9 @@ HEIGHTS = {"top": TOP, "middle": MIDDLE, "bottom": BOTTOM}
 
 @dataclass(frozen=True, eq=False)
 class ShellPoints:
-    """Points through the thickness at cell centres. Each shows the stress of its own cell, without averaging."""
+    """Points through the thickness at cell centres. Each has the stress of its own cell, without averaging."""
 
-    parts: tuple[tuple[ShellCells, IntArray], ...]  #: cells of one type and the chosen rows
+    parts: tuple[tuple[ShellCells, IntArray], ...]  #: cells of each type, and indices of the chosen cells
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -31,7 +31,7 @@ class ShellPoints:
 
     @property
     def positions(self) -> Array:
-        """Undeformed, mesh axes, (n_points, 3) [m]."""
+        """Undeformed positions in mesh axes, (n_points, 3) [m]."""
         places = []
         for group, rows in self.parts:
             center = group.planes.corners[rows].mean(axis=1)
@@ -40,7 +40,7 @@ class ShellPoints:
         return frozen(np.concatenate(places))
 
     def stress(self, u: Array) -> Array:
-        """Return the stress of columns over the mesh dofs, (n_points, 6, k) [Pa], xx yy zz yz xz xy in mesh axes."""
+        """Return the stress for columns over the mesh dofs, (n_points, 6, k) [Pa], xx yy zz yz xz xy in mesh axes."""
         values = []
         for group, rows in self.parts:
             for row in rows.tolist():
@@ -69,7 +69,7 @@ def shell_points(body: FEBody, cells: Mapping[str, Iterable[int]]) -> FEBody:
 
 
 def layer_stress(body: FEBody, u: Array, cells: Mapping[str, Iterable[int]], layer: int) -> Array:
-    """Return the stress of one layer at the centres of some cells, in the axes of the layer.
+    """Return the stress of one layer at the centres of some cells, in layer axes.
 
     Parameters
     ----------

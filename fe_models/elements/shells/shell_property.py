@@ -71,7 +71,7 @@ class ShellProperty:
 
     @property
     def materials(self) -> tuple[AnyMaterial, ...]:
-        """The material, as a tuple, as for layers."""
+        """Material as a tuple with one entry, in the form used for layers."""
         return (self.material,)
 
 
@@ -171,7 +171,7 @@ class LaminateProperty:
 
     @property
     def materials(self) -> tuple[AnyMaterial, ...]:
-        """Materials of the layers, each once."""
+        """Distinct materials of the layers."""
         return tuple(dict.fromkeys(layer.material for layer in self.layers))
 
 
@@ -225,7 +225,7 @@ class StiffnessProperty:
 
     @property
     def materials(self) -> tuple[AnyMaterial, ...]:
-        """None: the matrices hold the elasticity."""
+        """None, because the matrices contain the elasticity."""
         return ()
 
 
@@ -233,7 +233,7 @@ AnyShellProperty = ShellProperty | LaminateProperty | StiffnessProperty
 
 
 def symmetric(layers: Sequence[Layer]) -> tuple[Layer, ...]:
-    """Return the layers, bottom to middle, followed by their mirror image: [0, 90] gives [0, 90, 90, 0].
+    """Return the layers from bottom to middle, then their mirror image: [0, 90] gives [0, 90, 90, 0].
 
     Parameters
     ----------
@@ -260,7 +260,7 @@ def _direction(where: str, given: object) -> tuple[float, ...]:
 
 
 def _positive_matrix(where: str, given: object, n: int) -> Array:
-    """Return a matrix, (n, n), or raise unless it is symmetric and positive definite.
+    """Return a matrix, (n, n), after checking that it is symmetric and positive definite.
 
     Its units differ from row to row; the test of rounding takes each row relative to its diagonal entry.
     """
@@ -289,7 +289,7 @@ def _require_ratios(where: str, item: object) -> None:
 def assign_shell_properties(
     mesh: ShellMesh, properties: AnyShellProperty | Mapping[str, AnyShellProperty]
 ) -> tuple[tuple[AnyShellProperty, ...], dict[str, IntArray]]:
-    """Return the properties in use and, for each cell type, the index of the property of every cell.
+    """Return the properties in use and, for each cell type, the property index of each cell.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The skin of a shell: a point above and below every node, once for each smooth patch of cells at the node."""
+"""Skin of a shell: a point above and a point below each node, for each smooth patch of cells at the node."""
 
 from dataclasses import dataclass
 
@@ -10,39 +10,40 @@ from fe_models.foundation.arrays import Array, IntArray, frozen
 
 __all__ = ["ShellSkin", "cell_edges", "make_shell_skin"]
 
-SMOOTH = np.cos(np.deg2rad(40.0))  #: largest angle between the normals of two cells that share skin points
+#: cosine of the largest angle between the normals of two cells that share skin points
+SMOOTH = np.cos(np.deg2rad(40.0))
 
 
 @dataclass(frozen=True, eq=False)
 class ShellSkin:
-    """Points on the top and bottom faces, which follow their nodes rigidly; each of n patches of corners has two."""
+    """Points on the top and bottom faces that follow their nodes rigidly, two for each of n patches of corners."""
 
-    points: Array  #: points of the tops, then of the bottoms, (2 n, 3) [m]
-    mover: IntArray  #: mesh node that moves each point, (2 n,)
+    points: Array  #: positions of the top points, then of the bottom points, (2 n, 3) [m]
+    mover: IntArray  #: mesh node that each point follows, (2 n,)
     triangles: IntArray  #: triangles between points, normals outward, (n_tri, 3)
-    cell_of: IntArray  #: cell of each triangle, numbered through all types, (n_tri,)
-    patch: tuple[IntArray, ...]  #: patch of every corner, for each cell type, (n_cells, c)
+    cell_of: IntArray  #: cell of each triangle, numbered over all types, (n_tri,)
+    patch: tuple[IntArray, ...]  #: patch of each corner, (n_cells, c), for each cell type
 
     @property
     def n_patches(self) -> int:
-        """Number of patches, half of the number of points."""
+        """Number of patches: half of the number of points."""
         return len(self.points) // 2
 
 
 @dataclass(frozen=True, eq=False)
 class CellEdges:
-    """The edges of all cells; corners are numbered consecutively, by cell type and cell."""
+    """Edges of all cells; corners are numbered successively, by cell type and cell."""
 
     corners: IntArray  #: corner at the start and at the end of each edge, (n_edges, 2)
-    nodes: IntArray  #: (n_edges, 2)
-    cell: IntArray  #: cell of each edge, numbered through all types, (n_edges,)
-    first: IntArray  #: one edge of each pair of edges that meet no third edge, (n_pairs,)
-    second: IntArray  #: the other edge of each pair, (n_pairs,)
-    count: IntArray  #: number of edges on the same two nodes, including the edge itself, (n_edges,)
+    nodes: IntArray  #: nodes at the start and at the end of each edge, (n_edges, 2)
+    cell: IntArray  #: cell of each edge, numbered over all types, (n_edges,)
+    first: IntArray  #: first edge of each pair of coinciding edges without a third edge, (n_pairs,)
+    second: IntArray  #: second edge of each pair, (n_pairs,)
+    count: IntArray  #: number of edges between the same two nodes, including the edge itself, (n_edges,)
 
 
 def cell_edges(cells: tuple[IntArray, ...]) -> CellEdges:
-    """Return the edges of cells, and the pairs of edges that meet."""
+    """Return the edges of cells, and the pairs of coinciding edges."""
     corners, nodes, owner = [], [], []
     first_corner = first_cell = 0
     for rows in cells:
@@ -62,7 +63,7 @@ def cell_edges(cells: tuple[IntArray, ...]) -> CellEdges:
 
 
 def make_shell_skin(nodes: Array, groups: tuple[ShellCells, ...]) -> ShellSkin:
-    """Make the skin of all cells.
+    """Return the skin of all cells.
 
     (1) corners of neighbouring cells at a node share their points if the cells have the same thickness, offset and
         sense of the normal, and meet at less than 40 degrees; folds, joints of three cells and steps stay sharp

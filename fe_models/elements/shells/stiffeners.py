@@ -1,4 +1,4 @@
-"""A shell with beams on it as one body; nodes move together, except for independent rotations of sections."""
+"""Shell with beams on it as one body: nodes move together, except for independent section rotations."""
 
 from dataclasses import dataclass, replace
 
@@ -19,7 +19,7 @@ __all__ = ["StiffenedModel", "element_model_of", "with_frame"]
 
 @dataclass(frozen=True, eq=False)
 class StiffenedModel:
-    """A shell and a frame on it (`fe_models.body.fe_body.ElementModel`).
+    """Element model of a shell with a frame on it (`fe_models.body.fe_body.ElementModel`).
 
     The mesh dofs are those of the shell (six per node, three per skin point), then those of the frame (likewise). Each
     node of the frame is at a node of the shell. If its section rotates independently, the section rotation is the node
@@ -29,16 +29,16 @@ class StiffenedModel:
 
     shell: ShellModel
     frame: BeamModel
-    nodes: IntArray  #: shell node of each node of the frame, (n_frame_nodes,)
+    nodes: IntArray  #: shell node at each node of the frame, (n_frame_nodes,)
 
     @property
     def has_nodal_stress(self) -> bool:
-        """True, because the shell knows its stress."""
+        """Return True, because the shell can compute its stress."""
         return True
 
     @property
     def n_mesh_dof(self) -> int:
-        """Dofs of the mesh."""
+        """Number of dofs of the mesh."""
         return self.shell.n_mesh_dof + self.frame.n_mesh_dof
 
     def mass_gram(self, u: Array) -> Array:
@@ -47,7 +47,7 @@ class StiffenedModel:
         return self.shell.mass_gram(of_shell) + self.frame.mass_gram(of_frame)
 
     def nodal_stress(self, u: Array, *, nodes: IntArray | None = None) -> Array:
-        """Return the stress of the shell at its nodes and skin, then of the frame at its own."""
+        """Return the stress of the shell at its nodes and skin, then of the frame at its nodes and skin."""
         of_shell, of_frame = self._parts("nodal_stress", u)
         return np.concatenate([self.shell.nodal_stress(of_shell, nodes=nodes), self.frame.nodal_stress(of_frame)])
 
@@ -57,7 +57,7 @@ class StiffenedModel:
 
     @property
     def has_geometric_stiffness(self) -> bool:
-        """True, because shell and frame know their geometric stiffness."""
+        """Return True, because shell and frame can compute their geometric stiffness."""
         return True
 
     def mass_forces(self, loads: MassLoads) -> Array:
@@ -65,7 +65,7 @@ class StiffenedModel:
         return np.concatenate([self.shell.mass_forces(loads), self.frame.mass_forces(loads)])
 
     def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
-        """Return K u of shell and frame, (n_mesh_dof, k) [N, N m]; with `nodes` only of the shell cells at them."""
+        """Return K u of shell and frame, (n_mesh_dof, k) [N, N m]; with `nodes`, only of shell cells at these nodes."""
         of_shell, of_frame = self._parts("internal_forces", u)
         on_shell = self.shell.internal_forces(of_shell, nodes=nodes)
         return np.concatenate([on_shell, self.frame.internal_forces(of_frame)])
@@ -83,7 +83,7 @@ class StiffenedModel:
         )
 
     def _of_own_rotations(self, moments: Array, on_shell: Array, on_frame: Array) -> Array:
-        """Return second derivatives of ½ m·(theta_s × theta_b) of all sections, (k, n, n), for m (n_frame, 3, k)."""
+        """Return second derivatives of ½ m·(theta_s × theta_b) for all sections, (k, n, n), with m (n_frame, 3, k)."""
         n = len(self.nodes)
         theta_b = on_frame[: 6 * n].reshape(n, 6, -1)[:, 3:]
         theta_s = on_shell[: 6 * self.shell.n_nodes].reshape(self.shell.n_nodes, 6, -1)[self.nodes, 3:]
@@ -97,7 +97,7 @@ class StiffenedModel:
         return np.asarray((K + K.transpose(0, 2, 1)) / 2)
 
     def _parts(self, where: str, u: Array) -> tuple[Array, Array]:
-        """Return the rows of u of the shell and of the frame."""
+        """Return the rows of u that belong to the shell, and those of the frame."""
         if np.ndim(u) != 2 or np.shape(u)[0] != self.n_mesh_dof:
             raise BodyError(f"{where}: u: expected columns over {self.n_mesh_dof} dofs, got {np.shape(u)}")
         u = np.asarray(u)
@@ -158,7 +158,7 @@ def with_frame(shell: FEBody, model: ShellModel, frame: FEBody, nodes: IntArray,
 
 
 def element_model_of(model: ElementModel | None) -> BeamModel:
-    """Return the element model of a frame; raise `BodyError` for any other model."""
+    """Return the element model of a frame; raise `BodyError` if the body is not a frame."""
     if not isinstance(model, BeamModel):
         raise BodyError("with_frame: expected a frame of beams")
     return model

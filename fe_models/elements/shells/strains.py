@@ -17,27 +17,27 @@ __all__ = [
     "plate_sides",
 ]
 
-N_STRAINS = 9  #: eps_x eps_y gamma_xy, kappa_x kappa_y kappa_xy, gamma_xz gamma_yz, drilling
+N_STRAINS = 9  #: number of strains: eps_x eps_y gamma_xy, kappa_x kappa_y kappa_xy, gamma_xz gamma_yz, drilling
 
 
 @dataclass(frozen=True, eq=False)
 class FlatStrains:
-    """Strain operators of n elements at p points: strains = B u, where u are the local dofs, six per corner."""
+    """Operators B of n elements at p points: strains = B u with local dofs u, six for each corner."""
 
-    B: Array  #: (n, p, 9, 6 c)
-    weights: Array  #: area elements, (n, p) [m²]
+    B: Array  #: strain operators, (n, p, 9, 6 c)
+    weights: Array  #: area elements times quadrature weights, (n, p) [m²]
 
 
 @dataclass(frozen=True, eq=False)
 class FlatLaw:
     """Stiffness per area of n elements in local axes, for the strain operators (`elements.shells.laminate`)."""
 
-    A: Array  #: from membrane strains to membrane forces, (n, 3, 3) [N/m]
-    B: Array  #: from curvatures to membrane forces, (n, 3, 3) [N]
-    bending: Array  #: D* = D - B A⁻¹ B, (n, 3, 3) [N m]
-    shear_flexibility: Array  #: H⁻¹, (n, 2, 2) [m/N]
-    drilling: Array  #: gamma G t, (n,) [N/m]
-    nu: Array  #: (n,)
+    A: Array  #: matrix from membrane strains to membrane forces, (n, 3, 3) [N/m]
+    B: Array  #: matrix from curvatures to membrane forces, (n, 3, 3) [N]
+    bending: Array  #: bending stiffness D* = D - B A⁻¹ B, (n, 3, 3) [N m]
+    shear_flexibility: Array  #: shear flexibility H⁻¹, (n, 2, 2) [m/N]
+    drilling: Array  #: drilling stiffness gamma G t, (n,) [N/m]
+    nu: Array  #: Poisson's ratio, (n,)
 
 
 def plane_elasticity(E: Array, nu: Array) -> Array:
@@ -65,15 +65,15 @@ def inverse_2x2(J: Array, det: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class PlateSides:
-    """Rotation and shear along the sides of plate elements, as operators on w, theta_x, theta_y of the corners."""
+    """Operators on w, theta_x, theta_y of the corners for rotation and shear along the sides of plate elements."""
 
-    length: Array  #: (n, n_sides) [m]
+    length: Array  #: length of each side, (n, n_sides) [m]
     along: Array  #: unit vectors from the first to the second corner, (n, n_sides, 2)
-    bulge: Array  #: Delta, the rotation beta_s at the mid-point minus the mean of the ends, (n, n_sides, c, 3)
+    bulge: Array  #: Delta: rotation beta_s at the mid-point minus the mean of the ends, (n, n_sides, c, 3)
     shear: Array  #: shear strain gamma of the sides, (n, n_sides, c, 3)
 
     def curvature(self, gradients: Array) -> Array:
-        """Return the contribution of the mid-side rotations Delta to kappa_x kappa_y kappa_xy, (n, p, 3, c, 3).
+        """Return the part of kappa_x kappa_y kappa_xy due to the mid-side rotations Delta, (n, p, 3, c, 3).
 
         Parameters
         ----------
@@ -88,7 +88,7 @@ class PlateSides:
 
 
 def plate_sides(xy: Array, sides: IntArray, law: FlatLaw) -> PlateSides:
-    """Return rotation and shear along the sides of plate elements (DKMT, DKMQ).
+    """Return the operators for rotation and shear along the sides of plate elements (DKMT, DKMQ).
 
     (1) the rotation is quadratic, beta_s = linear + 4 s/L (1 - s/L) Delta
     (2) equilibrium of the side, Q = M,s, gives its constant shear strain gamma = -(2/3) phi Delta with phi = 12 D_s/L²

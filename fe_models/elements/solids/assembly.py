@@ -26,33 +26,33 @@ from fe_models.meshes.mesh import Mesh
 
 __all__ = ["Progress", "assemble", "expand_scalar_mass"]
 
-Progress = Callable[[float], None]  #: receives the finished fraction, 0 to 1
+Progress = Callable[[float], None]  #: callback that receives the finished fraction, from 0 to 1
 
-BATCH_BYTES = 32e6  #: memory of one batch of element matrices; larger batches leave the cache and are not faster
+BATCH_BYTES = 32e6  #: size of a batch of element matrices [bytes]; larger batches leave the cache and are not faster
 LARGEST_INT32 = 2**31 - 1
 
 
 @dataclass(frozen=True, eq=False)
 class NodeGraph:
-    """Graph of nodes that share an element, and the places of each node in the elements."""
+    """Graph of nodes that share an element, and positions of each node in the element lists."""
 
-    start: IntArray  #: first entry of `places` of each node, (n_nodes + 1,)
-    places: np.ndarray  #: places in the joined element lists, node by node, ascending, (n_places,) int32
-    row_start: IntArray  #: first entry of `columns` of each node, (n_nodes + 1,)
+    start: IntArray  #: first entry of `places` for each node, (n_nodes + 1,)
+    places: np.ndarray  #: positions in the joined element lists, node by node, ascending, (n_places,) int32
+    row_start: IntArray  #: first entry of `columns` for each node, (n_nodes + 1,)
     columns: np.ndarray  #: neighbours of each node, including itself, ascending, (n_entries,) int32
 
 
 @dataclass(frozen=True, eq=False)
 class Elasticity:
-    """Elastic constants and densities of the materials of a mesh, as arrays."""
+    """Elastic constants and densities of the materials of a mesh as arrays."""
 
-    properties: Array  #: lam, mu, rho of each material, (n_materials, 3); lam and mu are unused for general materials
-    tensors: Array  #: matrix of each material that maps strain to stress, (n_materials, 6, 6)
-    is_general: np.ndarray  #: whether a material is not isotropic, (n_materials,) bool
+    properties: Array  #: lam, mu, rho of each material, (n_materials, 3); lam and mu apply only to isotropic materials
+    tensors: Array  #: matrix from strain to stress of each material, (n_materials, 6, 6)
+    is_general: np.ndarray  #: whether each material is not isotropic, (n_materials,) bool
 
     @staticmethod
     def of(materials: Sequence[AnyMaterial]) -> "Elasticity":
-        """Return the constants of these materials."""
+        """Return the constants of these materials as arrays."""
         rows = [(m.lam, m.mu, m.rho) if isinstance(m, Material) else (0.0, 0.0, m.rho) for m in materials]
         is_general = np.array([not isinstance(m, Material) for m in materials])
         return Elasticity(np.array(rows), np.array([m.stiffness for m in materials]), is_general)
@@ -118,7 +118,7 @@ def assemble(
 
 
 def expand_scalar_mass(M_s: sp.csr_array) -> sp.csc_array:
-    """Return M = M_s ⊗ 1₃, (3 n_nodes, 3 n_nodes), dof 3 i + c, from the symmetric scalar mass, (n_nodes, n_nodes)."""
+    """Return M = M_s ⊗ 1₃, (3 n_nodes, 3 n_nodes), with dofs 3 i + c, from the scalar mass, (n_nodes, n_nodes)."""
     from fe_models.elements.solids.assembly_kernels import expand_mass
 
     n_nodes, nnz = M_s.shape[0], 3 * M_s.nnz
@@ -130,7 +130,7 @@ def expand_scalar_mass(M_s: sp.csr_array) -> sp.csc_array:
 
 
 def node_graph(lists: list[np.ndarray], n_nodes: int) -> NodeGraph:
-    """Make the node graph, steps (1) and (2), from the element lists of all types, each (n_cells, nodes per cell)."""
+    """Steps (1) and (2): return the node graph for element lists of all types, (n_cells, nodes per cell) each."""
     from fe_models.elements.solids.assembly_kernels import node_incidence, row_columns, row_counts
 
     members = np.concatenate([cells.ravel() for cells in lists])
@@ -171,7 +171,7 @@ def assembled_data(
     mass: str,
     progress: Progress | None,
 ) -> tuple[Array, Array]:
-    """Compute the entries of K, row by row, and of M_s: steps (3) and (4)."""
+    """Steps (3) and (4): compute the entries of K, row by row, and of M_s."""
     from fe_models.elements.solids.assembly_kernels import element_matrices, scatter_elements, tensor_stiffness
 
     K_data, M_data = np.zeros(9 * len(graph.columns)), np.zeros(len(graph.columns))
@@ -182,7 +182,7 @@ def assembled_data(
         tables = kernel_tables(reference_element(kind, integration, mass))
         _, of_stiffness, _ = tables
         n_a = len(CELL_SHAPES[kind].nodes)
-        # 9 + 1 numbers for each pair of nodes
+        # 9 numbers of K and 1 of M_s for each pair of nodes
         n_batch = min(len(cells), max(n_threads(), int(BATCH_BYTES / (80 * n_a**2))))
         K_e, M_e = np.empty((n_batch, 3 * n_a, 3 * n_a)), np.empty((n_batch, n_a, n_a))
         is_inverted = np.zeros(len(cells), bool)
@@ -216,14 +216,14 @@ def assembled_data(
 
 
 def lumped_mass(M_e: Array) -> Array:
-    """Return diagonal element masses, (n, n_a, n_a): the diagonal of M_e, scaled to the sum of all its entries."""
+    """Return lumped element masses, (n, n_a, n_a): the diagonal of M_e, scaled to the sum of all its entries."""
     diagonal = np.einsum("eaa->ea", M_e)
     total = M_e.sum(axis=(1, 2))
     return np.asarray((diagonal * (total / diagonal.sum(axis=1))[:, None])[:, :, None] * np.eye(M_e.shape[1]))
 
 
 def kernel_tables(element: ReferenceElement) -> tuple[tuple[np.ndarray, ...], ...]:
-    """Return the kernel's tables: for affine elements, and for stiffness and mass of curved elements.
+    """Return the tables for the kernel: for affine elements, and for stiffness and mass of curved elements.
 
     The tables of affine elements are the reference cell's nodes, (n_nodes, 3), those at e_1, e_2, e_3, (3,), and its
     integrals for pairs b >= a, row by row: ∫ ∂N_a/∂xi_k ∂N_b/∂xi_l in row 3 k + l, (9, n_pairs), and ∫ N_a N_b.
@@ -238,7 +238,7 @@ def kernel_tables(element: ReferenceElement) -> tuple[tuple[np.ndarray, ...], ..
 
 
 def expanded_stiffness(graph: NodeGraph, K_data: Array) -> sp.csc_array:
-    """Make K from its entries, the row starts and the column numbers; rows equal columns, because K is symmetric."""
+    """Return K from its entries, row starts and column numbers; rows equal columns, because K is symmetric."""
     from fe_models.elements.solids.assembly_kernels import expand_columns
 
     index_type = np.int32 if len(K_data) <= LARGEST_INT32 else np.int64
@@ -248,7 +248,7 @@ def expanded_stiffness(graph: NodeGraph, K_data: Array) -> sp.csc_array:
 
 
 def sorted_csc(data: Array, indices: np.ndarray, indptr: np.ndarray) -> sp.csc_array:
-    """Wrap the arrays of a square matrix with sorted and unique column entries, without check or copy."""
+    """Return a square matrix of these arrays with sorted, unique column entries, without check or copy."""
     matrix = sp.csc_array((data, indices, indptr), shape=2 * (len(indptr) - 1,))
     matrix.has_canonical_format = True
     return matrix
@@ -275,7 +275,7 @@ def require_assemblable(mesh: Mesh) -> list[str]:
 
 
 def require_upright(kind: str, is_inverted: np.ndarray) -> None:
-    """Raise `MeshError` that names the inverted elements of one type."""
+    """Raise `MeshError` that names the inverted elements of a type, if there are any."""
     rows = np.flatnonzero(is_inverted)
     if rows.size:
         some = ", ".join(str(row) for row in rows[:5]) + (", ..." if rows.size > 5 else "")

@@ -1,4 +1,4 @@
-"""Compiled loops of the assembly. They are imported only where used, because numba takes half a second to import.
+"""Compiled loops of the assembly, imported only when used, because importing numba takes half a second.
 
 Every kernel works on one share of the rows, columns or elements, `part` of `n_parts`, and writes only to that share.
 The shares run in threads without locks, and the order of additions to an entry never depends on the threads.
@@ -27,7 +27,7 @@ jit_fma = njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"
 
 @jit
 def node_incidence(members, n_nodes):
-    """Return start, (n_nodes + 1,), and for each node the ascending places in `members` where it occurs."""
+    """Return start, (n_nodes + 1,), and for each node its ascending positions in `members`."""
     start = np.zeros(n_nodes + 1, np.int64)
     for place in range(members.size):
         start[members[place] + 1] += 1
@@ -44,7 +44,7 @@ def node_incidence(members, n_nodes):
 
 @jit
 def neighbours_of(node, members, first, n_members, start, places, seen, found):
-    """Collect in `found` the nodes that share an element with `node`, unsorted; return how many there are."""
+    """Collect the nodes that share an element with `node` in `found`, unsorted; return their number."""
     count = 0
     for k in range(start[node], start[node + 1]):
         element_first = first[places[k]]
@@ -59,7 +59,7 @@ def neighbours_of(node, members, first, n_members, start, places, seen, found):
 
 @jit
 def row_counts(members, first, n_members, start, places, part, n_parts, counts):
-    """Count the neighbours (including itself) of each node of this part into counts, (n_nodes,)."""
+    """Write the number of neighbours of each node of this part, including itself, into counts, (n_nodes,)."""
     n_nodes = counts.size
     seen = np.full(n_nodes, -1, np.int32)
     found = np.empty(n_nodes, np.int32)
@@ -87,7 +87,7 @@ def row_columns(members, first, n_members, start, places, part, n_parts, row_sta
 
 @jit_fma
 def cofactors_of(J, cofactors):
-    """Write det(J) J⁻¹, (3, 3), and return det(J), for J, (3, 3)."""
+    """Write det(J) J⁻¹ for J, (3, 3), into `cofactors`, and return det(J)."""
     # the compiler does not know this size, so it does not unroll, and compiles in half of the time
     for i in range(J.shape[0]):
         i1, i2 = (i + 1) % 3, (i + 2) % 3
@@ -99,7 +99,7 @@ def cofactors_of(J, cofactors):
 
 @jit_fma
 def jacobian(x, dN, J, Q):
-    """Write J_ij = ∂x_i / ∂xi_j and Q = det(J) J⁻¹, (3, 3); return det(J). x, dN: (n_a, 3)."""
+    """Write J_ij = ∂x_i / ∂xi_j and Q = det(J) J⁻¹, (3, 3), and return det(J); x and dN are (n_a, 3)."""
     for i in range(J.shape[0]):
         for j in range(J.shape[0]):
             total = 0.0
@@ -111,7 +111,7 @@ def jacobian(x, dN, J, Q):
 
 @jit
 def is_affine(x, corners, reference, J):
-    """Write J from the edges at node 0; return whether x is affine in the reference coordinates, to roundoff.
+    """Write J from the edges at node 0; return whether x is affine in the reference coordinates to rounding.
 
     x: positions of the nodes, (n_a, 3); corners: the nodes at e_1, e_2, e_3 of the reference cell, (3,); reference:
     nodes of the reference cell, (n_a, 3).
@@ -133,7 +133,7 @@ def is_affine(x, corners, reference, J):
 
 @jit_fma
 def affine_element(J, lam, mu, rho, R_K, R_M, K, M):
-    """Compute element matrices with a constant Jacobian from integrals over the reference cell; return det(J).
+    """Compute element matrices for a constant Jacobian from integrals over the reference cell; return det(J).
 
     (1) C_ij,kl = det(J) (lam Q_ki Q_lj + mu Q_kj Q_li + mu δ_ij Q_k·Q_l) with Q = J⁻¹
     (2) K_ai,bj = Σ_kl C_ij,kl ∫ ∂N_a/∂xi_k ∂N_b/∂xi_l,  M_ab = rho det(J) ∫ N_a N_b, for the pairs b >= a.
@@ -264,7 +264,7 @@ def scatter_elements(
     neighbour is therefore at 9 row_start[i] + 3 m_i c + 3 p + d of K_data, and no conversion is needed.
     cursor: for each node, its first place in `places` that has not been added yet; workspace: (n_parts, n_nodes).
     """
-    where = workspace[part]  # place of a node among the neighbours of another one
+    where = workspace[part]  # position of a node among the neighbours of another node
     n_nodes = row_start.size - 1
     n_a = cells.shape[1]
     end_place = first_place + cells.size
@@ -292,7 +292,7 @@ def scatter_elements(
 
 @jit
 def expand_columns(row_start, columns, part, n_parts, indptr, indices):
-    """Write row starts and column numbers of the stiffness from the node graph, three columns for each neighbour."""
+    """Write row starts and column numbers of the stiffness from the node graph, three columns per neighbour."""
     n_nodes = row_start.size - 1
     for node in range(part * n_nodes // n_parts, (part + 1) * n_nodes // n_parts):
         at = row_start[node]
@@ -349,7 +349,7 @@ def tensor_stiffness(nodes, cells, tensors, is_general, of_cell, dN, w, part, n_
         for q in range(w.size):
             det = jacobian(x, dN[q], J, Q)
             if not det > 0.0:
-                break  # the loop over all elements reports the inverted element
+                break  # the loop over all elements reports inverted elements
             for a in range(n_a):
                 for i in range(J.shape[0]):
                     g[a, i] = (dN[q, a, 0] * Q[0, i] + dN[q, a, 1] * Q[1, i] + dN[q, a, 2] * Q[2, i]) / det

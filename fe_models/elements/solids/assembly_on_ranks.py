@@ -31,22 +31,22 @@ from fe_models.meshes.mesh import Mesh
 
 __all__ = ["MeshPart", "SpreadMesh", "assemble_on_ranks"]
 
-KEY = "assembled rows"  #: key in the store of a rank for rows that it has assembled and not yet delivered
+KEY = "assembled rows"  #: key in the store of a rank for assembled rows that it has not yet delivered
 MATRICES = ("K", "M", "M_s")
 KEPT = (*MATRICES, "mesh")
 
 
 @dataclass(frozen=True, eq=False)
 class MeshPart:
-    """The part of the mesh that one rank needs."""
+    """Part of the mesh that a rank needs."""
 
-    mesh: Mesh  #: the elements that touch the nodes of the rank, and all nodes of these elements
-    of_cell: Mapping[str, IntArray]  #: material of each cell, by cell type
+    mesh: Mesh  #: elements that touch the nodes of the rank, and all nodes of these elements
+    of_cell: Mapping[str, IntArray]  #: material index of each cell, by cell type
     position: np.ndarray  #: position of each node of the part in the global order, (n_part_nodes,)
-    own: np.ndarray  #: indices of the nodes that the rank owns, in that order, (n_own,)
+    own: np.ndarray  #: indices of the nodes that the rank owns, in global order, (n_own,)
 
     def cells_of(self, rows: slice) -> "MeshPart":
-        """Return the cells whose first node in the global order is owned by the rank, so each cell has one rank."""
+        """Return the cells whose first node in global order is owned by the rank; each cell has one such rank."""
         first = {kind: self.position[cells].min(axis=1) for kind, cells in self.mesh.cells.items()}
         index = {kind: np.flatnonzero((at >= rows.start) & (at < rows.stop)) for kind, at in first.items()}
         cells = {kind: self.mesh.cells[kind][some] for kind, some in index.items() if len(some)}
@@ -55,10 +55,10 @@ class MeshPart:
 
 
 class SpreadMesh:
-    """The distributed mesh: every rank keeps the cells that touch its nodes, until the last reference is dropped."""
+    """Distributed mesh: each rank stores the cells that touch its nodes until the last reference is dropped."""
 
     def __init__(self, layout: RowLayout) -> None:
-        """Let every rank keep the part of the mesh that it assembled; layout: distribution of the nodes."""
+        """Let each rank store the part of the mesh that it assembled; layout is the distribution of the nodes."""
         self.layout, self.key = layout, new_key()
         layout.ask(mesh_here, self.key)
         layout.free_with(self, self.key)
@@ -88,7 +88,7 @@ def assemble_on_ranks(
         asked(ranks, assemble_here, materials, dict(options))  # (3)
     # the message refers to a part of the mesh; a single process finds the same fault in the complete mesh
     except MeshError:
-        asked(ranks, forget_here)  # drop the rows of the ranks that found no fault
+        asked(ranks, forget_here)  # drop the rows on ranks without an error
         assemble(mesh, materials, of_cell, **options)
         raise
     of_dofs = (3 * order[:, None] + np.arange(3)).ravel()
@@ -99,7 +99,7 @@ def assemble_on_ranks(
 
 
 def node_order(lists: list[np.ndarray], n_nodes: int, size: int) -> tuple[IntArray, Rows]:
-    """Order the nodes, step (1): return the node at each position, (n_nodes,), and the positions of each rank."""
+    """Step (1): return the node at each position, (n_nodes,), and the positions of each rank."""
     graph = node_graph(lists, n_nodes)
     starts = graph.row_start.astype(np.int32)
     A = sp.csr_array((np.ones(len(graph.columns), np.int8), graph.columns, starts), shape=(n_nodes, n_nodes))
@@ -115,7 +115,7 @@ def mesh_part(
     rows: Rows,
     rank: int,
 ) -> MeshPart:
-    """Return the elements that touch the nodes of a rank, step (2)."""
+    """Step (2): return the elements that touch the nodes of a rank."""
     is_own = np.zeros(len(order), bool)
     is_own[order[rows.of(rank)]] = True
     chosen = {kind: np.flatnonzero(is_own[cells].any(axis=1)) for kind, cells in lists.items()}
@@ -137,7 +137,7 @@ def mesh_part(
 
 
 def assemble_here(ranks: Ranks, materials: tuple[AnyMaterial, ...], options: dict[str, Any]) -> None:
-    """Assemble and keep this rank's rows of K, M and M_s, with columns in the global order: step (3)."""
+    """Step (3): assemble and store the rows of K, M and M_s on this rank, with columns in global order."""
     parts = ranks.store.pop(KEY, None) or [None] * ranks.size
     part: MeshPart = parts[0] if ranks.size == 1 else ranks.comm.alltoall(parts)[0]
     del parts
@@ -162,25 +162,25 @@ def assemble_here(ranks: Ranks, materials: tuple[AnyMaterial, ...], options: dic
 
 
 def forget_here(ranks: Ranks) -> None:
-    """Drop the assembled rows and the part of the mesh."""
+    """Drop the assembled rows and the mesh part of this rank."""
     for key in (KEY, *(f"{KEY} {name}" for name in KEPT)):
         ranks.store.pop(key, None)
     give_back()
 
 
 def mesh_here(ranks: Ranks, key: str) -> None:
-    """Keep the part of the mesh under another key."""
+    """Store the mesh part of this rank under another key."""
     ranks.store[key] = ranks.store.pop(f"{KEY} mesh")
 
 
 def handed_here(ranks: Ranks, name: str) -> OwnRows:
-    """Return the assembled rows, and drop them from the store."""
+    """Return the assembled rows, and remove them from the store."""
     rows: OwnRows = ranks.store.pop(f"{KEY} {name}")
     return rows
 
 
 def expanded_rows(indptr: np.ndarray, columns: np.ndarray, data: Array) -> OwnRows:
-    """Return the rows S ⊗ 1₃ from the rows of a scalar matrix S."""
+    """Return the rows of S ⊗ 1₃, given rows of the scalar matrix S."""
     from fe_models.elements.solids.assembly_kernels import expand_mass
 
     n = 3 * len(data)

@@ -1,4 +1,4 @@
-"""The finite element body of a mesh of solid cells."""
+"""Finite element body of a mesh of solid cells."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -53,11 +53,11 @@ __all__ = ["SolidModel", "nodal_rotation", "scalar_mass_gram", "solid_body"]
 # (3) at a node, average over its cells
 
 
-FLAT = 1e-9  #: det J divided by the cube of its largest entry, up to which a cell has no gradient at its node
+FLAT = 1e-9  #: det J over the cube of its largest entry, below which a cell has no gradient at its node
 
 
 def nodal_rotation(mesh: Mesh, u: Array, nodes: IntArray) -> Array:
-    """Return rotation vectors at some nodes, (n, 3, k), of displacement columns u, (3 n_nodes, k), mesh axes.
+    """Return rotation vectors at some nodes, (n, 3, k), for displacement columns u, (3 n_nodes, k), mesh axes.
 
     Raises
     ------
@@ -92,28 +92,28 @@ def nodal_rotation(mesh: Mesh, u: Array, nodes: IntArray) -> Array:
 # body -----------------------------------------------------------------------------------------------------------------
 
 
-CELLS_AT_ONCE = 8_000  #: number of cells whose Jacobians are held at once
-GRAM_BYTES = 64e6  #: memory for M_s times a block of columns
+CELLS_AT_ONCE = 8_000  #: number of cells whose Jacobians are in memory at a time
+GRAM_BYTES = 64e6  #: size of M_s times a block of columns [bytes]
 
 
 @dataclass(frozen=True, eq=False)
 class SolidModel:
-    """The element model of a solid body (`fe_body.ElementModel`): mass integrals, stress, geometric stiffness."""
+    """Element model of a solid body (`fe_body.ElementModel`): mass integrals, stress, geometric stiffness."""
 
     mesh: Mesh
     materials: tuple[AnyMaterial, ...]
-    of_cell: Mapping[str, IntArray]  #: index of the material of each cell, (n_cells,), by cell type
+    of_cell: Mapping[str, IntArray]  #: material index of each cell, (n_cells,), by cell type
     M_s: sp.csr_array | SpreadMatrix  #: scalar consistent mass, (n_nodes, n_nodes) [kg]
     incompatible: bool = False  #: whether eight-node bricks have incompatible modes
     integration: str = "full"  #: integration of the stiffness, one of `fe_models.elements.solids.elements.INTEGRATIONS`
-    parts: SpreadMesh | None = None  #: the distributed mesh, if several ranks assembled it
+    parts: SpreadMesh | None = None  #: distributed mesh, if several ranks assembled it
 
-    has_nodal_stress: ClassVar[bool] = True  #: solid elements know their stress
-    has_geometric_stiffness: ClassVar[bool] = True  #: solid elements know their geometric stiffness
+    has_nodal_stress: ClassVar[bool] = True  #: solid elements can compute their stress
+    has_geometric_stiffness: ClassVar[bool] = True  #: solid elements can compute their geometric stiffness
 
     @cached_property
     def of_node(self) -> IntArray:
-        """Material whose stress each node shows: the first with the largest modulus among its elements, (n_nodes,).
+        """Material whose stress each node has, (n_nodes,): the first one with the largest modulus at the node.
 
         Stress jumps where materials meet, and one value per node can show one side only. The stiffer side usually has
         the larger stress, and a fixed choice keeps the stress linear in the displacement.
@@ -136,7 +136,7 @@ class SolidModel:
         )
 
     def nodal_stress(self, u: Array, *, nodes: IntArray | None = None) -> Array:
-        """Return the stress at the nodes, (n_nodes, 6, k) [Pa], xx yy zz yz xz xy, of columns u, (3 n_nodes, k).
+        """Return the stress at the nodes, (n_nodes, 6, k) [Pa], xx yy zz yz xz xy, for columns u, (3 n_nodes, k).
 
         If `nodes` are given, only their elements are visited, and the other nodes report zero.
         """
@@ -158,7 +158,7 @@ class SolidModel:
         return np.asarray(self.M_s @ loads.at(self.mesh.nodes).reshape(len(self.mesh.nodes), -1)).reshape(-1, loads.k)
 
     def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
-        """Return ∫ sigma grad N dV of the columns u, (3 n_nodes, k) [N], at the points of the geometric stiffness.
+        """Return ∫ sigma grad N dV for columns u, (3 n_nodes, k) [N], with the points of the geometric stiffness.
 
         If `nodes` are given, the forces at other nodes are zero.
         """
@@ -189,7 +189,7 @@ class SolidModel:
         return forces.reshape(3 * len(mesh.nodes), -1)
 
     def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Any) -> Array:
-        """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), of the states u, (3 n_nodes, k); only their stress counts.
+        """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), for states u, (3 n_nodes, k), which enter only by their stress.
 
         If Phi is distributed, each rank computes the contribution of its cells.
         """
@@ -328,7 +328,7 @@ def scalar_mass_gram(M_s: SymmetricProduct | RowsProduct, nodes: Array, columns:
 
 
 def spread_mass_gram(M_s: SpreadMatrix, nodes: Array, u: Any) -> Array:
-    """Return `scalar_mass_gram` of columns u, (3 n_nodes, k), for a distributed M_s, as the sum over the ranks.
+    """Return `scalar_mass_gram` for columns u, (3 n_nodes, k), and a distributed M_s, as sum over the ranks.
 
     Distributed columns must be laid out as the dofs of the nodes. Columns of rank 0 are sent to the ranks.
     """
@@ -341,7 +341,7 @@ def spread_mass_gram(M_s: SpreadMatrix, nodes: Array, u: Any) -> Array:
 
 
 def gram_here(ranks: Ranks, key: str, nodes: Part, u: Part, n_rows: int) -> Array:
-    """Return the contribution of this rank's rows to Aᵀ M_s A."""
+    """Return the contribution of the rows on this rank to Aᵀ M_s A."""
     product: RowsProduct = ranks.store[key]
     own = own_part(ranks, u)
     columns = np.ascontiguousarray(own).reshape(product.n_own, 3 * own.shape[1])
@@ -368,7 +368,7 @@ def node_volumes(mesh: Mesh) -> Array:
 def provenance(
     mesh: Mesh, materials: tuple[AnyMaterial, ...], of_cell: Mapping[str, IntArray], rules: Mapping[str, Any]
 ) -> dict[str, str]:
-    """Return the origin of the body: mesh, digest, elements, materials, version of scikit-fem, and unusual rules."""
+    """Return the provenance of the body: mesh, digest, elements, materials, scikit-fem version, unusual rules."""
     record = {"mesh": mesh.source, "mesh sha256": mesh.digest, "nodes": str(len(mesh.nodes))}
     record |= {f"file {path}": digest for path, digest in mesh.included.items()}
     record |= dict(mesh.origin)
@@ -387,6 +387,6 @@ def provenance(
 
 
 def require_rows(where: str, u: Array, n_rows: int) -> None:
-    """Raise `BodyError` unless u has that many rows and is two-dimensional."""
+    """Raise `BodyError` unless u is two-dimensional with this number of rows."""
     if u.ndim != 2 or u.shape[0] != n_rows:
         raise BodyError(f"{where}: u: expected columns over {n_rows} dofs, got {u.shape}")

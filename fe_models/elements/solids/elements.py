@@ -54,7 +54,7 @@ REDUCED: dict[str, tuple[str, Degree]] = {
     "pyramid": ("pyramid", (2, 2)),  # 8
     "pyramid13": ("pyramid", (2, 2)),  # 8
 }  #: fewest points that programs use; straight-edged cells keep their full stiffness, except wedges and bricks
-INTEGRATIONS = ("full", "reduced")  #: integration of the stiffness
+INTEGRATIONS = ("full", "reduced")  #: rules for the integration of the stiffness
 #: consistent; with the points of the reduced stiffness; 14 points for 20-node bricks (others consistent); diagonal
 MASSES = ("consistent", "reduced", "14-point", "lumped")
 # Stress is sampled where it is most accurate (at the points of reduced integration for quadratic elements). It is
@@ -74,23 +74,23 @@ STRESS_RULES: dict[str, tuple[tuple[str, Degree], str | None]] = {
 
 @dataclass(frozen=True, eq=False)
 class ShapeTable:
-    """Shape functions at the points of a quadrature rule on the reference cell."""
+    """Shape functions at the points of a quadrature rule in the reference cell."""
 
-    points: Array  #: (n_points, 3)
-    weights: Array  #: (n_points,); their sum is the volume of the reference cell
-    values: Array  #: N_a, (n_points, n_nodes)
-    gradients: Array  #: derivatives ∂N_a/∂xi_j with respect to the reference coordinates, (n_points, n_nodes, 3)
+    points: Array  #: quadrature points in reference coordinates, (n_points, 3)
+    weights: Array  #: quadrature weights, (n_points,); their sum is the volume of the reference cell
+    values: Array  #: shape functions N_a, (n_points, n_nodes)
+    gradients: Array  #: derivatives ∂N_a/∂xi_j with respect to reference coordinates, (n_points, n_nodes, 3)
 
 
 @dataclass(frozen=True, eq=False)
 class ReferenceElement:
-    """Tables of one cell type that assembly and stress recovery use."""
+    """Tables of one cell type for assembly and stress recovery."""
 
-    kind: str  #: name in `SOLID_TYPES`
+    kind: str  #: cell type, a name in `SOLID_TYPES`
     stiffness: ShapeTable
     mass: ShapeTable
     stress: ShapeTable  #: shape functions at the sampling points of the stress
-    extrapolation: Array  #: from the sampling points to the nodes, (n_nodes, n_points)
+    extrapolation: Array  #: matrix from the sampling points to the nodes, (n_nodes, n_points)
 
 
 def quadrature(cell: str, degree: Degree) -> tuple[Array, Array]:
@@ -133,7 +133,7 @@ def fourteen_points() -> tuple[Array, Array]:
 
 
 def shape_table(kind: str, points: Array, weights: Array) -> ShapeTable:
-    """Evaluate the shape functions of a cell type, in meshio node order, at points (n_points, 3)."""
+    """Evaluate the shape functions of a cell type, in node order of meshio, at points, (n_points, 3)."""
     import skfem
 
     if kind not in SKFEM_ELEMENTS:

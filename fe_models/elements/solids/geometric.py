@@ -49,11 +49,11 @@ __all__ = [
 
 #: number of columns above which the sparse matrix is faster (`python -m benchmarks.geometric_stiffness columns`)
 MANY_COLUMNS = 100
-PRODUCT_BYTES = 64e6  #: memory for S times a block of columns
+PRODUCT_BYTES = 64e6  #: size of S times a block of columns [bytes]
 
 
 def sparse_geometric_stiffness(matrices: Iterator[sp.csr_array], n_states: int, Phi: Array) -> Array:
-    """Return Phiᵀ (S_j ⊗ 1₃) Phi, (n_states, n, n), of scalar matrices S_j and columns Phi, (3 n_nodes, n)."""
+    """Return Phiᵀ (S_j ⊗ 1₃) Phi, (n_states, n, n), for scalar matrices S_j and columns Phi, (3 n_nodes, n)."""
     n_nodes, n = len(Phi) // 3, Phi.shape[1]
     width = max(16, int(PRODUCT_BYTES / (24 * max(n_nodes, 1))))
     cuts = np.linspace(0, n_nodes, n_threads() + 1).astype(int)
@@ -75,17 +75,17 @@ def sparse_geometric_stiffness(matrices: Iterator[sp.csr_array], n_states: int, 
 
 
 class IntegratedCells(NamedTuple):
-    """Cells of one type that share the points of a quadrature."""
+    """Cells of one type with the same quadrature points."""
 
-    cells: IntArray  #: nodes, (n_cells, n_nodes)
-    material: IntArray  #: index of the material of each cell, (n_cells,)
+    cells: IntArray  #: nodes of each cell, (n_cells, n_nodes)
+    material: IntArray  #: material index of each cell, (n_cells,)
     table: ShapeTable
 
 
 def scalar_geometric_matrices(
     nodes: Array, tensors: Array, parts: Sequence[IntegratedCells], u: Array
 ) -> Iterator[sp.csr_array]:
-    """Yield S, (n_nodes, n_nodes), for the stress of each state u, (3 n_nodes, k), over these cells.
+    """Yield S, (n_nodes, n_nodes), of these cells for the stress of each state u, (3 n_nodes, k).
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def scalar_geometric_matrices(
 #: distance of a middle node from the middle of its edge, over the cell's size, above which a tetrahedron is curved;
 #: below it the error of the geometric stiffness over a rotation is of this size
 CURVED = 1e-9
-CHUNK_BYTES = 1.5e6  #: memory of the products that a thread holds at once; they must stay in its cache
+CHUNK_BYTES = 1.5e6  #: size of the products that a thread has at a time; they must fit in its cache [bytes]
 
 
 def projected_geometric_stiffness(
@@ -135,7 +135,7 @@ def projected_geometric_stiffness(
     incompatible: bool = False,
     integration: str = "full",
 ) -> Array:
-    """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), for the stress of the states u, (3 n_nodes, k).
+    """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), for the stress of states u, (3 n_nodes, k).
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def projected_geometric_stiffness(
 
 
 def _of_bricks(nodes: Array, cells: IntArray, tensors: Array, u: Array, Phi: Array) -> Array:
-    """Return Phiᵀ K_geo Phi of bricks with incompatible modes, (k, n, n); tensors: stiffness of cells, (n, 6, 6)."""
+    """Return Phiᵀ K_geo Phi, (k, n, n), of bricks with incompatible modes; tensors: stiffness of cells, (n, 6, 6)."""
     n = Phi.shape[1]
     K = np.zeros((u.shape[1], n, n))
     for rows, dofs in brick_chunks(cells):
@@ -205,7 +205,7 @@ def _of_bricks(nodes: Array, cells: IntArray, tensors: Array, u: Array, Phi: Arr
 def integrated_cells(
     mesh: Mesh, kind: str, of_cell: Mapping[str, IntArray], integration: str = "full"
 ) -> list[IntegratedCells]:
-    """Return the cells of a kind with the quadrature of their geometric stiffness.
+    """Return the cells of a type with the quadrature of their geometric stiffness.
 
     The work on a rigid rotation must equal that of the nodal forces K u to roundoff. At the points of the stiffness it
     does. In a quadratic tetrahedron with straight edges four points are enough, those of the stress: there
@@ -226,7 +226,7 @@ def integrated_cells(
 
 
 def bends_of_cells(nodes: Array, cells: IntArray) -> Array:
-    """Return how far the middle nodes of quadratic tetrahedra lie beside their edges, over the cell's size, (n,)."""
+    """Return the distance of mid-side nodes of quadratic tetrahedra from the edge centres, over cell size, (n,)."""
     x = nodes[cells]
     x = x - x[:, :1]
     straight = shape_values("tetra", CELL_SHAPES["tetra10"].nodes)[0] @ x[:, :4]
@@ -236,7 +236,7 @@ def bends_of_cells(nodes: Array, cells: IntArray) -> Array:
 def _pairs_of(
     nodes: Array, cells: IntArray, material: IntArray, tensors: Array, table: ShapeTable, states: Array, columns: Array
 ) -> Array:
-    """Return the sum over the points of these cells, (n_states, n_pairs)."""
+    """Return the sum over the quadrature points of these cells, (n_states, n_pairs)."""
     from fe_models.elements.solids.stress_kernels import stress_and_products
 
     n_states, n = states.shape[2], columns.shape[2]
@@ -262,7 +262,7 @@ def _pairs_of(
 def spread_geometric_stiffness(
     parts: SpreadMesh, materials: tuple[AnyMaterial, ...], u: Array, Phi: SpreadColumns, rules: Mapping[str, Any]
 ) -> Array:
-    """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), as `elements.solids.geometric.projected_geometric_stiffness` does.
+    """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), as `projected_geometric_stiffness` does, for a distributed mesh.
 
     Parameters
     ----------
@@ -290,7 +290,7 @@ def stiffness_here(
     Phi: Part,
     rules: dict[str, Any],
 ) -> Array:
-    """Return the contribution of the cells of this rank."""
+    """Return the contribution of the cells on this rank."""
     whole: MeshPart = ranks.store[key]
     own = rows.of(ranks.rank)
     part = whole.cells_of(own)

@@ -1,4 +1,4 @@
-r"""The eight-node brick with incompatible modes, which bends as a beam does.
+r"""Eight-node brick with incompatible modes, which bends as a beam does.
 
 A trilinear field cannot bend: the displacement u = x y must come with v = -x²/2. Without it, a cell of length l in a
 wall of height h has a parasitic shear energy of (G/E)(l/h)² times the bending energy, however many cells lie across the
@@ -31,14 +31,14 @@ from fe_models.foundation.arrays import Array, IntArray, frozen
 __all__ = ["KIND", "VOIGT", "brick_chunks", "brick_operators", "brick_stiffness", "gradient_stress"]
 
 KIND = "hexahedron"
-CELLS_AT_ONCE = 1000  #: number of cells whose operators (14 kB each) are held at once
+CELLS_AT_ONCE = 1000  #: number of cells whose operators (14 kB each) are in memory at a time
 VOIGT = np.array([0, 4, 8, 5, 2, 1])  #: rows of xx yy zz yz xz xy in a tensor with rows 3 i + j
-TENSOR = np.array([0, 5, 4, 5, 1, 3, 4, 3, 2])  #: component (of xx yy zz yz xz xy) in row 3 i + j of a tensor
-TRANSPOSED = np.array([0, 3, 6, 1, 4, 7, 2, 5, 8])  #: position of row 3 j + i, for each row 3 i + j
+TENSOR = np.array([0, 5, 4, 5, 1, 3, 4, 3, 2])  #: index in xx yy zz yz xz xy of each tensor row 3 i + j
+TRANSPOSED = np.array([0, 3, 6, 1, 4, 7, 2, 5, 8])  #: tensor row 3 j + i for each tensor row 3 i + j
 
 
 def brick_operators(x: Array, C: Array) -> tuple[Array, Array]:
-    """Return the gradient operators at the points of the stiffness, and the volumes of the points.
+    """Return the gradient operators at the quadrature points of the stiffness, and the volumes of the points.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def _of_components(grad: Array) -> Array:
 
 @cache
 def _tables() -> tuple[Array, Array, Array, Array]:
-    """Return gradients and weights of the rule, slopes ∂(1 - xi_m²)/∂xi, and gradients at the centre."""
+    """Return gradients and weights of the rule, slopes ∂(1 - xi_m²)/∂xi, and gradients at the cell centre."""
     table = reference_element(KIND).stiffness
     centre = np.full((1, 3), 0.5)  # centre of the reference cell, 0..1
     slopes = -8 * (table.points - centre)

@@ -125,7 +125,7 @@ def nodes_interface(
 
 
 def _chosen(name: str, choose: Callable[[], Chosen]) -> Chosen:
-    """Return what a selection chooses; its error names the interface."""
+    """Return the result of a selection; its error message names the interface."""
     try:
         return choose()
     except InterfaceError as error:

@@ -1,4 +1,4 @@
-"""Stress of a displacement field at the nodes of a solid mesh."""
+"""Stress at the nodes of a solid mesh, from displacements."""
 
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -98,7 +98,7 @@ def nodal_stress(
 
 
 def add_brick_stress(nodes: Array, cells: IntArray, tensors: Array, shows: Array, u: Array, stress: Array) -> None:
-    """Add volume times stress of bricks with incompatible modes to the nodes that show it.
+    """Add volume times stress of bricks with incompatible modes to the nodes that have the stress of their material.
 
     Parameters
     ----------

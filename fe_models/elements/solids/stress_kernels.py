@@ -17,7 +17,7 @@ FIRST, SECOND = np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1])  # xx
 
 @jit_fast
 def add_gradient(field, cell, dN, Q, det, H):
-    """Write H_ij = ∂u_i / ∂x_j, (3, 3, k), of the columns `field`, (n_nodes, 3, k), at one point of one element."""
+    """Write H_ij = ∂u_i / ∂x_j, (3, 3, k), for columns `field`, (n_nodes, 3, k), at one point of one element."""
     n_k = field.shape[2]
     H[:] = 0.0
     for a in range(cell.size):
@@ -31,7 +31,7 @@ def add_gradient(field, cell, dN, Q, det, H):
 
 @jit
 def write_stress(H, C, factor, sigma):
-    """Write `factor` times the stress C eps, (6, k), of the gradients H, (3, 3, k); zeros of C, (6, 6), are skipped."""
+    """Write `factor` times the stress C eps, (6, k), from gradients H, (3, 3, k); zeros of C, (6, 6), are skipped."""
     sigma[:] = 0.0
     for c in range(6):
         row = sigma[c]
@@ -102,7 +102,7 @@ def stress_and_products(nodes, cells, of_cell, tensors, dN, w, u, phi, sigma, pr
 
 @jit
 def write_scalar_matrices(nodes, cells, of_cell, tensors, dN, w, u, matrices):
-    """Add ∫ grad N_aᵀ sigma grad N_b dV for the stress of one state u, (n_nodes, 3, 1), to (n_cells, n_a, n_a)."""
+    """Add ∫ grad N_aᵀ sigma grad N_b dV, for the stress of one state u, (n_nodes, 3, 1), to (n_cells, n_a, n_a)."""
     n_a = cells.shape[1]
     x, g = np.empty((n_a, 3)), np.empty((n_a, 3))
     J, Q = np.empty((3, 3)), np.empty((3, 3))
@@ -159,7 +159,7 @@ def add_internal_forces(nodes, cells, of_cell, tensors, dN, w, u, forces):
 
 @jit
 def volume_at_nodes(nodes, cells, of_cell, of_node, dN, w, volume):
-    """Add to volume, (n_nodes,), the volumes of the elements that adjoin each node and have its material."""
+    """Add the volumes of the elements that adjoin each node and have its material to volume, (n_nodes,)."""
     n_a = cells.shape[1]
     x = np.empty((n_a, 3))
     J, Q = np.empty((3, 3)), np.empty((3, 3))
