@@ -14,7 +14,6 @@ from floatframe.engine.kernels.evaluation import evaluate
 from floatframe.engine.kernels.joints.row_formulas import held_value
 from floatframe.engine.kernels.memory import GIVEN, TAKEN, WORK_GIVEN, WORK_TAKEN
 from floatframe.engine.kernels.model import JOINT, MASS, STIFFNESS
-from floatframe.engine.kernels.past import keep_past
 from floatframe.engine.kernels.rotation import (
     after_spin,
     changed_spin,
@@ -812,6 +811,37 @@ def step_after(h, error, most_error, has_failed):
     if fitting >= h and (has_failed or fitting < WORTH * h):
         return h
     return min(max(fitting, LEAST * h), MOST * h)
+
+
+@inner
+def keep_row(source, target, k):
+    """Copy numbers into row k of an array."""
+    for j in range(source.shape[0]):
+        target[k, j] = source[j]
+
+
+@inner
+def keep_past(past, memory, a, h):
+    """Store the memory after a step of size h with accelerations a, if there is space left."""
+    k, target = past.n, past.memory
+    if k >= target.h.shape[0]:
+        return
+    for i in range(memory.r.shape[0]):
+        keep_row(memory.r[i], target.r[k], i)
+        keep_row(memory.p[i], target.p[k], i)
+    keep_row(memory.q, target.q, k)
+    keep_row(memory.u, target.u, k)
+    keep_row(memory.u_dot, target.u_dot, k)
+    keep_row(a, target.a, k)
+    keep_row(memory.w, target.w, k)
+    keep_row(memory.work, target.work, k)
+    keep_row(memory.power, target.power, k)
+    keep_row(memory.angle, target.angle, k)
+    keep_row(memory.angle_rate, target.angle_rate, k)
+    target.h[k], target.h_next[k] = h, memory.h_next
+    target.n_steps[k], target.n_rejected[k] = memory.n_steps, memory.n_rejected
+    target.n_iterations[k] = memory.n_iterations
+    past.n = k + 1
 
 
 def time_loop(load, try_step, write):

@@ -307,7 +307,7 @@ class Counted(NamedTuple):
 
 
 class Past(NamedTuple):
-    """The memories after the last steps, if there is space for them; see kernels/past.py."""
+    """The memories after the last steps, if there is space for them (kernels/generalized_alpha.py)."""
 
     n: IntArray = integer()  #: number of stored memories; the caller resets it to zero
     memory: Memory = stacked(Memory(), n_past)
