@@ -54,12 +54,13 @@ _IGNORED = (
 
 @dataclass(frozen=True)
 class _OfElements:
-    """The nodes of a set of elements, as a member of a node set."""
+    """Nodes of a set of elements, as a member of a node set."""
 
     elements: str
 
 
-_Entry = IntArray | str | _OfElements  #: numbers, the name of another set, or the nodes of a set of elements
+#: entry of a set: numbers, the name of another set, or the nodes of a set of elements
+_Entry = IntArray | str | _OfElements
 
 
 @dataclass
@@ -77,7 +78,7 @@ class _Sets:
             self.entries.setdefault(name.upper(), []).append(entry)
 
     def resolve(self, nodes_of: Callable[[str], IntArray]) -> dict[str, IntArray]:
-        """Return name -> numbers of its members and of the sets it names, ascending."""
+        """Return the numbers in each set, ascending, including those of sets that it refers to."""
         return {self.spelling[key]: self._members(key, nodes_of, ()) for key in self.entries}
 
     def _members(self, key: str, nodes_of: Callable[[str], IntArray], seen: tuple[str, ...]) -> IntArray:
@@ -99,35 +100,39 @@ class _Sets:
 
 @dataclass
 class _Content:
-    """Nodes and elements as listed."""
+    """Nodes and elements as listed in the deck."""
 
     node_numbers: list[IntArray] = field(default_factory=list)
     coordinates: list[Array] = field(default_factory=list)
-    elements: list[tuple[str, str, IntArray]] = field(default_factory=list)  #: type, kind, rows of number and nodes
-    ignored: dict[str, int] = field(default_factory=dict)  #: element type -> how many
-    orienting: dict[int, int] = field(default_factory=dict)  #: number of a line -> a node besides those of its ends
+    #: type in the deck, kind of cell, and rows of element number and node numbers
+    elements: list[tuple[str, str, IntArray]] = field(default_factory=list)
+    ignored: dict[str, int] = field(default_factory=dict)  #: number of ignored elements of each type
+    #: orientation node of each line, by line number, in addition to its end nodes
+    orienting: dict[int, int] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
 class DeckMesh:
-    """Nodes, elements and sets of a deck, by the numbers of the deck; sets by their names in upper case."""
+    """Nodes, elements and sets with the numbers of the deck; names of sets in upper case."""
 
     where: str
-    node_numbers: IntArray  #: (n_nodes,)
-    coordinates: Array  #: (n_nodes, 3)
-    elements: tuple[tuple[str, str, IntArray], ...]  #: type in the deck, kind, rows of number and nodes
-    node_sets: dict[str, IntArray]  #: numbers, ascending, of existing nodes
-    element_sets: dict[str, IntArray]  #: numbers, ascending
-    spelling: dict[str, str]  #: of sets, as they first appear: by "NSET name" and "ELSET name"
-    ignored: dict[str, int]  #: element type -> how many
+    node_numbers: IntArray  #: node numbers, (n_nodes,)
+    coordinates: Array  #: node positions, (n_nodes, 3)
+    #: type in the deck, kind of cell, and rows of element number and node numbers
+    elements: tuple[tuple[str, str, IntArray], ...]
+    node_sets: dict[str, IntArray]  #: numbers of the existing nodes in each set, ascending
+    element_sets: dict[str, IntArray]  #: numbers of the elements in each set, ascending
+    spelling: dict[str, str]  #: spelling of each set where it first appears, by "NSET name" and "ELSET name"
+    ignored: dict[str, int]  #: number of ignored elements of each type
     notes: tuple[str, ...] = ()
-    orienting: Mapping[int, int] = field(default_factory=dict)  #: number of a line -> a node besides those of its ends
-    instances: tuple[str, ...] = ()  #: whose numbers were moved, the k-th by k `instance_step`
+    #: orientation node of each line, by line number, in addition to its end nodes
+    orienting: Mapping[int, int] = field(default_factory=dict)
+    instances: tuple[str, ...] = ()  #: instances whose numbers were shifted, the k-th by k `instance_step`
     instance_step: int = 0
 
     def rows_of(self, numbers: IntArray) -> IntArray:
-        """Return the rows of node numbers, -1 if there is none."""
+        """Return the rows of these node numbers; -1 for a missing node."""
         order = np.argsort(self.node_numbers, kind="stable")
         return _rows(self.node_numbers, order, numbers)
 
@@ -159,7 +164,7 @@ def read_abaqus(path: Path, data: bytes) -> RawMesh:
 
 
 def naming_note(mesh: DeckMesh) -> list[str]:
-    """Return a line about line and face elements next to solids: in a mesh they only name edges and faces."""
+    """Return a note about lines and faces next to solids, which only name edges and faces in a mesh."""
     counts: dict[str, int] = {}
     if any(kind in SOLID_TYPES for _, kind, _ in mesh.elements):
         for name, kind, table in mesh.elements:
@@ -232,7 +237,7 @@ def deck_mesh(where: str, blocks: list[DeckBlock]) -> DeckMesh:
 
 
 def raw_mesh_of(mesh: DeckMesh, notes: list[str]) -> RawMesh:
-    """Return the mesh of a deck after its checks, with the names of sets as in the deck."""
+    """Return the mesh of a deck after checks, with the names of sets as in the deck."""
     groups = {mesh.spelling[f"ELSET {name}"]: members for name, members in mesh.element_sets.items()}
     order = np.argsort(mesh.node_numbers, kind="stable")
     raw_blocks = []
@@ -260,7 +265,7 @@ def raw_mesh_of(mesh: DeckMesh, notes: list[str]) -> RawMesh:
 
 
 def _take(here: str, block: DeckBlock, content: _Content, node_sets: _Sets, element_sets: _Sets) -> None:
-    """Add one block to the content and the sets."""
+    """Add the content of one block to nodes, elements and sets."""
     if block.keyword == "NODE":
         numbers, points = _nodes(here, block)
         content.node_numbers.append(numbers)
@@ -310,7 +315,7 @@ def _nodes(here: str, block: DeckBlock) -> tuple[IntArray, Array]:
 
 
 def _element_type(name: str) -> tuple[str, int]:
-    """Return meshio name and nodes per element; ("ignored", 0) for elements that are no part of a solid."""
+    """Return meshio name and number of nodes of an element type; ("ignored", 0) if it is not part of a solid."""
     upper = name.upper()
     if match := _SOLID.match(upper):
         n_nodes = int(match[1])
@@ -387,7 +392,7 @@ def _require_unique(where: str, what: str, numbers: IntArray) -> None:
 
 
 def _rows(numbers: IntArray, order: IntArray, wanted: IntArray) -> IntArray:
-    """Return the rows of node numbers, -1 if there is none."""
+    """Return the rows of these node numbers; -1 for a missing node."""
     ordered = numbers[order]
     at = np.minimum(np.searchsorted(ordered, wanted), len(ordered) - 1)
     return np.where(ordered[at] == wanted, order[at], -1)

@@ -1,4 +1,4 @@
-"""The blocks of an Abaqus or CalculiX deck that make its mesh, and the keywords that cannot be read truthfully."""
+"""Blocks of an Abaqus or CalculiX deck that define its mesh, and keywords that cannot be read correctly."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from fe_models.foundation.paths import near_file
 
 __all__ = ["DeckBlock", "deck_blocks", "mesh_blocks", "refuse_unread"]
 
-DEEPEST = 10  #: levels of files that include files
+DEEPEST = 10  #: largest depth of nested include files
 _REFUSED = {
     "SYSTEM": "write the nodes in global coordinates",
     "NGEN": "write the generated nodes out",
@@ -26,27 +26,27 @@ _REFUSED = {
 
 @dataclass(frozen=True)
 class DeckBlock:
-    """A keyword line with its parameters and the data lines below it."""
+    """Keyword line with its parameters and data lines."""
 
     keyword: str
-    parameters: dict[str, str]  #: upper-case names; "" for a parameter without value
+    parameters: dict[str, str]  #: value of each parameter, by upper-case name; "" for a parameter without value
     lines: list[str]
     line_number: int
-    file: str = ""  #: the included file in which it is; empty: the deck itself
+    file: str = ""  #: included file that contains the block; empty: the deck itself
 
     @property
     def place(self) -> str:
-        """Its place, for messages."""
+        """Position of the block in the files, for messages."""
         return f"{self.file}, line {self.line_number}" if self.file else f"line {self.line_number}"
 
     @property
     def tokens(self) -> list[str]:
-        """All data fields in sequence."""
+        """All data fields of the block in sequence."""
         return [word for line in self.lines for word in (w.strip() for w in line.split(",")) if word]
 
 
 def deck_blocks(where: str, text: str, folder: Path, included: dict[str, str] | None = None) -> list[DeckBlock]:
-    """Return all blocks of a deck, files that it includes put in (*INCLUDE, and INPUT= of a keyword).
+    """Return all blocks of a deck, including those of files referred to by *INCLUDE or INPUT=.
 
     Parameters
     ----------
@@ -97,11 +97,11 @@ class _Line:
 @dataclass(frozen=True)
 class _Files:
     folder: Path
-    included: dict[str, str]  #: path -> sha256
+    included: dict[str, str]  #: sha256 of each included file, by path
 
 
 def _lines(where: str, text: str, of: _Files, files: tuple[Path, ...]) -> Iterator[_Line]:
-    """Yield the non-empty lines of a deck, with those of included files in their place."""
+    """Yield the non-empty lines of a deck, with the lines of included files at their place."""
     name = files[-1].name if files else ""
     pending = ""
     for number, raw in enumerate(text.splitlines(), start=1):
@@ -122,7 +122,7 @@ def _lines(where: str, text: str, of: _Files, files: tuple[Path, ...]) -> Iterat
 
 
 def _with_input(where: str, line: _Line, of: _Files, files: tuple[Path, ...]) -> Iterator[_Line]:
-    """Yield a keyword line and, where it names a file, the lines of that."""
+    """Yield a keyword line and, if it refers to an input file, the lines of this file."""
     keyword, parameters = _head(line.text)
     if keyword != "INCLUDE":
         yield line
@@ -168,7 +168,7 @@ def _blocks(where: str, lines: Iterator[_Line]) -> Iterator[DeckBlock]:
 
 
 def _is_remark(text: str) -> bool:
-    """Whether a line above the first keyword is one of stars behind a sign that slipped in, such as >**."""
+    """Return whether a line before the first keyword is a comment behind a stray character, such as >**."""
     return text[1:].strip("* ") == "" and "**" in text
 
 
@@ -188,7 +188,7 @@ def _block(head: _Line, lines: list[str]) -> DeckBlock:
 
 
 def refuse_unread(where: str, blocks: list[DeckBlock]) -> None:
-    """Raise `MeshError` if nodes or elements are made or moved by keywords that are not read."""
+    """Raise `MeshError` if keywords that are not supported create or move nodes or elements."""
     for block in blocks:
         if block.keyword in _REFUSED:
             raise MeshError(f"{where}, {block.place}: *{block.keyword} is not read: {_REFUSED[block.keyword]}")
@@ -200,7 +200,7 @@ def refuse_unread(where: str, blocks: list[DeckBlock]) -> None:
 
 
 def _one_part(where: str, blocks: list[DeckBlock]) -> tuple[list[DeckBlock], list[str]]:
-    """Return the blocks of a deck without parts, or of its only part, and the omitted ones."""
+    """Return the blocks of a deck without parts, or of its only part, and the omitted blocks."""
     parts = [b for b in blocks if b.keyword == "PART"]
     instances = [b for b in blocks if b.keyword == "INSTANCE"]
     if not parts and not instances:
@@ -242,7 +242,7 @@ def _one_part(where: str, blocks: list[DeckBlock]) -> tuple[list[DeckBlock], lis
 
 
 def _left_out(blocks: list[DeckBlock]) -> list[str]:
-    """Name the keywords that affect the mesh but are not read."""
+    """Name the keywords that affect the mesh but are not supported."""
     counts: dict[str, int] = {}
     for block in blocks:
         if block.keyword in ("SURFACE", "TIE", "MPC", "EQUATION", "COUPLING", "RIGID BODY", "TRANSFORM"):

@@ -1,4 +1,4 @@
-"""The .full file of ANSYS: assembled stiffness, mass and damping, upper triangles."""
+"""File .full of ANSYS: upper triangles of assembled stiffness, mass and damping."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,22 +12,23 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["AnsysMatrices", "read_full"]
 
-FULL = -4  #: kind of file with symbolic assembly
-COMPONENTS = 6  #: labels 1 to 6: UX UY UZ ROTX ROTY ROTZ
-EQUATIONS, LUMPED, UNSYMMETRIC, N_EQUATIONS_CE, N_NODES = 1, 10, 13, 20, 32  #: words of the header
-STIFFNESS, MASS, DAMPING, DOFS, SCALES = (18, 19), (26, 27), (28, 29), (35, 36), (59, 60)  #: pointers
+FULL = -4  #: kind of a file with symbolic assembly
+COMPONENTS = 6  #: number of component labels: UX UY UZ ROTX ROTY ROTZ
+EQUATIONS, LUMPED, UNSYMMETRIC, N_EQUATIONS_CE, N_NODES = 1, 10, 13, 20, 32  #: positions of words in the header
+#: positions of pointers in the header
+STIFFNESS, MASS, DAMPING, DOFS, SCALES = (18, 19), (26, 27), (28, 29), (35, 36), (59, 60)
 
 
 @dataclass(frozen=True, eq=False)
 class AnsysMatrices:
-    """The contents of a .full file; rows that ANSYS holds are removed, because the file lacks their stiffness."""
+    """Content of a .full file without constrained rows, because the file lacks their stiffness."""
 
     where: str
-    K: sp.csc_array  #: stiffness, (n_dof, n_dof), both triangles, in the nodal systems
+    K: sp.csc_array  #: stiffness, (n_dof, n_dof), both triangles, in nodal coordinate systems
     M: sp.csc_array | None  #: mass, (n_dof, n_dof)
     D: sp.csc_array | None  #: damping, (n_dof, n_dof)
-    dofs: IntArray  #: (node number, component 0-5) of every row, (n_dof, 2)
-    removed: IntArray  #: (node number, component) of the rows that are held, (n_removed, 2)
+    dofs: IntArray  #: (node number, component 0-5) of each row, (n_dof, 2)
+    removed: IntArray  #: (node number, component) of the constrained rows, (n_removed, 2)
 
 
 def read_full(path: str | Path) -> AnsysMatrices:
@@ -90,7 +91,7 @@ def read_full(path: str | Path) -> AnsysMatrices:
 
 
 def _mass(file: AnsysFile, n: int) -> sp.csc_array | None:
-    """Return the mass: a matrix, or one record of numbers on its diagonal if it is lumped."""
+    """Return the mass matrix, or the diagonal matrix of a single record if the mass is lumped."""
     if not file.header[LUMPED]:
         return _matrix(file, "mass", MASS, n)
     raise MatrixError(
@@ -99,7 +100,7 @@ def _mass(file: AnsysFile, n: int) -> sp.csc_array | None:
 
 
 def _matrix(file: AnsysFile, what: str, pointer: tuple[int, int], n: int) -> sp.csc_array | None:
-    """Return a matrix from its upper triangle, None if it does not exist."""
+    """Return a full matrix from its upper triangle; None if the file does not contain it."""
     at = file.pointer(*pointer)
     if not at:
         return None

@@ -1,4 +1,4 @@
-"""Binary files of ANSYS: records of 4-byte words, little endian, found by pointers in a header."""
+"""Binary files of ANSYS: records of 4-byte words, little endian, located by pointers in a header."""
 
 from pathlib import Path
 
@@ -9,17 +9,17 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["AnsysFile", "is_ansys_binary"]
 
-INTEGERS, REALS = 0x80000000, 0x00000000  #: flags of a record
-STANDARD_WORDS, HEADER_AT = 100, 103  #: length of the standard header; word at which the header of the file begins
+INTEGERS, REALS = 0x80000000, 0x00000000  #: flags of records of integers and reals
+STANDARD_WORDS, HEADER_AT = 100, 103  #: length of the standard header, and word at which the file header begins
 
 
 def is_ansys_binary(content: bytes) -> bool:
-    """Whether a file that begins so is a binary file of ANSYS: a record of 100 integers."""
+    """Return whether the first bytes are those of a binary ANSYS file: a record of 100 integers."""
     return content[:8] == np.array([STANDARD_WORDS, INTEGERS], "<u4").tobytes()
 
 
 class AnsysFile:
-    """A file of records, each its length in words, a flag, the data, and its length again.
+    """File of records; each consists of its length in words, a flag, the data, and the length again.
 
     Raises
     ------
@@ -48,7 +48,7 @@ class AnsysFile:
             )
 
     def record(self, at: int, what: str, flag: int) -> tuple[np.ndarray, int]:
-        """Return the words of the record that begins at this word, and where the next one begins."""
+        """Return the words of the record that begins at this word, and the start of the next record."""
         if not 0 < at <= self.n_words - 3:
             raise MatrixError(
                 f"{self.where}: {what}: expected a record at word {at}, the file has {self.n_words}: it is truncated"
@@ -73,24 +73,24 @@ class AnsysFile:
         return self.words[at + 2 : end], end + 1
 
     def integers(self, at: int, what: str, n: int | None = None) -> IntArray:
-        """Return a record of integers, of n of them if that is known."""
+        """Return a record of integers, after checking their number if n is known."""
         data, _ = self.record(at, what, INTEGERS)
         self._require(what, len(data), n)
         return data.astype(np.int64)
 
     def reals(self, at: int, what: str, n: int | None = None) -> Array:
-        """Return a record of doubles, of n of them if that is known."""
+        """Return a record of doubles, after checking their number if n is known."""
         data, _ = self.record(at, what, REALS)
         self._require(what, len(data) / 2, n)
         return self.doubles(data)
 
     @staticmethod
     def doubles(data: np.ndarray) -> Array:
-        """Return the words of a record as numbers."""
+        """Return the words of a record as float64 numbers."""
         return np.frombuffer(data.tobytes(), "<f8")
 
     def pointer(self, low: int, high: int) -> int:
-        """Return a pointer that the header holds in two words."""
+        """Return a pointer from its two words in the header."""
         return int(self.header[low]) & 0xFFFFFFFF | int(self.header[high]) << 32
 
     def _require(self, what: str, got: float, n: int | None) -> None:

@@ -1,4 +1,4 @@
-"""The .sub file of ANSYS: a superelement, of substructuring or component mode synthesis."""
+"""File .sub of ANSYS: a superelement from substructuring or component mode synthesis."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,17 +13,18 @@ from fe_models.foundation.arrays import SYMMETRY_DEFECT, Array, IntArray
 
 __all__ = ["SCALAR", "AnsysSuperelement", "read_sub"]
 
-SCALAR = -1  #: component of a modal coordinate
-SUB = 8  #: kind of file
-ROWS, LABELS, NODES, N_TRANSFORMED, N_MODES = 1, 4, 8, 20, 43  #: words of the header
+SCALAR = -1  #: component number of a modal coordinate
+SUB = 8  #: kind of a .sub file
+ROWS, LABELS, NODES, N_TRANSFORMED, N_MODES = 1, 4, 8, 20, 43  #: positions of words in the header
 UNSYMMETRIC, HAS_STIFFNESS, HAS_MASS, HAS_DAMPING, HAS_STRESS_STIFFNESS, N_LOADS = 9, 10, 11, 12, 13, 14
-LOADS, MATRICES, MASS_AT, LABELS_AT, DOFS, NUMBERS, POSITIONS = 19, 21, 26, 30, 31, 34, 35  #: pointers
-MASS_TOLERANCE = 1e-6  #: of the mass in the header against that of the matrix
+#: positions of pointers in the header
+LOADS, MATRICES, MASS_AT, LABELS_AT, DOFS, NUMBERS, POSITIONS = 19, 21, 26, 30, 31, 34, 35
+MASS_TOLERANCE = 1e-6  #: relative difference between the mass in the header and the mass of the matrix
 
 
 @dataclass(frozen=True, eq=False)
 class AnsysSuperelement:
-    """What a .sub file says, in its units; matrices in the nodal systems."""
+    """Content of a .sub file in its units; matrices are in nodal coordinate systems."""
 
     where: str
     K: Array  #: stiffness, (n_dof, n_dof)
@@ -32,10 +33,11 @@ class AnsysSuperelement:
     dofs: (
         IntArray  #: (node number, component 0-5, or `SCALAR` with the modal coordinate from 1) of each row, (n_dof, 2)
     )
-    positions: Mapping[int, Array]  #: node number -> (3,)
-    systems: Mapping[int, Array]  #: node number -> (3, 3), columns are the axes of its dofs; others: global axes
-    loads: Array  #: (n_dof, n_loads)
-    mass: float | None  #: of the whole part, as the file says it
+    positions: Mapping[int, Array]  #: position of each node, (3,), by node number
+    #: axes of the dofs of a node as columns, (3, 3), by node number; other nodes: global axes
+    systems: Mapping[int, Array]
+    loads: Array  #: load vectors, (n_dof, n_loads)
+    mass: float | None  #: mass of the whole part as stated in the file; None: unknown
 
 
 def read_sub(path: str | Path) -> AnsysSuperelement:
@@ -110,7 +112,7 @@ def read_sub(path: str | Path) -> AnsysSuperelement:
 
 
 def _rows(file: AnsysFile, n: int, n_modes: int, numbers: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the dofs of the rows, and the nodes of the list that carry modal coordinates."""
+    """Return the dofs of the rows, and the nodes in the list that represent modal coordinates."""
     header = file.header
     labels = file.integers(int(header[LABELS_AT]), "labels of dofs", int(header[LABELS]))
     if not len(labels) or labels.min() < 1 or labels.max() > 6:
@@ -155,7 +157,7 @@ def _places(file: AnsysFile, numbers: IntArray, carriers: IntArray) -> tuple[dic
 
 
 def _require_mass(where: str, M: Array, dofs: IntArray, mass: float) -> None:
-    """Refuse a matrix whose translations do not have the mass that the file says."""
+    """Raise an error if the translations of a mass matrix do not have the mass stated in the file."""
     e = np.zeros((len(M), 3))
     for k in range(3):
         e[dofs[:, 1] == k, k] = 1.0

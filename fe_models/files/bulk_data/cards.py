@@ -1,4 +1,4 @@
-"""Cards of Nastran's bulk data: free, small and large fields, continuations joined, replicated cards written out."""
+"""Cards of Nastran bulk data: free, small and large fields, with continuations joined and replications expanded."""
 
 import re
 from collections.abc import Iterator
@@ -8,11 +8,11 @@ from fe_models.errors import MeshError
 
 __all__ = ["Card", "read_cards"]
 
-SMALL, LARGE = (8, 8), (16, 4)  #: width and number of the data fields of a line
-MOST_REPEATED = 1_000_000  #: cards that one line may stand for
-INCREMENT = re.compile(r"\*\(?([^()]+)\)?$")  #: of a replicated field, *(2) or *2
-REPEATED = re.compile(r"=\(?(\d+)\)?$")  #: how many more cards, =(8) or =8
-EXPONENT = re.compile(r"(?<=[\d.])([+-]\d+)$")  #: of a real without its letter, 1.5-3
+SMALL, LARGE = (8, 8), (16, 4)  #: width of the data fields, and their number on a line
+MOST_REPEATED = 1_000_000  #: largest number of cards that one line may replicate
+INCREMENT = re.compile(r"\*\(?([^()]+)\)?$")  #: increment of a replicated field, *(2) or *2
+REPEATED = re.compile(r"=\(?(\d+)\)?$")  #: number of further cards in a replication, =(8) or =8
+EXPONENT = re.compile(r"(?<=[\d.])([+-]\d+)$")  #: exponent of a real number without letter, as in 1.5-3
 
 
 @dataclass(frozen=True)
@@ -21,14 +21,14 @@ class Card:
 
     name: str
     fields: tuple[str, ...]
-    where: str  #: file, line and name, for messages
+    where: str  #: file, line and name of the card, for messages
 
     def text(self, k: int) -> str:
-        """Return field k; empty where it is blank or beyond the last one."""
+        """Return the text of field k; an empty text if it is blank or missing."""
         return self.fields[k - 1] if 0 < k <= len(self.fields) else ""
 
     def integer(self, k: int, default: int | None = None) -> int:
-        """Return field k as an integer.
+        """Return the integer in field k.
 
         Raises
         ------
@@ -44,7 +44,7 @@ class Card:
             raise MeshError(f"{self.where}: field {k + 1}: expected an integer, got {word!r}") from None
 
     def real(self, k: int, default: float | None = None) -> float:
-        """Return field k as a real; Nastran may leave out the letter of the exponent (1.5-3) or write D.
+        """Return the real number in field k; Nastran permits D as exponent letter, or none (1.5-3).
 
         Raises
         ------
@@ -61,7 +61,7 @@ class Card:
 
 
 def real_of(word: str) -> float:
-    """Return the number of a field; ValueError if there is none."""
+    """Return the real number in a field; raise ValueError if it is not a number."""
     try:
         return float(word)
     except ValueError:  # D, or no letter of the exponent
@@ -70,7 +70,7 @@ def real_of(word: str) -> float:
 
 
 def read_cards(where: str, text: str) -> Iterator[Card]:
-    """Yield the cards behind the first BEGIN, or from the first line where there is none, up to ENDDATA.
+    """Yield the cards after the first BEGIN, or from the first line if there is none, up to ENDDATA.
 
     Raises
     ------
@@ -134,7 +134,7 @@ def read_cards(where: str, text: str) -> Iterator[Card]:
 
 
 def _replicated(here: str, fields: list[str], steps: list[str]) -> list[str]:
-    """Return the fields of the next card: = takes that of the card before, == also all behind it, *(x) adds x."""
+    """Return the fields of a replicated card: = repeats a field, == all following fields, *(x) adds x."""
     made: list[str] = []
     for k, word in enumerate(steps):
         before = fields[k] if k < len(fields) else ""
@@ -157,7 +157,7 @@ def _replicated(here: str, fields: list[str], steps: list[str]) -> list[str]:
 
 
 def _fields(line: str) -> tuple[str, list[str], str, str]:
-    """Return the first field, the data fields of a line, the mark of its continuation, and what stands behind it."""
+    """Return first field, data fields, continuation mark and remaining text of a line."""
     if "," in line:
         parts = [part.strip() for part in line.split(",")]
         if line[0] not in " +*=":  # blanks may separate the name from the first field

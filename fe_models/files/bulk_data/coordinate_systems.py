@@ -11,7 +11,8 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["CoordinateSystem", "GridPoints", "read_grid_points"]
 
-SMALLEST_SINE = 1e-6  #: between the z axis and the point that gives the xz plane
+#: smallest sine of the angle between the z axis and the direction to the point that defines the xz plane
+SMALLEST_SINE = 1e-6
 SYSTEM_CARDS = tuple(f"CORD{kind}{shape}" for kind in "12" for shape in "RCS")
 
 
@@ -20,11 +21,11 @@ class CoordinateSystem:
     """A rectangular ("R"), cylindrical ("C") or spherical ("S") system, its frame in basic axes."""
 
     shape: str
-    origin: Array  #: (3,), basic axes
-    axes: Array  #: (3, 3), columns x, y, z, basic axes
+    origin: Array  #: origin in basic axes, (3,)
+    axes: Array  #: axes x, y, z as columns in basic axes, (3, 3)
 
     def place(self, coordinates: Array) -> Array:
-        """Return the basic position, (3,), of (x, y, z), (r, theta, z) or (r, theta, phi), angles in degrees."""
+        """Return the basic position, (3,), of (x, y, z), (r, theta, z) or (r, theta, phi), with angles in degrees."""
         a, b, c = coordinates
         if self.shape == "R":
             local = np.array([a, b, c])
@@ -36,7 +37,7 @@ class CoordinateSystem:
         return np.asarray(self.origin + self.axes @ local)
 
     def axes_at(self, point: Array) -> Array:
-        """Return the directions of displacement at a point, (3, 3), columns in basic axes.
+        """Return the displacement directions at a point as columns in basic axes, (3, 3).
 
         They turn with the point in cylindrical and spherical systems; on the z axis the radius points along x.
         """
@@ -60,15 +61,17 @@ BASIC = CoordinateSystem("R", np.zeros(3), np.eye(3))
 
 @dataclass(frozen=True, eq=False)
 class GridPoints:
-    """The grid points of a model."""
+    """Grid points of a model."""
 
-    positions: dict[int, Array] = field(default_factory=dict)  #: id -> (3,), basic axes
-    axes: dict[int, Array] = field(default_factory=dict)  #: id -> (3, 3) columns; those in basic axes are not here
-    systems: dict[int, CoordinateSystem] = field(default_factory=dict)  #: by id, 0 is the basic one
+    positions: dict[int, Array] = field(default_factory=dict)  #: position of each grid point in basic axes, (3,)
+    #: displacement axes of a grid point as columns, (3, 3); grid points with basic axes are omitted
+    axes: dict[int, Array] = field(default_factory=dict)
+    #: coordinate systems by id; 0 is the basic system
+    systems: dict[int, CoordinateSystem] = field(default_factory=dict)
 
 
 def read_grid_points(cards: Iterable[Card], *, only_positions: bool = False) -> GridPoints:
-    """Return the grid points of the GRID cards, with GRDSET, in the systems of the CORD cards.
+    """Return the grid points of GRID and GRDSET cards in the systems of CORD cards.
 
     A card that is there twice with the same fields counts once. With `only_positions` displacement axes (CD) and
     systems that place no grid point are not looked at.
@@ -86,7 +89,7 @@ def read_grid_points(cards: Iterable[Card], *, only_positions: bool = False) -> 
 
 
 class _Resolver:
-    """Systems that refer to others and to grid points, which refer to systems: each is placed when it is asked for."""
+    """Resolver of systems and grid points that refer to each other; each is computed when it is needed."""
 
     def __init__(self, cards: tuple[Card, ...]) -> None:
         self.grids: dict[int, Card] = {}
@@ -112,7 +115,7 @@ class _Resolver:
                         )
 
     def all(self) -> GridPoints:
-        """Place every grid point and every system."""
+        """Compute all grid points and systems."""
         axes = {}
         for number, card in self.grids.items():
             place = self.place(number, card.where)
@@ -137,7 +140,7 @@ class _Resolver:
         return self.places[number]
 
     def system(self, number: int, asked_by: str) -> CoordinateSystem:
-        """Return a system."""
+        """Return a coordinate system, and compute it if necessary."""
         if number not in self.done:
             if number not in self.definitions:
                 raise MeshError(f"{asked_by}: needs coordinate system {number}, which is not defined")
@@ -160,7 +163,7 @@ class _Resolver:
 
 
 def _axes(card: Card, number: int, A: Array, B: Array, C: Array) -> Array:
-    """Return axes with z from A to B and C in the xz plane, (3, 3), columns."""
+    """Return axes as columns, (3, 3), with z from A to B and with C in the xz plane."""
     z, in_plane = B - A, C - A
     y = np.cross(z, in_plane)
     if not np.linalg.norm(y) > SMALLEST_SINE * np.linalg.norm(z) * np.linalg.norm(in_plane):
@@ -170,7 +173,7 @@ def _axes(card: Card, number: int, A: Array, B: Array, C: Array) -> Array:
 
 
 def _alike(card: Card, other: Card) -> bool:
-    """Whether two cards say the same, however they write their numbers."""
+    """Return whether two cards have the same content, however their numbers are written."""
     if card.name != other.name:
         return False
     for k in range(1, max(len(card.fields), len(other.fields)) + 1):

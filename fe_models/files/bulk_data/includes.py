@@ -1,4 +1,4 @@
-"""The text of a deck of Nastran with the files that it includes, and its sections: main bulk data, superelements."""
+"""Text of a Nastran deck including its include files, and its sections: main bulk data and superelements."""
 
 import re
 from hashlib import sha256
@@ -9,12 +9,12 @@ from fe_models.foundation.paths import near_file
 
 __all__ = ["bulk_parts", "bulk_text"]
 
-DEEPEST = 10  #: levels of files that include files
+DEEPEST = 10  #: largest depth of nested include files
 SECTION = re.compile(r"(?i)\s*BEGIN(?:\s+BULK)?(?:\s+SUPER\s*=?\s*(\d+))?\s*")
 
 
 def bulk_text(where: str, path: Path, text: str, included: dict[str, str], files: tuple[Path, ...] = ()) -> str:
-    """Return a deck with its includes put in, and without the BEGIN BULK and ENDDATA of these.
+    """Return a deck with its include files inserted, without their BEGIN BULK and ENDDATA lines.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def bulk_text(where: str, path: Path, text: str, included: dict[str, str], files
 
 
 def bulk_parts(where: str, text: str) -> dict[int, str]:
-    """Return the sections of a deck: 0 for the main bulk data, and the number of each superelement -> its text.
+    """Return the text of each section: 0 for the main bulk data, otherwise the number of the superelement.
 
     Each text has as many lines as the deck, so that messages name the right line.
 
@@ -90,7 +90,7 @@ def bulk_parts(where: str, text: str) -> dict[int, str]:
 
 
 def _section(where: str, line: str) -> int:
-    """Return the superelement that a line BEGIN opens, 0 for the main bulk data."""
+    """Return the superelement number in a BEGIN line; 0 for the main bulk data."""
     match = SECTION.fullmatch(line.partition("$")[0])
     if match is None:
         raise MeshError(f"{where}: {line.strip()}: expected BEGIN BULK or BEGIN SUPER = n; other sections are not read")

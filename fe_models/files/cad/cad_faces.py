@@ -1,4 +1,4 @@
-"""The faces of a solid: what kind of surface each is, where, how large, and which way it looks."""
+"""Faces of a solid: kind of surface, position, size and outward direction."""
 
 from dataclasses import dataclass, replace
 from types import ModuleType
@@ -14,9 +14,9 @@ __all__ = ["FACE_KINDS", "CadFace", "cad_faces"]
 FACE_KINDS = ("plane", "cylinder", "cone", "sphere", "torus", "other")
 NAMED = {"Plane": "plane", "Cylinder": "cylinder", "Cone": "cone", "Sphere": "sphere", "Torus": "torus"}
 SAMPLES = np.linspace(0.08, 0.92, 7)  #: fractions of the ranges of both surface parameters at which a face is sampled
-EQUAL = 1e-5  #: relative difference of curvatures or directions that are taken for one
-KERNEL_TOLERANCE = 1e-7  #: by which the kernel widens its boxes
-INSIDE = 1e-5  #: of the diagonal: how far from a face the side of the material is asked for
+EQUAL = 1e-5  #: relative difference up to which curvatures or directions are equal
+KERNEL_TOLERANCE = 1e-7  #: margin that the CAD kernel adds to its bounding boxes
+INSIDE = 1e-5  #: distance from a face over the diagonal at which points are tested for being inside the material
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +76,7 @@ class CadFace:
 
     @property
     def is_inner(self) -> bool:
-        """Whether it lies between two solids."""
+        """Whether the face is between two solids."""
         return len(self.solids) > 1
 
 
@@ -140,7 +140,7 @@ def _face(
 
 
 def _box(gmsh: ModuleType, tag: int, points: Array) -> Array:
-    """Return the least and greatest coordinates, (2, 3): those of the kernel, or by samples where they are loose."""
+    """Return the corners of the bounding box, (2, 3), from the kernel, or from samples if the kernel is inaccurate."""
     if gmsh.model.getType(2, tag) in NAMED:
         box = np.array(gmsh.model.getBoundingBox(2, tag)).reshape(2, 3)
         return box + np.array([[KERNEL_TOLERANCE], [-KERNEL_TOLERANCE]])
@@ -178,7 +178,7 @@ def _sampled(gmsh: ModuleType, tag: int) -> tuple[Array, Array, Array, Array]:
 
 
 def _kind_of(curvatures: Array, directions: Array, diagonal: float) -> str:
-    """Return the kind of a surface that the file calls a revolution, an extrusion or a spline, by its curvatures."""
+    """Return the true kind of a revolution, an extrusion or a spline surface from its curvatures."""
     if not len(curvatures):
         return "other"
     small, large = np.abs(curvatures).T
@@ -195,7 +195,7 @@ def _kind_of(curvatures: Array, directions: Array, diagonal: float) -> str:
 def _axis(
     kind: str, points: Array, normals: Array, curvatures: Array, directions: Array, centre: Array
 ) -> tuple[float, Array, Array | None]:
-    """Return radius, a point on the axis beside the centroid (or the centre) and the direction of the axis."""
+    """Return radius, a point on the axis next to the centroid (or the centre), and direction of the axis."""
     radius = 1 / float(np.abs(curvatures[:, 1]).mean())
     axis = None if kind == "sphere" else _rounded(directions[0, 0])
     if axis is not None and axis[np.abs(axis) > 0.1][0] < 0:
@@ -213,7 +213,7 @@ def _axis(
 def _outward(
     gmsh: ModuleType, volumes: list[int], points: Array, normals: Array, diagonal: float
 ) -> tuple[Array, Array] | None:
-    """Return the outward normal and the point where it was found; None where no point tells."""
+    """Return the outward normal and the point at which it was determined; None if it is undetermined."""
     for step in (INSIDE, INSIDE * 10):
         for point, normal in zip(points, normals, strict=True):
             ahead, behind = (
@@ -225,7 +225,7 @@ def _outward(
 
 
 def _rounded(direction: Array) -> Array:
-    """Return the direction without components that are rounding."""
+    """Return the direction with components within rounding set to zero."""
     unit = direction / np.linalg.norm(direction)
     cut = np.where(np.abs(unit) < 1e-9, 0.0, unit)
     return np.asarray(cut / np.linalg.norm(cut))

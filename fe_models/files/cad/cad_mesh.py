@@ -1,4 +1,4 @@
-"""The mesh of a CAD file: tetrahedra of the size that is asked for, with the faces of interfaces as groups."""
+"""Mesh of a CAD file: tetrahedra of the requested size, with the faces of interfaces as groups."""
 
 import math
 from collections.abc import Iterable
@@ -22,14 +22,14 @@ from fe_models.meshes.mesh import Mesh
 
 __all__ = ["MeshSize", "mesh_cad"]
 
-SMALLEST = 0.05  #: of the size: elements along sharp curvature and small features, where nothing else is said
-MOST_ELEMENTS = 5e6  #: estimated, above which a size is taken for a mistake in the unit
+SMALLEST = 0.05  #: default for the smallest over the largest element size, at sharp curvature and small features
+MOST_ELEMENTS = 5e6  #: estimated number of elements above which the size is probably in a wrong unit
 
 
 @dataclass(frozen=True)
 @checked_fields(ArgumentError)
 class MeshSize:
-    """How fine a CAD geometry is meshed.
+    """Element sizes for the mesh of a CAD geometry.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class MeshSize:
             )
 
     def description(self, symbol: str) -> str:
-        """Return the size in words, with the symbol of the length unit."""
+        """Return a description of the sizes with the symbol of the length unit."""
         curvature = f", {self.curvature:g} elements around a circle" if self.curvature else ""
         optimised = "" if self.optimise else ", not optimised"
         return f"{self.size:.6g} {symbol}{curvature}, order {self.order}{optimised}"
@@ -127,7 +127,7 @@ def mesh_cad(path: str | Path, size: MeshSize, *, units: Units | str, faces: Ite
 
 
 def _set_size(model: CadModel, size: MeshSize) -> None:
-    """Give gmsh the sizes in its unit; options come back as they were when the model is closed."""
+    """Set the element sizes in gmsh in its unit; the options are restored when the model is closed."""
     largest = size.size * model.scale
     volume = model.part.volume
     estimate = 9 * volume / size.size**3  # an edge of length h makes about h³/9 of a tetrahedron
@@ -149,7 +149,7 @@ def _set_size(model: CadModel, size: MeshSize) -> None:
 
 
 def _name_groups(model: CadModel, selectors: tuple[str, ...]) -> None:
-    """Make physical groups of solids, faces and selections."""
+    """Create physical groups of solids, faces and selections."""
     gmsh, part = model.gmsh, model.part
     solids = [tag for _, tag in gmsh.model.getEntities(3)]
     groups: dict[tuple[int, str], list[int]] = {}
@@ -170,12 +170,12 @@ def _name_groups(model: CadModel, selectors: tuple[str, ...]) -> None:
 
 
 def _plain(name: str) -> str:
-    """Return a name without quotes and line ends, which the mesh file cannot carry."""
+    """Return a name without quotes and line ends, which mesh files cannot contain."""
     return " ".join(name.replace('"', "'").split())
 
 
 def _require_whole(where: str, gmsh: ModuleType, advice: str) -> None:
-    """Raise unless every solid has elements and none is inverted."""
+    """Raise an error unless every solid has elements and none is inverted."""
     for _, tag in gmsh.model.getEntities(3):
         _, elements, _ = gmsh.model.mesh.getElements(3, tag)
         if not elements or not len(elements[0]):

@@ -1,4 +1,4 @@
-"""A CAD file opened in gmsh: its solids, in millimetres or as they are, its faces, and what its numbers mean."""
+"""CAD file opened in gmsh: its solids, faces and length unit."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -23,7 +23,7 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["CadModel", "CadPart", "open_cad", "read_cad"]
 
-OVERLAP = 1e-6  #: relative volume that solids may share by rounding
+OVERLAP = 1e-6  #: shared volume of two solids over their volume, up to which it is rounding
 OPTIONS: dict[str, float | str] = {
     "Geometry.OCCImportLabels": 1,
     "Geometry.OCCScaling": 1.0,
@@ -31,9 +31,10 @@ OPTIONS: dict[str, float | str] = {
     "Mesh.MeshSizeMax": 1e22,
     "Mesh.MeshSizeFromCurvature": 0,
     "Mesh.ElementOrder": 1,
-}  #: as they begin; what is set while the model is open goes with it
-MILLIMETRE = 1e-3  #: [m]
-KERNEL_UNITS = {1e-3: "MM", 1e-2: "CM", 1.0: "M", 1e3: "KM", 0.0254: "INCH", 0.3048: "FT"}  #: [m] -> name
+}  #: gmsh options at the start; changes while the model is open are discarded with it
+MILLIMETRE = 1e-3  #: one millimetre [m]
+#: name of each length unit of the CAD kernel, by its size in metres
+KERNEL_UNITS = {1e-3: "MM", 1e-2: "CM", 1.0: "M", 1e3: "KM", 0.0254: "INCH", 0.3048: "FT"}
 
 
 @presented
@@ -79,7 +80,7 @@ class CadPart:
 
     @property
     def description(self) -> str:
-        """What the file is and how its unit met that of the job."""
+        """Description of the file and of the conversion between its unit and that of the job."""
         symbol = self.units.length_symbol
         unit = f"in {self.unit}, taken to {symbol}" if self.unit else f"without unit, its numbers taken as {symbol}"
         n, m = len(self.solids), len(self.faces)
@@ -92,7 +93,7 @@ class CadModel:
 
     gmsh: ModuleType
     part: CadPart
-    scale: float  #: the length unit of the job over that of the model
+    scale: float  #: length unit of the job over that of the model
 
 
 def read_cad(path: str | Path, *, units: Units | str) -> CadPart:
@@ -119,7 +120,7 @@ def read_cad(path: str | Path, *, units: Units | str) -> CadPart:
 
 @contextmanager
 def open_cad(path: str | Path, *, units: Units | str) -> Iterator[CadModel]:
-    """Open a CAD file in gmsh, as `read_cad` does, for as long as the context lasts.
+    """Open a CAD file in gmsh, as `read_cad` does, until the context ends.
 
     (1) the file's unit is read from its text; gmsh converts STEP to millimetres whatever it is, and leaves IGES in its
         own, since the kernel sews faces whose edges are 1e-6 apart at most, which is less than the digits of metres;
@@ -178,7 +179,7 @@ def _volume(gmsh: ModuleType) -> float:
 
 
 def _sew(where: str, gmsh: ModuleType, shapes: list[tuple[int, int]]) -> None:
-    """Make one solid of faces that close; IGES files often hold no more than faces."""
+    """Make one solid from faces that enclose a volume; IGES files often contain only faces."""
     faces = [tag for dim, tag in shapes if dim == 2]
     if not faces:
         raise MeshError(f"{where}: expected a solid, got neither solids nor faces; is the file whole? Export the solid")
@@ -199,7 +200,7 @@ def _sew(where: str, gmsh: ModuleType, shapes: list[tuple[int, int]]) -> None:
 
 
 def _is_one_shell(gmsh: ModuleType) -> bool:
-    """Whether all faces hang together by edges: a body with a cavity cannot be told from two bodies."""
+    """Return whether all faces are connected by edges; a body with a cavity cannot be told from two bodies."""
     left = {tag for _, tag in gmsh.model.getEntities(2)}
     front = {left.pop()}
     while front:
@@ -211,7 +212,7 @@ def _is_one_shell(gmsh: ModuleType) -> bool:
 
 
 def _join(where: str, gmsh: ModuleType) -> None:
-    """Cut several solids where they touch, so that they share faces; solids that overlap are refused."""
+    """Cut several solids where they touch, so that they share faces; raise an error if solids overlap."""
     solids = gmsh.model.getEntities(3)
     if len(solids) < 2:
         return

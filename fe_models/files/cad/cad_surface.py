@@ -1,4 +1,4 @@
-"""Triangles of the faces of a CAD file, for drawing: a coarse mesh of the surface alone."""
+"""Triangles of the faces of a CAD file for drawing: a coarse mesh of the surface."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +12,8 @@ from fe_models.foundation.units import Units
 
 __all__ = ["CadSurface", "surface_of_cad"]
 
-AROUND = 36  #: triangles around a full circle
-FINENESS = 0.05  #: largest edge over the diagonal of the body
+AROUND = 36  #: number of triangles around a full circle
+FINENESS = 0.05  #: largest edge length over the diagonal of the body
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,12 +21,12 @@ class CadSurface:
     """A CAD part with triangles on its outer faces."""
 
     part: CadPart
-    nodes: Array  #: (n_nodes, 3), in the length unit of the part's `units`
-    triangles: dict[int, IntArray]  #: number of the face -> triangles, (n, 3)
+    nodes: Array  #: node positions, (n_nodes, 3), in the length unit of `units` of the part
+    triangles: dict[int, IntArray]  #: triangles of each face, (n, 3), by face number
 
 
 def surface_of_cad(path: str | Path, *, units: Units | str) -> CadSurface:
-    """Read a CAD file as `read_cad` does, and lay triangles on its outer faces.
+    """Read a CAD file as `read_cad` does, and triangulate its outer faces.
 
     Raises
     ------

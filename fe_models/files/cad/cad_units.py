@@ -1,4 +1,4 @@
-"""The length unit that a CAD file names, read from its text: gmsh converts by it and does not say so.
+"""Length unit in the text of a CAD file; gmsh converts the unit without reporting it.
 
 STEP: the entities of LENGTH_UNIT that the contexts of shapes name, with SI_UNIT(prefix, .METRE.), or with
 CONVERSION_BASED_UNIT(name, factor), whose factor is a measure in another unit. IGES: fields 14 and 15 of the global
@@ -12,7 +12,8 @@ from fe_models.errors import MeshError
 
 __all__ = ["CAD_SUFFIXES", "length_unit"]
 
-CAD_SUFFIXES = {".step": "STEP", ".stp": "STEP", ".iges": "IGES", ".igs": "IGES", ".brep": "BREP"}  #: suffix -> format
+#: format of each suffix
+CAD_SUFFIXES = {".step": "STEP", ".stp": "STEP", ".iges": "IGES", ".igs": "IGES", ".brep": "BREP"}
 
 PREFIXES = {
     "$": 1.0, ".MILLI.": 1e-3, ".CENTI.": 1e-2, ".DECI.": 1e-1, ".MICRO.": 1e-6, ".NANO.": 1e-9, ".KILO.": 1e3,
@@ -31,7 +32,7 @@ CONTEXT = re.compile(rb"GLOBAL_UNIT_ASSIGNED_CONTEXT\s*\(\s*\(([^)]*)\)\s*\)")
 
 
 def length_unit(path: Path, content: bytes) -> tuple[str, float] | None:
-    """Return the name of the length unit of a CAD file and its size in metres; None for BREP, which has none.
+    """Return name and size in metres of the length unit of a CAD file; None for BREP, which has no unit.
 
     Raises
     ------
@@ -56,7 +57,7 @@ def _name(metres: float) -> str:
 
 
 def _step_units(path: Path, content: bytes) -> set[float]:
-    """Return the sizes in metres of the length units in the contexts of the shapes."""
+    """Return the sizes of the length units in the contexts of the shapes [m]."""
     if b"ISO-10303-21" not in content[:4096]:
         raise MeshError(
             f"geometry {path}: expected a STEP file (ISO-10303-21 in its first line), got {content[:24]!r}; "
@@ -70,7 +71,7 @@ def _step_units(path: Path, content: bytes) -> set[float]:
 
 
 def _step_unit(path: Path, text: dict[int, str], number: int, depth: int = 0) -> float:
-    """Return the size of one length unit [m]: of the SI, or a multiple of another."""
+    """Return the size of one length unit [m]: an SI unit, or a multiple of another unit."""
     body = text.get(number, "")
     if (found := PREFIX.search(body)) and found[1] in PREFIXES:
         return PREFIXES[found[1]]
@@ -90,7 +91,7 @@ def _step_unit(path: Path, text: dict[int, str], number: int, depth: int = 0) ->
 
 
 def _iges_unit(path: Path, content: bytes) -> float:
-    """Return the size of the unit in the global section [m]."""
+    """Return the size of the unit in the global section of an IGES file [m]."""
     lines = content[:200_000].decode("latin-1").splitlines()
     text = "".join(line[:72] for line in lines if line[72:73] == "G")
     if not text:

@@ -33,9 +33,9 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["KEYS", "chosen_faces", "face_words"]
 
-RADIUS = 1e-4  #: relative difference of radii that are taken for one
-PLACE = 1e-5  #: of the size of the body: difference of places that are taken for one
-ANGLE = 1e-4  #: of directions that are taken for one [rad]
+RADIUS = 1e-4  #: relative difference of radii up to which they are equal
+PLACE = 1e-5  #: difference of positions over the body size, up to which they are equal
+ANGLE = 1e-4  #: angle between directions up to which they are equal [rad]
 KEYS = ("r", "d", "axis", "normal", "x", "y", "z", "name", "colour", "color", "near", "face")
 WORDS = (*FACE_KINDS, "hole", "outside", "box", "face", *(f"{key}=" for key in KEYS if key != "face"))
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -45,14 +45,14 @@ Test = Callable[[CadFace], bool]
 
 @dataclass(frozen=True)
 class _Selector:
-    """Conditions that are all to hold, and the point the nearest face is asked for."""
+    """Conditions that a face must all fulfil, and the point to which it must be closest."""
 
     tests: tuple[Test, ...]
     near: Array | None
 
 
 def chosen_faces(text: str, faces: Sequence[CadFace]) -> list[CadFace]:
-    """Return the outer faces of the body that a selector means, by ascending number.
+    """Return the outer faces of the body that a selector chooses, by ascending number.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def chosen_faces(text: str, faces: Sequence[CadFace]) -> list[CadFace]:
 
 
 def face_words(face: CadFace) -> str:
-    """Return what a face is, in the words of a selector: "cylinder r=12 hole"."""
+    """Return a description of a face in the form of a selector: "cylinder r=12 hole"."""
     words = [face.kind]
     if face.radius is not None:
         words.append(f"r={face.radius:.6g}")
@@ -82,7 +82,7 @@ def face_words(face: CadFace) -> str:
 
 
 def _there_is(text: str, faces: Sequence[CadFace]) -> str:
-    """List the faces of the kinds that are named, or of all, each sort once."""
+    """List the existing faces of the named kinds, or of all kinds, each description once."""
     kinds = [kind for kind in FACE_KINDS if kind in text.lower().split()]
     named = [face for face in faces if not kinds or face.kind in kinds]
     if not named:
@@ -148,7 +148,7 @@ def _is_number(text: str, value: str) -> Test:
 
 
 def _condition(text: str, word: str, key: str, value: str, slack: float) -> Test:
-    """Return the test of a pair key=value."""
+    """Return the test that a pair key=value describes."""
     if key == "name":
         return lambda face: face.name == value
     if key in ("colour", "color"):
@@ -179,7 +179,7 @@ def _condition(text: str, word: str, key: str, value: str, slack: float) -> Test
 
 
 def _lies_at(face: CadFace, axis: int, place: float, slack: float) -> bool:
-    """Whether a flat face lies at this coordinate, or the axis or centre of a round one does."""
+    """Return whether a flat face, or the axis or centre of a round face, has this coordinate."""
     if face.point is not None:
         along = 0.0 if face.axis is None else abs(float(face.axis[axis]))
         return along < ANGLE and abs(float(face.point[axis]) - place) <= slack

@@ -1,4 +1,4 @@
-"""One gmsh model at a time: the library is loaded lazily, options are set for repeatable meshes and restored."""
+"""One gmsh model at a time: gmsh is loaded when needed, and its options are set for repeatable meshes and restored."""
 
 import os
 import sys
@@ -46,7 +46,7 @@ def load_gmsh() -> ModuleType:
 
 @contextmanager
 def gmsh_model(name: str, options: Mapping[str, float | str]) -> Iterator[ModuleType]:
-    """Open an empty gmsh model, and close it whatever happens; options come back as they were.
+    """Open an empty gmsh model and always close it; options are restored.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def _set(gmsh: ModuleType, option: str, value: float | str) -> None:
 
 @contextmanager
 def gmsh_call(where: str, *, advice: str) -> Iterator[None]:
-    """Make one message of what gmsh raises, and keep quiet what its kernel prints on the standard output.
+    """Convert errors of gmsh to one message, and suppress the output of its kernel.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def gmsh_call(where: str, *, advice: str) -> Iterator[None]:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Send what C++ code prints on the standard output nowhere: OpenCASCADE's readers ignore gmsh's options."""
+    """Suppress standard output of C++ code: readers of OpenCASCADE ignore the options of gmsh."""
     sys.stdout.flush()
     try:
         kept = os.dup(1)

@@ -1,1 +1,1 @@
-"""Whole decks of finite element programs: one record whatever the program, with a ledger of what was not taken over."""
+"""Complete decks of finite element programs: one record for all programs, with a ledger of unconverted data."""

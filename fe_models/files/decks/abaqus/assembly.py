@@ -1,4 +1,4 @@
-"""Assemblies of Abaqus: instances of parts become one flat deck.
+"""Assemblies of Abaqus: instances of parts are converted to one flat deck.
 
 Nodes and elements of the k-th instance (from 0) have k S added to their numbers, those of the assembly itself n S, with
 n instances and S a power of ten above all numbers. Sets of an instance are called `INSTANCE.set`, as Abaqus calls them;
@@ -22,7 +22,8 @@ __all__ = ["TURNED", "flat_assembly"]
 #: parameter added here to blocks whose components are along the axes of an instance: the nine numbers of R
 TURNED = "TURNED WITH ITS INSTANCE"
 
-SETS = {"NSET": "NSET", "ELSET": "ELSET", "NODE": "NSET", "ELEMENT": "ELSET"}  #: keyword -> parameter with its name
+#: parameter with the name of the set, for each keyword
+SETS = {"NSET": "NSET", "ELSET": "ELSET", "NODE": "NSET", "ELEMENT": "ELSET"}
 NAMES = (
     "NSET",
     "ELSET",
@@ -31,20 +32,21 @@ NAMES = (
     "REF NODE",
     "ROT NODE",
     "ORIENTATION",
-)  #: parameters that name something of a part
+)  #: parameters whose values are names within a part
 
 
 class FlatAssembly(NamedTuple):
-    """A deck with its instances written out."""
+    """Deck with its instances expanded."""
 
     blocks: list[DeckBlock]
-    notes: list[str]  #: how numbers follow from those of the deck
-    instances: tuple[str, ...] = ()  #: whose numbers were moved, the k-th by k step; none where numbers are the deck's
+    notes: list[str]  #: notes on how the numbers follow from those of the deck
+    #: instances whose numbers were shifted, the k-th by k step; empty if numbers are those of the deck
+    instances: tuple[str, ...] = ()
     step: int = 0
 
 
 def flat_assembly(where: str, blocks: list[DeckBlock]) -> FlatAssembly:
-    """Return the blocks of a deck with its instances written out, and how their numbers follow from those of the deck.
+    """Return the blocks of a deck with expanded instances, and notes on the relation to its numbers.
 
     Raises
     ------
@@ -86,7 +88,7 @@ def flat_assembly(where: str, blocks: list[DeckBlock]) -> FlatAssembly:
 def _sorted(
     where: str, blocks: list[DeckBlock]
 ) -> tuple[dict[str, list[DeckBlock]], list[tuple[DeckBlock, list[DeckBlock]]], list[DeckBlock], list[DeckBlock]]:
-    """Return the blocks of parts, of instances, of the assembly itself, and of the model."""
+    """Return the blocks of parts, of instances, of the assembly, and of the model."""
     parts: dict[str, list[DeckBlock]] = {}
     instances: list[tuple[DeckBlock, list[DeckBlock]]] = []
     own: list[DeckBlock] = []
@@ -117,7 +119,7 @@ def _largest(block: DeckBlock) -> int:
 
 
 def _motion(where: str, head: DeckBlock) -> tuple[Array, Array]:
-    """Return R and t of x → R x + t: a translation, then a rotation about the line of two points by an angle."""
+    """Return R and t of the motion x → R x + t: a translation, then a rotation by an angle about a line."""
     try:
         rows = [[float(word or 0) for word in line.rstrip(", ").split(",")] for line in head.lines]
         t = np.array([*rows[0], 0.0, 0.0, 0.0][:3]) if rows else np.zeros(3)
@@ -133,7 +135,7 @@ def _motion(where: str, head: DeckBlock) -> tuple[Array, Array]:
 
 
 def _placed(block: DeckBlock, instance: str, offset: int, R: Array, t: Array) -> DeckBlock:
-    """Return a block of a part as it is in an instance."""
+    """Return a block of a part as it appears in an instance."""
     block = _numbered(block, offset, instance)
     parameters = {
         key: f"{instance}.{value}" if key in NAMES and value and not value.isdigit() else value
@@ -171,7 +173,7 @@ def _placed(block: DeckBlock, instance: str, offset: int, R: Array, t: Array) ->
 
 
 def _equations(block: DeckBlock, instance: str, offset: int) -> list[str]:
-    """Return the lines of *EQUATION, a line each for the number of terms and for every term."""
+    """Return the lines of *EQUATION, with one line for the number of terms and one for each term."""
     words = [word.strip() for line in block.lines for word in line.rstrip(", ").split(",")]
     lines, at = [], 0
     while at < len(words):
@@ -188,7 +190,7 @@ def _equations(block: DeckBlock, instance: str, offset: int) -> list[str]:
 
 
 def _mpcs(block: DeckBlock, instance: str, offset: int, is_moved: bool) -> list[str]:
-    """Return the lines of *MPC: a kind, unless the line goes on, and nodes or sets."""
+    """Return the lines of *MPC: a kind, unless the line continues another one, and nodes or sets."""
     lines = []
     for line in block.lines:
         kind, *words = [word.strip() for word in line.rstrip(", ").split(",")]
@@ -203,12 +205,12 @@ def _mpcs(block: DeckBlock, instance: str, offset: int, is_moved: bool) -> list[
 
 
 def _named(word: str, instance: str, offset: int) -> str:
-    """Return a node number or set of the part as it is called in the deck."""
+    """Return the name in the flat deck of a node number or set of the part."""
     return str(int(word) + offset) if word.isdigit() else f"{instance}.{word}" if word else word
 
 
 def _turned_points(block: DeckBlock, R: Array, t: Array) -> str:
-    """Return the points of axes as they are in an instance: directions turn, the two points of an axis move too."""
+    """Return the points that define axes in an instance: directions rotate, two points of an axis also translate."""
     words = [float(word or 0) for word in block.lines[0].rstrip(", ").split(",")]
     points = np.array([*words, 0.0, 0.0, 0.0][: 9 if len(words) > 6 else 6]).reshape(-1, 3)
     is_axis = block.keyword == "TRANSFORM" and block.parameters.get("TYPE", "R").upper() == "C"
@@ -216,14 +218,14 @@ def _turned_points(block: DeckBlock, R: Array, t: Array) -> str:
 
 
 def _prefixed(line: str, instance: str, offset: int) -> str:
-    """Return a line whose first word is a set or a number of the part."""
+    """Return a line with its first word, a set or number of the part, converted."""
     first, comma, rest = line.partition(",")
     word = first.strip()
     return f"{_named(word, instance, offset)}{comma}{rest}"
 
 
 def _numbered(block: DeckBlock, offset: int, instance: str) -> DeckBlock:
-    """Return nodes, elements or sets with their numbers moved, and names of sets within sets those of the instance."""
+    """Return nodes, elements or sets with shifted numbers; sets within sets get the names of the instance."""
     if block.keyword not in SETS or (not offset and not instance):
         return block
     lines = []
@@ -243,7 +245,7 @@ def _numbered(block: DeckBlock, offset: int, instance: str) -> DeckBlock:
 
 
 def _resolved(block: DeckBlock, offsets: dict[str, int]) -> DeckBlock:
-    """Return a block in which INSTANCE.17 is the number of that node."""
+    """Return a block in which INSTANCE.17 is replaced by the number of this node."""
 
     def number(match: re.Match[str]) -> str:
         of = offsets.get(match[1].strip().upper())

@@ -40,7 +40,7 @@ def read_coupling(here: str, block: DeckBlock, draft: Draft) -> None:
 
 
 def _equations(here: str, block: DeckBlock, draft: Draft) -> None:
-    """Lines: number of terms; then node, component, coefficient of each, up to four a line."""
+    """Read *EQUATION: number of terms, then node, component and coefficient of each, up to four on a line."""
     words = [word.strip() for line in block.lines for word in line.rstrip(", ").split(",")]
     turn = block.parameters.get(TURNED)
     axes = None if turn is None else np.array(turn.split(), dtype=float).reshape(3, 3).T
@@ -63,7 +63,7 @@ def _equations(here: str, block: DeckBlock, draft: Draft) -> None:
 
 
 def equations_in_basic_axes(draft: Draft) -> None:
-    """Make the equations of a deck those of its nodes in basic axes.
+    """Convert the equations of a deck to components in basic axes.
 
     (1) a component of a node with axes R of its own, or those of its instance, is R[c] · u; terms of the same component
         are added
@@ -93,7 +93,7 @@ def equations_in_basic_axes(draft: Draft) -> None:
 
 
 def _keep(draft: Draft, row: Row) -> None:
-    """Add one equation without its zero terms; the first term stays."""
+    """Add an equation without its zero terms; the first term remains."""
     terms = [
         (draft.node_group(draft.where, [node]), c, float(a))
         for k, ((node, c), a) in enumerate(row.items())
@@ -159,7 +159,7 @@ def _coupling(here: str, block: DeckBlock, draft: Draft) -> None:
 
 
 def _within(here: str, draft: Draft, leader: int, members: IntArray, radius: float) -> IntArray:
-    """Return the nodes within a distance of a node (INFLUENCE RADIUS)."""
+    """Return the nodes within a distance from a node (INFLUENCE RADIUS)."""
     at = draft.mesh.coordinates[draft.mesh.rows_of(np.array([leader]))][0]
     away = np.linalg.norm(draft.mesh.coordinates[draft.mesh.rows_of(members)] - at, axis=1)
     if not (away <= radius).any():
@@ -168,7 +168,7 @@ def _within(here: str, draft: Draft, leader: int, members: IntArray, radius: flo
 
 
 def _limits(block: DeckBlock) -> set[int]:
-    """Return the components, 0 to 5, of lines of a first and a last one."""
+    """Return the components, 0 to 5, of lines with a first and a last component."""
     held: set[int] = set()
     for line in block.lines:
         limits = [int(word) for word in line.rstrip(", ").split(",")]
@@ -224,7 +224,7 @@ def _mpcs(here: str, block: DeckBlock, draft: Draft) -> None:
 
 
 def _equal(here: str, draft: Draft, leader: int, members: IntArray, *, is_tied: bool) -> None:
-    """Take PIN, equal displacements, and TIE, equal rotations too: without a lever, however far apart the nodes are."""
+    """Convert PIN (equal displacements) and TIE (equal rotations as well), without lever at any distance."""
     first = draft.node_group(here, [leader])
     for member in np.setdiff1d(members, [leader]).tolist():
         other = draft.node_group(here, [member])
@@ -234,7 +234,7 @@ def _equal(here: str, draft: Draft, leader: int, members: IntArray, *, is_tied: 
 
 
 def surface_nodes(here: str, draft: Draft, name: str) -> IntArray:
-    """Return the numbers of the nodes of a surface: of element faces or of nodes."""
+    """Return the node numbers of a surface, which consists of element faces or nodes."""
     block = draft.surfaces.get(name.upper())
     if block is None:
         return draft.nodes_of(here, name)
@@ -256,7 +256,7 @@ def surface_nodes(here: str, draft: Draft, name: str) -> IntArray:
 
 
 def _with_middles(draft: Draft, elements: IntArray, corners: IntArray) -> IntArray:
-    """Return the corner nodes of faces with the middle nodes of edges between two of them."""
+    """Return the corner nodes of faces, and the middle nodes of edges between two of them."""
     from fe_models.meshes.cell_shapes import CELL_SHAPES
 
     found = [corners]

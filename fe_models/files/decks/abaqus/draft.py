@@ -1,4 +1,4 @@
-"""A deck of Abaqus or CalculiX while it is read: the content of its blocks so far."""
+"""Content of an Abaqus or CalculiX deck while it is read."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -32,16 +32,16 @@ __all__ = ["GROUNDED", "Draft", "PointElements"]
 GROUNDED = "grounded"  #: name of the interfaces at springs and dashpots to the ground
 
 COMPONENTS = "123456"
-AXES_DIGITS = 7  #: to which the axes of nodes that are held together are the same
-MOST_AXES = 50  #: different axes of supports, each an interface of the job
+AXES_DIGITS = 7  #: digits to which axes of nodes in one support must agree
+MOST_AXES = 50  #: largest number of different axes of supports; each becomes an interface of the job
 
 
 @dataclass
 class PointElements:
-    """Elements of points: masses, springs, dashpots."""
+    """Elements at points: masses, springs, dashpots."""
 
     kind: str
-    rows: dict[int, tuple[int, ...]] = field(default_factory=dict)  #: number -> numbers of its nodes
+    rows: dict[int, tuple[int, ...]] = field(default_factory=dict)  #: node numbers of each element, by element number
 
 
 @dataclass
@@ -52,14 +52,15 @@ class Draft:
     program: str
     mesh: DeckMesh
     ledger: Ledger
-    material: str = ""  #: whose properties are being read
+    material: str = ""  #: name of the material whose properties are being read
     materials: dict[str, DeckMaterial] = field(default_factory=dict)
-    orientations: dict[str, Array | None] = field(default_factory=dict)  #: by name in upper case, (3, 3); None: unknown
-    used_orientations: set[str] = field(default_factory=set)  #: names in upper case
-    nodal_thickness: dict[int, float] = field(default_factory=dict)  #: of shells, by node number
-    sheets: list[str] = field(default_factory=list)  #: groups of shells that are plane elements (CPS, CPE)
-    strained: set[str] = field(default_factory=set)  #: those in plane strain (CPE)
-    nodal_shells: set[str] = field(default_factory=set)  #: groups of shells that have their thickness from nodes alone
+    #: axes as rows, (3, 3), by upper-case name; None: unknown
+    orientations: dict[str, Array | None] = field(default_factory=dict)
+    used_orientations: set[str] = field(default_factory=set)  #: upper-case names of orientations in use
+    nodal_thickness: dict[int, float] = field(default_factory=dict)  #: thickness of shells at each node, by node number
+    sheets: list[str] = field(default_factory=list)  #: groups of shells that represent plane elements (CPS, CPE)
+    strained: set[str] = field(default_factory=set)  #: groups of plane strain elements (CPE)
+    nodal_shells: set[str] = field(default_factory=set)  #: groups of shells whose thickness is only given at nodes
     solids: list[SolidSection] = field(default_factory=list)
     shells: list[ShellSection] = field(default_factory=list)
     lines: list[LineSection] = field(default_factory=list)
@@ -72,23 +73,26 @@ class Draft:
     raw_equations: list[tuple[list[tuple[int, int, float]], Array | None]] = field(default_factory=list)
     equations: list[Equation] = field(default_factory=list)
     loads: list[Load] = field(default_factory=list)
-    points: dict[str, PointElements] = field(default_factory=dict)  #: by set in upper case
-    surfaces: dict[str, DeckBlock] = field(default_factory=dict)  #: by name in upper case
-    rotations: dict[int, int] = field(default_factory=dict)  #: *RIGID BODY: number of ROT NODE -> of REF NODE
-    moved: dict[int, Array] = field(default_factory=dict)  #: nodes put elsewhere than the deck has them
-    pilots: dict[int, Array] = field(default_factory=dict)  #: nodes whose component 1 is a rotation -> about which axis
-    pending: dict[str, str] = field(default_factory=dict)  #: parameters of a *COUPLING whose kind comes below
-    transformed: dict[int, Array] = field(default_factory=dict)  #: node number -> its own axes as rows, (3, 3)
-    node_groups: dict[str, IntArray] = field(default_factory=dict)  #: groups added here, rows
-    cell_groups: dict[str, IntArray] = field(default_factory=dict)  #: groups added here, element numbers
+    points: dict[str, PointElements] = field(default_factory=dict)  #: elements at points, by upper-case name of the set
+    surfaces: dict[str, DeckBlock] = field(default_factory=dict)  #: surfaces, by upper-case name
+    rotations: dict[int, int] = field(default_factory=dict)  #: REF NODE of each ROT NODE of *RIGID BODY
+    moved: dict[int, Array] = field(default_factory=dict)  #: new positions of nodes that were moved
+    #: rotation axis of each node whose component 1 is a rotation
+    pilots: dict[int, Array] = field(default_factory=dict)
+    pending: dict[str, str] = field(default_factory=dict)  #: parameters of a *COUPLING whose kind follows
+    transformed: dict[int, Array] = field(default_factory=dict)  #: axes of a node as rows, (3, 3), by node number
+    node_groups: dict[str, IntArray] = field(default_factory=dict)  #: node groups created by the reader, as rows
+    #: cell groups created by the reader, as element numbers
+    cell_groups: dict[str, IntArray] = field(default_factory=dict)
     face_blocks: list[RawBlock] = field(default_factory=list)
-    held: dict[int, dict[str, set[int]]] = field(default_factory=dict)  #: node number -> set name -> components
+    #: fixed components for each set name, by node number
+    held: dict[int, dict[str, set[int]]] = field(default_factory=dict)
     sectioned: list[IntArray] = field(default_factory=list)  #: numbers of elements that have a section
 
     # --- names of nodes ------------------------------------------------------------------------------------------
 
     def nodes_of(self, here: str, word: str) -> IntArray:
-        """Return the numbers of the nodes of a node number or of a set (of nodes, or of the nodes of elements)."""
+        """Return the numbers of the nodes that a node number, a node set or an element set stands for."""
         word = word.strip().strip('"')
         if word.lstrip("+").isdigit():
             return np.array([int(word)], dtype=np.int64)
@@ -98,7 +102,7 @@ class Draft:
         return self.mesh.node_sets[key]
 
     def elements_of(self, here: str, word: str) -> IntArray:
-        """Return the numbers of the elements of an element number or set."""
+        """Return the numbers of the elements that an element number or set stands for."""
         word = word.strip().strip('"')
         if word.lstrip("+").isdigit():
             return np.array([int(word)], dtype=np.int64)
@@ -121,7 +125,7 @@ class Draft:
         return found
 
     def node_group(self, here: str, numbers: Iterable[int], name: str = "") -> str:
-        """Return the name of a group of these nodes: a set of the deck that is the same, or one made here."""
+        """Return the name of a group with these nodes: an equal set of the deck, or a new group."""
         wanted = np.unique(np.asarray(list(numbers), dtype=np.int64))
         if name and name.upper() in self.mesh.node_sets and np.array_equal(self.mesh.node_sets[name.upper()], wanted):
             return self.mesh.spelling[f"NSET {name.upper()}"]
@@ -136,7 +140,7 @@ class Draft:
         return made
 
     def types_of(self, elements: IntArray) -> dict[tuple[str, str], IntArray]:
-        """Return (type in the deck, kind) -> numbers of these elements."""
+        """Return the numbers of these elements by (type in the deck, kind)."""
         found: dict[tuple[str, str], IntArray] = {}
         for name, kind, table in self.mesh.elements:
             mine = table[np.isin(table[:, 0], elements), 0]
@@ -145,7 +149,7 @@ class Draft:
         return found
 
     def cell_group(self, name: str, elements: IntArray) -> str:
-        """Return the name of a group of these cells: the set of that name if it is the same, or one made here."""
+        """Return the name of a group with these cells: the set with that name if it is equal, or a new group."""
         key = name.upper()
         if key in self.mesh.element_sets and np.array_equal(self.mesh.element_sets[key], np.unique(elements)):
             return self.mesh.spelling[f"ELSET {key}"]
@@ -157,7 +161,7 @@ class Draft:
         return made
 
     def used_nodes(self) -> IntArray:
-        """Return the numbers of nodes that have a motion of their own: those of elements, and leaders of others."""
+        """Return the numbers of nodes with independent motion: nodes of elements, and leaders of other nodes."""
         sectioned = np.concatenate(self.sectioned) if self.sectioned else np.zeros(0, np.int64)
         parts = [table[np.isin(table[:, 0], sectioned), 1:].ravel() for _, _, table in self.mesh.elements]
         groups = [mass.nodes for mass in self.masses] + [name for spring in self.springs for name in spring.nodes]
@@ -168,7 +172,7 @@ class Draft:
         return np.setdiff1d(nodes, np.concatenate([np.zeros(0, np.int64), *followers]))
 
     def numbers_of_group(self, name: str) -> IntArray:
-        """Return the numbers of the nodes of a group, made here or of the deck."""
+        """Return the node numbers in a group, created by the reader or in the deck."""
         if name in self.node_groups:
             return self.mesh.node_numbers[self.node_groups[name]]
         return self.mesh.node_sets[name.upper()]
@@ -176,7 +180,7 @@ class Draft:
     # --- at the end ----------------------------------------------------------------------------------------------
 
     def close(self) -> None:
-        """Count elements without a section, materials without numbers, and couplings left open."""
+        """Add elements without section, materials without values and open couplings to the ledger."""
         with_section = np.concatenate(self.sectioned) if self.sectioned else np.zeros(0, np.int64)
         counts: dict[str, int] = {}
         for name, _, table in self.mesh.elements:
@@ -196,7 +200,7 @@ class Draft:
             self.ledger.refuse("*COUPLING", "neither *KINEMATIC nor *DISTRIBUTING stands below it")
 
     def supports_of_groups(self) -> list[Support]:
-        """Return the supports: nodes held in the same components under the same names together."""
+        """Return the supports: nodes with the same fixed components and names are combined."""
         found: dict[tuple[tuple[str, ...], tuple[int, ...], bytes], list[int]] = {}
         for turned, leader in self.rotations.items():
             for name, about in self.held.pop(turned, {}).items():
@@ -237,12 +241,12 @@ class Draft:
 
     @staticmethod
     def _are_whole(components: tuple[int, ...]) -> bool:
-        """Whether these are all translations or none, and all rotations or none: the same along any axes."""
+        """Return whether the components contain all translations or none, and all rotations or none."""
         return all(
             not set(part) - set(components) or not set(part) & set(components) for part in ((0, 1, 2), (3, 4, 5))
         )
 
     def _axes_of(self, node: int) -> bytes:
-        """Return the axes of a node, equal for nodes whose axes are but for roundoff; empty: basic axes."""
+        """Return the axes of a node, identical for nodes whose axes agree to rounding; empty: basic axes."""
         axes = self.transformed.get(node)
         return b"" if axes is None else (np.round(axes, AXES_DIGITS) + 0.0).tobytes()

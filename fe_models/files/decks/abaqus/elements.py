@@ -1,4 +1,4 @@
-"""Element types of Abaqus and CalculiX: integration in each program, and elements at points."""
+"""Element types of Abaqus and CalculiX: integration rules of each program, and elements at points."""
 
 import numpy as np
 
@@ -54,11 +54,11 @@ _FACES: dict[str, dict[int, tuple[int, ...]]] = {
     "tetr": _TETS,
     "wedg": _WEDGES,
     "pyra": _PYRAMIDS,
-}  #: first letters of the kind -> face -> local corner nodes
+}  #: local corner nodes of each face, by the first letters of the element kind
 
 
 def read_element(here: str, block: DeckBlock, draft: Draft) -> None:
-    """Read elements at points (masses, springs); those of the mesh have been read before."""
+    """Read elements at points (masses, springs); elements of the mesh have been read before."""
     name = block.parameters["TYPE"].upper()
     if name in _POINTS:
         n = _POINTS[name]
@@ -75,7 +75,7 @@ def read_element(here: str, block: DeckBlock, draft: Draft) -> None:
 
 
 def faces_of(draft: Draft, elements: IntArray, face: int) -> dict[str, IntArray]:
-    """Return "triangle" and "quad" -> rows of the corner nodes of face number `face` of these solid cells."""
+    """Return rows of corner nodes, by "triangle" and "quad", for face number `face` of these solid cells."""
     found: dict[str, list[IntArray]] = {}
     for _, kind, table in draft.mesh.elements:
         local = _FACES.get(kind[:4], {}).get(face)

@@ -59,18 +59,18 @@ PARAMETERS = {
     "DLOAD": _LOAD,
     "DSLOAD": _LOAD,
     "GRAVITY": _LOAD,
-}  #: keyword -> its parameters, blanks in their names may be left out
+}  #: parameters of each keyword; blanks in their names may be omitted
 PARAMETERS |= {"PART": "NAME; INTERNAL~", "END PART": "", "ASSEMBLY": "NAME", "END ASSEMBLY": "", "END INSTANCE": ""}
 PARAMETERS |= {"INSTANCE": "NAME; PART; DEPENDENT~; LIBRARY!; INSTANCE!", "INCLUDE": "INPUT; PASSWORD!"}
 
 
 def parameters_of(keyword: str) -> tuple[TableField, ...]:
-    """Return the parameters of a keyword that `PARAMETERS` lists."""
+    """Return the parameters of a keyword listed in `PARAMETERS`."""
     return parse_fields(word.strip() for word in PARAMETERS[keyword].split(";") if word.strip())
 
 
 def check_parameters(block: DeckBlock, ledger: Ledger) -> None:
-    """Put into the ledger the parameters of a keyword that are not taken over.
+    """Add the parameters of a keyword that are not converted to the ledger.
 
     (1) one that is not listed is refused
     (2) one that is listed with a default is refused where it has another value

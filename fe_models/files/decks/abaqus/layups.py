@@ -1,4 +1,4 @@
-"""Shells of layers, and shells of one orthotropic material, which are shells of one layer."""
+"""Layered shells, and shells of one orthotropic material, which count as one layer."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["layers_of_block", "layups_in_axes"]
 
-PARALLEL = 1e-6  #: of axes 3 of two orientations, and of an axis 3 and the normals of a flat shell
+PARALLEL = 1e-6  #: sine of the angle up to which axes 3 of orientations and normals of a flat shell count as parallel
 #: cosine between a shell normal and the direction of a layup, above which y replaces x or the layup is refused
 STEEP = 0.9
 
@@ -33,7 +33,7 @@ def layers_of_block(here: str, block: DeckBlock) -> tuple[DeckLayer, ...]:
 
 
 def layups_in_axes(draft: Draft) -> None:
-    """Give the layers of each shell their angles from one direction.
+    """Compute the layer angles of each shell from one reference direction.
 
     (1) layers of isotropic materials have no direction: the basic x axis is taken, y where x is across the shell
     (2) of others, the direction is axis 1 of the orientation of the first of them; a layer with a number instead of an
@@ -58,19 +58,19 @@ def layups_in_axes(draft: Draft) -> None:
 
 
 def _is_directed(draft: Draft, name: str) -> bool:
-    """Whether a material is not isotropic."""
+    """Return whether a material is not isotropic."""
     material = next((each for key, each in draft.materials.items() if key.upper() == name.upper()), None)
     return material is not None and (material.shear is not None or material.elasticity is not None)
 
 
 def _numbers_of(draft: Draft, group: str) -> IntArray:
-    """Return the numbers of the elements of a group."""
+    """Return the element numbers in a group."""
     members = draft.cell_groups.get(group)
     return draft.mesh.element_sets[group.upper()] if members is None else members
 
 
 def _normals(draft: Draft, group: str) -> tuple[IntArray, Array]:
-    """Return numbers and unit normals of the cells of a group, by their corners."""
+    """Return numbers and unit normals of the cells in a group, from their corners."""
     members = _numbers_of(draft, group)
     found, normals = [np.zeros(0, np.int64)], [np.zeros((0, 3))]
     for _, kind, table in draft.mesh.elements:
@@ -86,7 +86,7 @@ def _normals(draft: Draft, group: str) -> tuple[IntArray, Array]:
 
 
 def _without_direction(draft: Draft, shell: ShellSection) -> list[ShellSection]:
-    """Step (1)."""
+    """Step (1): convert layers of isotropic materials, which need no direction."""
     elements, normals = _normals(draft, shell.group)
     is_steep = np.abs(normals[:, 0]) > STEEP
     made = []
@@ -102,7 +102,7 @@ def _without_direction(draft: Draft, shell: ShellSection) -> list[ShellSection]:
 
 
 def _directed(draft: Draft, shell: ShellSection, layers: tuple[DeckLayer, ...]) -> ShellSection | str:
-    """Steps (2) and (3); a text says what is in the way."""
+    """Steps (2) and (3): convert layers with a direction; return a text with the reason if this is impossible."""
     axes: list[Array] = []
     angles: list[float] = []
     for layer in layers:

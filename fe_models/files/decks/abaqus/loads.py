@@ -21,11 +21,11 @@ _NAMED = {
     "XASYMM": (1, 2, 3),
     "YASYMM": (0, 2, 4),
     "ZASYMM": (0, 1, 5),
-}  #: supports by name -> components
+}  #: fixed components of each named support
 
 
 def read_boundary(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
-    """Note which components of which nodes are held, and by which name."""
+    """Record which components of which nodes are fixed, and under which name."""
     for line in block.lines:
         words = [word.strip() for word in line.rstrip(", ").split(",")]
         nodes = draft.nodes_of(here, words[0])
@@ -49,7 +49,7 @@ def read_boundary(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
 
 
 def read_load(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
-    """Take the loads of one block; what has no place in a load case is counted."""
+    """Read the loads of one block; loads that a load case cannot represent are added to the ledger."""
     if block.keyword == "CLOAD":
         _nodal(here, block, draft, step)
         return
@@ -75,7 +75,7 @@ def read_load(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
 
 
 def _nodal(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
-    """Add forces at nodes to the load of this step."""
+    """Add nodal forces to the load of this step."""
     forces: dict[str, np.ndarray] = {}
     for line in block.lines:
         words = [word.strip() for word in line.rstrip(", ").split(",")]
@@ -119,7 +119,7 @@ def _pressure(draft: Draft, name: str, faces: dict[str, IntArray], words: list[s
 
 
 def _surface_faces(here: str, draft: Draft, name: str) -> dict[str, IntArray]:
-    """Return the faces of a surface by kind."""
+    """Return the faces of a surface, by kind."""
     block = draft.surfaces.get(name.upper())
     found: dict[str, list[IntArray]] = {}
     for line in block.lines if block is not None else []:

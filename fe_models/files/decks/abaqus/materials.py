@@ -1,4 +1,4 @@
-"""Materials of Abaqus and CalculiX, isotropic and orthotropic, and axes: of materials and of nodes."""
+"""Materials of Abaqus and CalculiX (isotropic, orthotropic), and axes of materials and nodes."""
 
 from dataclasses import replace
 
@@ -13,16 +13,17 @@ from fe_models.foundation.words import nearest, quoted
 __all__ = ["materials_in_axes", "numbers", "read_material", "read_orientation", "read_transform"]
 
 COLLINEAR = 1e-8
-ON_AXIS = 1e-10  #: CalculiX's distance from the axis of *TRANSFORM, in the unit of the deck, that counts as on the axis
+#: distance from the axis of *TRANSFORM up to which CalculiX considers a node as on the axis [unit of the deck]
+ON_AXIS = 1e-10
 
 
 def numbers(line: str) -> list[float]:
-    """Return the numbers of a data line; fields left empty are zero."""
+    """Return the numbers in a data line; empty fields are zero."""
     return [float(word.strip().upper().replace("D", "E") or 0) for word in line.rstrip(", ").split(",")]
 
 
 def read_material(here: str, block: DeckBlock, draft: Draft) -> None:
-    """Take the elastic constants and the density; count the rest."""
+    """Read elastic constants and density; add other data to the ledger."""
     name = draft.material
     if block.keyword == "MATERIAL":
         draft.materials[name] = DeckMaterial(name)
@@ -106,7 +107,7 @@ def _tensor(values: list[float]) -> Array:
 
 
 def _compliance(young: Array, poisson: Array) -> Array:
-    """Return strains by stresses 11 22 33, (3, 3)."""
+    """Return the (3, 3) matrix from stresses 11 22 33 to strains."""
     S = np.diag(1 / young)
     S[0, 1] = S[1, 0] = -poisson[0] / young[0]
     S[0, 2] = S[2, 0] = -poisson[1] / young[0]
@@ -134,7 +135,7 @@ def read_orientation(here: str, block: DeckBlock, draft: Draft) -> None:
 
 
 def _plane_axes(x: Array, y: Array) -> Array:
-    """Return three axes as rows: along x, in the plane of x and y, across both."""
+    """Return three axes as rows: along x, in the plane of x and y, and normal to both."""
     z = np.cross(x, y)
     if np.linalg.norm(z) <= COLLINEAR * np.linalg.norm(x) * np.linalg.norm(y):
         raise ValueError("points a and b lie on one line through the origin")
@@ -167,7 +168,7 @@ def read_transform(here: str, block: DeckBlock, draft: Draft) -> None:
 
 
 def _across(axis: Array) -> Array:
-    """Return the direction that CalculiX calls radial at a node on the axis, where any direction is as good.
+    """Return the direction that CalculiX uses as radial direction at a node on the axis.
 
     Its first component that the axis has makes it normal to the axis; the next one is 1, the third 0.
     """
@@ -179,7 +180,7 @@ def _across(axis: Array) -> Array:
 
 
 def materials_in_axes(draft: Draft) -> None:
-    """Give each solid section whose material is orthotropic this material in its own axes."""
+    """Assign to each solid section with an orthotropic material a copy of the material in its own axes."""
     used = set(draft.used_orientations)
     spelt = {name.upper(): name for name in draft.materials}
     for k, solid in enumerate(draft.solids):

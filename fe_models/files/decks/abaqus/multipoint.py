@@ -1,4 +1,4 @@
-"""Nonlinear constraints of CalculiX, made linear at the undeformed place as its first increment has them.
+"""Nonlinear constraints of CalculiX, linearised at the undeformed position as in its first increment.
 
 - PLANE: nodes stay in the plane of the first three that span one. A node at Σ N_a x_a, (N_1 + N_2 + N_3 = 1), has
   n · (u - Σ N_a u_a) = 0 with the normal n.
@@ -16,12 +16,12 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["LINEARISED", "read_linearised"]
 
-AWAY = 1e-3  #: of the size of a group: how far a node may stand from the line or plane it keeps to
+AWAY = 1e-3  #: largest distance of a node from its line or plane, over the size of the group
 ROUNDOFF = 1e-9
 
 
 def read_linearised(here: str, draft: Draft, kind: str, words: list[str]) -> str:
-    """Take one constraint of `LINEARISED`; a text says why it cannot be taken."""
+    """Convert one constraint of `LINEARISED`; return a text with the reason if this is impossible."""
     numbers = [int(number) for word in words for number in draft.nodes_of(here, word)]
     return LINEARISED[kind](here, draft, numbers)
 
@@ -31,7 +31,7 @@ def _points(draft: Draft, numbers: list[int] | IntArray) -> Array:
 
 
 def _add(here: str, draft: Draft, terms: list[tuple[int, int, float]]) -> None:
-    """Add an equation of node numbers; its first term gives way."""
+    """Add an equation with node numbers; its first term is eliminated."""
     named = [(draft.node_group(here, [node]), c, a) for node, c, a in terms if a != 0]
     draft.equations.append(Equation(tuple(named)))
 
@@ -88,7 +88,7 @@ def _straight(here: str, draft: Draft, numbers: list[int]) -> str:
 
 
 def _mean_rotation(here: str, draft: Draft, numbers: list[int]) -> str:
-    """Put the node of the angle at the centroid, let it follow the mean displacement, and its rotation the angle."""
+    """Move the node of the angle to the centroid; it follows the mean displacement, and its rotation is the angle."""
     *listed, pilot = numbers
     nodes, counts = np.unique(np.array(listed, dtype=np.int64), return_counts=True)
     axis = _points(draft, [pilot])[0]

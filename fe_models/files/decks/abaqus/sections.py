@@ -32,7 +32,7 @@ _PLANAR = {
 }
 #: plane elements that are membranes: plane stress, and plane strain by displacements alone
 SHEETS = re.compile(r"CPS.*|CPE[34568](I|R|H|RH|IH|M|MH)?")
-ALONG = 1e-9  #: a vector is along a line if its part across is smaller than this, relative to its length
+ALONG = 1e-9  #: component of a vector normal to a line over its length, below which it is along the line
 
 
 def read_section(here: str, block: DeckBlock, draft: Draft) -> None:
@@ -63,7 +63,7 @@ def read_section(here: str, block: DeckBlock, draft: Draft) -> None:
 
 
 def _of_set(here: str, block: DeckBlock, draft: Draft) -> tuple[str, dict[tuple[str, str], IntArray]]:
-    """Return the name of the element set of a section as written, and its elements by type."""
+    """Return the element set of a section as written in the deck, and its elements by type."""
     word = block.parameters.get("ELSET", "")
     elements = draft.elements_of(here, word)
     draft.sectioned.append(elements)
@@ -113,7 +113,7 @@ def _sheet(name: str, kind: str, block: DeckBlock, draft: Draft, elements: IntAr
 
 
 def _rods(name: str, block: DeckBlock, draft: Draft, elements: IntArray) -> None:
-    """Read the area of trusses. Its default is 1 in both programs."""
+    """Read the area of trusses. The default is 1 in both programs."""
     area = numbers(block.lines[0])[0] if block.lines else 1.0
     draft.rods.append(RodSection(draft.cell_group(name, elements), _material_of(block, draft), area))
 
@@ -197,7 +197,7 @@ def _beam_section(here: str, block: DeckBlock, draft: Draft) -> None:
 
 
 def _first_axis(draft: Draft, element: int, given: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Return n1 of a beam: from its first node to the node that orients it, or as the section says."""
+    """Return axis n1 of a beam: from its first node to its orientation node, or as given in the section."""
     if element not in draft.mesh.orienting:
         return given
     row = next(row for _, _, table in draft.mesh.elements for row in table[table[:, 0] == element])
@@ -207,7 +207,7 @@ def _first_axis(draft: Draft, element: int, given: tuple[float, float, float]) -
 
 
 def _is_uneven(kind: str, walls: tuple[float, ...]) -> bool:
-    """Whether a box has four walls and those that face each other differ."""
+    """Return whether a box has four walls of which opposite ones differ."""
     return kind == "BOX" and len(walls) == 4 and (walls[0] != walls[2] or walls[1] != walls[3])
 
 
@@ -247,7 +247,7 @@ def _cowper(a: float, b: float, nu: float) -> float:
 def _known(
     draft: Draft, types: dict[tuple[str, str], IntArray], kinds: tuple[str, ...], first: str, block: DeckBlock
 ) -> IntArray:
-    """Return the numbers of elements of these kinds; refuse the others."""
+    """Return the numbers of elements of these kinds; add others to the ledger as not converted."""
     kept = [np.zeros(0, np.int64)]
     for (name, kind), elements in types.items():
         if kind in kinds and name.startswith(first):
@@ -258,7 +258,7 @@ def _known(
 
 
 def _material_of(block: DeckBlock, draft: Draft) -> str:
-    """Return the name of the material of a section as written at *MATERIAL."""
+    """Return the material name of a section as written at *MATERIAL."""
     wanted = block.parameters.get("MATERIAL", "").strip('"')
     return next((name for name in draft.materials if name.upper() == wanted.upper()), wanted)
 
@@ -274,7 +274,7 @@ def _masses(here: str, block: DeckBlock, draft: Draft) -> None:
 
 
 def _springs(here: str, block: DeckBlock, draft: Draft) -> None:
-    """Read springs and dashpots: along the line of two nodes (A), or of one component of one (1) or two nodes (2)."""
+    """Read springs and dashpots: along the line of two nodes (A), or in one component of one (1) or two nodes (2)."""
     of_set = draft.points_of(block.parameters.get("ELSET", ""))
     if of_set is None:
         return
@@ -300,7 +300,7 @@ def _springs(here: str, block: DeckBlock, draft: Draft) -> None:
 
 
 def _to_ground(block: DeckBlock, draft: Draft, of_set: PointElements) -> None:
-    """Note a spring or dashpot to the ground: a body is free here, and gets an interface where it would be attached."""
+    """Record a spring or dashpot to the ground as an interface, because the body is free."""
     component = int(numbers(block.lines[0])[0]) - 1
     if not 0 <= component < 6 or "ORIENTATION" in block.parameters:
         why = "along axes of its own (ORIENTATION), or of another component than 1 to 6"
@@ -321,7 +321,7 @@ def _to_ground(block: DeckBlock, draft: Draft, of_set: PointElements) -> None:
 
 
 def _component_springs(here: str, block: DeckBlock, draft: Draft, of_set: PointElements) -> None:
-    """Read springs between the same component of two nodes, if their forces balance.
+    """Read springs between equal components of two nodes, if their forces are in balance.
 
     Two forces along an axis balance on one line only: the nodes are at one place, or apart along this axis. Two moments
     always do.
@@ -348,7 +348,7 @@ def _component_springs(here: str, block: DeckBlock, draft: Draft, of_set: PointE
 
 
 def _axial(here: str, draft: Draft, row: tuple[int, ...], value: float, *, is_damper: bool) -> DeckSpring | None:
-    """Return a spring or damper along the line of its nodes; None if they are at one place."""
+    """Return a spring or damper along the line of its nodes; None if they coincide."""
     ends = draft.mesh.coordinates[draft.mesh.rows_of(np.array(row))]
     if not np.linalg.norm(ends[1] - ends[0]) > 0:
         return None

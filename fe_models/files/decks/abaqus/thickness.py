@@ -1,4 +1,4 @@
-"""Shells whose thickness is given at nodes: each element with its mean thickness."""
+"""Shells whose thickness is given at nodes: each element gets its mean thickness."""
 
 from dataclasses import replace
 
@@ -11,8 +11,8 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["read_nodal_thickness", "sections_by_thickness"]
 
-MOST = 500  #: different thicknesses of one section, each a table of the job
-DIGITS = 9  #: of the mean thickness, to which elements are called equal
+MOST = 500  #: largest number of different thicknesses in one section; each becomes a table of the job
+DIGITS = 9  #: digits to which mean thicknesses must agree for elements to share a section
 #: integral of each node's shape function over the element, as part of its area (parallelograms and triangles)
 _SHARES: dict[str, tuple[float, ...]] = {
     "triangle": (1 / 3,) * 3,
@@ -24,7 +24,7 @@ _SHARES: dict[str, tuple[float, ...]] = {
 
 
 def read_nodal_thickness(here: str, block: DeckBlock, draft: Draft) -> None:
-    """Keep the thickness at nodes; the last that is given counts."""
+    """Read nodal thicknesses; a later value replaces an earlier one."""
     for line in block.lines:
         word, *sizes = line.rstrip(", ").split(",")
         thickness = numbers(sizes[0])[0]
@@ -32,7 +32,7 @@ def read_nodal_thickness(here: str, block: DeckBlock, draft: Draft) -> None:
 
 
 def sections_by_thickness(draft: Draft) -> None:
-    """Replace each shell section with thicknesses at nodes by one section for each mean thickness of its elements.
+    """Replace each shell section with nodal thicknesses by one section for each mean thickness.
 
     (1) mean of an element: the integral of the thickness that its shape functions carry, by its area
     (2) nodes without a thickness of their own have that of the section
@@ -73,7 +73,7 @@ def sections_by_thickness(draft: Draft) -> None:
 
 
 def _mean_thickness(draft: Draft, group: str, at_node: Array) -> tuple[Array, Array, Array]:
-    """Return numbers of the elements of a group, mean thickness of each, and whether it varies inside."""
+    """Return element numbers of a group, mean thickness of each, and whether it varies within the element."""
     members = draft.cell_groups.get(group)
     if members is None:
         members = draft.mesh.element_sets[group.upper()]

@@ -1,4 +1,4 @@
-"""Ties of surfaces: every node of the slave surface follows the face of the master surface it stands on."""
+"""Ties of surfaces: each node of the slave surface follows the face of the master surface on which it lies."""
 
 import numpy as np
 
@@ -11,13 +11,13 @@ from fe_models.meshes.cell_shapes import CELL_SHAPES, facet_tables, shape_values
 
 __all__ = ["read_tie"]
 
-CANDIDATES = 6  #: nearest faces that are tried for a node
-SHARE = 0.025  #: of the size of a face: how far a node may stand from it where the deck does not say
+CANDIDATES = 6  #: number of closest faces that are tried for a node
+SHARE = 0.025  #: largest distance of a node from a face over the size of the face, if the deck gives none
 NEWTON_STEPS = 20
 
 
 def read_tie(here: str, block: DeckBlock, draft: Draft, slaves: IntArray) -> None:
-    """Add three equations for each slave node: its displacement is that of the place on the face, Σ N_a u_a.
+    """Add three equations for each slave node: its displacement is that of its point on the face, Σ N_a u_a.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def read_tie(here: str, block: DeckBlock, draft: Draft, slaves: IntArray) -> Non
 
 
 def _complete_faces(here: str, draft: Draft, name: str) -> dict[str, IntArray]:
-    """Return face kind -> rows of all nodes of the faces of a surface, middle nodes included."""
+    """Return the rows of all nodes of the faces of a surface, including middle nodes, by face kind."""
     block = draft.surfaces.get(name.upper())
     found: dict[str, list[IntArray]] = {}
     for line in block.lines if block is not None else []:
@@ -81,7 +81,7 @@ def _complete_faces(here: str, draft: Draft, name: str) -> dict[str, IntArray]:
 
 
 def _foot(kind: str, X: Array, point: Array) -> tuple[float, Array]:
-    """Return the distance of a point from a face and the shape functions at its foot, (n_nodes,), by Gauss-Newton."""
+    """Return the distance of a point from a face, and the shape functions at its projection, (n_nodes,)."""
     xi = np.full(2, 1 / 3 if kind.startswith("triangle") else 0.5)
     for _ in range(NEWTON_STEPS):
         N, dN = shape_values(kind, xi[None])
@@ -95,7 +95,7 @@ def _foot(kind: str, X: Array, point: Array) -> tuple[float, Array]:
 
 
 def _inside(kind: str, xi: Array) -> Array:
-    """Return the nearest place of the reference face."""
+    """Return the closest point of the reference face."""
     xi = np.clip(xi, 0, 1)
     excess = xi.sum() - 1
     return np.clip(xi - excess / 2, 0, 1) if kind.startswith("triangle") and excess > 0 else xi

@@ -1,4 +1,4 @@
-"""Boxes whose walls differ: the numbers of a general section.
+"""Boxes with different walls, converted to general sections.
 
 Walls 1 to 4 stand at +y, +z, -y, -z. Area and second moments are those of the outer rectangle less the hole. Shear and
 torsion are those of the thin-walled cell along the middle line: for a force V along c (y or z), I = ∮ c² t ds,
@@ -22,14 +22,14 @@ ROUNDOFF = 1e-12
 
 @dataclass(frozen=True)
 class UnevenBox:
-    """A box as a table [sections.NAME] of a job, and where it lies."""
+    """Box as a table [sections.NAME] of a job, and its position."""
 
     shape: dict[str, Any]
-    centroid: tuple[float, float]  #: (y, z) from the middle of the outer rectangle
+    centroid: tuple[float, float]  #: centroid (y, z) relative to the centre of the outer rectangle
 
 
 def uneven_box(b: float, h: float, walls: tuple[float, ...]) -> UnevenBox | None:
-    """Return the section of a box; None where walls differ both ways, so that its principal axes are turned.
+    """Return the section of a box; None if walls differ in both directions, which rotates its principal axes.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def uneven_box(b: float, h: float, walls: tuple[float, ...]) -> UnevenBox | None
 
 
 def _line_centroid(corners: Array, t: Array) -> Array:
-    """Return the centroid of the middle line with its thickness, (2,)."""
+    """Return the centroid of the middle line with its wall thicknesses, (2,)."""
     ends = np.roll(corners, -1, axis=0)
     weights = np.linalg.norm(ends - corners, axis=1) * t
     return np.asarray(weights @ (corners + ends) / 2 / weights.sum())

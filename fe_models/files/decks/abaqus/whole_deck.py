@@ -1,4 +1,4 @@
-"""Whole decks of Abaqus and CalculiX: the model around the mesh, which `fe_models.files.abaqus` reads."""
+"""Complete decks of Abaqus and CalculiX: the model around the mesh that `fe_models.files.abaqus` reads."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +23,7 @@ from fe_models.files.decks.ledger import Ledger
 
 __all__ = ["PROGRAMS", "read_abaqus_deck"]
 
-PROGRAMS = ("calculix", "abaqus")  #: whose rules of integration and mass a deck may be read by
+PROGRAMS = ("calculix", "abaqus")  #: programs whose rules for integration and mass may apply to a deck
 _MESH = (
     "NODE", "ELEMENT", "NSET", "ELSET", "HEADING", "PREPRINT", "PART", "END PART", "ASSEMBLY", "END ASSEMBLY",
     "INSTANCE", "END INSTANCE", "INCLUDE", "SYSTEM",
@@ -60,11 +60,11 @@ _NONLINEAR = {
     "ADD": "mass that is not at nodes",
     "NONSTRUCTURAL MASS": "mass that is not at nodes",
     "FLUID SECTION": "fluid elements",
-}  #: keyword -> why it cannot be taken over: these carry mass, stiffness or constraints
+}  #: reason why each keyword cannot be converted: it has mass, stiffness or constraints
 #: keyword without blanks, which CalculiX lets one leave out -> keyword
 _SQUEEZED = {name.replace(" ", ""): name for name in (*PARAMETERS, *HARMLESS, *_NONLINEAR)}
-SAME_PLANE = 1e-9  #: differences in z of plane elements, relative to the size of the deck
-_FIRST = ("ELEMENT", "TRANSFORM", "SURFACE")  #: read before the others, which may stand above them
+SAME_PLANE = 1e-9  #: differences in z of plane elements, over the size of the deck, up to which they are in one plane
+_FIRST = ("ELEMENT", "TRANSFORM", "SURFACE")  #: keywords that are read before the others, which may precede them
 _SILENT = ("STEP", "END STEP", "ENDSTEP", "NO ANALYSIS")
 
 
@@ -128,7 +128,7 @@ def read_abaqus_deck(path: Path, data: bytes, *, program: str = "calculix") -> D
 
 
 def _take(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
-    """Call the reader of one block, or count the block in the ledger."""
+    """Call the reader of one block, or add the block to the ledger."""
     keyword = block.keyword
     if keyword == "ELEMENT":
         read_element(here, block, draft)
@@ -158,7 +158,7 @@ def _take(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
 
 
 def _check_plane(draft: Draft) -> None:
-    """Refuse plane elements beside elements in space, or out of a plane across z."""
+    """Raise an error for plane elements together with elements in space, or outside of one plane normal to z."""
     if not draft.sheets:
         return
     if len(draft.shells) > len(draft.sheets) or draft.solids or draft.lines or draft.rods:
@@ -171,7 +171,7 @@ def _check_plane(draft: Draft) -> None:
 
 
 def _strain_in_plane(draft: Draft) -> None:
-    """Give plane strain elements the sheet of their material that has no strain across its plane."""
+    """Assign to plane strain elements a sheet material without strain normal to the plane."""
     for k, shell in enumerate(draft.shells):
         if shell.group not in draft.strained:
             continue

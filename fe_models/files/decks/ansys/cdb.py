@@ -16,7 +16,7 @@ from fe_models.meshes.cells.raw_mesh import RawBlock, RawMesh
 
 __all__ = ["read_cdb_deck"]
 
-COLUMNS = 11  #: of an element before its nodes
+COLUMNS = 11  #: number of columns of an element before its nodes
 #: element -> integration, mass, what is different
 SOLIDS = {
     185: (
@@ -27,8 +27,9 @@ SOLIDS = {
     186: ("reduced", "14-point", ""),
     187: ("reduced", "consistent", ""),
 }
-MESH_ONLY = 200  #: the element of ANSYS that is a mesh alone
-SHELLS = {181: (4, "quad"), 281: (8, "quad8")}  #: element -> nodes, cell; equal third and fourth corners: a triangle
+MESH_ONLY = 200  #: number of the ANSYS element type that is only a mesh
+#: number of nodes, and kind of cell, for each shell element; equal third and fourth corners: a triangle
+SHELLS = {181: (4, "quad"), 281: (8, "quad8")}
 _DOFS = {"UX": 0, "UY": 1, "UZ": 2, "ROTX": 3, "ROTY": 4, "ROTZ": 5}
 _FORCES = {"FX": 0, "FY": 1, "FZ": 2, "MX": 3, "MY": 4, "MZ": 5}
 #: element -> number of KEYOPT -> its values, and the integration that each means; "": as without it
@@ -39,7 +40,8 @@ KEYOPTS: dict[int, dict[int, dict[int, str]]] = {
     181: {1: {0: ""}, 3: {0: "", 2: ""}},
     281: {1: {0: ""}},
 }
-OUTPUT_KEYOPTS = (4, 5, 8, 9, 10, 15)  #: output, layers, boundary layers of waves: they change no mass or stiffness
+#: KEYOPTs for output, layers and acoustic layers, which change neither mass nor stiffness
+OUTPUT_KEYOPTS = (4, 5, 8, 9, 10, 15)
 DAMPING_LABELS = ("DMPR", "DMPS", "ALPD", "BETD")
 ISOTROPIC = ("EX", "PRXY", "NUXY", "DENS")
 ORTHOTROPIC = ("EY", "EZ", "PRXZ", "PRYZ", "NUXZ", "NUYZ", "GXY", "GXZ", "GYZ")
@@ -58,17 +60,17 @@ class _Draft:
     where: str
     ledger: Ledger
     nodes: list[tuple[int, list[float]]] = field(default_factory=list)
-    elements: list[list[int]] = field(default_factory=list)  #: columns of each, then its nodes
-    kinds: dict[int, int] = field(default_factory=dict)  #: number of the type -> element of ANSYS
+    elements: list[list[int]] = field(default_factory=list)  #: columns of each element, then its nodes
+    kinds: dict[int, int] = field(default_factory=dict)  #: ANSYS element of each type number
     components: dict[str, tuple[str, IntArray]] = field(default_factory=dict)
     #: material -> label -> values by their place in the table of temperatures
     constants: dict[int, dict[str, dict[int, float]]] = field(default_factory=dict)
-    keyopts: dict[int, dict[int, int]] = field(default_factory=dict)  #: number of the type -> KEYOPT -> value
-    is_lumped: bool = False  #: LUMPM,ON
+    keyopts: dict[int, dict[int, int]] = field(default_factory=dict)  #: value of each KEYOPT, by type number
+    is_lumped: bool = False  #: whether LUMPM,ON is in the file
     section: int = 0  #: number of the last SECTYPE
     #: number of a section -> thickness, material, angle of its layers, bottom to top
     layers: dict[int, list[tuple[float, int, float]]] = field(default_factory=dict)
-    offsets: dict[int, str] = field(default_factory=dict)  #: number of a section -> MID, TOP or BOT
+    offsets: dict[int, str] = field(default_factory=dict)  #: MID, TOP or BOT, by section number
     held: dict[int, set[int]] = field(default_factory=dict)
     forces: dict[int, Array] = field(default_factory=dict)
 
@@ -113,7 +115,7 @@ def _format(here: str, line: str) -> tuple[int, int, int]:
 
 
 def _nodes(here: str, words: list[str], lines: Iterator[tuple[int, str]], draft: _Draft) -> None:
-    """Numbers, then up to three coordinates and three angles; zeros at the end are left out."""
+    """Read nodes: numbers, then up to three coordinates and three angles; trailing zeros may be missing."""
     n, width, real = _format(here, next(lines)[1])
     for _, line in lines:
         head = line[: n * width]
@@ -127,7 +129,7 @@ def _nodes(here: str, words: list[str], lines: Iterator[tuple[int, str]], draft:
 
 
 def _elements(here: str, words: list[str], lines: Iterator[tuple[int, str]], draft: _Draft) -> None:
-    """Eleven columns and eight nodes on a line, further nodes on the next."""
+    """Read elements: eleven columns and eight nodes on a line, further nodes on the next line."""
     if words[1] != "19":  # another layout
         raise MeshError(f"{here}: expected 19 columns (EBLOCK,19,SOLID), got {words[1]}")
     _, width, _ = _format(here, next(lines)[1])
@@ -147,7 +149,7 @@ def _elements(here: str, words: list[str], lines: Iterator[tuple[int, str]], dra
 
 
 def _component(here: str, words: list[str], lines: Iterator[tuple[int, str]], draft: _Draft) -> None:
-    """Numbers, a negative one the end of a range."""
+    """Read a component: numbers, where a negative one ends a range."""
     per_line, width, _ = _format(here, next(lines)[1])
     count = int(words[3])
     values: list[int] = []
@@ -163,7 +165,7 @@ def _component(here: str, words: list[str], lines: Iterator[tuple[int, str]], dr
 
 
 def _section_block(here: str, words: list[str], lines: Iterator[tuple[int, str]], draft: _Draft) -> None:
-    """Layers of the last SECTYPE, one a line: thickness, material, angle, points."""
+    """Read the layers of the last SECTYPE, one on a line: thickness, material, angle, points."""
     for _ in range(int(words[1])):
         _, line = next(lines)
         _layer([word.strip() for word in line.split(",")], draft)
@@ -179,7 +181,7 @@ BLOCKS = {"NBLOCK": _nodes, "EBLOCK": _elements, "CMBLOCK": _component, "SECBLOC
 
 
 def _command(name: str, words: list[str], draft: _Draft, line: int) -> None:
-    """Read one command, or count it in the ledger."""
+    """Read one command, or add it to the ledger."""
     if name == "ET" and len(words) > 2 and words[1].isdigit():
         draft.kinds[int(words[1])] = int(re.sub(r"\D", "", words[2]))
     elif name == "MPDATA" and len(words) > 6:  # MPDATA,R5.0, 1,EX  ,       1, 1, value, value, value
@@ -311,7 +313,7 @@ def _deck(path: Path, draft: _Draft) -> Deck:
 
 
 def _shell(draft: _Draft, kind: int, row: list[int]) -> tuple[str, ShellSection, list[int]] | None:
-    """Return the cell of a shell element, its section and its nodes; None if it is refused.
+    """Return cell, section and nodes of a shell element; None if it cannot be converted.
 
     The nodes lie on the middle surface, or on the top or bottom one (SECOFFSET). Layers of isotropic materials are read
     as they are; directions of orthotropic ones would follow the axes of the element.
@@ -341,12 +343,12 @@ def _shell(draft: _Draft, kind: int, row: list[int]) -> tuple[str, ShellSection,
 
 
 def _plain_type(draft: _Draft, number: int) -> bool:
-    """Whether the element type has no KEYOPT that chooses its integration."""
+    """Return whether no KEYOPT of the element type changes its integration."""
     return not any(key == 2 and value for key, value in draft.keyopts.get(number, {}).items())
 
 
 def _integration(draft: _Draft, number: int, kind: int) -> str:
-    """Return the integration chosen by KEYOPT of an element type, empty for the default; refuse others."""
+    """Return the integration chosen by a KEYOPT; empty for the default. Other KEYOPTs go to the ledger."""
     chosen = ""
     for key, value in draft.keyopts.get(number, {}).items():
         known = KEYOPTS[kind].get(key, {0: ""})
@@ -392,7 +394,7 @@ def _material(draft: _Draft, number: int, tables: dict[str, dict[int, float]], i
 
 
 def _shape(where: str, kind: int, row: list[int]) -> tuple[str, list[int]]:
-    """Return the cell of an element and its nodes. A brick with equal nodes is another cell."""
+    """Return cell and nodes of an element. A brick with coinciding nodes is another kind of cell."""
     n = row[COLUMNS:]
     if kind == 187 and len(n) >= 10:
         return "tetra10", n[:10]
@@ -417,7 +419,7 @@ def _shape(where: str, kind: int, row: list[int]) -> tuple[str, list[int]]:
 
 
 def _rows(numbers: IntArray, order: IntArray, wanted: IntArray) -> IntArray:
-    """Return the rows of node numbers, -1 where there is none."""
+    """Return the rows of these node numbers; -1 for a missing node."""
     ordered = numbers[order]
     at = np.minimum(np.searchsorted(ordered, wanted), len(ordered) - 1)
     return np.where(ordered[at] == wanted, order[at], -1)
@@ -426,7 +428,7 @@ def _rows(numbers: IntArray, order: IntArray, wanted: IntArray) -> IntArray:
 def _supports(
     draft: _Draft, numbers: IntArray, order: IntArray, used: IntArray, sets: dict[str, IntArray]
 ) -> tuple[list[Support], dict[str, IntArray]]:
-    """Return one support for each set of components that nodes are held in, and the groups with theirs."""
+    """Return one support for each set of fixed components, and the groups of its nodes."""
     by: dict[tuple[int, ...], list[int]] = {}
     for number, components in draft.held.items():
         row = int(_rows(numbers, order, np.array([number]))[0])

@@ -38,7 +38,7 @@ HARMLESS = frozenset(
 
 
 def fields_of_command(name: str) -> tuple[TableField, ...]:
-    """Return the fields of a command that `COMMANDS` lists."""
+    """Return the fields of a command listed in `COMMANDS`."""
     return parse_fields(COMMANDS[name].split())
 
 
@@ -62,7 +62,7 @@ def check_command(name: str, words: list[str], ledger: Ledger, line: int) -> Non
 
 
 def check_columns(row: list[int], ledger: Ledger) -> None:
-    """Refuse an element of EBLOCK that uses a column which is not converted."""
+    """Add an element of EBLOCK to the ledger if it uses an unsupported column."""
     for item in parse_fields(COLUMNS.split()):
         value = row[item.number - 1]
         if item.use == "default" and not has_default(str(value), item.default):
@@ -70,7 +70,7 @@ def check_columns(row: list[int], ledger: Ledger) -> None:
 
 
 def says_something(word: str) -> bool:
-    """Whether a field is text or a number that is not zero."""
+    """Return whether a field is a text or a nonzero number."""
     try:
         return float(word) != 0
     except ValueError:
