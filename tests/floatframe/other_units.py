@@ -54,6 +54,7 @@ from floatframe.components.hydraulics import (
 from floatframe.components.wheels import BrushTyre, LinearTyre, MagicFormulaTyre
 from floatframe.components.wheels.roads.road import Grip
 from floatframe.components.wheels.tyre_file import TyreProperties
+from floatframe.engine.compiling.placing import placed_bodies
 from floatframe.model.bodies.ground import GROUND
 from floatframe.model.bodies.markers import body_name
 from floatframe.model.functions.time_functions import TimeFunction
@@ -363,6 +364,8 @@ def in_units(system, units, turn=None, place=None):
 def moved(system, R, place):
     """Return a system that as a whole is turned and moved: bodies, markers on the ground, what has ground axes."""
 
+    system = replace(system, bodies=placed_bodies(system))  # not where their meshes are drawn
+
     def marker(each):
         if body_name(each.body) != GROUND.name:
             return each
@@ -374,7 +377,7 @@ def moved(system, R, place):
         """Return a joint whose marker A is the ground, without a place, with that place."""
         body = system.body(body_name(joint.marker_b.body))
         where = np.zeros(3) if joint.marker_b.position is None else joint.marker_b.position
-        found = body.drawn_position + rotation_matrix(body.orientation) @ where
+        found = body.position + rotation_matrix(body.orientation) @ where
         return replace(joint, marker_a=Marker(GROUND, position=found))
 
     def part(each):
@@ -397,7 +400,7 @@ def moved(system, R, place):
         return each
 
     bodies = tuple(
-        replace(body, position=R @ body.drawn_position + place, velocity=R @ body.velocity,
+        replace(body, position=R @ body.position + place, velocity=R @ body.velocity,
                 orientation=euler_parameter_product(euler_parameters(R), body.orientation))
         for body in system.bodies
     )  # fmt: skip
