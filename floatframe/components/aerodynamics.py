@@ -1,4 +1,4 @@
-"""Lift and drag of a wing, a part of it or a tail as functions of the angle of attack, in quasi-steady strip theory."""
+"""Lift and drag of a wing, part of a wing or tail as functions of the angle of attack, by quasi-steady strip theory."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -25,8 +25,8 @@ NO_WIND: Any = (0.0, 0.0, 0.0)
 OUTPUTS = (
     ("lift", "N"), ("drag", "N"), ("alpha", "rad"), ("speed", "m/s"), ("lift coefficient", "1"), ("power lost", "W"),
 )  # fmt: skip
-FACTOR = 10  #: index in the data of the factor on the lift
-LEAST_SPEED = 1e-6  #: speed below which force and angle are zero
+FACTOR = 10  #: index in the data of the lift factor
+LEAST_SPEED = 1e-6  #: air speed below which force and angle are zero
 
 
 @frozen_copies
@@ -48,16 +48,16 @@ class LiftingSurface(Element):
 
     name: str
     marker: Marker  #: x forward along the chord, z up
-    area: float  #: [m²]
-    lift_slope: float  #: dC_L/dalpha [1/rad]
-    density: float  #: rho of the air [kg/m³]
-    #: alpha without lift as a function of time [rad]: negative for incidence and flaps, positive for an elevator pulled
-    #: up
+    area: float  #: wing area [m²]
+    lift_slope: float  #: slope of the lift coefficient, dC_L/dalpha [1/rad]
+    density: float  #: density rho of the air [kg/m³]
+    #: angle of attack without lift as a function of time [rad]: negative for incidence and flaps, positive for an
+    #: elevator that is pulled up
     zero_lift: TimeFunction | float = 0.0
-    most_lift: float = 1.5  #: largest magnitude of C_L
-    zero_drag: float = 0.0  #: C_D without lift
-    induced_drag: float = 0.0  #: 1/(pi e aspect ratio)
-    factor: TimeFunction | float = 1.0  #: factor on the lift as a function of time, such as for spoilers
+    most_lift: float = 1.5  #: largest absolute lift coefficient C_L
+    zero_drag: float = 0.0  #: drag coefficient C_D without lift
+    induced_drag: float = 0.0  #: factor of induced drag, 1/(pi e aspect ratio)
+    factor: TimeFunction | float = 1.0  #: lift factor as a function of time, for example for spoilers
     wind: Array = NO_WIND  #: velocity of the air, ground axes, (3,) [m/s]
 
     def __post_init__(self) -> None:

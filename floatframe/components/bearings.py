@@ -37,7 +37,7 @@ OUTPUTS = {
     "x": "m", "y": "m", "axial": "m", "tilt x": "rad", "tilt y": "rad", "force x": "N", "force y": "N",
     "axial force": "N", "energy": "J", "power lost": "W",
 }  # fmt: skip
-LEAST_COSINE = 0.5  #: least cosine between both axes as assembled; a smaller one indicates a wrong marker axis
+LEAST_COSINE = 0.5  #: smallest cosine between both axes when assembled; a smaller one indicates a wrong marker axis
 
 
 @frozen_copies
@@ -58,17 +58,17 @@ class Bearing(Element):
     name: str
     marker_a: Marker
     marker_b: Marker
-    stiffness: Array  #: K across the axis: [[k_xx, k_xy], [k_yx, k_yy]], its diagonal, or one number [N/m]
+    stiffness: Array  #: radial stiffness K: [[k_xx, k_xy], [k_yx, k_yy]], its diagonal, or one number [N/m]
     damping: Array = 0.0  # type: ignore[assignment]  #: D, likewise [N s/m]
-    axial_stiffness: float = 0.0  #: k_a [N/m]
-    axial_damping: float = 0.0  #: d_a [N s/m]
-    tilt_stiffness: float = 0.0  #: k_t [N m/rad]
-    tilt_damping: float = 0.0  #: d_t [N m s/rad]
+    axial_stiffness: float = 0.0  #: axial stiffness k_a [N/m]
+    axial_damping: float = 0.0  #: axial damping d_a [N s/m]
+    tilt_stiffness: float = 0.0  #: tilting stiffness k_t [N m/rad]
+    tilt_damping: float = 0.0  #: tilting damping d_t [N m s/rad]
     axis: Array = (0.0, 0.0, 1.0)  # type: ignore[assignment]  #: e, in the axes of marker a, (3,)
     #: direction of x, in the axes of marker a, (3,); None: the axis of a that follows the one nearest to `axis`: x for
     #: z
     x_axis: Array | None = None
-    shaft_axis: Array | None = None  #: s, in the axes of marker b, (3,); None: as `axis`
+    shaft_axis: Array | None = None  #: direction s of the shaft in axes of marker b, (3,); None: equal to `axis`
 
     def __post_init__(self) -> None:
         where = f"element {self.name!r}"
@@ -102,7 +102,7 @@ class Bearing(Element):
         return self.tilt_stiffness > 0.0 or self.tilt_damping > 0.0
 
     def small_angles(self) -> Callable[[Array], Array] | None:
-        """Return the relative difference between the tilt and its sine, which the moment follows."""
+        """Return the relative difference between the tilt and its sine, on which the moment depends."""
         return self.tilt_beyond_sine if self.resists_tilt else None
 
     def tilt_beyond_sine(self, A: Array) -> Array:

@@ -30,7 +30,7 @@ ELEMENTS = {"cable": "floatframe.components.cables:Cable"}
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class Cable(Element):
-    """A cable between points of bodies, with the stiffness of the whole cable; preloaded or slack as assembled.
+    """A cable between points of bodies, with the stiffness of the whole cable; tensioned or slack when assembled.
 
     Raises
     ------
@@ -40,10 +40,10 @@ class Cable(Element):
 
     name: str
     points: Sequence[Marker]  #: ends and inner points, in order
-    stiffness: float  #: of the whole cable, E A / length [N/m]
-    damping: float = 0.0  #: acts while the cable is taut [N s/m]
-    preload: float | None = None  #: tension as assembled [N]; None: 0, or the value that follows from `length`
-    length: float | None = None  #: unstretched length [m]; None: follows from the preload
+    stiffness: float  #: stiffness of the whole cable, E A / length [N/m]
+    damping: float = 0.0  #: damping while the cable is taut [N s/m]
+    preload: float | None = None  #: tension when assembled [N]; None: 0, or the value that follows from `length`
+    length: float | None = None  #: unstretched length [m]; None: computed from the preload
 
     def __post_init__(self) -> None:
         where = f"element {self.name!r}"
@@ -62,7 +62,7 @@ class Cable(Element):
 
     @property
     def markers(self) -> tuple[Marker, ...]:
-        """Markers of its points."""
+        """Markers of the cable's points."""
         return tuple(self.points)
 
     def law(self, placed: Placed) -> ElementLaw:
@@ -92,7 +92,7 @@ class Cable(Element):
         )
 
     def drawn(self) -> Sequence[Stretched]:
-        """Return its straight segments."""
+        """Return the straight segments of the cable."""
         return tuple(Stretched("line", first=k, second=k + 1) for k in range(len(self.points) - 1))
 
 

@@ -51,16 +51,16 @@ class BristleFriction(Element):
     name: str
     marker_a: Marker
     marker_b: Marker
-    coulomb: float  #: F_C, friction at high sliding velocity [N, N m]
-    stiffness: float  #: sigma_0 of the bristles [N/m, N m/rad]
-    static: float | None = None  #: F_S, largest force while sticking [N, N m]; None: as `coulomb`
-    stribeck_speed: float | None = None  #: v_S, needed with `static` [m/s, rad/s]
-    damping: float = 0.0  #: sigma_1 of the bristles [N s/m, N m s/rad]
-    viscous: float = 0.0  #: sigma_2 [N s/m, N m s/rad]
-    elastic: float = 0.7  #: fraction of the steady deflection below which nothing slips; 0 with `creeps`
-    creeps: bool = False  #: True: the bristles slip at any deflection (LuGre as published)
-    motion: str = "along"  #: "along" the axis, or "about" it
-    speed: float = 0.0  #: initial sliding velocity, with the bristles deflected as in steady sliding
+    coulomb: float  #: friction force F_C at high sliding velocity [N, N m]
+    stiffness: float  #: stiffness sigma_0 of the bristles [N/m, N m/rad]
+    static: float | None = None  #: largest friction force F_S while sticking [N, N m]; None: equal to `coulomb`
+    stribeck_speed: float | None = None  #: Stribeck speed v_S, required with `static` [m/s, rad/s]
+    damping: float = 0.0  #: damping sigma_1 of the bristles [N s/m, N m s/rad]
+    viscous: float = 0.0  #: viscous friction sigma_2 [N s/m, N m s/rad]
+    elastic: float = 0.7  #: fraction of the steady deflection below which there is no slip; 0 with `creeps`
+    creeps: bool = False  #: whether the bristles slip at any deflection (LuGre as published)
+    motion: str = "along"  #: motion "along" the axis or "about" it
+    speed: float = 0.0  #: initial sliding velocity, with the bristle deflection of steady sliding
     axis: Array = (0.0, 0.0, 1.0)  # type: ignore[assignment]  #: in the axes of marker a, (3,)
 
     def __post_init__(self) -> None:
@@ -114,7 +114,7 @@ class BristleFriction(Element):
 
 @njit
 def slipping(z, v, steady, elastic, creeps):
-    """Return alpha, the fraction of the motion that is slip, from 0 (sticks) to 1."""
+    """Return alpha, the fraction of the motion that is slip, from 0 (sticking) to 1."""
     if creeps > 0.0:
         return 0.0 * z + 1.0
     size = absolute(z)

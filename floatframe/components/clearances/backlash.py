@@ -58,13 +58,13 @@ class BallWithPlay(Element):
     name: str
     marker_a: Marker
     marker_b: Marker
-    play: float  #: difference of the radii [m]
-    stiffness: float  #: k of the contact [N/mⁿ]
-    exponent: float = 1.0  #: n
-    damping: float = 0.0  #: chi, damping proportional to the approach velocity [s/m]
-    friction: float = 0.0  #: mu
-    friction_speed: float = FRICTION_SPEED  #: v_s, slip at which friction is 0.71 of its value [m/s]
-    radius: float = 0.0  #: radius of the ball, lever arm of the friction [m]
+    play: float  #: radial play, the difference of the radii [m]
+    stiffness: float  #: contact stiffness k [N/mⁿ]
+    exponent: float = 1.0  #: exponent n of the contact depth
+    damping: float = 0.0  #: damping chi, proportional to the approach velocity [s/m]
+    friction: float = 0.0  #: coefficient of friction mu
+    friction_speed: float = FRICTION_SPEED  #: slip speed v_s at which friction is 0.71 of its value [m/s]
+    radius: float = 0.0  #: radius of the ball, which is the lever arm of friction [m]
 
     def __post_init__(self) -> None:
         require_numbers(self, {"play": Range(above=0.0)})
@@ -119,12 +119,12 @@ class Backlash(Element):
     name: str
     marker_a: Marker
     marker_b: Marker
-    lower: float  #: [m, rad]
-    upper: float  #: above `lower` [m, rad]
-    stiffness: float  #: k of the stops [N/mⁿ, N m/radⁿ]
-    exponent: float = 1.0  #: n
-    damping: float = 0.0  #: chi, damping proportional to the approach velocity [s/m, s/rad]
-    motion: str = "along"  #: "along" the axis, or "about" it
+    lower: float  #: lower end of the dead band [m, rad]
+    upper: float  #: upper end of the dead band, above `lower` [m, rad]
+    stiffness: float  #: stiffness k of the stops [N/mⁿ, N m/radⁿ]
+    exponent: float = 1.0  #: exponent n of the contact depth
+    damping: float = 0.0  #: damping chi, proportional to the approach velocity [s/m, s/rad]
+    motion: str = "along"  #: motion "along" the axis or "about" it
     axis: Array = (0.0, 0.0, 1.0)  # type: ignore[assignment]  #: in the axes of marker a, (3,)
 
     def __post_init__(self) -> None:

@@ -21,7 +21,7 @@ from floatframe.model.elements.pairs import inner_product, vector_product
 
 __all__ = ["NUMBERS", "add_contact", "contact_numbers", "depth_force", "require_numbers"]
 
-NUMBERS = 6  #: parameters of a contact in `data`: k, n, chi, mu, v_s, r
+NUMBERS = 6  #: number of contact parameters in `data`: k, n, chi, mu, v_s, r
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def contact_numbers(element: Any) -> list[float]:
 
 @register_jitable
 def depth_force(depth, rate, data, at):
-    """Return the normal force N, its spring part and the energy of the spring, for a depth >= 0.
+    """Return the normal force N, its elastic part and the elastic energy for a depth >= 0.
 
     data: k, n, chi, from index `at` on.
     """

@@ -70,20 +70,21 @@ class HingeWithPlay(Element):
     name: str
     marker_a: Marker
     marker_b: Marker
-    radial_play: float  #: from the middle to the contact, half the difference of the diameters [m]
-    stiffness: float  #: k of the contact in one plane [N/mⁿ]
-    length: float = 0.0  #: L of the bearing [m]; 0: a single plane, in which the pin tilts freely
-    axial_play: float = 0.0  #: to each side [m]
+    radial_play: float  #: distance from the centred pin to contact, half the difference of the diameters [m]
+    stiffness: float  #: contact stiffness k in one plane [N/mⁿ]
+    length: float = 0.0  #: length L of the bearing [m]; 0: a single plane, in which the pin tilts freely
+    axial_play: float = 0.0  #: axial play to each side [m]
     slides: bool = False  #: whether the pin moves freely along the axis
-    axial_stiffness: float | None = None  #: [N/mⁿ]; None: as `stiffness`
-    exponent: float = 1.0  #: n
-    damping: float = 0.0  #: chi, damping proportional to the approach velocity [s/m]
-    friction: float = 0.0  #: mu
-    friction_speed: float = FRICTION_SPEED  #: v_s, slip at which friction is 0.71 of its value [m/s]
-    radius: float = 0.0  #: radius of the pin, lever arm of the friction [m]
-    turn_stiffness: float = 0.0  #: k_t about the axis [N m/rad]
-    turn_damping: float = 0.0  #: d_t [N m s/rad]
-    turn_free: float = 0.0  #: angle at which the spring about the axis is free, relative to the assembled angle [rad]
+    axial_stiffness: float | None = None  #: stiffness of the axial contact [N/mⁿ]; None: equal to `stiffness`
+    exponent: float = 1.0  #: exponent n of the contact depth
+    damping: float = 0.0  #: damping chi, proportional to the approach velocity [s/m]
+    friction: float = 0.0  #: coefficient of friction mu
+    friction_speed: float = FRICTION_SPEED  #: slip speed v_s at which friction is 0.71 of its value [m/s]
+    radius: float = 0.0  #: radius of the pin, which is the lever arm of friction [m]
+    turn_stiffness: float = 0.0  #: torsional stiffness k_t about the axis [N m/rad]
+    turn_damping: float = 0.0  #: torsional damping d_t about the axis [N m s/rad]
+    #: angle at which the torsional spring is free of moment, relative to the assembled angle [rad]
+    turn_free: float = 0.0
     axis: Array = (0.0, 0.0, 1.0)  # type: ignore[assignment]  #: in the axes of marker a, (3,)
 
     def __post_init__(self) -> None:
@@ -102,7 +103,7 @@ class HingeWithPlay(Element):
         object.__setattr__(self, "axis", unit_vector(f"element {self.name!r}: axis", self.axis))
 
     def law(self, placed: Placed) -> ElementLaw:
-        """Return the law of the hinge, whose axes must coincide as assembled."""
+        """Return the law of the hinge, whose axes must coincide when assembled."""
         axial = self.stiffness if self.axial_stiffness is None else self.axial_stiffness
         gaps = {"gap": GapSpring(self.stiffness, self.exponent)}
         if self.length > 0.0:

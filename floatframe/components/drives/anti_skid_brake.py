@@ -57,19 +57,19 @@ class AntiSkidBrake(Element):
     """
 
     name: str
-    marker_a: Marker  #: on the brake support
-    marker_b: Marker  #: on the wheel
+    marker_a: Marker  #: marker on the brake support
+    marker_b: Marker  #: marker on the wheel
     pressure: TimeFunction | float  #: pilot's pressure above ambient, a function of time [Pa]
-    gain: float  #: torque divided by pressure [m³]
-    build_rate: float  #: [Pa/s]
-    release_rate: float  #: [Pa/s]
-    radius: float  #: R, rolling radius [m]
-    slip: float  #: threshold of the slip
-    slip_band: float  #: half width of the range around the threshold in which the valve opens and closes
+    gain: float  #: brake gain: torque divided by pressure [m³]
+    build_rate: float  #: rate at which the valve builds up pressure [Pa/s]
+    release_rate: float  #: rate at which the valve releases pressure [Pa/s]
+    radius: float  #: rolling radius R of the wheel [m]
+    slip: float  #: slip threshold at which the valve releases
+    slip_band: float  #: half width of the slip range around the threshold in which the valve opens and closes
     reference_deceleration: float  #: largest assumed deceleration of the vehicle [m/s²]
     drop_out: float  #: reference speed below which anti-skid is off [m/s]
     deceleration: float | None = None  #: threshold of the rim deceleration [m/s²]; None: only slip is used
-    deceleration_band: float | None = None  #: needed with it [m/s²]
+    deceleration_band: float | None = None  #: half width of the range around this threshold, required with it [m/s²]
     reference_time: float = LAG  #: time constant with which the reference speed follows a faster wheel [s]
     sensor_time: float = SENSOR_TIME  #: time constant of the sensor [s]
     time_constant: float = LAG  #: time constant of valve and brake [s]

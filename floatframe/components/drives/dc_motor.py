@@ -30,10 +30,10 @@ __all__ = ["DcMotor"]
 
 FRICTION_SPEED = Quantity(1.0, RATE)
 
-#: quantities that a controller can use, with their units
+#: quantities that a controller can control, with their units
 CONTROLLED = {"speed": "rad/s", "angle": "rad", "current": "A"}
 BY_FUNCTION, SPEED, ANGLE, CURRENT = range(4)
-SUPPLY = 18  #: index in the data of the voltage or the controller
+SUPPLY = 18  #: index in the data of the voltage or of the controller
 OUTPUTS = (
     ("current", "A"), ("voltage", "V"), ("torque", "N m"), ("speed", "rad/s"), ("angle", "rad"), ("power in", "W"),
     ("power lost", "W"), ("power out", "W"), ("energy", "J"),
@@ -60,17 +60,17 @@ class DcMotor(Element):
     name: str
     marker_a: Marker
     marker_b: Marker
-    resistance: float  #: R [ohm]
-    inductance: float  #: L [H]
-    constant: float  #: k, torque divided by current, or voltage divided by speed [N m/A = V s/rad]
-    voltage: TimeFunction | float | None = None  #: u as a function of time [V]
-    controller: Pid | None = None  #: controller of u, instead of `voltage`
+    resistance: float  #: resistance R of the armature [ohm]
+    inductance: float  #: inductance L of the armature [H]
+    constant: float  #: motor constant k: torque divided by current, or voltage divided by speed [N m/A = V s/rad]
+    voltage: TimeFunction | float | None = None  #: voltage u as a function of time [V]
+    controller: Pid | None = None  #: controller of u, in place of `voltage`
     controlled: str = "speed"  #: quantity that the controller controls: "speed", "angle" or "current"
-    axis: Array = Z_AXIS  #: in the axes of marker a, (3,)
+    axis: Array = Z_AXIS  #: axis in axes of marker a, (3,)
     ratio: float = 1.0  #: gear ratio, speed of the motor divided by omega
     friction: float = 0.0  #: dry friction of the motor [N m]
-    friction_speed: float = FRICTION_SPEED  #: w in friction ω/√(ω² + w²), with ω the speed of the motor [rad/s]
-    damping: float = 0.0  #: damping of the motor, torque divided by speed [N m s]
+    friction_speed: float = FRICTION_SPEED  #: speed scale w of friction ω/√(ω² + w²), with motor speed ω [rad/s]
+    damping: float = 0.0  #: viscous damping of the motor: torque divided by speed [N m s]
     current: float = 0.0  #: initial current [A]
 
     def __post_init__(self) -> None:
@@ -121,7 +121,7 @@ class DcMotor(Element):
 
 @njit
 def dc_motor_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
-    """Write the torque of a motor, the rates of its current and its controller, and its outputs."""
+    """Write the motor torque, the rates of current and controller states, and the outputs."""
     R, L, k, ratio, mode = data[0], data[1], data[2], data[3], int(data[7])
     e = direction_of(x, 0, data, 8)
     speed = turning_speed(x, 0, 1, e)

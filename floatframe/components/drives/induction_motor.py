@@ -61,22 +61,23 @@ class InductionMotor(Element):
     name: str
     marker_a: Marker
     marker_b: Marker
-    stator_resistance: float  #: R_s [ohm]
-    rotor_resistance: float  #: R_r referred to the stator [ohm]
-    stator_leakage: float  #: L_ls [H]
-    rotor_leakage: float  #: L_lr referred to the stator [H]
-    magnetizing: float  #: L_m [H]
+    stator_resistance: float  #: stator resistance R_s [ohm]
+    rotor_resistance: float  #: rotor resistance R_r, referred to the stator [ohm]
+    stator_leakage: float  #: leakage inductance L_ls of the stator [H]
+    rotor_leakage: float  #: leakage inductance L_lr of the rotor, referred to the stator [H]
+    magnetizing: float  #: magnetizing inductance L_m [H]
     pole_pairs: int
     frequency: TimeFunction | float  #: supply frequency as a function of time [Hz]
-    voltage: TimeFunction | float | None = None  #: phase peak as a function of time [V]; None: by V/f
-    rated_voltage: float | None = None  #: phase peak at the rated frequency, for V/f [V]
-    rated_frequency: float | None = None  #: for V/f [Hz]
-    boost: float = 0.0  #: amplitude at standstill, for V/f [V]
-    harmonics: Sequence[Sequence[float]] = ()  #: order, and amplitude relative to the fundamental, of each
-    axis: Array = Z_AXIS  #: in the axes of marker a, (3,)
-    ratio: float = 1.0  #: gear ratio, speed of the motor divided by that of b
-    damping: float = 0.0  #: damping of the motor, torque divided by speed [N m s]
-    fluxes: Sequence[float] = (0.0, 0.0, 0.0, 0.0)  #: initial flux linkages: stator a, b, rotor a, b [V s]
+    #: peak phase voltage as a function of time [V]; None: from constant V/f
+    voltage: TimeFunction | float | None = None
+    rated_voltage: float | None = None  #: peak phase voltage at the rated frequency, for constant V/f [V]
+    rated_frequency: float | None = None  #: rated frequency, for constant V/f [Hz]
+    boost: float = 0.0  #: voltage amplitude at standstill, for constant V/f [V]
+    harmonics: Sequence[Sequence[float]] = ()  #: order of each harmonic, and its amplitude relative to the fundamental
+    axis: Array = Z_AXIS  #: axis in axes of marker a, (3,)
+    ratio: float = 1.0  #: gear ratio, speed of the motor divided by the speed of b
+    damping: float = 0.0  #: viscous damping of the motor: torque divided by speed [N m s]
+    fluxes: Sequence[float] = (0.0, 0.0, 0.0, 0.0)  #: initial flux linkages of stator a, b and rotor a, b [V s]
 
     def __post_init__(self) -> None:
         where = f"element {self.name!r}"

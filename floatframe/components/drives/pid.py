@@ -35,16 +35,16 @@ class Pid:
     - "back-calculation": dI/dt = ki e + (u_limited - u)/tracking_time.
     """
 
-    target: TimeFunction | float  #: desired value, as a function of time
+    target: TimeFunction | float  #: desired value as a function of time
     kp: float
-    ki: float = 0.0  #: [1/s times the unit of kp]
-    kd: float = 0.0  #: [s times the unit of kp]
-    filter_time: float | None = None  #: time constant of the filter of e; needed with kd [s]
+    ki: float = 0.0  #: gain of the integral [1/s times the unit of kp]
+    kd: float = 0.0  #: gain of the derivative [s times the unit of kp]
+    filter_time: float | None = None  #: time constant of the derivative filter, required with kd [s]
     lower: float | None = None  #: lower limit of the output; None: no limit
     upper: float | None = None  #: upper limit of the output; None: no limit
     anti_windup: str = "clamping"
-    tracking_time: float | None = None  #: time constant of back-calculation [s]
-    integral: float = 0.0  #: initial value of I
+    tracking_time: float | None = None  #: time constant of back-calculation (anti-windup) [s]
+    integral: float = 0.0  #: initial value of the integral part I
 
     def __post_init__(self) -> None:
         for key in ("kp", "ki", "kd", "integral"):
@@ -71,7 +71,7 @@ class Pid:
 
     @property
     def states(self) -> list[str]:
-        """Names of its states: I if there is ki, x if there is kd."""
+        """Names of the states: I if ki is given, x if kd is given."""
         return [name for name, factor in (("integral", self.ki), ("filtered error", self.kd)) if factor != 0]
 
     def start(self, value: float, seen: str, output: str) -> list[tuple[str, str, float]]:

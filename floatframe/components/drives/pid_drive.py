@@ -39,7 +39,7 @@ class PidDrive(Element):
     marker_b: Marker
     controller: Pid
     controlled: str = "angle"
-    axis: Array = Z_AXIS  #: in the axes of marker a, (3,)
+    axis: Array = Z_AXIS  #: axis in axes of marker a, (3,)
     time_constant: float = 0.0  #: time constant of the actuator [s]
 
     def __post_init__(self) -> None:

@@ -33,13 +33,14 @@ class SpeedControl(Element):
     name: str
     marker_a: Marker
     marker_b: Marker
-    target: TimeFunction | float  #: desired omega as a function of time [rad/s]
-    gain: float  #: K [N m s]
-    rate_time: float = 0.0  #: lambda [s]
-    filter_time: float | None = None  #: time constant of the filter, needed with lambda; at most lambda/10 is usual [s]
-    axis: Array = Z_AXIS  #: in the axes of marker a, (3,)
+    target: TimeFunction | float  #: desired speed omega as a function of time [rad/s]
+    gain: float  #: gain K [N m s]
+    rate_time: float = 0.0  #: rate time lambda [s]
+    #: time constant of the filter, required with lambda; usually at most lambda/10 [s]
+    filter_time: float | None = None
+    axis: Array = Z_AXIS  #: axis in axes of marker a, (3,)
     limit: float | None = None  #: largest torque in both directions [N m]; None: no limit
-    speed: float = 0.0  #: initial omega, at which the filter starts [rad/s]
+    speed: float = 0.0  #: initial speed omega, from which the filter starts [rad/s]
 
     def __post_init__(self) -> None:
         check_shaft(self)

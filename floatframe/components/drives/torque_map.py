@@ -41,16 +41,17 @@ class TorqueMap(Element):
     name: str
     marker_a: Marker
     marker_b: Marker
-    speeds: Sequence[float]  #: speeds of the motor, increasing [rad/s]
-    throttles: Sequence[float]  #: increasing
-    torques: Sequence[Sequence[float]]  #: one row for each speed, one column for each throttle [N m]
-    throttle: TimeFunction | float | None = None  #: function of time
-    controller: Pid | None = None  #: controller of the throttle from the speed of b, instead of `throttle`
-    time_constant: float = 0.0  #: lag of the torque [s]
-    ratio: float = 1.0  #: gear ratio, speed of the motor divided by that of b
-    axis: Array = Z_AXIS  #: in the axes of marker a, (3,)
-    efficiency_torques: Sequence[float] | None = None  #: magnitudes of the motor torque, increasing [N m]
-    efficiencies: Sequence[Sequence[float]] | None = None  #: one row for each of `speeds`, one column for each torque
+    speeds: Sequence[float]  #: increasing speeds of the motor [rad/s]
+    throttles: Sequence[float]  #: increasing throttle values
+    torques: Sequence[Sequence[float]]  #: torques, with a row for each speed and a column for each throttle [N m]
+    throttle: TimeFunction | float | None = None  #: throttle as a function of time
+    controller: Pid | None = None  #: controller of the throttle from the speed of b, in place of `throttle`
+    time_constant: float = 0.0  #: time constant of the torque lag [s]
+    ratio: float = 1.0  #: gear ratio, speed of the motor divided by the speed of b
+    axis: Array = Z_AXIS  #: axis in axes of marker a, (3,)
+    efficiency_torques: Sequence[float] | None = None  #: increasing absolute motor torques of the efficiency map [N m]
+    #: efficiencies, with a row for each of `speeds` and a column for each torque
+    efficiencies: Sequence[Sequence[float]] | None = None
     controlled: str = "speed"
 
     def __post_init__(self) -> None:

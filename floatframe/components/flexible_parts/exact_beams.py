@@ -1,4 +1,4 @@
-"""Geometrically exact beams: the lines of a finite element model with arbitrary displacements and rotations.
+"""Geometrically exact beams from the lines of a finite element model, for arbitrary displacements and rotations.
 
 Two-node elements of the Simo-Reissner beam [1]_ in absolute coordinates. Node i has a position r_i and axes R_i. In the
 frame C half way between the rotations of both nodes of an element (the rotations from R_1 to C and from C to R_2 are
@@ -41,15 +41,15 @@ E_X = np.array([1.0, 0.0, 0.0])
 
 @dataclass
 class Lump:
-    """Sums over the mass of a node, about the node in mesh axes, from which a rigid body is made."""
+    """Moments of the mass lumped at a node, about the node in mesh axes, for a rigid body."""
 
-    place: Array  #: (3,)
+    place: Array  #: position of the node, (3,)
     mass: float = 0.0
-    moment: Array | float = 0.0  #: ∫ o, (3,)
-    inertia: Array | float = 0.0  #: ∫ |o|² 1 - o oᵀ, (3, 3)
+    moment: Array | float = 0.0  #: first moment ∫ o, (3,)
+    inertia: Array | float = 0.0  #: inertia ∫ |o|² 1 - o oᵀ, (3, 3)
 
     def add(self, mass: float, center: Array, inertia: Array) -> None:
-        """Add a rigid piece, given its centre of mass and the inertia about it."""
+        """Add a rigid piece with its centre of mass and the inertia about this centre."""
         arm = center - self.place
         self.mass += mass
         self.moment = self.moment + mass * arm
@@ -67,7 +67,7 @@ def exact_beams(
     omega_B: Array | None = None,
     damping: float = 0.0,
 ) -> FlexiblePart:
-    """Return a body of beam elements as geometrically exact beams, to be put into a system.
+    """Return a body of beam elements as geometrically exact beams, ready for a system.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def linked(body: FEBody, model: BeamModel) -> bool:
 
 
 def piece_stiffness(K_local: Array, L: float, pieces: int) -> Array:
-    """Return the stiffness of a piece of a line for the relative motion of its ends at its middle, (6, 6): step (2).
+    """Return the stiffness of a line piece for relative motion of its ends at mid-length, (6, 6): step (2).
 
     (a) flexibility F of the line: relative motion of both ends under a force and a moment at the middle
     (b) F = L c + L³/12 Eᵀ c E, with the flexibility c of the section and E f = (0, e_x × f); uniform along the line

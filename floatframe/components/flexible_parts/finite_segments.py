@@ -34,7 +34,7 @@ def floating_parts(
     ends: tuple[str, str] = ("start", "end"),
     stiffening: bool = True,
 ) -> FlexiblePart:
-    """Return reduced bodies in a row, fixed to each other at their ends.
+    """Return reduced bodies in a row, each fixed to the next at its end.
 
     The row may bend and rotate arbitrarily. Only the bending of each part in its own frame must stay small
     (docs/multibody.md, The range of a linear frame); it decreases with the square of the part's length.
@@ -206,7 +206,7 @@ def between(line: BeamLine, start: float, end: float) -> tuple[Array, Array]:
 
 
 def segment(where: str, line: BeamLine, start: float, end: float) -> tuple[float, float, Array]:
-    """Return the mass, the x of the centre of mass, and the inertia about it, of the beam from start to end."""
+    """Return mass, x of the centre of mass, and inertia about it, of the beam from start to end."""
     x, weight = between(line, start, end)
     mass = weight * line.at("rho_A", x)
     Iy, Iz = (float(weight @ line.at(law, x)) for law in ("rho_Iy", "rho_Iz"))
@@ -222,7 +222,7 @@ def segment(where: str, line: BeamLine, start: float, end: float) -> tuple[float
 
 
 def element_stiffness(line: BeamLine, start: float, end: float) -> Array:
-    """Return the stiffness between both halves of a piece of beam, for relative motion at its middle, (6, 6): (2)."""
+    """Return the stiffness between the halves of a beam piece for relative motion at mid-length, (6, 6): (2)."""
     # for the inverse of a law, which is not a polynomial
     xi, weight = np.polynomial.legendre.leggauss(max(8, line.degree + 2))
     cuts = np.array([start, *(x for x in line.breaks if start < x < end), end])

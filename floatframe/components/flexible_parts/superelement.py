@@ -16,8 +16,8 @@ from floatframe.model.rotations import euler_parameters, rotation_matrix, tilde
 
 __all__ = ["corotational", "node_inertias", "relative_stiffness"]
 
-RANK = 1e-12  #: eigenvalue of the scaled flexibility between the nodes below which it is taken as zero
-ALIKE = 1e-6  #: difference up to which the axes of a node, in two elements, are taken as equal
+RANK = 1e-12  #: eigenvalue of the scaled flexibility between the nodes below which it counts as zero
+ALIKE = 1e-6  #: difference of the axes of a node in two elements up to which they count as equal
 
 
 def corotational(
@@ -127,7 +127,7 @@ def corotational(
 
 
 def carried(interface: ReducedInterface, point: Array) -> Array:
-    """Return X, (6, n_q): motion due to the modes of a point carried by an interface, in axes of B."""
+    """Return X, (6, n_q), the modal motion of a point that an interface carries, in axes of B."""
     lever = tilde(point - interface.position)
     return np.asarray(np.vstack([interface.Psi[:3] - lever @ interface.Psi[3:], interface.Psi[3:]]))
 
@@ -190,22 +190,22 @@ def node_inertias(
 
 
 def rigid(arm: Array) -> Array:
-    """Return the matrix [1, -arm~; 0, 1], (6, 6), from motion at a point to motion at another, arm from it to this."""
+    """Return the matrix [1, -arm~; 0, 1], (6, 6), that transfers motion from a point to another at `arm`."""
     return np.block([[np.eye(3), -tilde(arm)], [np.zeros((3, 3)), np.eye(3)]])
 
 
 def rigid_form(B: Array) -> tuple[float, Array, Array]:
-    """Return mass, first moment and inertia of the rigid body nearest to a symmetric 6 × 6 matrix."""
+    """Return mass, first moment and inertia of the rigid body closest to a symmetric 6 × 6 matrix."""
     S = np.array([B[5, 1] - B[4, 2], B[3, 2] - B[5, 0], B[4, 0] - B[3, 1]]) / 2
     return float(np.trace(B[:3, :3]) / 3), S, B[3:, 3:]
 
 
 def about(J: Array, S: Array, m: float, arm: Array) -> Array:
-    """Return the inertia about a point, where `arm` leads from the point to the node."""
+    """Return the inertia about a point, for the inertia about a node at `arm` from the point."""
     cross = np.outer(S, arm)
     return J + (2 * S @ arm + m * arm @ arm) * np.eye(3) - cross - cross.T - m * np.outer(arm, arm)
 
 
 def sum_of(a: tuple[float, Array, Array], b: tuple[float, Array, Array]) -> tuple[float, Array, Array]:
-    """Return the sum of both shares of a node."""
+    """Return the sum of both parts at a node."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]

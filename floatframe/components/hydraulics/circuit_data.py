@@ -81,24 +81,25 @@ OUTPUTS = {
     ACCUMULATOR: (("oil", "m^3"),),
     PUMP: (("flow", "m^3/s"), ("torque", "N m"), ("speed", "rad/s")),
     SPOOL: (("spool", "1"),),
-}  #: outputs of a component that sensors can read, by its kind
+}  #: outputs of each kind of component that sensors can read
 
 
 @dataclass
 class PlacedNode:
-    """A node while the data are assembled."""
+    """A node while the data are compiled."""
 
     name: str
     volume: float = 0.0
     compliance: float = 0.0
     start: float = 0.0
     pressure: TimeFunction | None = None
-    attached: list[tuple[int, int, int]] = field(default_factory=list)  #: kind of connection, component, and its output
+    #: kind of connection, component, and output of the component
+    attached: list[tuple[int, int, int]] = field(default_factory=list)
 
 
 @dataclass
 class Record:
-    """A component while the data are assembled."""
+    """A component while the data are compiled."""
 
     name: str
     kind: int
@@ -107,8 +108,8 @@ class Record:
     numbers: list[float]
     markers: tuple[int, int] = (-1, -1)
     start: float | None = None  #: initial value of its state
-    functions: dict[int, TimeFunction] = field(default_factory=dict)  #: functions, by index among its parameters
-    is_servo: bool = False  #: whether the spool follows its command
+    functions: dict[int, TimeFunction] = field(default_factory=dict)  #: functions by their index among the parameters
+    is_servo: bool = False  #: whether the spool is a state that follows its command
     spool: tuple[int, int] | None = None  #: index among its parameters, and component whose first output is read
 
 
@@ -140,7 +141,7 @@ class Builder:
         return k if k < n else -1 - (k - n)
 
     def node(self, number: int) -> PlacedNode:
-        """Return the node with a number."""
+        """Return the node with a given number."""
         return self.nodes[number] if number >= 0 else self.given[-1 - number]
 
     def add(self, record: Record, attached: dict[int, list[tuple[int, int]]]) -> int:
@@ -155,7 +156,7 @@ class Builder:
         return self.add(record, {record.a: [(OUT_OF, 0)], record.b: [(INTO, 0)]})
 
     def conductance(self, area: float, discharge: float) -> float:
-        """Return the flow through an orifice divided by the square root of its pressure difference."""
+        """Return the flow through an orifice divided by the square root of the pressure difference."""
         return discharge * area * sqrt(2 / self.fluid.density)
 
 
@@ -265,7 +266,7 @@ def add_pipe(made: Builder, each: Pipe) -> None:
 
 
 def add_directional_valve(made: Builder, each: DirectionalValve, cylinders: dict[str, int]) -> None:
-    """Add a directional valve, as a spool and four flow paths."""
+    """Add a directional valve as a spool and four flow paths."""
     record = Record(each.name, SPOOL, NONE, NONE, [each.time_constant, 0, each.gain or 0.0, 0])
     assert isinstance(each.opening, TimeFunction)  # ensured by the component
     record.functions[1] = each.opening
@@ -509,7 +510,7 @@ class Circuit(Element):
 
     @property
     def markers(self) -> tuple[Marker, ...]:
-        """Markers of its cylinders and pumps, two for each."""
+        """Markers of the cylinders and pumps, two for each."""
         return tuple(
             marker
             for each in self.components

@@ -218,7 +218,7 @@ def circuit_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
 
 @njit
 def circuit_rest(t, x, z, lam, data, wrench, z_dot, g, outputs):
-    """Write as `circuit_law`, but with pressure rates that are easier to solve and vanish at the same pressures.
+    """Write results as `circuit_law`, with pressure rates that are easier to solve and have the same zeros.
 
     The flow Q into a node depends on roots of pressure differences, with which Newton's method steps back and forth
     across the zero. Q sqrt(Q² + Q_0²)/Q_0, with the flow Q_0 at which its orifices become laminar, is proportional to

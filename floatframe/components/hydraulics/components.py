@@ -1,4 +1,4 @@
-"""Components of a circuit: descriptions without behaviour, between nodes given by name. Pressures are absolute."""
+"""Components of a circuit between named nodes, as data without behaviour. Pressures are absolute."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -50,10 +50,10 @@ def checked(
 
 @dataclass(frozen=True)
 class Node:
-    """Properties of a node besides its components."""
+    """Properties of a node in addition to its components."""
 
-    volume: float = 0.0  #: dead volume [m³]
-    pressure: float | None = None  #: at the start, absolute [Pa]; None: ambient
+    volume: float = 0.0  #: dead volume at the node [m³]
+    pressure: float | None = None  #: initial absolute pressure [Pa]; None: ambient
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "volume", number("node: volume", self.volume, at_least=0.0))
@@ -73,8 +73,8 @@ class Cylinder:
     """
 
     name: str
-    marker_a: Marker  #: on the housing
-    marker_b: Marker  #: on the rod
+    marker_a: Marker  #: marker on the housing
+    marker_b: Marker  #: marker on the rod
     head_area: float  #: piston area on the side of marker a [m²]
     rod_area: float = 0.0  #: ring area of the piston on the side of the rod [m²]
     head: str | None = None  #: node of the head chamber
@@ -85,10 +85,10 @@ class Cylinder:
     rod_dead_volume: float = 0.0  #: dead volume of the rod chamber, at full stroke [m³]
     leakage: float = 0.0  #: leakage past the piston, flow divided by pressure difference [m³/(s Pa)]
     friction: float = 0.0  #: friction of the seals [N]
-    friction_speed: float = FRICTION_SPEED  #: v_s in friction v/√(v² + v_s²) [m/s]
+    friction_speed: float = FRICTION_SPEED  #: speed scale v_s of friction v/√(v² + v_s²) [m/s]
     damping: float = 0.0  #: viscous damping [N s/m]
-    stop_stiffness: float = 0.0  #: k, stiffness of both stops; 0: no stops [N/m]
-    stop_damping: float = 0.0  #: d, damping of both stops [s/m]
+    stop_stiffness: float = 0.0  #: stiffness k of both stops [N/m]; 0: no stops
+    stop_damping: float = 0.0  #: damping d of both stops [s/m]
 
     def __post_init__(self) -> None:
         checked(
@@ -125,11 +125,11 @@ class Orifice:
     name: str
     a: str
     b: str
-    area: float  #: cross section [m²]
+    area: float  #: cross section of the orifice [m²]
     discharge: float = 0.7
     #: pressure difference below which the flow is laminar [Pa]; None: 1e-3 of the ambient pressure
     transition: float | None = None
-    opening: TimeFunction | float | None = None  #: open fraction of the area as a function of time; None: 1
+    opening: TimeFunction | float | None = None  #: open fraction of the area as a function of time; None: fully open
 
     def __post_init__(self) -> None:
         checked(self, above=("area", "discharge", "transition"), functions=("opening",))
@@ -143,7 +143,7 @@ class Resistance:
     name: str
     a: str
     b: str
-    conductance: float  #: [m³/(s Pa)]
+    conductance: float  #: flow divided by pressure difference [m³/(s Pa)]
 
     def __post_init__(self) -> None:
         checked(self, above=("conductance",))
@@ -157,11 +157,11 @@ class CheckValve:
     name: str
     a: str
     b: str
-    area: float  #: when fully open [m²]
-    full: float  #: pressure difference at which it is fully open [Pa]
-    cracking: float = 0.0  #: pressure difference at which it begins to open [Pa]
+    area: float  #: cross section when fully open [m²]
+    full: float  #: pressure difference at which the valve is fully open [Pa]
+    cracking: float = 0.0  #: pressure difference at which the valve begins to open [Pa]
     discharge: float = 0.7
-    transition: float | None = None  #: as for an orifice [Pa]
+    transition: float | None = None  #: pressure difference below which the flow is laminar, as for an orifice [Pa]
     leakage: float = 0.0  #: leakage when closed, flow divided by pressure difference [m³/(s Pa)]
 
     def __post_init__(self) -> None:
@@ -190,9 +190,9 @@ class Accumulator:
 
     name: str
     node: str
-    gas_volume: float  #: V_0 [m³]
-    charge: float  #: absolute pressure of the gas without oil [Pa]
-    exponent: float = 1.4  #: n; 1: isothermal
+    gas_volume: float  #: gas volume V_0 without oil [m³]
+    charge: float  #: absolute gas pressure without oil [Pa]
+    exponent: float = 1.4  #: polytropic exponent n; 1: isothermal
     oil_limit: float | None = None  #: largest volume of oil [m³]; None: 0.999 of the gas volume
 
     def __post_init__(self) -> None:
@@ -218,14 +218,14 @@ class Pipe:
     name: str
     a: str
     b: str
-    length: float  #: [m]
-    area: float  #: [m²]
+    length: float  #: length of the pipe [m]
+    area: float  #: cross section of the pipe [m²]
     segments: int = 1
     friction_factor: float = 0.0  #: Darcy friction factor of turbulent flow
     wall_modulus: float | None = (
         None  #: pressure divided by the relative growth of the area, E t/d for a thin wall [Pa]; None: rigid
     )
-    flow: float = 0.0  #: initial flow [m³/s]
+    flow: float = 0.0  #: initial flow through the pipe [m³/s]
 
     def __post_init__(self) -> None:
         checked(self, above=("length", "area", "wall_modulus"), at_least=("friction_factor",))
@@ -242,7 +242,7 @@ class Supply:
 
     name: str
     node: str
-    pressure: TimeFunction | float  #: absolute [Pa]
+    pressure: TimeFunction | float  #: absolute pressure at the node [Pa]
 
     def __post_init__(self) -> None:
         if not isinstance(self.pressure, TimeFunction):
@@ -270,7 +270,7 @@ class FlowSource:
     name: str
     a: str
     b: str
-    flow: TimeFunction | float  #: at ambient pressure [m³/s]
+    flow: TimeFunction | float  #: flow at ambient pressure [m³/s]
 
     def __post_init__(self) -> None:
         checked(self, functions=("flow",))
@@ -288,9 +288,9 @@ class Pump:
     name: str
     a: str
     b: str
-    marker_a: Marker  #: on the housing
-    marker_b: Marker  #: on the shaft
-    displacement: float  #: volume per radian [m³]
+    marker_a: Marker  #: marker on the housing
+    marker_b: Marker  #: marker on the shaft
+    displacement: float  #: displaced volume per radian [m³]
     axis: Array = (0.0, 0.0, 1.0)  # type: ignore[assignment]  #: in axes of marker a, (3,)
     leakage: float = 0.0  #: leakage from a to b, flow divided by pressure difference [m³/(s Pa)]
     drag: float = 0.0  #: drag torque divided by speed [N m s]
@@ -315,15 +315,15 @@ class DirectionalValve:
     tank: str
     a: str
     b: str
-    area: float  #: area of a path at u = 1 [m²]
-    opening: TimeFunction | float = 0.0  #: u as a function of time, or the desired stroke [m]
-    time_constant: float = 0.0  #: time constant of the spool; 0: it follows at once [s]
-    follow: str | None = None  #: name of a cylinder whose stroke is controlled
+    area: float  #: area of each flow path at u = 1 [m²]
+    opening: TimeFunction | float = 0.0  #: spool position u as a function of time, or the desired stroke [m]
+    time_constant: float = 0.0  #: time constant of the spool [s]; 0: no lag
+    follow: str | None = None  #: name of a cylinder whose stroke the valve controls
     gain: float | None = None  #: u divided by the error of the stroke [1/m]
-    overlap: float = 0.0  #: part of the spool travel without flow
+    overlap: float = 0.0  #: fraction of the spool travel without flow
     discharge: float = 0.7
-    transition: float | None = None  #: as for an orifice [Pa]
-    leakage: float = 0.0  #: leakage of each path [m³/(s Pa)]
+    transition: float | None = None  #: pressure difference below which the flow is laminar, as for an orifice [Pa]
+    leakage: float = 0.0  #: leakage of each path, flow divided by pressure difference [m³/(s Pa)]
 
     def __post_init__(self) -> None:
         checked(

@@ -26,8 +26,9 @@ from floatframe.model.checked_values import number
 __all__ = ["Fluid", "compression"]
 
 CAVITY_WIDTHS = 50  #: number of widths d between vapour and ambient pressure
-LEAST_PRESSURE = 1e-3  #: relative to the ambient pressure; below it, the curve of the air is continued by its tangent
-MOST_EXPONENT = 30.0  #: above it, at cavities of 1e13 volumes, the exponential is continued by its tangent
+#: pressure relative to ambient below which the compression curve of the air continues along its tangent
+LEAST_PRESSURE = 1e-3
+MOST_EXPONENT = 30.0  #: exponent above which, at cavities of 1e13 volumes, the exponential continues along its tangent
 
 
 @dataclass(frozen=True)
@@ -37,13 +38,13 @@ class Fluid:
     Example, mineral oil in SI units: density 870 kg/m³, bulk modulus 1.4e9 Pa, viscosity 0.03 Pa s, ambient 101325 Pa.
     """
 
-    density: float  #: at ambient pressure [kg/m³]
-    bulk_modulus: float  #: K, of the liquid without air [Pa]
-    ambient: float  #: p_a, absolute ambient pressure [Pa]
-    viscosity: float | None = None  #: dynamic viscosity, used for pipes [Pa s]
+    density: float  #: density at ambient pressure [kg/m³]
+    bulk_modulus: float  #: bulk modulus K of the liquid without air [Pa]
+    ambient: float  #: absolute ambient pressure p_a [Pa]
+    viscosity: float | None = None  #: dynamic viscosity, required for pipes [Pa s]
     air: float = 0.0  #: volume fraction of entrained air at ambient pressure
     air_exponent: float = 1.4  #: polytropic exponent n of the entrained air
-    vapour_pressure: float = 0.0  #: p_v, absolute [Pa]
+    vapour_pressure: float = 0.0  #: absolute vapour pressure p_v [Pa]
 
     def __post_init__(self) -> None:
         for name in ("density", "bulk_modulus", "ambient", "air_exponent"):
@@ -62,19 +63,19 @@ class Fluid:
 
     @property
     def numbers(self) -> list[float]:
-        """K, a, 1/n, p_a, p_v, d, in the order in which `compression` reads them."""
+        """Parameters K, a, 1/n, p_a, p_v, d in the order in which `compression` reads them."""
         width = (self.ambient - self.vapour_pressure) / CAVITY_WIDTHS
         return [self.bulk_modulus, self.air, 1 / self.air_exponent, self.ambient, self.vapour_pressure, width]
 
     def compression(self, p: float) -> tuple[float, float, float]:
-        """Return v, dv/dp and h at an absolute pressure p."""
+        """Return the relative volume v, dv/dp and h at an absolute pressure p."""
         v, dv, h = compression(p, np.array(self.numbers), 0)
         return float(v), float(dv), float(h)
 
 
 @register_jitable
 def compression(p, data: Array, at: int):
-    """Return v, dv/dp and h at the pressure p, of the fluid whose parameters begin at data[at]."""
+    """Return v, dv/dp and h at pressure p, for the fluid whose parameters begin at data[at]."""
     K, air, m = data[at], data[at + 1], data[at + 2]
     p_a, p_v, width = data[at + 3], data[at + 4], data[at + 5]
     liquid = (1.0 - air) * np.exp(-(p - p_a) / K)

@@ -14,7 +14,7 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["GAS_NUMBERS", "gas_numbers", "oil_in_accumulator"]
 
-ROUNDING = 0.01  #: w, half width of the rounding relative to the pressure at the corner
+ROUNDING = 0.01  #: half width w of the rounding, relative to the pressure at the corner
 GAS_NUMBERS = 13  #: number of values from `gas_numbers`
 
 
@@ -46,7 +46,7 @@ def cubic(x, width, a, a_slope, b, b_slope):
 
 @register_jitable
 def power_integral(p, volume, charge, m):
-    """Return an integral of V_0 (1 - (p_0/p)^m) over the pressure."""
+    """Return the integral of V_0 (1 - (p_0/p)^m) over pressure."""
     if m == 1.0:
         return volume * (p - charge * np.log(p / charge))
     return volume * (p - charge / (1.0 - m) * (p / charge) ** (1.0 - m))
@@ -54,7 +54,7 @@ def power_integral(p, volume, charge, m):
 
 @register_jitable
 def oil_in_accumulator(p, data: Array, at: int):
-    """Return U, dU/dp and the integral of U up to p, of the gas whose parameters begin at data[at]."""
+    """Return the oil volume U, dU/dp and the integral of U up to p, for the gas whose parameters begin at data[at]."""
     volume, charge, m, limit = data[at], data[at + 1], data[at + 2], data[at + 3]
     p1, p2, p3, p4 = data[at + 4], data[at + 5], data[at + 6], data[at + 7]
     zero = 0.0 * p

@@ -1,4 +1,4 @@
-"""Validation of the nodes of a circuit: their components, prescribed pressures, and whether a pressure is defined."""
+"""Validation of the nodes of a circuit: their components, and whether every pressure is defined."""
 
 from collections.abc import Mapping, Sequence
 
@@ -24,7 +24,7 @@ from floatframe.model.functions.time_functions import TimeFunction, constant
 
 __all__ = ["check_nodes", "nodes_of", "prescribed"]
 
-PORTS = ("a", "b", "head", "rod", "node", "pressure", "tank")  #: fields of components that may name nodes
+PORTS = ("a", "b", "head", "rod", "node", "pressure", "tank")  #: fields of components that may contain node names
 
 
 def nodes_of(component: Component) -> list[str]:

@@ -17,7 +17,7 @@ TRANSITION = 1e-3  # relative to the ambient pressure; below it, the flow of com
 
 @register_jitable
 def gas_spring(V, V_0, charge, n, p_a, least):
-    """Return the gas pressure at the volume V, and its energy relative to that at V_0 and ambient pressure."""
+    """Return the gas pressure at volume V, and its energy relative to V_0 and ambient pressure."""
     low = least * V_0
     inside = low + 0.0 * V if V.real < low else V
     p = charge * (V_0 / inside) ** n

@@ -27,7 +27,7 @@ __all__ = ["OleoStrut"]
 FRICTION_SPEED = Quantity(0.01, SPEED)
 
 Z_AXIS: Any = (0.0, 0.0, 1.0)
-#: relative to the extended gas volume; below it, the curve of the pressure is continued by its tangent
+#: volume, relative to the extended gas volume, below which the pressure curve continues along its tangent
 LEAST_GAS = 0.02
 OUTPUTS = (
     ("stroke", "m"), ("rate", "m/s"), ("force", "N"), ("gas pressure", "Pa"), ("oil pressure", "Pa"), ("flow", "m^3/s"),
@@ -59,27 +59,27 @@ class OleoStrut(Element):
     """
 
     name: str
-    marker_a: Marker  #: on the cylinder
-    marker_b: Marker  #: on the piston
+    marker_a: Marker  #: marker on the cylinder
+    marker_b: Marker  #: marker on the piston
     fluid: Fluid
-    gas_volume: float  #: V_0, when extended [m³]
-    charge: float  #: absolute gas pressure when extended [Pa]
-    gas_area: float  #: A_g, area of the piston rod, which displaces gas [m²]
-    oil_area: float  #: A_o, area of the oil chamber [m²]
+    gas_volume: float  #: gas volume V_0 of the extended strut [m³]
+    charge: float  #: absolute gas pressure of the extended strut [Pa]
+    gas_area: float  #: area A_g of the piston rod, which displaces gas [m²]
+    oil_area: float  #: area A_o of the oil chamber [m²]
     #: area of the orifice, a number or a function of the stroke s [m²]
     area: TimeFunction | float = field(metadata=NOT_OF_TIME)
     stroke: float  #: stroke at which the strut bottoms [m]
     extended_length: float  #: distance between the markers along the axis at s = 0 [m]
-    stop_stiffness: float  #: k, stiffness of the stops [N/m]
-    #: area of the orifice when the strut extends [m²]; None: as `area`
+    stop_stiffness: float  #: stiffness k of the stops [N/m]
+    #: area of the orifice during extension [m²]; None: equal to `area`
     recoil_area: TimeFunction | float | None = field(default=None, metadata=NOT_OF_TIME)
-    exponent: float = 1.3  #: n, polytropic exponent of the gas
+    exponent: float = 1.3  #: polytropic exponent n of the gas
     discharge: float = 0.9
     oil_volume: float | None = None  #: volume of the oil chamber [m³]; None: incompressible oil
     friction: float = 0.0  #: friction of the seals [N]
     friction_area: float = 0.0  #: additional friction of the seals divided by the gas pressure [m²]
-    friction_speed: float = FRICTION_SPEED  #: [m/s]
-    stop_damping: float = 0.0  #: d, damping of the stops [s/m]
+    friction_speed: float = FRICTION_SPEED  #: speed scale of the seal friction [m/s]
+    stop_damping: float = 0.0  #: damping d of the stops [s/m]
     axis: Array = Z_AXIS  #: direction from marker a to marker b, in the axes of marker a, (3,)
 
     def __post_init__(self) -> None:

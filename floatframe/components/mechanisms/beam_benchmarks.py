@@ -189,7 +189,7 @@ def crank_turn(duration: float = 0.4) -> TimeFunction:
 
 
 def carried(marker: Marker, offset: Array, place: Array) -> tuple[Marker, list[Joint]]:
-    """Return a marker at an offset from a marker, on its rigid body or on a small body fixed to its interface."""
+    """Return a marker at an offset from another one, on its rigid body or on a small body fixed to its interface."""
     if marker.interface is None:
         at = np.zeros(3) if marker.position is None else marker.position
         return Marker(marker.body, position=at + offset), []
@@ -197,7 +197,7 @@ def carried(marker: Marker, offset: Array, place: Array) -> tuple[Marker, list[J
 
 
 def placed(maker: PartMaker, name: str, start: Array, direction: Array, across: Array) -> FlexiblePart:
-    """Return a part from a point along a direction, with its y axis along another direction."""
+    """Return a part that starts at a point in a given direction, with its y axis in another direction."""
     R = np.column_stack([direction, across, np.cross(direction, across)])
     return maker(name, position=start, orientation=euler_parameters(R))
 
@@ -205,7 +205,7 @@ def placed(maker: PartMaker, name: str, start: Array, direction: Array, across: 
 def made(
     parts: list[FlexiblePart], bodies: list[RigidBody], joints: list[Joint], forces: list[Force], name: str
 ) -> System:
-    """Return the system of the parts and the bodies, joints and forces between them."""
+    """Return a system of the parts with the bodies, joints and forces between them."""
     all_bodies: list[Body] = [body for part in parts for body in part.bodies] + list(bodies)
     all_joints = [joint for part in parts for joint in part.joints] + joints
     all_forces = [force for part in parts for force in part.forces] + forces

@@ -32,7 +32,7 @@ from floatframe.model.system import Body, System
 __all__ = ["andrews_mechanism", "bricard_mechanism", "flyball_governor", "n_four_bar", "point_pendulum"]
 
 X, Y, Z = np.eye(3)
-G = 9.81  #: of all problems of the library [m/s²]
+G = 9.81  #: acceleration of gravity in all problems of the library [m/s²]
 UNITS = "m-kg-s"
 
 
@@ -248,6 +248,6 @@ def rod(name: str, mass: float, inertia: Array, length: float, start: Array, dir
 
 
 def axes_of(body: Body) -> Array:
-    """Return R_GB of a rigid body as assembled, (3, 3)."""
+    """Return the assembled R_GB of a rigid body, (3, 3)."""
     assert isinstance(body, RigidBody)
     return rotation_matrix(body.orientation)

@@ -18,7 +18,7 @@ from floatframe.model.system import Body
 
 __all__ = ["Rod", "between", "slender_inertia", "turning"]
 
-THICKNESS = 0.02  #: diameter of a rigid rod divided by its length; gives it an inertia about its axis
+THICKNESS = 0.02  #: diameter of a rigid rod divided by its length, which gives it an inertia about its axis
 
 
 def slender_inertia(mass: float, length: float) -> Array:
@@ -77,7 +77,7 @@ class Rod:
         self.start, self.end = Marker(name, ends[0]), Marker(name, ends[1])
 
     def across(self, direction: Array) -> Array:
-        """Return a direction in ground axes, (3,), in the axes of the marker at the start."""
+        """Return a direction given in ground axes in the axes of the start marker, (3,)."""
         body = self.body
         if isinstance(body, FlexibleBody):
             assert self.start.interface is not None

@@ -1,4 +1,4 @@
-"""The data of the compiled law, from wheels, track and contact laws."""
+"""Compilation of wheels, track and contact laws to the data of the law `wheels_on_rails`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -44,15 +44,16 @@ class ContactLaws:
     """
 
     normal: str = "hertz"  #: "hertz": from the penetration; "constraint": the treads are constrained to the rails
-    creep: str = "fastsim"  #: kalker, kalker-saturated, polach or fastsim
-    friction: float = 0.3  #: mu
-    shear_modulus: float = 8.2e10  #: G of wheel and rail [Pa]
+    creep: str = "fastsim"  #: creep law: kalker, kalker-saturated, polach or fastsim
+    friction: float = 0.3  #: coefficient of friction mu
+    shear_modulus: float = 8.2e10  #: shear modulus G of wheel and rail [Pa]
     poisson: float = 0.28
-    smoothing: float = 2e-5  #: eps of the quasi-elastic contact [m]
-    damping: float = 0.0  #: in N = K d^(3/2) (1 + damping d_dot) [s/m]
-    low_speed: float = 0.05  #: v_0: creepages are divided by sqrt(v² + v_0²) [m/s]
-    strips: int = 12  #: number of FASTSIM cells along, and of strips across
-    polach: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 0.0)  #: k_A, k_S, and A and B [s/m] of its friction law
+    smoothing: float = 2e-5  #: smoothing length eps of the quasi-elastic contact [m]
+    damping: float = 0.0  #: damping factor in N = K d^(3/2) (1 + damping d_dot) [s/m]
+    low_speed: float = 0.05  #: speed v_0 in sqrt(v² + v_0²), by which creepages are divided [m/s]
+    strips: int = 12  #: number of FASTSIM cells in rolling direction, and of strips across
+    #: Polach's factors k_A, k_S, and A and B [s/m] of his friction law
+    polach: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 0.0)
 
     def __post_init__(self) -> None:
         where = "contact of wheel and rail"
@@ -76,16 +77,16 @@ class ContactLaws:
 
 
 class Wheel(NamedTuple):
-    """A wheel: its side of the track, and its position on the axle."""
+    """A wheel with its side of the track and its position on the axle."""
 
-    side: int  #: +1 on the left rail, -1 on the right one
-    arm: float  #: from the marker to its running circle along the axle, to the left [m]
+    side: int  #: side of the track: +1 left rail, -1 right rail
+    arm: float  #: distance from the marker to the running circle along the axle, positive to the left [m]
     pair: Pair
 
 
 @lru_cache(maxsize=32)
 def shift_off_the_rail(pair: Pair) -> float:
-    """Return the outward shift from which a wheel counts as derailed [m].
+    """Return the outward shift beyond which a wheel counts as derailed [m].
 
     With a flange: if it has climbed to within 8 mm of its height; without: if the middle of the wheel leaves the rail
     head.
@@ -99,7 +100,7 @@ def shift_off_the_rail(pair: Pair) -> float:
 
 
 def grid_of(pair: Pair) -> TableGrid:
-    """Return the grid of the table of a pair, up to the shift at which the wheel is derailed."""
+    """Return the grid of a pair's contact table, up to the shift at which the wheel is derailed."""
     most = shift_off_the_rail(pair) + 0.002
     least = -max(0.03, most)
     return TableGrid(v=(least, most, int(np.ceil((most - least) / 2e-4)) + 1))
@@ -157,7 +158,7 @@ def law_numbers(wheels: Sequence[Wheel], track: Track, laws: ContactLaws, spin_i
 
 
 def n_parts_of(wheels: Sequence[Wheel]) -> int:
-    """Return the number of contact parts of a wheel, which is the same for all wheels."""
+    """Return the number of contact parts per wheel, which all wheels share."""
     found = {len(PARTS) if each.pair.has_flange else 1 for each in wheels}
     if len(found) > 1:
         raise ModelError("wheels of an axle: expected both with a flange or both without one")

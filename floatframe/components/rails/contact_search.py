@@ -28,9 +28,9 @@ from floatframe.model.checked_values import number
 
 __all__ = ["ContactPoint", "Pair", "QuasiElastic", "quasi_elastic", "rigid_contacts", "wheel_curve"]
 
-STEP = 1e-4  #: step of s on the wheel in the search [m]
+STEP = 1e-4  #: step of the coordinate s on the wheel in the search [m]
 FLANK = (0.35, 0.7)  #: range of slopes in which the tread blends into the flange
-TYPICAL_RADIUS = 0.5  #: typical radius of relative curvature, for the constant L of the quasi-elastic depth [m]
+TYPICAL_RADIUS = 0.5  #: typical radius of relative curvature, for the length L of the quasi-elastic depth [m]
 
 
 @frozen_copies
@@ -73,7 +73,7 @@ class Pair:
 
     @cached_property
     def content(self) -> tuple[bytes | float, ...]:
-        """Key by which equal pairs are recognised, so that they share tables."""
+        """Key for equal pairs, which share their tables."""
         shapes = (self.wheel.y, self.wheel.z, self.rail.y, self.rail.z)
         numbers = (self.radius, self.running_circles, self.gauge, self.inclination)
         return (*(sha256(values.tobytes()).digest() for values in shapes), *numbers)
@@ -86,7 +86,7 @@ class Pair:
 
     @cached_property
     def head(self) -> Profile:
-        """The rail as installed in the track, inclined inward."""
+        """The rail as installed in the track, inclined inwards."""
         return inclined(self.rail, self.inclination)
 
     @cached_property
@@ -157,12 +157,12 @@ def wheel_curve(pair: Pair, roll: float = 0.0, yaw: float = 0.0, s: Array | None
 class ContactPoint(NamedTuple):
     """A contact point of rigid bodies."""
 
-    s: float  #: position on the wheel, from the running circle [m]
+    s: float  #: coordinate on the wheel, from the running circle [m]
     y: float  #: position on the head of the rail [m]
-    x: float  #: ahead of the wheel centre [m]
+    x: float  #: distance ahead of the wheel centre [m]
     radius: float  #: rolling radius r_0 + F(s) [m]
     angle: float  #: angle of the contact plane to the track, positive if the rail rises outward [rad]
-    height: float  #: h at which the wheel touches at this point [m]
+    height: float  #: height h at which the wheel touches at this point [m]
 
 
 def rigid_contacts(
@@ -219,8 +219,8 @@ class QuasiElastic(NamedTuple):
     q: Array  #: depth at h = 0 [m]
     slope: Array  #: dq/du, mean of Z': tangent of the contact angle, positive if the rail rises outward
     x: Array  #: position of the contact point relative to the wheel centre, forward [m]
-    y: Array  #: outward [m]; with this lever, the moment about the direction of the track equals that of dq/dphi
-    z: Array  #: upward [m], near -radius
+    y: Array  #: position outwards [m]; with this lever the moment about the track direction equals that of dq/dphi
+    z: Array  #: position upwards [m], near -radius
     radius: Array  #: rolling radius [m]
     bend: Array  #: curvature of p in the lateral direction, in the contact plane: eps/variance [1/m]
 

@@ -27,24 +27,24 @@ __all__ = ["FIELDS", "LEAST_BEND", "ContactTable", "Steel", "TableGrid", "contac
 #: could become negative at jumps)
 FIELDS = ("q", "slope", "x", "y", "z", "radius", "stiffness", "a_1", "b_1", "c11", "c22", "c23", "c33")
 
-LEAST_BEND = 0.05  #: least curvature of a contact [1/m]
-FAR = 0.003  #: height of a part above the rail beyond which the table is constant [m]
+LEAST_BEND = 0.05  #: smallest curvature of a contact [1/m]
+FAR = 0.003  #: height of a part above the rail above which the table is constant [m]
 
 
 class Steel(NamedTuple):
     """Material of wheel and rail."""
 
-    shear_modulus: float = 8.2e10  #: G [Pa]
+    shear_modulus: float = 8.2e10  #: shear modulus G [Pa]
     poisson: float = 0.28
 
 
 @dataclass(frozen=True)
 class TableGrid:
-    """The grid of the table; beyond it, the values at its edge are used."""
+    """The grid of the contact table; outside the grid, values at its edge apply."""
 
-    v: tuple[float, float, int] = (-0.03, 0.015, 226)  #: smallest and largest [m], number of points
-    roll: tuple[float, float, int] = (-0.012, 0.012, 7)  #: [rad]
-    yaw: tuple[float, int] = (0.04, 6)  #: largest [rad]; number of points, from zero on
+    v: tuple[float, float, int] = (-0.03, 0.015, 226)  #: smallest and largest shift [m], number of points
+    roll: tuple[float, float, int] = (-0.012, 0.012, 7)  #: smallest and largest roll [rad], number of points
+    yaw: tuple[float, int] = (0.04, 6)  #: largest yaw [rad], number of points from zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ def contact_table(
 
 @lru_cache(maxsize=32)
 def made_once(pair: Pair, parts: tuple[str, ...], smoothing: float, steel: Steel, grid: TableGrid) -> ContactTable:
-    """Return the table, which is computed at the first request."""
+    """Return the table, computed at the first request."""
     v, roll = np.linspace(*grid.v), np.linspace(*grid.roll)
     sines = np.linspace(0.0, np.sin(grid.yaw[0]), grid.yaw[1])
     values = np.empty((len(parts), len(v), len(roll), grid.yaw[1], len(FIELDS)))

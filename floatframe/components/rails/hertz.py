@@ -22,12 +22,12 @@ __all__ = ["Ellipse", "ellipse"]
 
 
 class Ellipse(NamedTuple):
-    """The load-independent ellipse: semi-axes are a_1 N^(1/3) and b_1 N^(1/3), and N = stiffness approach^(3/2)."""
+    """The contact ellipse for a unit load: semi-axes are a_1 N^(1/3), b_1 N^(1/3); N = stiffness approach^(3/2)."""
 
-    a_1: Array  #: for the semi-axis in the rolling direction [m/N^(1/3)]
-    b_1: Array  #: for the lateral semi-axis [m/N^(1/3)]
-    stiffness: Array  #: [N/m^(3/2)]
-    ratio: Array  #: a/b
+    a_1: Array  #: factor of the semi-axis in rolling direction [m/N^(1/3)]
+    b_1: Array  #: factor of the lateral semi-axis [m/N^(1/3)]
+    stiffness: Array  #: Hertz stiffness [N/m^(3/2)]
+    ratio: Array  #: ratio a/b of the semi-axes
 
 
 def curvature_ratio(k: Array) -> Array:

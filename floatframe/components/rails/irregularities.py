@@ -17,7 +17,7 @@ from floatframe.model.checked_values import number
 
 __all__ = ["SPECTRA", "Irregularities", "TrackSpectrum", "random_irregularities", "wheel_envelope"]
 
-HALF_BASE = 0.75  #: half the distance between the rails, by which cross level is converted to roll [m]
+HALF_BASE = 0.75  #: half the distance between the rails, which converts cross level to roll [m]
 MOST = 0.2  #: largest deviation of a rail [m]
 
 
@@ -29,15 +29,15 @@ class TrackSpectrum:
     S_roll = roll_factor A_v W_c² W²/(D (W² + W_s²)) with W_r in D, [rad²/(rad/m)].
     """
 
-    lateral: float  #: A_l [m rad]
-    vertical: float  #: A_v [m rad]
-    w_c: float  #: [rad/m]
-    w_r: float  #: [rad/m]; 0: no limit for long waves
-    w_s: float  #: [rad/m]
-    roll_factor: float  #: 1/b² with the half base b [1/m²]
+    lateral: float  #: amplitude A_l of alignment [m rad]
+    vertical: float  #: amplitude A_v of profile [m rad]
+    w_c: float  #: cut-off wavenumber W_c [rad/m]
+    w_r: float  #: cut-off wavenumber W_r of long waves [rad/m]; 0: none
+    w_s: float  #: cut-off wavenumber W_s of cross level [rad/m]
+    roll_factor: float  #: factor 1/b² of roll, with half base b [1/m²]
 
     def densities(self, W: Array) -> tuple[Array, Array, Array]:
-        """Return the lateral, vertical and roll densities at W [rad/m]."""
+        """Return the spectral densities of alignment, profile and roll at wavenumber W [rad/m]."""
         common = self.w_c**2 / ((W**2 + self.w_r**2) * (W**2 + self.w_c**2))
         return (
             self.lateral * common,
@@ -55,7 +55,7 @@ def fra(vertical: float, lateral: float, w_s: float) -> TrackSpectrum:
     return TrackSpectrum(0.25e-4 * lateral, 0.25e-4 * vertical, 0.8245, 0.0, w_s, 4 / (2 * HALF_BASE) ** 2)
 
 
-#: by name: ERRI B176 (low and high disturbance), FRA classes 1 (worst) to 6
+#: spectra by name: ERRI B176 (low and high disturbance), FRA classes 1 (worst) to 6
 SPECTRA = {
     "erri-low": TrackSpectrum(2.119e-7, 4.032e-7, 0.8246, 0.0206, 0.4380, 1 / HALF_BASE**2),
     "erri-high": TrackSpectrum(6.125e-7, 1.080e-6, 0.8246, 0.0206, 0.4380, 1 / HALF_BASE**2),
@@ -79,9 +79,9 @@ class Irregularities:
         If lengths differ, positions are not equally spaced, or a deviation seems to be in millimetres.
     """
 
-    s: Array  #: (n,), equally spaced [m]
-    left_y: Array  #: lateral of the left rail, to the left [m]
-    left_z: Array  #: vertical, upward [m]
+    s: Array  #: equally spaced arc lengths, (n,) [m]
+    left_y: Array  #: lateral deviation of the left rail, positive to the left [m]
+    left_z: Array  #: vertical deviation of the left rail, positive upwards [m]
     right_y: Array
     right_z: Array
 

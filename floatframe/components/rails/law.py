@@ -43,7 +43,7 @@ HEAD = (
 )  # fmt: skip
 #: parameters of each wheel
 WHEEL_HEAD = ("side", "arm", "half", "radius", "table_at", "u_off")
-LIFTED = 0.025  #: height of a tread above its rail from which the wheel counts as derailed [m]
+LIFTED = 0.025  #: height of a tread above its rail above which the wheel counts as derailed [m]
 N_HEAD, N_WHEEL, N_FIELDS, N_CELL = len(HEAD), len(WHEEL_HEAD), 13, 8
 
 #: outputs of each wheel, with units
@@ -61,7 +61,7 @@ GAUSS_W = np.polynomial.legendre.leggauss(4)[1]
 
 @numba.njit(cache=True)
 def along_cell(data, at, x, y):
-    """Return the distance of a point ahead of the beginning of a cell, along the tangent there."""
+    """Return the distance of a point ahead of the start of a cell, along the tangent at the start."""
     return (x - data[at + 1]) * np.cos(data[at + 3]) + (y - data[at + 2]) * np.sin(data[at + 3])
 
 

@@ -34,10 +34,10 @@ class Profile:
     """
 
     kind: str  #: "wheel" or "rail"
-    y: Array  #: (n,) outward [m], increasing
-    z: Array  #: (n,) [m]: for a wheel the increase of the radius, for a rail the height above its top
-    name: str = "points"  #: in messages
-    inclination: float = field(default=0.0, kw_only=True)  #: angle by which a rail was inclined inward [rad]
+    y: Array  #: increasing outward coordinates, (n,) [m]
+    z: Array  #: heights, (n,) [m]: increase of the radius of a wheel, height above the top of a rail
+    name: str = "points"  #: name of the profile in messages
+    inclination: float = field(default=0.0, kw_only=True)  #: angle by which a rail has been inclined inwards [rad]
 
     def __post_init__(self) -> None:
         where = f"profile {self.name!r}"

@@ -30,8 +30,8 @@ GAUSS = np.polynomial.legendre.leggauss(5)
 class Segment:
     """A piece of track whose curvature and cant change linearly from beginning to end."""
 
-    length: float  #: [m]
-    curvature: tuple[float, float] = (0.0, 0.0)  #: at beginning and end, 1/R, positive to the left [1/m]
+    length: float  #: length of the segment [m]
+    curvature: tuple[float, float] = (0.0, 0.0)  #: curvature 1/R at beginning and end, positive to the left [1/m]
     #: height of the right rail above the left one, over 1.5 m, at beginning and end [m]
     cant: tuple[float, float] = (0.0, 0.0)
 
@@ -76,9 +76,9 @@ def curve(
 class TrackFrame(NamedTuple):
     """The track at one position."""
 
-    origin: Array  #: point of the centre line, between the tops of the rails, in ground axes [m]
-    axes: Array  #: t, n, b as columns, (3, 3)
-    curvature: float  #: [1/m]
+    origin: Array  #: point on the centre line between the tops of the rails, ground axes [m]
+    axes: Array  #: axes t, n, b as columns, (3, 3)
+    curvature: float  #: curvature of the centre line [1/m]
 
 
 @frozen_copies
@@ -87,7 +87,7 @@ class TrackFrame(NamedTuple):
 class Track:
     """Consecutive segments from a point of the ground in a given direction, with irregularities of the rails."""
 
-    segments: Sequence[Segment] = ()  #: none: an infinite straight track
+    segments: Sequence[Segment] = ()  #: segments in order; none: an infinite straight track
     irregularities: Irregularities | None = None
     start: Array = field(
         default_factory=lambda: np.zeros(3)
@@ -117,7 +117,7 @@ class Track:
 
     @property
     def length(self) -> float:
-        """Length of all segments [m]."""
+        """Total length of the segments [m]."""
         return float(sum(each.length for each in self.segments))
 
     @cached_property

@@ -50,14 +50,14 @@ class Wheelset(Element):
     """
 
     name: str
-    marker: Marker  #: at the middle of the axle, with the y axis along it to the left, on the rotating body
-    pair: Pair = field(default_factory=Pair)  #: wheel and rail, equal on both sides
+    marker: Marker  #: marker at the middle of the axle, y axis along the axle to the left, on the rotating body
+    pair: Pair = field(default_factory=Pair)  #: profiles of wheel and rail, equal on both sides
     track: Track = field(default_factory=Track)
     laws: ContactLaws = field(default_factory=ContactLaws)
     #: if above 0: inertia about the axle of the rotating parts [kg m²]; the body of the marker then does not rotate
     #: with them
     spin_inertia: float = 0.0
-    spin: float = 0.0  #: in this case, their initial angular velocity, a state [rad/s]
+    spin: float = 0.0  #: initial angular velocity of these parts, which is then a state [rad/s]
 
     def __post_init__(self) -> None:
         require_spin(self)
@@ -89,7 +89,7 @@ class WheelOnRail(Element):
     """
 
     name: str
-    #: at the middle of the running circle, with the y axis along the axle to the left, on the rotating body
+    #: marker in the middle of the running circle, y axis along the axle to the left, on the rotating body
     marker: Marker
     side: str = "left"  #: side of the track, "left" or "right"
     pair: Pair = field(default_factory=Pair)
@@ -97,7 +97,7 @@ class WheelOnRail(Element):
     laws: ContactLaws = field(default_factory=ContactLaws)
     #: if above 0: inertia of the wheel about its axle [kg m²]; the body of the marker then does not rotate with it
     spin_inertia: float = 0.0
-    spin: float = 0.0  #: in this case, its initial angular velocity, a state [rad/s]
+    spin: float = 0.0  #: initial angular velocity of the wheel, which is then a state [rad/s]
 
     def __post_init__(self) -> None:
         require_spin(self)

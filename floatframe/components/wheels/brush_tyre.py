@@ -99,7 +99,7 @@ def brush_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
 
 @njit(error_model="numpy")
 def brush_law_at_rest(t, x, z, lam, data, wrench, z_dot, g, outputs):
-    """Write the same for a wheel at a standstill, whose tread is deformed by the displacement of the wheel."""
+    """Write the results for a standing wheel, whose tread is deformed by the displacement of the wheel."""
     brush_law(t, x, z, lam, data, wrench, z_dot, g, outputs)
     hold_tread(x, data, outputs[10], z, z_dot)
 
@@ -123,26 +123,26 @@ class BrushTyre(Element):
     """
 
     name: str
-    marker_a: Marker  #: on the road: z up, x along the road
-    marker_b: Marker  #: at the wheel centre, on the spinning body
-    radius: float  #: R_0, unloaded [m]
-    stiffness: float  #: k, vertical [N/m]
-    nominal_load: float  #: F_0, the load to which the parameters below refer [N]
-    slip_stiffness: float  #: C_0 = 2 c_p a_0², for small slip, along and across [N]
-    contact_length: float  #: 2 a_0 [m]
-    friction: float = 1.0  #: mu
-    damping: float = 0.0  #: c, vertical [N s/m]
+    marker_a: Marker  #: marker on the road: z up, x along the road
+    marker_b: Marker  #: marker at the wheel centre, on the spinning body
+    radius: float  #: unloaded radius R_0 [m]
+    stiffness: float  #: vertical stiffness k [N/m]
+    nominal_load: float  #: load F_0 to which the parameters below refer [N]
+    slip_stiffness: float  #: slip stiffness C_0 = 2 c_p a_0² for small slip, both along and across [N]
+    contact_length: float  #: contact length 2 a_0 [m]
+    friction: float = 1.0  #: coefficient of friction mu
+    damping: float = 0.0  #: vertical damping c [N s/m]
     #: relaxation length along x [m]; 0: no relaxation, so that the wheel creeps at a standstill
     relaxation_x: float = 0.0
     relaxation_y: float = 0.0  #: relaxation length along y [m]
-    rolling_resistance: float = 0.0  #: f_r: M_y = -f_r R_0 F_z
-    flattening: float = 1 / 3  #: q, in the effective rolling radius R_0 - q d
+    rolling_resistance: float = 0.0  #: factor f_r of rolling resistance, M_y = -f_r R_0 F_z
+    flattening: float = 1 / 3  #: factor q in the effective rolling radius R_0 - q d
     low_speed: float = DEFAULT_LOW_SPEED  #: speed below which the wheel is treated as nearly standing [m/s]
-    settling_time: float = SETTLING_TIME  #: tau, settling time of the damped tread at a standstill [s]
+    settling_time: float = SETTLING_TIME  #: settling time tau of the damped tread at a standstill [s]
     landing_depth: float | None = None  #: deflection over which damping and tread forces build up [m]; None: radius/500
     #: spin axis, pointing left, in axes of marker B
     axis: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))
-    road: Road = field(default_factory=FlatRoad)  #: in axes of marker A
+    road: Road = field(default_factory=FlatRoad)  #: road in axes of marker A
 
     def __post_init__(self) -> None:
         positive = ("nominal_load", "slip_stiffness", "contact_length", "friction")
@@ -158,7 +158,7 @@ class BrushTyre(Element):
         return tyre_looks(self.radius, self.axis, self.road)
 
     def law(self, placed: Placed) -> ElementLaw:
-        """Return the element law for the markers in the assembled configuration."""
+        """Return the element law for the markers in the assembled position."""
         own = [self.slip_stiffness, 0.5 * self.contact_length, self.nominal_load, self.friction]
         own += [self.flattening, self.rolling_resistance]
         data = tyre_numbers(f"element {self.name!r}", placed, common_numbers(self), self.axis, own, self.road)

@@ -19,10 +19,10 @@ SCALES = (
     "LXAL LYKA LVYKA LS LSGKP LSGAL LMX LVMX LMY"
 ).split()  #: scaling factors, 1 if missing in the file
 
-#: default of each coefficient, by name
+#: default value of each coefficient, by name
 COEFFICIENTS = {name: 0.0 for name in ZERO} | {name: 1.0 for name in SCALES} | {"PKY4": 2.0, "QRE0": 1.0, "QSY7": 1.0}
 
-#: coefficients that only one version of the formula has
+#: coefficients that exist in only one version of the formula
 ONLY_61 = set(
     "PPX1 PPX2 PPX3 PPX4 PPY1 PPY2 PPY3 PPY4 PPY5 PPZ1 PPZ2 PPMX1 RBX3 RBY4 PEY5 PKY4 PKY5 PKY6 PKY7 QDZ10 QDZ11 "
     "QSX4 QSX5 QSX6 QSX7 QSX8 QSX9 QSX10 QSX11 QSY5 QSY6 QSY7 QSY8 QRE0 QV1 QV2 QFZ1 QFZ2 PFZ1 "
@@ -34,7 +34,7 @@ ONLY_52 = set("PHY3 PTX1 PTX2 PTX3 PTY1 PTY2 LGAX LGAY LGAZ".split())
 NEEDED = ("PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
 NEEDED_COMBINED = ("RBX1", "RCX1", "RBY1", "RCY1")  #: required in files for combined slip
 
-#: effects that are neglected here, by coefficient; reported if a file has the coefficient
+#: neglected effects, by coefficient; they are reported if a file has the coefficient
 LEFT_OUT = {
     "LMUV": "friction that falls with the sliding speed",
     "QFCX": "vertical deflection by longitudinal force",

@@ -16,11 +16,11 @@ __all__ += ["touching"]
 
 # indices of the parameters that all tyres have; the parameters of each law begin at `COMMON`
 RADIUS, STIFFNESS, DAMPING, LANDING, LOW_SPEED, SETTLING, SIGMA_X, SIGMA_Y = range(8)
-AXIS = 8  #: of the wheel, in axes of its marker (3)
-CENTRE_AT, TURN_AT = 11, 14  #: of the assembled wheel: its centre (3) and axes (9), in axes of the road
+AXIS = 8  #: index of the wheel's spin axis in axes of its marker (3)
+CENTRE_AT, TURN_AT = 11, 14  #: indices of the assembled wheel's centre (3) and axes (9), in axes of the road
 ROAD, COMMON = 23, 24  #: index of the first parameter of the road; index of the first parameter of a law
 
-#: iterations for the contact point on an uneven road; each reduces the error by the factor radius times curvature
+#: number of iterations for the contact point on uneven roads; each reduces the error by radius times curvature
 FEET = 4
 
 
@@ -44,7 +44,7 @@ def along(c, a, s, b):
 
 @register_jitable(error_model="numpy")
 def rotated_vector(x, m, a):
-    """Return in ground axes a vector a given in axes of marker m: A a."""
+    """Return the vector A a in ground axes, for a in axes of marker m."""
     return (
         x[m, 3] * a[0] + x[m, 4] * a[1] + x[m, 5] * a[2],
         x[m, 6] * a[0] + x[m, 7] * a[1] + x[m, 8] * a[2],
@@ -54,7 +54,7 @@ def rotated_vector(x, m, a):
 
 @register_jitable(error_model="numpy")
 def turned_back(x, m, a):
-    """Return in axes of marker m a vector a given in ground axes: A.T a."""
+    """Return the vector A.T a in axes of marker m, for a in ground axes."""
     return (
         x[m, 3] * a[0] + x[m, 6] * a[1] + x[m, 9] * a[2],
         x[m, 4] * a[0] + x[m, 7] * a[1] + x[m, 10] * a[2],

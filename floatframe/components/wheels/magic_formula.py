@@ -36,8 +36,8 @@ COEFFICIENTS_AT = COMMON + 20
     LYKA, LVYKA, LS, LSGKP, LSGAL, LMX, LVMX, LMY,
 ) = range(COEFFICIENTS_AT, COEFFICIENTS_AT + 171)  # fmt: skip
 
-TINY = 1e-9  #: relative to the nominal load; keeps quotients of an unloaded tyre finite
-LESS_FRICTION = 10.0  #: A_mu, by which shifts decrease with friction, version 6.1
+TINY = 1e-9  #: small load, relative to the nominal load, that keeps quotients of an unloaded tyre finite
+LESS_FRICTION = 10.0  #: factor A_mu by which shifts decrease with friction, version 6.1
 
 
 @register_jitable(error_model="numpy")

@@ -89,7 +89,7 @@ __all__ = ["MagicFormulaTyre", "magic_formula_law", "magic_formula_law_at_rest"]
 # the law of a tyre with the Magic Formula: contact, tread and validity ranges around the formula ----------------------
 
 
-SHORTEST = 0.05  #: least relaxation length of a tyre with a small load, divided by its radius
+SHORTEST = 0.05  #: smallest relaxation length of a tyre with a small load, divided by its radius
 
 
 @register_jitable(error_model="numpy")
@@ -190,7 +190,7 @@ def magic_formula_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
 
 @njit(error_model="numpy")
 def magic_formula_law_at_rest(t, x, z, lam, data, wrench, z_dot, g, outputs):
-    """Write the same for a wheel at a standstill, whose tread is deformed by the displacement of the wheel."""
+    """Write the results for a standing wheel, whose tread is deformed by the displacement of the wheel."""
     magic_formula_law(t, x, z, lam, data, wrench, z_dot, g, outputs)
     hold_tread(x, data, outputs[10], z, z_dot)
 
@@ -202,8 +202,9 @@ SETTLING_TIME = Quantity(0.02, TIME)
 
 CONVENTIONS = {"iso": 1.0, "adapted-sae": -1.0}
 SIDES = ("left", "right")
-WIDEST = {"kappa": (-1.5, 1.5), "alpha": (-1.5, 1.5), "gamma": (-1.0, 1.0)}  #: ranges if the file gives none
-LOADS = 1e-3, 1e3  #: the same for the load, relative to the nominal load
+#: ranges of the inputs if the file gives none
+WIDEST = {"kappa": (-1.5, 1.5), "alpha": (-1.5, 1.5), "gamma": (-1.0, 1.0)}
+LOADS = 1e-3, 1e3  #: range of the load, relative to the nominal load, if the file gives none
 SI = UNIT_SYSTEMS["m-kg-s"]
 LENGTH, FORCE, SPEED_DIMENSIONS = (
     Dimensions(length=1),
@@ -226,24 +227,24 @@ class MagicFormulaTyre(Element):
     """
 
     name: str
-    marker_a: Marker  #: on the road: z up, x along the road
-    marker_b: Marker  #: at the wheel centre, on the spinning body
-    tyre: TyreProperties  #: from `read_tyre_file`
+    marker_a: Marker  #: marker on the road: z up, x along the road
+    marker_b: Marker  #: marker at the wheel centre, on the spinning body
+    tyre: TyreProperties  #: tyre properties from `read_tyre_file`
     convention: str = "iso"  #: sign convention of the file: "iso" (W axes of ISO 8855, as TYDEX) or "adapted-sae"
     side: str | None = None  #: mounted side, "left" or "right"; the tyre is mirrored if the file is for the other side
     pressure: float | None = None  #: inflation pressure; None: that of the file
     is_combined: bool | None = None  #: whether slip is combined; None: according to USE_MODE of the file
-    #: relaxation lengths; None: from the file; 0: none, so that it creeps at a standstill
+    #: relaxation lengths; None: from the file; 0: none, so that the wheel creeps at a standstill
     relaxation_x: float | None = None
     relaxation_y: float | None = None
     low_speed: float | None = (
         None  #: speed below which the wheel is treated as nearly standing; None: VXLOW of the file, or 1 m/s
     )
-    settling_time: float = SETTLING_TIME  #: tau, settling time of the damped tread at a standstill [s]
+    settling_time: float = SETTLING_TIME  #: settling time tau of the damped tread at a standstill [s]
     landing_depth: float | None = None  #: deflection over which damping and tread forces build up; None: radius/500
     #: spin axis, pointing left, in axes of marker B
     axis: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))
-    road: Road = field(default_factory=FlatRoad)  #: in axes of marker A
+    road: Road = field(default_factory=FlatRoad)  #: road in axes of marker A
 
     def __post_init__(self) -> None:
         where = f"element {self.name!r}"
@@ -297,7 +298,7 @@ class MagicFormulaTyre(Element):
         return tyre_looks(self.tyre.radius, self.axis, self.road, width=self.tyre.width, is_in_metres=True)
 
     def law(self, placed: Placed) -> ElementLaw:
-        """Return the element law for the markers in the assembled configuration, in units of the system."""
+        """Return the element law for the markers in the assembled position, in units of the system."""
         where = f"element {self.name!r}"
         units, tyre, p = placed.units, self.tyre, self.tyre.coefficients
         radius = tyre.radius * LENGTH.factor(SI, units)

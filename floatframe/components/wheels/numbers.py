@@ -1,4 +1,4 @@
-"""The parameters that all tyres share, which precede those of their law, and the road, which follows them."""
+"""The parameters that all tyres share; the parameters of the law and of the road follow them in the data."""
 
 from collections.abc import Callable, Sequence
 
@@ -16,7 +16,7 @@ from floatframe.model.elements.unit_names import in_units, outputs_in
 __all__ = ["tyre_law", "tyre_numbers"]
 
 TREAD = 1e-3  #: typical deflection of the tread, divided by the radius
-UPRIGHT = 0.2  #: cosine of the inclination below which a wheel is taken as lying on its side
+UPRIGHT = 0.2  #: cosine of the inclination below which a wheel counts as lying on its side
 
 
 def tyre_numbers(

@@ -1,4 +1,4 @@
-"""The outputs that every tyre provides to sensors."""
+"""The outputs of every tyre, which sensors can read."""
 
 import numpy as np
 from numba.extending import register_jitable

@@ -20,8 +20,8 @@ from floatframe.components.wheels.contact import LOW_SPEED, RADIUS, SETTLING, SI
 
 __all__ = ["direction", "hold_tread", "magnitude", "square", "tread_slip"]
 
-LEAST_SLIP = 1e-4  #: least slip at which a tyre slides; keeps the loss of a tyre with a small load finite
-AIR = 20.0  #: a lifted tread relaxes at the rate (V + AIR V_low)/sigma
+LEAST_SLIP = 1e-4  #: smallest slip at which a tyre slides, which keeps the power loss of a lightly loaded tyre finite
+AIR = 20.0  #: factor in the rate (V + AIR V_low)/sigma at which a lifted tread relaxes
 
 
 @register_jitable(error_model="numpy")

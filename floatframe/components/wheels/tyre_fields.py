@@ -8,9 +8,10 @@ from floatframe.model.checked_values import number, unit_vector
 
 __all__ = ["check_common", "check_road", "common_numbers", "landing_depth"]
 
-STEEPEST = 1.0  #: steepest slope on which a wheel can follow the ground itself; steeper ground needs an envelope
-LANDINGS = 500  #: ratio of radius to landing depth
-FIT = 1e-6  #: relative difference, taken as rounding, between the radius of a wheel and that of an envelope
+#: steepest slope on which a wheel can follow the ground itself; an envelope is required for steeper ground
+STEEPEST = 1.0
+LANDINGS = 500  #: ratio of the radius to the landing depth
+FIT = 1e-6  #: relative difference between the radii of wheel and envelope that counts as rounding
 
 
 def check_common(
@@ -39,7 +40,7 @@ def check_common(
 
 
 def check_road(where: str, road: Any, radius: float) -> None:
-    """Raise `ModelError` unless it is a road; an envelope must be for a wheel of this radius."""
+    """Raise `ModelError` unless the value is a road; an envelope must be made for a wheel of this radius."""
     if not isinstance(road, FlatRoad | GridRoad):
         raise ModelError(
             f"{where}: road: expected a FlatRoad or a GridRoad (from profile_road, iso_8608_road "
@@ -68,7 +69,7 @@ def landing_depth(given: float | None, radius: float) -> float:
 
 
 def common_numbers(tyre: Any) -> list[float]:
-    """Return the first parameters in the data, in the order of `contact`."""
+    """Return the first parameters in the data in the order that `contact` reads."""
     return [
         tyre.radius,
         tyre.stiffness,

@@ -13,10 +13,10 @@ from floatframe.errors import ModelError
 
 __all__ = ["TyreProperties", "read_tyre_file", "shipped_tyre"]
 
-LARGEST = 1_000_000  #: bytes; real files have about ten thousand
+LARGEST = 1_000_000  #: largest size of a file in bytes; real files have about ten thousand
 VERSIONS = {"5.2": 52, "6.1": 61}
-FIT_TYPES = {"6": 52, "21": 52, "52": 52, "61": 61, "62": 61}  #: version of the formula, by FITTYP
-#: version by PROPERTY_FILE_FORMAT, if there is no FITTYP
+FIT_TYPES = {"6": 52, "21": 52, "52": 52, "61": 61, "62": 61}  #: version of the formula for each FITTYP
+#: version for each PROPERTY_FILE_FORMAT, if FITTYP is missing
 FORMATS = {"PAC2002": 52, "MF_05": 52, "MF05": 52, "MF61": 61}
 LENGTHS = {"METER": 1.0, "METRE": 1.0, "M": 1.0, "MM": 1e-3, "MILLIMETER": 1e-3, "CM": 1e-2, "CENTIMETER": 1e-2}
 LENGTHS |= {"INCH": 0.0254, "IN": 0.0254, "FOOT": 0.3048, "FT": 0.3048, "KM": 1e3, "KILOMETER": 1e3}
@@ -33,22 +33,23 @@ LINE = re.compile(r"^(\w+)\s*=\s*(.*)$")
 class TyreProperties:
     """The content of a tyre property file, in SI units."""
 
-    version: int  #: version of the formula: 52 or 61
+    version: int  #: version of the formula, 52 or 61
     coefficients: Mapping[str, float]  #: values of all `coefficients.COEFFICIENTS`
-    radius: float  #: UNLOADED_RADIUS [m]
-    load: float  #: FNOMIN [N]
-    stiffness: float  #: VERTICAL_STIFFNESS [N/m]
-    damping: float  #: VERTICAL_DAMPING [N s/m]
-    speed: float  #: LONGVL, speed of the measurement [m/s]
-    low_speed: float | None  #: VXLOW [m/s]
-    width: float | None  #: WIDTH [m]
-    side: str  #: TYRESIDE: "left", "right" or "symmetric"
-    is_combined: bool | None  #: according to USE_MODE; None: it states neither
-    pressure: float | None  #: INFLPRES [Pa]
-    nominal_pressure: float | None  #: NOMPRES [Pa]
-    ranges: Mapping[str, tuple[float, float]]  #: of kappa, alpha, gamma, load and pressure, in SI units
-    carcass: tuple[float | None, float | None]  #: LONGITUDINAL_STIFFNESS and LATERAL_STIFFNESS [N/m]
-    source: str = "tyre"  #: name in messages
+    radius: float  #: unloaded radius, UNLOADED_RADIUS [m]
+    load: float  #: nominal load, FNOMIN [N]
+    stiffness: float  #: vertical stiffness, VERTICAL_STIFFNESS [N/m]
+    damping: float  #: vertical damping, VERTICAL_DAMPING [N s/m]
+    speed: float  #: speed of the measurement, LONGVL [m/s]
+    low_speed: float | None  #: low-speed limit, VXLOW [m/s]
+    width: float | None  #: width of the tyre, WIDTH [m]
+    side: str  #: side of the tyre, TYRESIDE: "left", "right" or "symmetric"
+    is_combined: bool | None  #: whether slip is combined, from USE_MODE; None if it does not state this
+    pressure: float | None  #: inflation pressure, INFLPRES [Pa]
+    nominal_pressure: float | None  #: nominal pressure, NOMPRES [Pa]
+    ranges: Mapping[str, tuple[float, float]]  #: ranges of kappa, alpha, gamma, load and pressure in SI units
+    #: carcass stiffnesses, LONGITUDINAL_STIFFNESS and LATERAL_STIFFNESS [N/m]
+    carcass: tuple[float | None, float | None]
+    source: str = "tyre"  #: name of the tyre in messages
     notes: tuple[str, ...] = field(default=())  #: defaults taken for missing coefficients, and effects neglected
 
     @property
@@ -99,7 +100,7 @@ def shipped_tyre(name: str) -> Path:
 
 
 def tyre_from_text(text: str, where: str, *, version: str | None = None) -> TyreProperties:
-    """Return the tyre of the text of a property file; messages begin with `where`."""
+    """Return the tyre for the text of a property file; messages begin with `where`."""
     words = entries(text, where)
     if not words:
         raise ModelError(f"{where}: no line KEY = value; expected the text of a tyre property file")

@@ -27,15 +27,15 @@ __all__ = ["ROUGHNESS", "bump", "cosine_bump", "density", "iso_8608_road", "ramp
 # the matrix of g between all of them. The coherence is g².
 
 
-#: G_d(n_0) at the geometric mean of each class [m³]
+#: spectral density G_d(n_0) at the geometric mean of each class [m³]
 ROUGHNESS = {name: 16e-6 * 4.0**k for k, name in enumerate("ABCDEFGH")}
-REFERENCE = 0.1  #: n_0 [cycles/m]
-CLASS_RANGE = 0.011, 2.83  #: range of n for the classes of the standard [cycles/m]
-WAVES = 8  #: periods of the longest wave in the period of the series
+REFERENCE = 0.1  #: reference wavenumber n_0 [cycles/m]
+CLASS_RANGE = 0.011, 2.83  #: range of wavenumbers n for the classes of the standard [cycles/m]
+WAVES = 8  #: number of the longest waves in the period of the series
 
 
 def density(road_class: str, n: Array, *, waviness: float = 2.0) -> Array:
-    """Return the one-sided density G_d [m³] at the middle of a class, at n [cycles/m]."""
+    """Return the one-sided spectral density G_d [m³] in the middle of a class, at wavenumber n [cycles/m]."""
     if road_class not in ROUGHNESS:
         raise ModelError(f"road: class: expected one of {', '.join(ROUGHNESS)}, got {road_class!r}")
     return ROUGHNESS[road_class] * (np.asarray(n) / REFERENCE) ** -waviness
@@ -176,7 +176,7 @@ def cosine_bump(at: float, height: float, width: float, *, length: float) -> Pol
 
 
 def place(where: str, at: float, length: float) -> tuple[float, float]:
-    """Return the beginning of an obstacle and the length of its road, validated."""
+    """Return the checked start of an obstacle and the length of its road."""
     at, length = number(f"{where}: at", at, at_least=0.0), number(f"{where}: length", length, above=0.0)
     if at >= length:
         raise ModelError(f"{where}: at: expected a place on the road of length {length:g}, got {at:g}")

@@ -75,8 +75,8 @@ ENVELOPE_STEPS = 20  #: number of steps of an envelope per radius
 class Grip:
     """A friction factor along the road, for example of a wet patch, linear between knots."""
 
-    x: Array  #: knots along the road, (n,) [m], increasing
-    factor: Array  #: above 0, (n,); constant before the first knot and beyond the last
+    x: Array  #: increasing knots along the road, (n,) [m]
+    factor: Array  #: friction factors above 0, (n,); constant outside the knots
 
     def __post_init__(self) -> None:
         x = knots("road: grip: x", self.x)
@@ -135,11 +135,11 @@ class GridRoad:
     for shorter waves, use `enveloped`.
     """
 
-    x: Array  #: knots along the road, (n_x,) [m], increasing
-    z: Array  #: heights, (n_x, n_y) or (n_x,) [m]
+    x: Array  #: increasing knots along the road, (n_x,) [m]
+    z: Array  #: heights at the knots, (n_x, n_y) or (n_x,) [m]
     y: Array = (0.0,)  # type: ignore[assignment]  #: knots across, (n_y,) [m], increasing
-    is_linear: bool = False  #: linear between the knots
-    envelope_radius: float | None = None  #: radius of the disc whose envelope z is [m]; None: z is the ground itself
+    is_linear: bool = False  #: whether heights are linear between the knots
+    envelope_radius: float | None = None  #: radius of the disc whose envelope is z [m]; None: z is the ground itself
     grip: Grip | None = None  #: friction factor for tyres along the road; None: 1
 
     def __post_init__(self) -> None:
@@ -211,8 +211,8 @@ def at_row(y: Array, rows: Array, place: float) -> Array:
 class Polyline:
     """A profile of straight pieces, which may have upright steps: two corners with equal x."""
 
-    x: Array  #: of the corners, (n,) [m], not decreasing
-    z: Array  #: of the corners, (n,) [m]
+    x: Array  #: x of the corners, not decreasing, (n,) [m]
+    z: Array  #: z of the corners, (n,) [m]
 
     def __post_init__(self) -> None:
         x = array_of_shape("profile: x", self.x, (len(np.atleast_1d(np.asarray(self.x, dtype=object))),))
@@ -267,7 +267,7 @@ def profile_road(x: Any, z: Any, *, is_linear: bool = False) -> GridRoad:
 
 
 def knots(where: str, values: Any, least: int = 2) -> Array:
-    """Return increasing numbers, at least `least` of them; `ModelError` otherwise."""
+    """Return values as increasing numbers, at least `least` of them; `ModelError` if they are not."""
     array = array_of_shape(where, values, (len(np.atleast_1d(np.asarray(values, dtype=object))),))
     if len(array) < least:
         raise ModelError(f"{where}: expected {least} knots or more, got {len(array)}")
@@ -280,7 +280,7 @@ def knots(where: str, values: Any, least: int = 2) -> Array:
 
 
 def even_knots(low: float, high: float, step: float) -> Array:
-    """Return equally spaced numbers from low to high, at most a step apart."""
+    """Return equally spaced numbers from low to high with a spacing of at most `step`."""
     number("envelope: step", step, above=0.0)
     return np.linspace(low, high, max(2, int(np.ceil((high - low) / step)) + 1))
 
