@@ -1,4 +1,4 @@
-"""Writing an FMU: model description, binaries that host Python, and all the unit needs in its resources."""
+"""Writing of an FMU: model description, binaries that run Python, and all files that the unit needs."""
 
 import hashlib
 import html
@@ -31,7 +31,7 @@ SYSTEM, SETTINGS = "system.toml", "unit.json"  #: files in the resources of an F
 
 
 class HostedUnit:
-    """The unit in the resources of an FMU.
+    """The unit that runs the system in the resources of an FMU.
 
     Parameters
     ----------
@@ -46,24 +46,24 @@ class HostedUnit:
         self.settings = json.loads((Path(resources) / SETTINGS).read_text(encoding="utf-8"))
         self.variables = tuple(Variable(**each) for each in self.settings["variables"])
         self.log = log
-        self.t_start = 0.0  #: [s]
+        self.t_start = 0.0  #: start time of the motion [s]
         self.values = {each.name: each.start for each in self.variables if each.causality in ("parameter", "input")}
         self.unit: Unit | None = None
         self.is_running = False
 
     @property
     def seconds(self) -> float:
-        """Seconds in a unit of time of the system."""
+        """Number of seconds in the time unit of the system."""
         return float(self.settings["seconds"])
 
     def variable(self, reference: int) -> Variable:
-        """Return a variable by its value reference."""
+        """Return the variable with a value reference."""
         if not 0 <= reference < len(self.variables):
             raise ModelError(f"value reference {reference}: expected 0 to {len(self.variables) - 1}")
         return self.variables[reference]
 
     def set(self, references: Sequence[int], values: Sequence[float]) -> None:
-        """Set inputs, and parameters before the initialisation has ended."""
+        """Set inputs; parameters can be set until the initialisation has ended."""
         for reference, value in zip(references, values, strict=True):
             each = self.variable(reference)
             if each.causality not in ("parameter", "input"):
@@ -79,7 +79,7 @@ class HostedUnit:
                 self.unit = None  # recreated with these values when requested
 
     def begun(self) -> Unit:
-        """Return the unit, at its beginning or later."""
+        """Return the unit, which has begun its motion or continues it."""
         if self.unit is None:
             changes = {v.path: self.values[v.name] for v in self.variables
                        if v.causality == "parameter" and self.values[v.name] != v.start}  # fmt: skip
@@ -102,12 +102,12 @@ class HostedUnit:
         return [known[each.name] for each in wanted]
 
     def begin(self) -> None:
-        """End the initialisation: joints are closed, the motion begins."""
+        """End the initialisation: close the joints and start the motion."""
         self.begun()
         self.is_running = True
 
     def step(self, t: float, size: float) -> None:
-        """Take a communication step of a size from a time, both in seconds."""
+        """Take a communication step of size `size` from time t, both in seconds."""
         unit = self.begun()
         told = len(unit.notes)
         unit.step(t / self.seconds, size / self.seconds)
@@ -115,50 +115,50 @@ class HostedUnit:
             self.log(words)
 
     def state(self) -> UnitState:
-        """Return all the unit remembers."""
+        """Return the complete state of the unit."""
         return self.begun().state()
 
     def restore(self, state: UnitState) -> None:
-        """Go to a state of this unit, or of another one of this FMU with the same parameters."""
+        """Restore a state of this unit, or of another instance of the FMU with the same parameters."""
         unit = self.begun()
         unit.restore(state)
         self.is_running = True
         self.values |= unit.inputs
 
     def state_of_bytes(self, content: bytes) -> UnitState:
-        """Return a state that was serialised."""
+        """Return the state for serialised bytes."""
         return UnitState.from_bytes(content, self.begun().system)
 
 
 def words_of(error: BaseException) -> str:
-    """Return an error in one line: its message if it is meant for users, otherwise with its kind."""
+    """Return an error as one line: its message if it is meant for users, otherwise with the type of the error."""
     return str(error) if isinstance(error, FloatframeError) else f"{type(error).__name__}: {error}"
 
 
 # archive --------------------------------------------------------------------------------------------------------------
 
 
-PACKAGES = {2: "pythonfmu", 3: "pythonfmu3"}  #: whose binaries and classes an FMU takes along
+PACKAGES = {2: "pythonfmu", 3: "pythonfmu3"}  #: packages whose binaries and classes are copied into an FMU
 VERSIONS = tuple(PACKAGES)
-#: module in the resources: its own for each version, since a process that loads both imports each once
+#: module name in the resources, different for each version, because a process imports each name only once
 SCRIPT = "floatframe_unit_fmi{}"
-#: on the page of documentation
+#: text of the documentation page in an FMU
 PAGE = """<p>The first run compiles code, a minute or less, once for each installation. Its binary is that of
 {package}.</p>
 <p>Time is in seconds. Force inputs are held over a communication step; a drive takes its value, rate and
 acceleration, and follows them without jumps. The motion is that of the system file alone where the communication step
 is a multiple of its step, {step!r} s, and inputs are held. Parameters are set before the initialisation ends.
 States can be kept, restored and serialised.</p>"""
-EPOCH = (1980, 1, 1, 0, 0, 0)  #: of all files in an FMU: the same system makes the same bytes
+EPOCH = (1980, 1, 1, 0, 0, 0)  #: date of all files in an FMU, so that the same system gives the same bytes
 
 
 @dataclass(frozen=True)
 class WrittenFmu:
-    """What was written."""
+    """The FMU that was written."""
 
     path: Path
     variables: tuple[Variable, ...]
-    platforms: tuple[str, ...]  #: folders of binaries, such as linux64
+    platforms: tuple[str, ...]  #: folders of binaries in the FMU, such as linux64
 
 
 def write_fmu(
@@ -170,7 +170,7 @@ def write_fmu(
     outputs: Sequence[str] | None = None,
     parameters: Mapping[str, str] | None = None,
 ) -> WrittenFmu:
-    """Write the FMU of a system file, for co-simulation.
+    """Write the FMU for co-simulation of a system file.
 
     Parameters
     ----------
@@ -240,7 +240,7 @@ def write_fmu(
 
 
 def resource_files(system: Path, content: Mapping[str, Any]) -> dict[str, bytes]:
-    """Return the system file, with paths to its modal files and signals, and these files, by name."""
+    """Return the system file with changed paths to modal files and signals, and all these files by name."""
     files: dict[str, bytes] = {}
     changed = json.loads(json.dumps(content))
     taken: dict[Path, str] = {}
@@ -261,13 +261,13 @@ def resource_files(system: Path, content: Mapping[str, Any]) -> dict[str, bytes]
 
 
 def identifier_of(name: str) -> str:
-    """Return a name as C takes it."""
+    """Return a name as a valid C identifier."""
     plain = re.sub(r"\W", "_", name, flags=re.ASCII)
     return plain if plain[:1].isalpha() else f"unit_{plain}"
 
 
 def binaries_of(package: Path, identifier: str) -> dict[str, bytes]:
-    """Return the libraries of PythonFMU under the name of the model, by their place in an FMU."""
+    """Return the libraries of PythonFMU, named after the model, by their paths in an FMU."""
     folder = package / "resources" / "binaries"
     found = {
         f"binaries/{each.parent.name}/{identifier}{each.suffix}": each.read_bytes()
@@ -288,7 +288,7 @@ def release() -> str:
 
 
 def licences(package: str) -> dict[str, bytes]:
-    """Return the licence texts of the binaries and classes that an FMU takes along."""
+    """Return the licence texts of the binaries and classes that an FMU contains."""
     try:
         files = distribution(package).files or ()
     except PackageNotFoundError:
@@ -301,7 +301,7 @@ def licences(package: str) -> dict[str, bytes]:
 
 
 def documentation(about: Description, variables: Sequence[Variable], page: str) -> str:
-    """Return the page of documentation in an FMU; page: additional paragraphs, HTML."""
+    """Return the documentation page of an FMU; page: additional paragraphs in HTML."""
     rows = "\n".join(
         "<tr>" + "".join(f"<td>{html.escape(text)}</td>" for text in (v.name, v.causality, v.unit, v.words)) + "</tr>"
         for v in variables
@@ -318,7 +318,7 @@ def documentation(about: Description, variables: Sequence[Variable], page: str) 
 
 
 def zipped(files: Mapping[str, bytes]) -> bytes:
-    """Return a zip file of the files, the same for the same files."""
+    """Return the files as a zip file, whose bytes are the same for the same files."""
     data = io.BytesIO()
     with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED) as archive:
         for name in sorted(files):
@@ -477,5 +477,5 @@ WORDS = {
 
 
 def slave_script(fmi: int) -> str:
-    """Return the script for FMI 2 or 3."""
+    """Return the Python script of the unit for FMI 2 or 3."""
     return UNIT_SCRIPT.format(**WORDS[fmi])

@@ -1,4 +1,4 @@
-"""A system and units of other programs: the master that advances them by macro-steps."""
+"""A system coupled with units of other programs: the master algorithm that advances them by macro-steps."""
 
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -114,7 +114,7 @@ def co_simulate(
 
 
 def with_motion(error: CosimulationError | ConvergenceError, run: Run, t: float, H: float) -> Exception:
-    """Return the error with the motion so far, and where it is."""
+    """Return the error with the motion so far and the path of its file."""
     run.look()
     trajectory, where = motion_so_far(run)
     words = f"system {run.system.name!r}: the macro-step of {H:g} from t = {t:.9g} failed: {error}{where}"
@@ -125,17 +125,17 @@ def with_motion(error: CosimulationError | ConvergenceError, run: Run, t: float,
 
 @dataclass(frozen=True)
 class Signals:
-    """What passes between a system and its units at one time: values by name."""
+    """Values by name that a system and its units exchange at one time."""
 
-    system: Mapping[str, float]  #: outputs of the system, sensor.column
-    units: Mapping[str, float]  #: inputs of the system, set by units
+    system: Mapping[str, float]  #: outputs of the system, by sensor.column
+    units: Mapping[str, float]  #: inputs of the system that units prescribe
 
     def __iter__(self) -> Any:
         return iter((self.system, self.units))
 
 
 class Master:
-    """The system as a unit, the other units, and their connections."""
+    """The master of a co-simulation: the system as a unit, the other units, and their connections."""
 
     def __init__(
         self, system: System, integrator: Integrator, h: float, slaves: Sequence[ForeignSlave], coupling: Coupling
@@ -147,10 +147,10 @@ class Master:
         inputs, outputs = list(dict.fromkeys(targets.values())), sorted({sensor for sensor, _ in sensors.values()})
         self.unit = Unit(system, integrator, h, inputs, outputs)
         self.sensors = sensors
-        self.columns: dict[str, str] = {}  #: source -> name of the output of the unit
+        self.columns: dict[str, str] = {}  #: name of the unit's output for each source
 
     def begin(self) -> None:
-        """Begin the system, find the columns that are connected, begin the units; refuse algebraic loops."""
+        """Initialise the system, the connected columns and the units; raise an error for algebraic loops."""
         self.unit.begin()
         outputs = {each.name: each for each in output_variables(self.unit, self.unit.system)}
         for source, (sensor, column) in self.sensors.items():
@@ -167,7 +167,7 @@ class Master:
         self.signals = self.exchanged()
 
     def require_scheme(self) -> None:
-        """Raise `ModelError` for an algebraic loop in the explicit scheme, a unit or a drive that cannot iterate."""
+        """Raise `ModelError` for an explicit scheme with an algebraic loop, or units or drives that cannot iterate."""
         if self.coupling.scheme == "iterated":
             for slave in self.slaves:
                 if not slave.can_go_back:
@@ -191,7 +191,7 @@ class Master:
                         )
 
     def exchanged(self) -> Signals:
-        """Return the signals at the time that all have reached: (1)."""
+        """Return the signals at the time that all units have reached: (1)."""
         found = self.exchanged_once()
         # outputs that depend directly on forces use those of this time
         if self.followers and self.coupling.scheme == "iterated":
@@ -201,7 +201,7 @@ class Master:
         return found
 
     def exchanged_once(self) -> Signals:
-        """Return the signals with the current inputs of the system."""
+        """Return the signals for the present inputs of the system."""
         measured = self.unit.values()
         of_system = {source: measured[name] for source, name in self.columns.items()}
         of_units: dict[str, float] = {}
@@ -212,14 +212,14 @@ class Master:
         return Signals(of_system, of_units)
 
     def apply(self, signals: Signals) -> None:
-        """Give signals to all."""
+        """Set the signals as inputs of all units."""
         for name, value in signals.units.items():
             self.unit.set(name, value)
         for slave in self.slaves:
             slave.set({name: signals.system[source] for name, source in slave.unit.inputs.items()})
 
     def step(self, t: float, H: float) -> None:
-        """Take a macro-step."""
+        """Take a macro-step of size H from t."""
         if self.coupling.scheme == "explicit":
             self.apply(self.signals)
             self.advance(t, H)
@@ -251,26 +251,26 @@ class Master:
                 slave.free(state)
 
     def advance(self, t: float, H: float) -> None:
-        """Let all take the step: (2)."""
+        """Advance all units by the step: (2)."""
         for slave in self.slaves:
             slave.step(t, H)
         self.unit.step(t, H)
 
 
 def mean(a: Signals, b: Signals) -> Signals:
-    """Return the means of two sets of signals."""
+    """Return the mean of each signal in two sets."""
     parts = ({name: (x[name] + y[name]) / 2 for name in x} for x, y in zip(a, b, strict=True))
     return Signals(*parts)
 
 
 def largest_change(a: Signals, b: Signals) -> float:
-    """Return the largest change of a signal, relative to its size (or to 1e-12 if the signal is zero)."""
+    """Return the largest relative change of a signal (relative to 1e-12 if the signal is zero)."""
     changes = [abs(y[n] - x[n]) / max(abs(x[n]), abs(y[n]), 1e-12) for x, y in zip(a, b, strict=True) for n in x]
     return max(changes, default=0.0)
 
 
 def sensor_and_column(system: System, source: str) -> tuple[str, str | None]:
-    """Return the sensor or joint coordinate, and the column, of "tip.x" or "hinge.angle"; None: the first one."""
+    """Return sensor (or joint coordinate) and column for "tip.x" or "hinge.angle"; None: the first column."""
     names = [sensor.name for sensor in sensors_of(system)]
     names += [f"{joint.name}.{coordinate}" for joint in system.joints for coordinate in joint.coordinates]
     if source in names:
@@ -282,7 +282,7 @@ def sensor_and_column(system: System, source: str) -> tuple[str, str | None]:
 
 
 def targets_of(system: System, units: Sequence[ForeignUnit]) -> dict[str, str]:
-    """Return the inputs of the system on which units act, by the names they are called; each by one output only."""
+    """Return, by name, the inputs of the system that units prescribe; each may have only one source."""
     choices, found = input_choices(system), {}
     for unit in units:
         for output, target in unit.outputs.items():

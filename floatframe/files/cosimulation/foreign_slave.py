@@ -1,4 +1,4 @@
-"""A unit of another program, run by FMPy: checked before the run, with its errors as messages."""
+"""A unit of another program run by FMPy: checked before the run, with its errors as messages."""
 
 import math
 import shutil
@@ -19,13 +19,13 @@ __all__ = ["ForeignSlave", "callbacks"]
 
 REAL = ("Real", "Float64")
 VERSIONS = ("2.0", "3.0")
-DISCARD, ERROR, FATAL = 2, 3, 4  #: status of a call that failed
+DISCARD, ERROR, FATAL = 2, 3, 4  #: FMI status codes of failed calls
 
-words_of_call: list[str] = []  #: log messages of units since the last call of one of their functions
+words_of_call: list[str] = []  #: log messages of units since the last call of an FMI function
 
 
 class ForeignSlave:
-    """An instance of an FMU, of version 2 or 3; close it when it is done.
+    """An instance of an FMU of version 2 or 3; call `close` at the end.
 
     Parameters
     ----------
@@ -62,15 +62,15 @@ class ForeignSlave:
                 self.require_variable(part, name, causality)
         self.folder = Path(tempfile.mkdtemp(prefix="floatframe-fmu-"))
         self.instance: Any = None
-        self.worst = 0  #: status of its worst failure: 3 error, 4 fatal
+        self.worst = 0  #: status of its most severe failure: 3 error, 4 fatal
 
     @property
     def is_fmi_2(self) -> bool:
-        """Whether its version is 2; otherwise it is 3."""
+        """Whether the FMU has version 2; otherwise it has version 3."""
         return bool(self.description.fmiVersion == "2.0")
 
     def require_usable(self, path: Path) -> None:
-        """Raise `ModelError` unless the FMU is of a version, a kind and a platform that can run here."""
+        """Raise `ModelError` unless version, kind and platform of the FMU are supported here."""
         about = self.description
         if about.fmiVersion not in VERSIONS:
             raise ModelError(f"{self.where}: {path}: FMI {about.fmiVersion}, expected {' or '.join(VERSIONS)}")
@@ -82,7 +82,7 @@ class ForeignSlave:
             raise ModelError(f"{self.where}: {path}: no binary for {self.fmpy.platform}; it has those for {has}")
 
     def require_variable(self, part: str, name: str, causality: str) -> None:
-        """Raise `ModelError` unless a variable exists, is real, and has the causality."""
+        """Raise `ModelError` unless a variable exists, is real, and has the given causality."""
         choices = [v.name for v in self.description.modelVariables if v.causality == causality]
         found = self.references.get(name)
         if found is None:
@@ -94,12 +94,12 @@ class ForeignSlave:
 
     @property
     def can_go_back(self) -> bool:
-        """Whether it keeps and restores its state."""
+        """Whether the FMU can save and restore its state."""
         about = self.description.coSimulation
         return bool(getattr(about, "canGetAndSetFMUstate", False) or getattr(about, "canGetAndSetFMUState", False))
 
     def feeds_through(self, output: str) -> list[str]:
-        """Return the connected inputs on which an output depends directly.
+        """Return the connected inputs that have direct feedthrough to an output.
 
         All of them if the FMU does not declare it.
         """
@@ -109,7 +109,7 @@ class ForeignSlave:
         return list(self.unit.inputs)
 
     def call(self, what: str, function: Any, *values: Any, **named: Any) -> Any:
-        """Call a function of the FMU; `CosimulationError` with the words of its log if it fails."""
+        """Call a function of the FMU; `CosimulationError` with its log messages if the call fails."""
         words_of_call.clear()
         try:
             return function(*values, **named)
@@ -119,7 +119,7 @@ class ForeignSlave:
             raise CosimulationError(f"{self.where}: {what} failed: {words}") from error
 
     def begin(self, t: float, inputs: Mapping[str, float]) -> None:
-        """Instantiate it, set parameters and inputs, and initialise it at t."""
+        """Instantiate the FMU, set parameters and inputs, and initialise it at t."""
         fmpy = self.fmpy
         self.call("its extraction", fmpy.extract, self.unit.file, unzipdir=str(self.folder))
         self.instance = self.call("its instantiation", self.instantiated)
@@ -133,7 +133,7 @@ class ForeignSlave:
         self.call("its initialisation", self.instance.exitInitializationMode)
 
     def instantiated(self) -> Any:
-        """Return an instance of it that logs to `words_of_call`."""
+        """Return an instance of the FMU that logs to `words_of_call`."""
         if not self.is_fmi_2:
             simulation = extra_module("fmpy.simulation", extra="fmi", purpose="units of other programs")
             return simulation.instantiate_fmu(
@@ -149,14 +149,14 @@ class ForeignSlave:
         return instance
 
     def set(self, values: Mapping[str, float]) -> None:
-        """Set variables."""
+        """Set variables of the FMU."""
         if values:
             function = self.instance.setReal if self.is_fmi_2 else self.instance.setFloat64
             references = [self.references[name].valueReference for name in values]
             self.call("setting its inputs", function, references, [float(x) for x in values.values()])
 
     def outputs(self) -> dict[str, float]:
-        """Return the outputs that are connected; `CosimulationError` if one is not finite."""
+        """Return the connected outputs; `CosimulationError` if one is not finite."""
         names = list(self.unit.outputs)
         if not names:
             return {}
@@ -169,7 +169,7 @@ class ForeignSlave:
         return dict(zip(names, map(float, values), strict=True))
 
     def step(self, t: float, size: float) -> None:
-        """Take a step of a size from t."""
+        """Take a step of size `size` from t."""
         result = self.call(
             f"its step from t = {t:.9g}", self.instance.doStep, currentCommunicationPoint=t * self.seconds,
             communicationStepSize=size * self.seconds,
@@ -178,21 +178,21 @@ class ForeignSlave:
             raise CosimulationError(f"{self.where}: it requested the end of the run in its step from t = {t:.9g}")
 
     def state(self) -> Any:
-        """Return its state, which `free` releases."""
+        """Return the state of the FMU; `free` releases it."""
         return self.call("keeping its state", self.instance.getFMUstate if self.is_fmi_2 else self.instance.getFMUState)
 
     def restore(self, state: Any) -> None:
-        """Go back to a state."""
+        """Restore a state."""
         function = self.instance.setFMUstate if self.is_fmi_2 else self.instance.setFMUState
         self.call("going back to a state", function, state)
 
     def free(self, state: Any) -> None:
-        """Let go of a state."""
+        """Release a state."""
         function = self.instance.freeFMUstate if self.is_fmi_2 else self.instance.freeFMUState
         self.call("letting go of a state", function, state)
 
     def close(self) -> None:
-        """Terminate it and remove extracted files.
+        """Terminate the FMU and remove its extracted files.
 
         After an error it is only freed, after a fatal error it is not called.
         """
@@ -209,19 +209,19 @@ class ForeignSlave:
 
 
 def note(*values: Any) -> None:
-    """Store the log messages of a unit."""
+    """Store a log message of a unit."""
     text = values[-1]
     words_of_call.append(one_line(text.decode("utf-8", "replace") if isinstance(text, bytes) else text))
 
 
 @cache
 def logger() -> Any:
-    """Return `note` behind a C function, one for all units of version 2."""
+    """Return a C function that calls `note`, shared by all units of version 2."""
     return extra_module("fmpy.fmi2", extra="fmi", purpose="units of other programs").fmi2CallbackLoggerTYPE(note)
 
 
 def callbacks() -> Any:
-    """Return the callbacks of a unit of version 2.
+    """Return the callback functions for a unit of version 2.
 
     FMPy puts texts together in a function of C that knows one logger, the last it was given, and calls it for all units
     of the process: a logger of one of them would hear the others, and be called when it has gone.
@@ -238,6 +238,6 @@ def callbacks() -> Any:
 
 
 def one_line(text: Any) -> str:
-    """Return words without line breaks, of a length that can be read."""
+    """Return a text without line breaks, shortened to a readable length."""
     words = " ".join(str(text).split())
     return words if len(words) <= 400 else words[:397] + "..."

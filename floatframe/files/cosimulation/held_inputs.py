@@ -1,4 +1,4 @@
-"""Inputs of a system that another program sets: force factors, motors and drives as functions of time that are held.
+"""Inputs of a system that another program sets: force factors, motors and drives, held between communication steps.
 
 Each input is a function of time of one piece in the compiled system, whose numbers a unit writes anew at every
 communication point; nothing is compiled again.
@@ -24,17 +24,17 @@ __all__ = ["HeldInput", "function_numbers", "input_choices", "with_held_inputs"]
 
 @dataclass(frozen=True)
 class HeldInput:
-    """A number that acts on a system from outside: its name, its place, and its initial value."""
+    """A value that another program prescribes: name, unit and initial value."""
 
-    name: str  #: such as forces.push.amplitude, joints.hub.angle, or the name of a table [inputs.NAME]
-    unit: str  #: in the symbols of the system, "1" for a factor
-    words: str  #: what it is
+    name: str  #: name, such as forces.push.amplitude, joints.hub.angle, or the name of a table [inputs.NAME]
+    unit: str  #: unit in the symbols of the system, "1" for a factor
+    words: str  #: description of the input
     start: float  #: value at t = 0
-    is_drive: bool = False  #: a prescribed coordinate, given with its first two rates
-    is_own: bool = True  #: in the file it is constant, so that it is an input unless others are named
+    is_drive: bool = False  #: whether it is a prescribed coordinate, given with its first two rates
+    is_own: bool = True  #: whether it is constant in the file, so that it is an input by default
 
     def variables(self, time_symbol: str) -> list[tuple[str, str]]:
-        """Return names and units of the variables: one, or value, rate and acceleration of a drive."""
+        """Return names and units of the variables: one, or three (value, rate, acceleration) for a drive."""
         if not self.is_drive:
             return [(self.name, self.unit)]
         per_time = (f"{self.unit}/{time_symbol}", f"{self.unit}/{time_symbol}²")
@@ -42,27 +42,27 @@ class HeldInput:
 
 
 def force_channels(system: System) -> list[Channel | CoordinateChannel]:
-    """Return the inputs of a system that are forces; drives are separate inputs, and bases have none in time."""
+    """Return the inputs of a system that are forces; drives are separate inputs, and bases are not supported."""
     return [each for each in inputs_of(system.inputs) if isinstance(each, Channel | CoordinateChannel)]
 
 
 def is_constant(function: TimeFunction | float | None) -> bool:
-    """Return whether a function of time is the same number always."""
+    """Return whether a function of time is constant."""
     return not isinstance(function, TimeFunction) or (len(function.begins) == 1 and not function.pieces[0, 1:7].any())
 
 
 def value_at_start(function: TimeFunction | float | None, default: float) -> float:
-    """Return a function of time at t = 0."""
+    """Return the value of a function of time at t = 0."""
     return default if function is None else function(0.0) if isinstance(function, TimeFunction) else float(function)
 
 
 def input_choices(system: System) -> dict[str, HeldInput]:
-    """Return all that can be an input of a system, by name."""
+    """Return all possible inputs of a system by name."""
     return {each.name: each for each in found_inputs(system)}
 
 
 def found_inputs(system: System) -> Iterator[HeldInput]:
-    """Yield the inputs that forces, drives and channels of a system offer."""
+    """Yield the possible inputs of a system from forces, drives and channels."""
     for channel in force_channels(system):
         unit = channel_unit(system, channel)
         yield HeldInput(channel.name, unit, f"force or torque of the input {channel.name}", 0.0)
@@ -84,12 +84,12 @@ def found_inputs(system: System) -> Iterator[HeldInput]:
 
 
 def is_angle(system: System, joint: str, coordinate: str) -> bool:
-    """Return whether a joint coordinate is an angle; distances and places along axes are not."""
+    """Return whether a joint coordinate is an angle rather than a distance."""
     return coordinate.startswith("angle")
 
 
 def with_held_inputs(system: System, names: Sequence[str] | None = None) -> tuple[System, tuple[HeldInput, ...]]:
-    """Return a system whose inputs are functions of one piece, and the inputs.
+    """Return a system in which inputs are functions with one piece, and the inputs.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def with_held_inputs(system: System, names: Sequence[str] | None = None) -> tupl
 
 
 def channel_forces(channel: Any, function: TimeFunction) -> list[PointForce | JointForce]:
-    """Return the forces of a channel of a linearised system, of the size of a function of time."""
+    """Return the forces along a channel of a linearised system, whose size is a function of time."""
     if not isinstance(channel, Channel):
         return [JointForce(f"inputs.{channel.name}", channel.joint, channel.coordinate, motor=function)]
     key = "force" if channel.quantity == "translation" else "torque"
@@ -149,7 +149,7 @@ def channel_forces(channel: Any, function: TimeFunction) -> list[PointForce | Jo
 
 
 def function_numbers(system: System, compiled: CompiledSystem, held: HeldInput) -> list[int]:
-    """Return the numbers of the functions in the compiled system that an input is."""
+    """Return the numbers of an input's functions in the compiled system."""
     model = compiled.model
     names = {held.name, f"inputs.{held.name}", f"inputs.{held.name}.against"}
     names |= {held.name.removeprefix("forces.").removesuffix(end) for end in (".amplitude", ".motor")}

@@ -1,4 +1,4 @@
-"""What a unit shows to other programs: its parameters, inputs and outputs as variables with units and starts."""
+"""The interface of a unit: parameters, inputs and outputs as variables with units and initial values."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -27,13 +27,13 @@ from floatframe.results.sensors import (
 
 __all__ = ["Variable", "interface", "parameter_paths", "read_unit", "value_at"]
 
-#: sensors that measure the state alone; a force changes accelerations, and forces elsewhere, at once
+#: sensors that depend only on the state; other sensors respond immediately to forces
 OF_THE_STATE = (
     AngleSensor, DisplacementSensor, ElongationSensor, ModeSensor, MomentumSensor, StrainGauge, StressSensor,
     VonMisesSensor,
 )  # fmt: skip
-COLUMNS_OF_THE_STATE = ("value", "rate")  #: of a joint coordinate, in addition to the force along it
-TABLES_OF_NUMBERS = ("bodies", "forces", "couplers")  #: whose numbers are parameters without being named
+COLUMNS_OF_THE_STATE = ("value", "rate")  #: columns of a joint coordinate that depend only on the state
+TABLES_OF_NUMBERS = ("bodies", "forces", "couplers")  #: tables whose numbers are parameters by default
 
 
 @dataclass(frozen=True)
@@ -41,21 +41,22 @@ class Variable:
     """A real variable of a unit."""
 
     name: str
-    causality: str  #: parameter, input, output, local or independent
-    unit: str = ""  #: in the symbols of the system; "": none
-    words: str = ""  #: what it is
+    causality: str  #: causality: parameter, input, output, local or independent
+    unit: str = ""  #: unit in the symbols of the system, "" for none
+    words: str = ""  #: description of the variable
     start: float = 0.0
-    path: str = ""  #: key path in the system file, of a parameter
-    feeds_through: bool = False  #: of an output: whether it follows force inputs at once
-    is_drive: bool = False  #: of an input: of a prescribed motion
-    is_tunable: bool = False  #: of a parameter: whether it may change in a motion
-    is_state: bool = False  #: whether it is a continuous state, which begins at its start
-    derivative_of: str = ""  #: name of the state whose derivative it is
-    depends_on: tuple[str, ...] | None = None  #: names of states and inputs; None: force inputs if it feeds through
+    path: str = ""  #: key path of a parameter in the system file
+    feeds_through: bool = False  #: whether an output has direct feedthrough from force inputs
+    is_drive: bool = False  #: whether an input prescribes a motion
+    is_tunable: bool = False  #: whether a parameter may change during a motion
+    is_state: bool = False  #: whether the variable is a continuous state with an initial value
+    derivative_of: str = ""  #: name of the state of which the variable is the derivative
+    #: names of states and inputs on which it depends; None: force inputs if `feeds_through`
+    depends_on: tuple[str, ...] | None = None
 
 
 def value_at(content: Mapping[str, Any], path: str, where: str) -> float:
-    """Return the number at a key path of a system file; `SystemFileError` if there is none."""
+    """Return the number at a key path of a system file; `SystemFileError` if it does not exist."""
     here: Any = content
     left = path
     while True:
@@ -80,7 +81,7 @@ def value_at(content: Mapping[str, Any], path: str, where: str) -> float:
 
 
 def paths_in(content: Mapping[str, Any]) -> list[str]:
-    """Return the key paths of the numbers that are parameters without being named."""
+    """Return the key paths of all numbers that are parameters by default."""
     found = [f"system.gravity.{k}" for k in range(len(content.get("system", {}).get("gravity", ())))]
     for table in TABLES_OF_NUMBERS:
         for name, section in content.get(table, {}).items():
@@ -91,7 +92,7 @@ def paths_in(content: Mapping[str, Any]) -> list[str]:
 
 
 def parameter_paths(content: Mapping[str, Any], given: Mapping[str, str] | None, where: str) -> dict[str, str]:
-    """Return key paths of the parameters by name: those given, or all numbers of bodies, forces, couplers, gravity."""
+    """Return key paths of parameters by name: those given, or all numbers of bodies, forces, couplers and gravity."""
     paths = {path: path for path in paths_in(content)} if given is None else dict(given)
     for path in paths.values():
         value_at(content, path, where)
@@ -105,7 +106,7 @@ def read_unit(
     inputs: Sequence[str] | None = None,
     outputs: Sequence[str] | None = None,
 ) -> tuple[Unit, RunOptions]:
-    """Read a system file as a unit, with numbers changed by key path.
+    """Read a system file as a unit, with some numbers changed by key path.
 
     Raises
     ------
@@ -121,7 +122,7 @@ def read_unit(
 
 
 def interface(unit: Unit, content: Mapping[str, Any], paths: Mapping[str, str], where: str) -> tuple[Variable, ...]:
-    """Return the variables of a unit at its beginning: time, parameters, inputs, outputs; names are used once.
+    """Return the variables of a unit at its start: time, parameters, inputs, outputs; all names are unique.
 
     Raises
     ------
@@ -148,7 +149,7 @@ def interface(unit: Unit, content: Mapping[str, Any], paths: Mapping[str, str], 
 
 
 def output_variables(unit: Unit, system: System) -> Iterator[Variable]:
-    """Yield the outputs of a unit that has begun."""
+    """Yield the outputs of an initialised unit."""
     for sensor, measurement in zip(unit.sensors, unit.measured(), strict=True):
         is_of_state = isinstance(sensor, OF_THE_STATE) or (
             isinstance(sensor, PlaceSensor) and sensor.quantity != "acceleration"

@@ -1,4 +1,4 @@
-"""The model description of a unit: modelDescription.xml of FMI 2.0 and FMI 3.0, from one list of variables."""
+"""The model description of a unit, modelDescription.xml of FMI 2.0 and 3.0, from one list of variables."""
 
 import re
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ EXPONENTS = {"": 1, "²": 2, "³": 3}
 
 
 class BaseUnit(NamedTuple):
-    """One unit in SI: factor · kg^kg m^m s^s rad^rad."""
+    """A unit in SI base units: factor · kg^kg m^m s^s rad^rad."""
 
     factor: float
     kg: int = 0
@@ -29,7 +29,7 @@ class BaseUnit(NamedTuple):
 
 
 def base_unit(units: Units, words: str) -> BaseUnit | None:
-    """Return a unit such as "mm/s²" or "N mm" in SI; None for one without, or one that FMI cannot hold.
+    """Return a unit such as "mm/s²" or "N mm" in SI base units; None if there is none, or FMI cannot express it.
 
     words: symbols of the system, those to the power of 2 or 3 with ² or ³, parted by spaces; divisors after "/".
     """
@@ -62,7 +62,7 @@ def base_unit(units: Units, words: str) -> BaseUnit | None:
 # model description ----------------------------------------------------------------------------------------------------
 
 
-#: requirements of an FMU where it runs
+#: note on the requirements of an FMU where it runs
 NEEDS = (
     "Needs Python with floatframe where it runs: the program that loads it must be Python itself (FMPy), or find the "
     "library of a Python in which floatframe is installed (Linux: LD_PRELOAD=libpython3.x.so; Windows: python3x.dll on "
@@ -73,23 +73,23 @@ CATEGORIES = {"logAll": "all messages", "logStatusWarning": "warnings", "logStat
 
 @dataclass(frozen=True)
 class Description:
-    """Data of a model description besides the variables."""
+    """Data of a model description in addition to the variables."""
 
-    name: str  #: of the model
-    identifier: str  #: of its binaries, a name in C
-    token: str  #: guid, instantiation token
+    name: str  #: name of the model
+    identifier: str  #: name of the binaries, a C identifier
+    token: str  #: identification of the FMU: guid, or instantiation token
     tool: str
     units: Units
-    stop_time: float  #: [s]
-    step: float  #: [s]
-    words: str  #: what it is
-    is_hosted: bool = True  #: whether it needs another program where it runs
-    has_derivatives: bool = False  #: whether it can be solved by others (model exchange)
-    sources: tuple[str, ...] = ()  #: its files of C, which FMI 2.0 names here
+    stop_time: float  #: default stop time [s]
+    step: float  #: recommended step size [s]
+    words: str  #: description of the model
+    is_hosted: bool = True  #: whether the FMU needs another program where it runs
+    has_derivatives: bool = False  #: whether the importing program can integrate it (model exchange)
+    sources: tuple[str, ...] = ()  #: C source files, which FMI 2.0 lists here
 
 
 def model_description(about: Description, variables: Sequence[Variable], fmi: int) -> bytes:
-    """Return modelDescription.xml of version 2 or 3; the value reference of a variable is its place."""
+    """Return modelDescription.xml of version 2 or 3; the value reference of a variable is its index."""
     root = Element(
         "fmiModelDescription",
         {
@@ -120,7 +120,7 @@ def model_description(about: Description, variables: Sequence[Variable], fmi: in
 
 
 def add_interface(root: Element, kind: str, about: Description, fmi: int) -> None:
-    """Add the capabilities of a unit in one kind of use."""
+    """Add the capabilities of a unit in one kind of interface."""
     state = "FMUstate" if fmi == 2 else "FMUState"
     can = {"modelIdentifier": about.identifier}
     if about.is_hosted:
@@ -135,7 +135,7 @@ def add_interface(root: Element, kind: str, about: Description, fmi: int) -> Non
 
 
 def add_units(root: Element, units: Units, variables: Sequence[Variable]) -> None:
-    """Add the units of the variables, with their factors to SI where FMI can hold them."""
+    """Add the units of the variables, with factors to SI if FMI can express them."""
     symbols = sorted({each.unit for each in variables if each.unit})
     if not symbols:
         return
@@ -149,7 +149,7 @@ def add_units(root: Element, units: Units, variables: Sequence[Variable]) -> Non
 
 
 def attributes(each: Variable) -> dict[str, str]:
-    """Return the attributes of a variable that both versions have."""
+    """Return the attributes of a variable that both versions share."""
     variability = "continuous"
     if each.causality == "parameter":
         variability = "tunable" if each.is_tunable else "fixed"
@@ -162,7 +162,7 @@ def attributes(each: Variable) -> dict[str, str]:
 
 
 def known_places(variables: Sequence[Variable], each: Variable) -> list[int]:
-    """Return the places of the states and inputs that an output or derivative follows at once.
+    """Return the indices of states and inputs with direct feedthrough to an output or derivative.
 
     Of outputs that feed through without a list of their own these are all inputs of forces, not those of drives.
     """
@@ -174,12 +174,12 @@ def known_places(variables: Sequence[Variable], each: Variable) -> list[int]:
 
 
 def has_start(each: Variable) -> bool:
-    """Whether a variable begins at a value that can be given."""
+    """Whether a variable has a start value that can be given."""
     return each.is_state or each.causality in ("parameter", "input")
 
 
 def structure_of(variables: Sequence[Variable]) -> tuple[list[int], list[int], list[int]]:
-    """Return the places of outputs, of derivatives in the order of their states, and of unknowns of the beginning."""
+    """Return indices of outputs, of derivatives in the order of their states, and of initial unknowns."""
     outputs = [k for k, each in enumerate(variables) if each.causality == "output"]
     places = {each.derivative_of: k for k, each in enumerate(variables) if each.derivative_of}
     derivatives = [places[each.name] for each in variables if each.is_state]
@@ -187,7 +187,7 @@ def structure_of(variables: Sequence[Variable]) -> tuple[list[int], list[int], l
 
 
 def add_variables_2(root: Element, variables: Sequence[Variable]) -> None:
-    """Add variables and structure in the form of FMI 2.0, where places count from 1."""
+    """Add variables and model structure of FMI 2.0, in which indices count from 1."""
     listed = SubElement(root, "ModelVariables")
     places = {each.name: k + 1 for k, each in enumerate(variables)}
     for k, each in enumerate(variables):
@@ -209,7 +209,7 @@ def add_variables_2(root: Element, variables: Sequence[Variable]) -> None:
 
 
 def add_variables_3(root: Element, variables: Sequence[Variable]) -> None:
-    """Add variables and structure in the form of FMI 3.0."""
+    """Add variables and model structure of FMI 3.0."""
     listed = SubElement(root, "ModelVariables")
     places = {each.name: k for k, each in enumerate(variables)}
     for k, each in enumerate(variables):

@@ -1,4 +1,4 @@
-"""A system as a unit of a co-simulation: communication steps with held inputs, outputs of sensors, a way back."""
+"""A system as a unit of a co-simulation: communication steps with held inputs, outputs of sensors, saved states."""
 
 import io
 from collections.abc import Mapping, Sequence
@@ -32,22 +32,22 @@ from floatframe.simulation.validity_watch import ValidityWatch
 
 __all__ = ["Unit", "UnitState", "quintic", "sensor_names"]
 
-ROUNDING = 1e-9  #: fraction of a step by which times of another program may differ
-JUMP = 1e-9  #: of an input, as in `TimeFunction.jumps`: changes below it are roundings of another program
+ROUNDING = 1e-9  #: allowed difference of times of another program, as a fraction of a step
+JUMP = 1e-9  #: change of an input, as in `TimeFunction.jumps`, below which it is a rounding error of the other program
 
 
 @dataclass(frozen=True, eq=False)
 class UnitState:
-    """The complete memory of a unit: time, memory of the integrator, inputs, and the pieces of its drives."""
+    """The complete state of a unit: time, memory of the integrator, inputs and drive functions."""
 
     t: float
     memory: Memory
     inputs: Mapping[str, float]
-    acting: Mapping[str, float]  #: values of force inputs that act
-    drives: Mapping[str, Array]  #: value, rate and second rate at t, (3,) each
+    acting: Mapping[str, float]  #: force inputs that act at present
+    drives: Mapping[str, Array]  #: value, rate and second rate of each drive at t, (3,) each
 
     def to_bytes(self) -> bytes:
-        """Return it as bytes (npz)."""
+        """Return the state as bytes (npz)."""
         data = io.BytesIO()
         record = {f"memory.{name}": array for name, array in restart_record(self.memory, 0).items()}
         for part in ("inputs", "acting"):
@@ -58,7 +58,7 @@ class UnitState:
 
     @staticmethod
     def from_bytes(content: bytes, system: System) -> "UnitState":
-        """Return the object that `to_bytes` wrote; `ResultsError` if it belongs to another system."""
+        """Return the state from the bytes of `to_bytes`; `ResultsError` if it belongs to another system."""
         try:
             with np.load(io.BytesIO(content), allow_pickle=False) as file:
                 record = dict(file)
@@ -75,7 +75,7 @@ class UnitState:
 
 
 def quintic(begin: Array, end: Array, duration: float) -> Array:
-    """Return c, (6,), of Σ c_k s^k with value, rate and second rate `begin` at s = 0 and `end` at s = duration.
+    """Return coefficients c, (6,), of Σ c_k s^k with value, rate, second rate `begin` at s = 0, `end` at s = duration.
 
     The first three follow from the beginning; with e the end less what they make of it, as (e0, e1 T, e2 T²),
     c_3 T³ = 10 e0 - 4 e1 T + e2 T²/2,  c_4 T⁴ = -15 e0 + 7 e1 T - e2 T²,  c_5 T⁵ = 6 e0 - 3 e1 T + e2 T²/2.
@@ -95,7 +95,7 @@ def quintic(begin: Array, end: Array, duration: float) -> Array:
 
 
 def sensor_names(system: System, outputs: Sequence[str] | None) -> list[str]:
-    """Return the sensors for outputs: the named ones, else all of the system, else all joint coordinates."""
+    """Return the sensors for outputs: the named ones, else all sensors of the system, else all joint coordinates."""
     if outputs is not None:
         return [sensor_of(system, name).name for name in outputs]
     named = [sensor.name for sensor in sensors_of(system)]
@@ -104,7 +104,7 @@ def sensor_names(system: System, outputs: Sequence[str] | None) -> list[str]:
 
 @dataclass
 class Unit:
-    """A motion controlled by another program, which sets inputs, requests steps, reads outputs, and may go back.
+    """A motion that another program controls by inputs, communication steps, outputs, and saved states.
 
     Force inputs keep their values over a communication step; where one changes, the motion begins anew from the state
     (as `integrate` does where a force jumps), so that no impulse is lost. A drive is led from where it is to the value,
@@ -115,13 +115,15 @@ class Unit:
 
     system: System
     integrator: Integrator
-    h: float  #: longest step of the integrator [s]
-    names: Sequence[str] | None = None  #: of inputs; None: those that `with_held_inputs` uses
-    outputs: Sequence[str] | None = None  #: sensors or joint coordinates; None: those of `sensor_names`
-    inputs: dict[str, float] = field(init=False)  #: values that were set
-    notes: list[str] = field(init=False, default_factory=list)  #: messages on bodies that left their linear range
+    h: float  #: largest step size of the integrator [s]
+    names: Sequence[str] | None = None  #: names of the inputs; None: the default of `with_held_inputs`
+    #: sensors or joint coordinates for outputs; None: the default of `sensor_names`
+    outputs: Sequence[str] | None = None
+    inputs: dict[str, float] = field(init=False)  #: present values of the inputs
+    notes: list[str] = field(init=False, default_factory=list)  #: messages about bodies that left their linear range
     t: float = field(init=False, default=0.0)
-    steps: list[Rows] = field(init=False, default_factory=list)  #: results of the steps of the last communication step
+    #: results of the time steps in the last communication step
+    steps: list[Rows] = field(init=False, default_factory=list)
 
     def __post_init__(self) -> None:
         if self.system.fmus:
@@ -164,7 +166,7 @@ class Unit:
         self.watch = ValidityWatch(self.system, ())
 
     def set(self, name: str, value: float) -> None:
-        """Set an input; it acts from the time reached on."""
+        """Set an input, which acts from the present time."""
         if name not in self.inputs:
             raise ModelError(f"unit {self.system.name!r}: no input {name!r}; expected one of {', '.join(self.inputs)}")
         if not np.isfinite(value):
@@ -172,7 +174,7 @@ class Unit:
         self.inputs[name] = float(value)
 
     def begin(self, t: float = 0.0) -> None:
-        """Close the joints and begin the motion at t, with the inputs that are set."""
+        """Close the joints and start the motion at t with the present inputs."""
         compiled = compiled_system(self.system)
         self.t = t
         for each in self.held:
@@ -191,16 +193,16 @@ class Unit:
         raise_errors_of(compiled.callbacks)
 
     def drive_inputs(self, each: HeldInput) -> list[float]:
-        """Return value, rate and acceleration that are set for a drive."""
+        """Return the present value, rate and acceleration of a drive."""
         return [self.inputs[name] for name, _ in each.variables(self.system.units.time_symbol)]
 
     def write(self, each: HeldInput, t: float, coefficients: Array) -> None:
-        """Write the functions of time that an input is."""
+        """Write coefficients into the functions of time of an input."""
         for number in self.numbers[each.name]:
             write_function(compiled_system(self.system), number, t, coefficients)
 
     def settle(self) -> None:
-        """Apply changed force inputs; if one jumps, the motion restarts with it from the state."""
+        """Apply changed force inputs; if one jumps, restart the integrator from the present state."""
         assert self.memory is not None
         jumps = False
         for each in self.held:
@@ -214,7 +216,7 @@ class Unit:
             self.memory, self.row = self.integrator.after_jump(self.system, self.t, self.memory, self.work)
 
     def step(self, t: float, size: float) -> None:
-        """Take a communication step from t to t + size with the inputs held, in equal steps of up to h.
+        """Take a communication step from t to t + size with constant inputs, in equal time steps of at most h.
 
         Raises
         ------
@@ -239,7 +241,7 @@ class Unit:
             raise
 
     def advance(self, size: float) -> None:
-        """Take the steps of a communication step."""
+        """Take the time steps of a communication step."""
         self.settle()
         n = number_of_steps(0.0, size, self.h)
         h, t = size / n, self.t
@@ -280,7 +282,7 @@ class Unit:
         self.t, self.drives, self.steps = t + size, drives, steps
 
     def measured(self) -> list[Measurement]:
-        """Return the current values of the sensors, with the current inputs."""
+        """Return the present sensor values for the present inputs."""
         if self.memory is None:
             raise ModelError(f"unit {self.system.name!r}: outputs before its beginning")
         self.settle()
@@ -291,17 +293,17 @@ class Unit:
         return [sensor.measure(self.system, motion) for sensor in self.sensors]
 
     def values(self) -> dict[str, float]:
-        """Return the outputs by name, sensor.column."""
+        """Return the outputs by name "sensor.column"."""
         return {f"{m.sensor}.{name}": float(column[-1]) for m in self.measured() for name, column in m.columns.items()}
 
     def state(self) -> UnitState:
-        """Return all the unit remembers."""
+        """Return the complete state of the unit."""
         if self.memory is None:
             raise ModelError(f"unit {self.system.name!r}: its state before its beginning")
         return UnitState(self.t, self.memory, dict(self.inputs), dict(self.acting), dict(self.drives))
 
     def restore(self, state: UnitState) -> None:
-        """Go back, or on, to a state of this unit."""
+        """Restore an earlier or later state of this unit."""
         self.t, self.memory = state.t, state.memory
         self.inputs, self.acting, self.drives = dict(state.inputs), dict(state.acting), dict(state.drives)
         for each in self.held:

@@ -1,1 +1,1 @@
-"""Robots described in URDF, read and written: links become bodies, joints joints; and back."""
+"""Robots in URDF, read and written: links correspond to bodies, and joints to joints."""

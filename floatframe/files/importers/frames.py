@@ -1,4 +1,4 @@
-"""Frames in frames, and rotations as roll, pitch and yaw."""
+"""Relative frames, and rotations by roll, pitch and yaw."""
 
 from dataclasses import dataclass, field
 
@@ -8,27 +8,27 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["Frame", "rpy_of"]
 
-UPRIGHT = 1e-12  #: cosine of the pitch below which roll and yaw turn about one axis
+UPRIGHT = 1e-12  #: cosine of the pitch below which roll and yaw rotate about the same axis
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """A frame in another one."""
+    """A frame relative to another frame."""
 
-    x: Array = field(default_factory=lambda: np.zeros(3))  #: its origin, (3,)
-    R: Array = field(default_factory=lambda: np.eye(3))  #: its axes as columns, (3, 3)
+    x: Array = field(default_factory=lambda: np.zeros(3))  #: position of the origin, (3,)
+    R: Array = field(default_factory=lambda: np.eye(3))  #: axes as columns, (3, 3)
 
     def __matmul__(self, other: "Frame") -> "Frame":
         return Frame(self.x + self.R @ other.x, self.R @ other.R)
 
     @property
     def inverse(self) -> "Frame":
-        """The other frame in this one."""
+        """The reference frame relative to this frame."""
         return Frame(-self.R.T @ self.x, self.R.T)
 
 
 def rpy_of(R: Array) -> Array:
-    """Return roll, pitch and yaw of R = R_z(yaw) R_y(pitch) R_x(roll), (3,) [rad].
+    """Return roll, pitch and yaw, (3,) [rad], for R = R_z(yaw) R_y(pitch) R_x(roll).
 
     Where the pitch is a right angle, yaw and roll turn about one axis: the roll is zero there.
     """

@@ -1,4 +1,4 @@
-"""Surfaces that a description of a robot names: their files, and the contents of these.
+"""Surface files that a robot description names, and their contents.
 
 Names are `package://NAME/rest` (of ROS), `file:///path`, or a path relative to the description. A package is looked for
 where the caller says it is, then in the folders above the description (as NAME/rest, or as the folder NAME itself),
@@ -25,7 +25,7 @@ VARIABLE = "ROS_PACKAGE_PATH"
 
 
 def mesh_path(name: str, source: str, packages: Mapping[str, str | os.PathLike[str]] | None = None) -> Path:
-    """Return the file that a name in a description means.
+    """Return the path of the file that a name in a description refers to.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def candidates(name: str, source: str, packages: Mapping[str, str | os.PathLike[
 
 
 def mesh_of(mesh: MeshFile, path: Path) -> Mesh:
-    """Return the surface of a file in the units of the robot, mirrored if the scale is negative.
+    """Return the surface in a file in units of the robot, mirrored if the scale is negative.
 
     Raises
     ------

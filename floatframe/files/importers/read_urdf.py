@@ -1,4 +1,4 @@
-"""URDF, the description of robots of ROS, read into a `Robot`.
+"""Reading of URDF, the robot description format of ROS, to a `Robot`.
 
 Elements and attributes are those of its specification (docs/robots.md has the table). What it does not name is listed
 in `Robot.notes`; what it names and is not valid is refused with its line. Nothing is completed: a link without
@@ -40,26 +40,26 @@ __all__ = ["Element", "read_urdf", "read_xml"]
 # robots have none, and it could name other files or entities that grow without end.
 
 
-MOST_BYTES = 50_000_000  #: a robot of hundreds of links has some 100 kB
+MOST_BYTES = 50_000_000  #: largest size of a file in bytes; a robot with hundreds of links has about 100 kB
 MOST_NESTED = 50
 
 
 @dataclass(eq=False)
 class Element:
-    """An element with its attributes and the elements in it."""
+    """An XML element with its attributes and child elements."""
 
     tag: str
     attributes: dict[str, str]
-    line: int  #: of the file, from 1
+    line: int  #: line number in the file, from 1
     children: list["Element"] = field(default_factory=list)
 
     def all(self, tag: str) -> list["Element"]:
-        """Return the elements of a tag in it, in the order of the file."""
+        """Return the child elements with a tag in the order of the file."""
         return [child for child in self.children if child.tag == tag]
 
 
 def read_xml(path: Path, root: str) -> Element:
-    """Return the tree of a file.
+    """Return the XML tree of a file.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def read_xml(path: Path, root: str) -> Element:
 
 
 def parsed(path: Path, content: bytes) -> Element:
-    """Return the first element of a content with all that is in it."""
+    """Return the root element of an XML text with all its children."""
     parser = expat.ParserCreate()
     top = Element("", {}, 0)
     open_elements = [top]
@@ -117,7 +117,7 @@ def parsed(path: Path, content: bytes) -> Element:
 
 Color = tuple[float, float, float, float]
 
-READ = {  #: elements that are read, by their parent element
+READ = {  #: child elements that are read, by the tag of their parent
     "robot": ("link", "joint", "material"),
     "link": ("inertial", "visual", "collision"),
     "joint": ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic"),
@@ -147,7 +147,7 @@ def read_urdf(path: str | os.PathLike[str]) -> Robot:
 
 
 class Reader:
-    """Reader of one file, which collects its materials and counts elements that are not read."""
+    """Reads one file; collects materials and counts elements that are ignored."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -155,7 +155,7 @@ class Reader:
         self.unread: Counter[str] = Counter()
 
     def robot(self) -> Robot:
-        """Return the robot."""
+        """Return the robot in the file."""
         top = read_xml(self.path, "robot")
         self.refuse_macros(top)
         for element in top.all("material"):
@@ -169,7 +169,7 @@ class Reader:
         return Robot(self.text(top, "name"), links, joints, str(self.path), notes)
 
     def refuse_macros(self, top: Element) -> None:
-        """Raise `UrdfError` if a file is to be expanded by xacro first."""
+        """Raise `UrdfError` if the file must be expanded by xacro first."""
         left = [top]
         while left:
             element = left.pop()
@@ -182,7 +182,7 @@ class Reader:
                 )
 
     def count_unread(self, element: Element, within: str = "") -> None:
-        """Count elements that are not read."""
+        """Count child elements that are ignored."""
         known = READ.get(element.tag)
         for child in element.children:
             if known is not None and child.tag not in known:
@@ -191,20 +191,20 @@ class Reader:
                 self.count_unread(child)
 
     def error(self, element: Element, words: str) -> UrdfError:
-        """Return the error about an element."""
+        """Return an error about an element."""
         return UrdfError(f"{self.path}, line {element.line}: <{element.tag}>: {words}")
 
     # Numbers and words -----------------------------------------------------------------------------------------------
 
     def text(self, element: Element, key: str) -> str:
-        """Return an attribute that has to be there and is no empty text."""
+        """Return a required attribute, which must not be empty."""
         value = element.attributes.get(key, "").strip()
         if not value:
             raise self.error(element, f"expected the attribute {key}, a text, got none")
         return value
 
     def numbers(self, element: Element, key: str, n: int, default: Array | None = None) -> Array:
-        """Return the n numbers of an attribute, (n,)."""
+        """Return an attribute as n numbers, (n,)."""
         if key not in element.attributes and default is not None:
             return default
         words = self.text(element, key).split()
@@ -219,29 +219,29 @@ class Reader:
         return values
 
     def number(self, element: Element, key: str, default: float | None = None) -> float:
-        """Return the number of an attribute."""
+        """Return an attribute as a number."""
         return float(self.numbers(element, key, 1, None if default is None else np.array([default]))[0])
 
     def optional(self, element: Element | None, key: str) -> float | None:
-        """Return the number of an attribute, None if it or the element is not there."""
+        """Return an attribute as a number; None if the attribute or the element is missing."""
         return None if element is None or key not in element.attributes else self.number(element, key)
 
     def one(self, element: Element, tag: str) -> Element | None:
-        """Return the element of a tag in it, None if there is none; `UrdfError` if there are several."""
+        """Return the child element with a tag; None if there is none, `UrdfError` if there are several."""
         found = element.all(tag)
         if len(found) > 1:
             raise self.error(element, f"expected one <{tag}>, got {len(found)}")
         return found[0] if found else None
 
     def needed(self, element: Element, tag: str) -> Element:
-        """Return the one element of a tag in it."""
+        """Return the required child element with a tag."""
         found = self.one(element, tag)
         if found is None:
             raise self.error(element, f"expected <{tag}> in it, got none")
         return found
 
     def pose(self, element: Element) -> Pose:
-        """Return the <origin> of an element."""
+        """Return the pose in the <origin> of an element."""
         origin = self.one(element, "origin")
         if origin is None:
             return Pose()
@@ -251,7 +251,7 @@ class Reader:
     # Links -----------------------------------------------------------------------------------------------------------
 
     def link(self, element: Element) -> Link:
-        """Return a <link>."""
+        """Return the link of a <link> element."""
         inertial = self.one(element, "inertial")
         return Link(
             self.text(element, "name"),
@@ -262,7 +262,7 @@ class Reader:
         )
 
     def inertial(self, element: Element) -> Inertial:
-        """Return an <inertial>."""
+        """Return the mass properties of an <inertial> element."""
         at = self.needed(element, "mass")
         mass = self.number(at, "value")
         if mass < 0:
@@ -272,7 +272,7 @@ class Reader:
         return Inertial(mass, self.pose(element), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
 
     def picture(self, element: Element) -> Picture:
-        """Return a <visual> or <collision>."""
+        """Return the picture of a <visual> or <collision> element."""
         at = self.needed(element, "geometry")
         shapes = [child for child in at.children if child.tag in READ["geometry"]]
         if len(shapes) != 1:
@@ -293,7 +293,7 @@ class Reader:
         return Picture(self.geometry(shapes[0]), self.pose(element), color, element.attributes.get("name", ""))
 
     def geometry(self, element: Element) -> Box | Cylinder | Sphere | MeshFile:
-        """Return the content of a <geometry>."""
+        """Return the geometry of a <geometry> element."""
         try:
             if element.tag == "box":
                 return Box(self.numbers(element, "size", 3))
@@ -309,7 +309,7 @@ class Reader:
         return MeshFile(self.text(element, "filename"), scale)
 
     def color(self, element: Element) -> Color | None:
-        """Return the <color> of a <material>, None if it has none."""
+        """Return the <color> of a <material>; None if it has none."""
         at = self.one(element, "color")
         if at is None:
             return None
@@ -322,7 +322,7 @@ class Reader:
     # Joints ----------------------------------------------------------------------------------------------------------
 
     def joint(self, element: Element) -> RobotJoint:
-        """Return a <joint>."""
+        """Return the joint of a <joint> element."""
         kind = self.text(element, "type")
         if kind not in JOINT_TYPES:
             raise self.error(element, f"type: expected one of {', '.join(JOINT_TYPES)}, got {quoted(kind)}")
@@ -351,7 +351,7 @@ class Reader:
         )
 
     def axis(self, element: Element, kind: str) -> Array:
-        """Return the axis of a joint, (3,), of length one; x without <axis>."""
+        """Return the unit axis of a joint, (3,); the x axis if <axis> is missing."""
         at = self.one(element, "axis")
         if at is None or kind not in WITH_AXIS:
             return np.array([1.0, 0.0, 0.0])
@@ -362,14 +362,14 @@ class Reader:
         return axis if abs(length - 1) < 1e-15 else axis / length
 
     def limits(self, element: Element | None, kind: str) -> JointLimits:
-        """Return the limits of a joint; of a revolute or prismatic one a number that is missing is 0, as specified."""
+        """Return the limits of a joint; missing limits of revolute and prismatic joints are 0, as URDF specifies."""
         effort, velocity = self.optional(element, "effort"), self.optional(element, "velocity")
         if element is None or kind not in ("revolute", "prismatic"):
             return JointLimits(None, None, effort, velocity)
         return JointLimits(self.number(element, "lower", 0.0), self.number(element, "upper", 0.0), effort, velocity)
 
     def mimic(self, element: Element) -> Mimic:
-        """Return a <mimic>."""
+        """Return the leader and factors of a <mimic> element."""
         return Mimic(
             self.text(element, "joint"), self.number(element, "multiplier", 1.0), self.number(element, "offset", 0.0)
         )

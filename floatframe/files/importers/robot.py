@@ -1,4 +1,4 @@
-"""A robot as URDF describes it: links in a tree of joints, checked, in the terms of the file.
+"""A robot as described by URDF: a checked tree of links and joints, in the terms of the file.
 
 A link has one frame; the frame of a joint stands at `pose` in that of its parent link, and is that of its child link
 where the joint is at zero. Lengths are in m, masses in kg, angles in rad.
@@ -33,16 +33,16 @@ __all__ = [
 
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "planar", "floating")
 WITH_AXIS = ("revolute", "continuous", "prismatic", "planar")
-WITH_VALUE = ("revolute", "continuous", "prismatic")  #: whose position is one number
+WITH_VALUE = ("revolute", "continuous", "prismatic")  #: types of joints whose position is one number
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """A place and a turn, as URDF writes them."""
+    """Position and orientation in the form of URDF."""
 
-    xyz: Array = field(default_factory=lambda: np.zeros(3))  #: (3,) [m]
-    rpy: Array = field(default_factory=lambda: np.zeros(3))  #: roll, pitch, yaw about fixed x, y, z, (3,) [rad]
+    xyz: Array = field(default_factory=lambda: np.zeros(3))  #: position, (3,) [m]
+    rpy: Array = field(default_factory=lambda: np.zeros(3))  #: roll, pitch and yaw about fixed axes x, y, z, (3,) [rad]
 
     def __post_init__(self) -> None:
         for name in ("xyz", "rpy"):
@@ -50,7 +50,7 @@ class Pose:
 
     @cached_property
     def rotation(self) -> Array:
-        """R = R_z(yaw) R_y(pitch) R_x(roll), (3, 3): from the axes of the pose to those of its reference."""
+        """Rotation matrix R_z(yaw) R_y(pitch) R_x(roll), (3, 3), from the axes of the pose to its reference."""
         (cr, cp, cy), (sr, sp, sy) = np.cos(self.rpy), np.sin(self.rpy)
         return np.array(
             [
@@ -66,60 +66,60 @@ class Pose:
 class Inertial:
     """Mass properties of a link."""
 
-    mass: float  #: [kg]
-    pose: Pose  #: centre of mass, and the axes of the tensor, in the frame of the link
-    tensor: Array  #: about the centre of mass, in the axes of the pose, (3, 3) [kg m²]
+    mass: float  #: mass of the link [kg]
+    pose: Pose  #: centre of mass and axes of the inertia tensor, in the frame of the link
+    tensor: Array  #: inertia tensor about the centre of mass, axes of the pose, (3, 3) [kg m²]
 
 
 @dataclass(frozen=True, eq=False)
 class MeshFile:
-    """A surface in a file, as the description names it."""
+    """A surface file as named in the description."""
 
-    file: str  #: as written: package://..., file://..., a path relative to the description
-    scale: Array = field(default_factory=lambda: np.ones(3))  #: of its three coordinates, (3,)
+    file: str  #: name as written: package://..., file://..., or a path relative to the description
+    scale: Array = field(default_factory=lambda: np.ones(3))  #: scale factors of the three coordinates, (3,)
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """The look of a link (visual), or its shape for contact (collision)."""
+    """The visual shape of a link, or its collision shape."""
 
     geometry: Box | Cylinder | Sphere | MeshFile
     pose: Pose = field(default_factory=Pose)
-    color: tuple[float, float, float, float] | None = None  #: red, green, blue, opacity, 0 to 1 each
+    color: tuple[float, float, float, float] | None = None  #: red, green, blue and opacity, each 0 to 1
     name: str = ""
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Link:
-    """A link."""
+    """A link of a robot."""
 
     name: str
-    inertial: Inertial | None = None  #: None: it has no mass
+    inertial: Inertial | None = None  #: mass properties; None: the link has no mass
     visuals: tuple[Picture, ...] = ()
     collisions: tuple[Picture, ...] = ()
-    line: int = 0  #: of the file, 0: none
+    line: int = 0  #: line number in the file, 0 if there is no file
 
     @property
     def mass(self) -> float:
-        """Its mass, 0 without inertia [kg]."""
+        """Mass of the link, 0 without mass properties [kg]."""
         return 0.0 if self.inertial is None else self.inertial.mass
 
 
 @dataclass(frozen=True)
 class JointLimits:
-    """Limits of a joint; None: not given."""
+    """Limits of a joint; None for those that are not given."""
 
-    lower: float | None = None  #: [rad or m]
+    lower: float | None = None  #: lower limit of the position [rad or m]
     upper: float | None = None
-    effort: float | None = None  #: [N m or N]
-    velocity: float | None = None  #: [rad/s or m/s]
+    effort: float | None = None  #: largest torque or force [N m or N]
+    velocity: float | None = None  #: largest velocity [rad/s or m/s]
 
 
 @dataclass(frozen=True)
 class Mimic:
-    """A joint that follows another: value = multiplier × that of the other + offset."""
+    """A joint that follows another joint: value = multiplier × value of the other joint + offset."""
 
     joint: str
     multiplier: float = 1.0
@@ -135,17 +135,17 @@ class RobotJoint:
     type: str  #: one of `JOINT_TYPES`
     parent: str
     child: str
-    pose: Pose = field(default_factory=Pose)  #: of its frame in that of the parent link
-    axis: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))  #: in its frame, (3,), of length one
+    pose: Pose = field(default_factory=Pose)  #: pose of the joint frame in the parent link
+    axis: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))  #: unit axis in the joint frame, (3,)
     limits: JointLimits = field(default_factory=JointLimits)
-    damping: float = 0.0  #: [N m s/rad or N s/m]
-    friction: float = 0.0  #: of Coulomb [N m or N]
+    damping: float = 0.0  #: viscous damping [N m s/rad or N s/m]
+    friction: float = 0.0  #: Coulomb friction [N m or N]
     mimic: Mimic | None = None
-    line: int = 0  #: of the file, 0: none
+    line: int = 0  #: line number in the file, 0 if there is no file
 
     @property
     def has_value(self) -> bool:
-        """Whether its position is one number."""
+        """Whether the position of the joint is one number."""
         return self.type in WITH_VALUE
 
 
@@ -154,7 +154,7 @@ class RobotJoint:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class Robot:
-    """A robot: links, and joints that connect them to one tree.
+    """A robot, whose joints connect its links to one tree.
 
     Parameters
     ----------
@@ -200,12 +200,12 @@ class Robot:
         self.check_tree()
 
     def where(self, line: int = 0) -> str:
-        """Return the beginning of a message about a line of the file."""
+        """Return the start of a message about a line in the file."""
         place = self.source or f"robot {self.name!r}"
         return f"{place}, line {line}" if line else place
 
     def check_joint(self, joint: RobotJoint) -> None:
-        """Raise `UrdfError` if a joint is impossible."""
+        """Raise `UrdfError` if a joint is invalid."""
         where = f"{self.where(joint.line)}: joint {quoted(joint.name)}"
         if joint.type not in JOINT_TYPES:
             raise UrdfError(f"{where}: unknown type {quoted(joint.type)}{nearest(joint.type, JOINT_TYPES)}")
@@ -226,7 +226,7 @@ class Robot:
             self.check_mimic(where, joint)
 
     def check_mimic(self, where: str, joint: RobotJoint) -> None:
-        """Raise `UrdfError` if a joint cannot follow the one that it names."""
+        """Raise `UrdfError` if a joint cannot follow the joint that its <mimic> names."""
         assert joint.mimic is not None
         if not joint.has_value:
             raise UrdfError(f"{where}: mimic: a {joint.type} joint has no single value that could follow another")
@@ -246,7 +246,7 @@ class Robot:
             leader = None if leader.mimic is None else self.by_joint.get(leader.mimic.joint)
 
     def check_tree(self) -> None:
-        """Raise `UrdfError` unless joints and links are one tree."""
+        """Raise `UrdfError` unless joints and links form one tree."""
         parent: dict[str, RobotJoint] = {}
         for joint in self.joints:
             if joint.child in parent:
@@ -269,27 +269,27 @@ class Robot:
 
     @cached_property
     def by_link(self) -> dict[str, Link]:
-        """Links by name."""
+        """Links by their names."""
         return {link.name: link for link in self.links}
 
     @cached_property
     def by_joint(self) -> dict[str, RobotJoint]:
-        """Joints by name."""
+        """Joints by their names."""
         return {joint.name: joint for joint in self.joints}
 
     @cached_property
     def parent_joint(self) -> dict[str, RobotJoint]:
-        """The joint of which each link but the root is the child, by name of the link."""
+        """The joint that carries each link except the root, by name of the link."""
         return {joint.child: joint for joint in self.joints}
 
     @property
     def root(self) -> str:
-        """Name of the link that is no child."""
+        """Name of the link that no joint carries."""
         return next(link.name for link in self.links if link.name not in self.parent_joint)
 
     @cached_property
     def order(self) -> tuple[str, ...]:
-        """Names of the links, the root first, each after its parent and before its siblings (depth first)."""
+        """Names of the links in depth-first order, starting with the root."""
         children: dict[str, list[str]] = {}
         for joint in self.joints:
             children.setdefault(joint.parent, []).append(joint.child)
@@ -300,20 +300,20 @@ class Robot:
         return tuple(order)
 
     def link(self, name: str) -> Link:
-        """Return a link; `UrdfError` with the choices if there is none of that name."""
+        """Return a link; `UrdfError` lists the choices if it does not exist."""
         if name not in self.by_link:
             raise UrdfError(f"{self.where()}: there is no link {quoted(name)}{nearest(name, self.by_link)}")
         return self.by_link[name]
 
     def joint(self, name: str) -> RobotJoint:
-        """Return a joint; `UrdfError` with the choices if there is none of that name."""
+        """Return a joint; `UrdfError` lists the choices if it does not exist."""
         if name not in self.by_joint:
             raise UrdfError(f"{self.where()}: there is no joint {quoted(name)}{nearest(name, self.by_joint)}")
         return self.by_joint[name]
 
 
 def checked_axis(where: str, values: Array) -> Array:
-    """Return an axis of length one; `UrdfError` if it has no direction."""
+    """Return a unit vector along the axis; `UrdfError` for a zero vector."""
     try:
         return unit_vector(where, values)
     except ValueError as error:
@@ -321,7 +321,7 @@ def checked_axis(where: str, values: Array) -> Array:
 
 
 def checked_number(where: str, value: float) -> float:
-    """Return a finite number; `UrdfError` if it is none."""
+    """Return a finite number; `UrdfError` for other values."""
     try:
         return number(where, value)
     except ValueError as error:

@@ -48,14 +48,14 @@ from floatframe.model.system import System
 
 __all__ = ["FlexibleLink", "RobotSystem", "robot_system"]
 
-PLACE = 1e-3  #: farthest an interface may be from its joint, of the size of the flexible body
+PLACE = 1e-3  #: largest distance of an interface from its joint, relative to the size of the flexible body
 
 
 @presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class FlexibleLink:
-    """A reduced body in the place of a link.
+    """A reduced body that replaces a link.
 
     Its mass and inertia take the place of those of the description, and the joints of the link stand at its
     interfaces. The position of an interface must be that of its joint; its triad may be any.
@@ -82,7 +82,7 @@ class FlexibleLink:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class RobotSystem:
-    """A robot as a system, and where its links are in it.
+    """A robot as a system, with the positions of its links in the bodies.
 
     Parameters
     ----------
@@ -123,11 +123,11 @@ class RobotSystem:
         return Marker(body, position=frame.x, triad=frame.R)
 
     def coordinate(self, joint: str) -> JointCoordinate:
-        """Return the coordinate of a joint that has one, for couplers, forces and sensors."""
+        """Return the coordinate of a joint with a position, for couplers, forces and sensors."""
         return JointCoordinate(joint, coordinate_of(self.robot, joint))
 
     def offset(self, joint: str) -> float:
-        """Return the value of a joint where its coordinate is zero: value = offset + coordinate."""
+        """Return the joint value at zero coordinate: value = offset + coordinate."""
         return offset_of(self.robot, self.values, joint)
 
 
@@ -140,7 +140,7 @@ def coordinate_of(robot: Robot, joint: str) -> str:
 
 
 def offset_of(robot: Robot, values: Mapping[str, float], joint: str) -> float:
-    """(4): return the value of a joint where its coordinate is zero."""
+    """(4): return the joint value at which its coordinate is zero."""
     return 0.0 if robot.joint(joint).type == "prismatic" else values[joint]
 
 
@@ -218,7 +218,7 @@ def robot_system(
 
 
 def shifted(function: TimeFunction, by: float) -> TimeFunction:
-    """Return a function with a number added."""
+    """Return a function of time plus a constant."""
     pieces = function.pieces.copy()
     pieces[:, 0] += by
     return TimeFunction(function.begins, pieces)
@@ -246,7 +246,7 @@ def values_of(robot: Robot, given: Mapping[str, float], what: str = "configurati
 
 
 def range_of(robot: Robot, joint: RobotJoint) -> tuple[float | None, float | None]:
-    """Return the limits of a joint, narrowed by those of the joints that follow it."""
+    """Return the limits of a joint, reduced by the limits of joints that follow it."""
     low = -np.inf if joint.limits.lower is None else joint.limits.lower
     high = np.inf if joint.limits.upper is None else joint.limits.upper
     for follower in robot.joints:
@@ -262,7 +262,7 @@ def range_of(robot: Robot, joint: RobotJoint) -> tuple[float | None, float | Non
 
 
 class Builder:
-    """Makes the parts of a system from a robot."""
+    """Creates the parts of a system from a robot."""
 
     def __init__(
         self,
@@ -287,21 +287,23 @@ class Builder:
         self.units: Units = unit_system("m-kg-s")
         self.reduced = {name: self.read(name, each) for name, each in flexible.items()}
         self.carriers: dict[str, tuple[str, Frame]] = {}
-        self.parts: dict[str, list[str]] = {}  #: links of each rigid body, the one whose frame it has first
-        self.placed: dict[str, Frame] = {}  #: frames of links in the ground
-        self.moving: dict[str, tuple[Array, Array]] = {}  #: velocities of their origins, and angular ones, ground axes
+        #: links of each rigid body; the body frame is the frame of the first link
+        self.parts: dict[str, list[str]] = {}
+        self.placed: dict[str, Frame] = {}  #: frames of the links in ground axes
+        #: velocities of the link origins and angular velocities, ground axes
+        self.moving: dict[str, tuple[Array, Array]] = {}
         for link in robot.order:
             self.carry(link)
 
     def read(self, name: str, link: FlexibleLink) -> ReducedBody:
-        """Return the reduced body in the place of a link, in m, kg and s."""
+        """Return the reduced body that replaces a link, in m, kg and s."""
         from cms.body.modal_file.file import convert_units, read
 
         body = link.body if isinstance(link.body, ReducedBody) else read(Path(link.body))
         return body if body.units == self.units else convert_units(body, self.units)
 
     def error(self, link: str, words: str) -> UrdfError:
-        """Return the error about a link."""
+        """Return an error about a link."""
         return UrdfError(f"{self.robot.where(self.robot.link(link).line)}: link {quoted(link)}: {words}")
 
     # Bodies ----------------------------------------------------------------------------------------------------------
@@ -332,13 +334,13 @@ class Builder:
             self.begin_body(link)
 
     def begin_body(self, link: str) -> None:
-        """Let a link carry itself."""
+        """Start a new body with a link."""
         self.carriers[link] = link, Frame()
         if link not in self.flexible:
             self.parts[link] = [link]
 
     def joint_frame(self, joint: RobotJoint) -> Frame:
-        """T_origin T_joint(value): the frame of the child link in that of the parent link."""
+        """Return T_origin T_joint(value), the frame of the child link relative to the parent link."""
         value, turn = self.values.get(joint.name, 0.0), Frame()
         if joint.type == "prismatic":
             turn = Frame(value * joint.axis)
@@ -372,7 +374,7 @@ class Builder:
         return MassProperties(inertial.mass, frame.x + frame.R @ inertial.pose.xyz, frame.R @ tensor @ frame.R.T)
 
     def rigid_body(self, name: str) -> RigidBody:
-        """Return the body of a link and of those that are fixed to it."""
+        """Return the rigid body of a link and of all links fixed to it."""
         made = [(link, self.properties(link, self.carriers[link][1])) for link in self.parts[name]]
         masses = [each for _, each in made if each is not None]
         if not masses:
@@ -393,7 +395,7 @@ class Builder:
             raise self.error(name, str(error)) from None
 
     def flexible_body(self, name: str) -> FlexibleBody:
-        """Return the flexible body in the place of a link."""
+        """Return the flexible body that replaces a link."""
         given = self.flexible[name]
         mesh = self.placed[name] @ self.mesh_frame(name)
         v, omega = self.moving[name]
@@ -404,7 +406,7 @@ class Builder:
         )  # fmt: skip
 
     def mesh_frame(self, name: str) -> Frame:
-        """Return the mesh axes of a flexible link in the frame of the link."""
+        """Return the mesh axes of a flexible link relative to the link frame."""
         given = self.flexible[name]
         where = f"flexible link {name!r}"
         return Frame(
@@ -441,7 +443,7 @@ class Builder:
     # Joints ----------------------------------------------------------------------------------------------------------
 
     def marker(self, link: str, joint: RobotJoint, frame: Frame) -> Marker:
-        """(4): return the marker of a joint on a link, at a frame in that of the link."""
+        """(4): return the marker of a joint on a link, at a frame given in the link."""
         body, own = self.carriers[link]
         if link in self.flexible:
             return self.interface_marker(link, joint, frame)
@@ -477,7 +479,7 @@ class Builder:
         return Marker(link, name, triad=in_link.R.T @ frame.R)
 
     def joint(self, joint: RobotJoint) -> Joint | None:
-        """Return a joint of the system; None if it holds nothing, or connects a body to itself."""
+        """Return a joint of the system; None if it has no constraint, or connects a body to itself."""
         if self.carriers[joint.parent][0] == self.carriers[joint.child][0] or joint.type == "floating":
             return None
         a = self.marker(joint.parent, joint, Frame(joint.pose.xyz, joint.pose.rotation))
@@ -496,7 +498,7 @@ class Builder:
         return RevoluteJoint(joint.name, a, b, axis=joint.axis, axis_b=joint.axis, motions=drive)
 
     def force(self, joint: RobotJoint) -> Force | None:
-        """(5): return damping and friction of a joint, None if it has none."""
+        """(5): return damping and friction of a joint; None if it has none."""
         if not joint.has_value or joint.name in self.drives or not (joint.damping or joint.friction):
             return None
         coordinate = coordinate_of(self.robot, joint.name)
@@ -534,7 +536,7 @@ class Builder:
     # The system ------------------------------------------------------------------------------------------------------
 
     def robot_system(self, gravity: Array) -> RobotSystem:
-        """Return the system and where links are in it."""
+        """Return the system and the positions of its links."""
         robot = self.robot
         bodies = [
             self.flexible_body(link) if link in self.flexible else self.rigid_body(link)

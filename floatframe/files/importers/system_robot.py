@@ -59,11 +59,11 @@ TYPES: dict[type, str] = {
 
 @dataclass(frozen=True, eq=False)
 class ExportedRobot:
-    """A robot made of a system."""
+    """A robot exported from a system."""
 
     robot: Robot
-    meshes: Mapping[str, bytes]  #: files of surfaces, by their path relative to the description
-    notes: tuple[str, ...]  #: parts that URDF cannot represent, which are omitted
+    meshes: Mapping[str, bytes]  #: surface files, by their path relative to the description
+    notes: tuple[str, ...]  #: notes on parts that URDF cannot represent and that are omitted
 
 
 def robot_of_system(
@@ -90,7 +90,7 @@ def robot_of_system(
 
 
 class Exporter:
-    """Makes links and joints of a system."""
+    """Creates links and joints from a system."""
 
     def __init__(self, system: System, values: dict[str, float], limits: dict[str, JointLimits]) -> None:
         self.system, self.values, self.limits = system, values, limits
@@ -118,11 +118,11 @@ class Exporter:
                 for end in joint_markers(system, joint, placed)
             )
             self.ends[joint.name] = a, b
-        self.frames: dict[str, Frame] = {}  #: of links in their bodies
+        self.frames: dict[str, Frame] = {}  #: frames of the links in their bodies
         self.made: list[RobotJoint] = []
 
     def at(self, body: str) -> Frame:
-        """Return the frame of a body in the ground, as placed."""
+        """Return the assembled frame of a body in ground axes."""
         if body == GROUND.name:
             return Frame()
         found = self.bodies[body]
@@ -131,7 +131,7 @@ class Exporter:
     # Joints ----------------------------------------------------------------------------------------------------------
 
     def exported(self) -> ExportedRobot:
-        """Return the robot."""
+        """Return the exported robot."""
         root = self.root()
         self.frames[root] = Frame()
         self.follow(root)
@@ -147,7 +147,7 @@ class Exporter:
         return ExportedRobot(Robot(self.system.name, links, self.made), self.meshes, tuple(self.notes))
 
     def root(self) -> str:
-        """(1): return the ground, or the first body if nothing is attached to the ground and all are connected."""
+        """(1): return the ground, or the first body if all are connected and none is attached to the ground."""
         if any(GROUND.name in (a[0], b[0]) for a, b in self.ends.values()):
             return GROUND.name
         reached, left = set(), [next(iter(self.bodies))]
@@ -159,7 +159,7 @@ class Exporter:
         return next(iter(self.bodies)) if reached == set(self.bodies) else GROUND.name
 
     def follow(self, start: str) -> None:
-        """(1): add the joints of a link, outwards, in the order of the system."""
+        """(1): add the joints that a link carries, outwards, in the order of the system."""
         left, used = [start], {joint.name for joint in self.made}
         while left:
             parent = left.pop(0)
@@ -178,7 +178,7 @@ class Exporter:
                 left.append(child)
 
     def joint(self, joint: Joint, parent: str, child: str) -> RobotJoint:
-        """(2), (3): return a joint, and note the frame of its child link."""
+        """(2), (3): return a joint, and store the frame of its child link."""
         if type(joint) not in TYPES:
             raise UrdfError(
                 f"{self.where}: joint {joint.name!r}: URDF has no {type(joint).__name__}; it has revolute, prismatic, "
@@ -213,7 +213,7 @@ class Exporter:
         return RobotJoint(joint.name, kind, parent, child, pose, axis, limited, damping, friction, mimic)
 
     def offset(self, name: str) -> float:
-        """Return the value of a joint where its coordinate is zero."""
+        """Return the joint value at which its coordinate is zero."""
         joint = next(each for each in self.system.joints if each.name == name)
         if not isinstance(joint, PrismaticJoint):
             return self.values.get(name, 0.0)
@@ -231,7 +231,7 @@ class Exporter:
         return damping, friction
 
     def limits_and_mimic(self, joint: Joint) -> tuple[float | None, float | None, Mimic | None]:
-        """(4): return limits of a joint by the stops on it, and the joint that it follows."""
+        """(4): return the limits of a joint from its stops, and the joint that it follows."""
         low: float | None = None
         high: float | None = None
         mimic = None
@@ -255,11 +255,11 @@ class Exporter:
         return low, high, mimic
 
     def sum_as_placed(self, terms: list[tuple[str, float]]) -> float:
-        """Return the sum that a coupler without a constant holds."""
+        """Return the assembled coordinate sum, which a coupler without a constant holds."""
         return sum(factor * (self.values.get(name, 0.0) - self.offset(name)) for name, factor in terms)
 
     def note_the_rest(self) -> None:
-        """(4): list the omitted parts."""
+        """(4): note the parts that are omitted."""
         for force in self.system.forces:
             if isinstance(force, Gravity):
                 self.notes.append("gravity")
@@ -310,33 +310,33 @@ class Exporter:
 
 
 def joint_terms(coupler: CoordinateCoupler) -> list[tuple[str, float]] | None:
-    """Return the joints of a coupler with their factors; None if it couples other quantities."""
+    """Return the joints of a coupler with their factors; None if it couples other coordinates."""
     if not all(isinstance(coordinate, JointCoordinate) for coordinate, _ in coupler.terms):
         return None
     return [(coordinate.joint, factor) for coordinate, factor in coupler.terms]  # type: ignore[union-attr]
 
 
 def is_mimic(coupler: CoordinateCoupler) -> bool:
-    """Whether a coupler lets one joint follow another, always."""
+    """Whether a coupler permanently lets one joint follow another."""
     held = coupler.constant
     is_constant = not (isinstance(held, TimeFunction) and (len(held.pieces) > 1 or held.pieces[:, 1:7].any()))
     return coupler.acts and is_constant and len(coupler.terms) == 2
 
 
 def is_drag(force: JointForce) -> bool:
-    """Whether a joint force is damping and friction alone."""
+    """Whether a joint force consists only of damping and friction."""
     others = force.stiffness, force.preload, force.friction_coefficient, force.motor, force.characteristic
     return not any(others)
 
 
 def rounded(axis: Array) -> Array:
-    """Return an axis without the rounding of components that are zero or one."""
+    """Return an axis whose components near zero or one are exact."""
     near = np.round(axis)
     return near if np.abs(axis - near).max() < 1e-15 else axis / np.linalg.norm(axis)
 
 
 def turn_to(axis: Array) -> Array:
-    """Return the shortest turn that leads z to an axis, (3, 3)."""
+    """Return the smallest rotation from z to an axis, (3, 3)."""
     z = np.array([0.0, 0.0, 1.0])
     normal, cosine = np.cross(z, axis), float(z @ axis)
     sine = float(np.linalg.norm(normal))
@@ -346,7 +346,7 @@ def turn_to(axis: Array) -> Array:
 
 
 def pose_of(frame: Frame) -> Pose:
-    """Return a frame as URDF writes it."""
+    """Return a frame in the form of URDF."""
     return Pose(frame.x, rpy_of(frame.R))
 
 
@@ -357,7 +357,7 @@ TENSOR = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1,
 
 
 def write_urdf(robot: Robot, path: str | os.PathLike[str]) -> None:
-    """Write a robot; an existing file is replaced completely or not at all.
+    """Write a robot to a file; an existing file is replaced completely or not at all.
 
     Parameters
     ----------
@@ -379,7 +379,7 @@ def write_urdf(robot: Robot, path: str | os.PathLike[str]) -> None:
 
 
 def urdf_text(robot: Robot) -> str:
-    """Return a robot as text; `UrdfError` if a limit required by URDF is unknown."""
+    """Return a robot as URDF text; `UrdfError` if a limit that URDF requires is unknown."""
     lines = ['<?xml version="1.0" encoding="utf-8"?>', f"<robot name={quoteattr(robot.name)}>"]
     for link in robot.links:
         lines += link_lines(link)
@@ -389,12 +389,12 @@ def urdf_text(robot: Robot) -> str:
 
 
 def numbers(values: Array | tuple[float, ...] | list[float]) -> str:
-    """Return numbers in quotes, the shortest digits that read the same."""
+    """Return numbers in quotes, with the fewest digits that are read back exactly."""
     return '"' + " ".join(number(value) for value in values) + '"'
 
 
 def number(value: float) -> str:
-    """Return the shortest digits that read the same."""
+    """Return a number with the fewest digits that are read back exactly."""
     text = repr(float(value))
     return text.removesuffix(".0")
 
@@ -409,14 +409,14 @@ def link_lines(link: Link) -> list[str]:
 
 
 def wrapped(head: str, inside: list[str]) -> list[str]:
-    """Return an element with its lines, indented."""
+    """Return an XML element around indented lines."""
     if not inside:
         return [f"  <{head}/>"]
     return [f"  <{head}>", *(f"  {line}" for line in inside), f"  </{head.split()[0]}>"]
 
 
 def origin_lines(pose: Pose) -> list[str]:
-    """Return the line of a pose; none for the frame itself."""
+    """Return the line of a pose; none for the identity."""
     if not (pose.xyz.any() or pose.rpy.any()):
         return []
     rpy = f" rpy={numbers(pose.rpy)}" if pose.rpy.any() else ""
@@ -433,7 +433,7 @@ def inertial_lines(inertial: Inertial) -> list[str]:
 
 
 def picture_lines(tag: str, picture: Picture, material: str) -> list[str]:
-    """Return the lines of a visual or a collision; `material`: the name of its colour."""
+    """Return the lines of a visual or collision shape; `material`: name of its colour."""
     shape = picture.geometry
     if isinstance(shape, Box):
         inner = f"<box size={numbers(shape.size)}/>"

@@ -28,7 +28,7 @@ TYPES = {kind: name for name, kind in JOINTS.items()}
 
 
 def write_system(found: RobotSystem, folder: Path, *, t_end: float = 1.0, h: float = 1e-3) -> tuple[Path, ...]:
-    """Write the system of a robot into a folder; return the files, the system file first.
+    """Write the system of a robot to a folder; return the files, the system file first.
 
     Raises
     ------
@@ -50,7 +50,7 @@ def write_system(found: RobotSystem, folder: Path, *, t_end: float = 1.0, h: flo
 
 
 class Writer:
-    """Makes the tables of a system file; keeps the files that they name."""
+    """Creates the tables of a system file, and stores the files that they name."""
 
     def __init__(self, found: RobotSystem, folder: Path) -> None:
         self.found, self.folder = found, folder
@@ -107,7 +107,7 @@ class Writer:
 
 
 def marker_keys(side: str, marker: Any) -> dict[str, Any]:
-    """Return the keys of a marker."""
+    """Return the keys for a marker."""
     assert isinstance(marker, Marker)  # a robot has no joint without
     keys: dict[str, Any] = {f"body_{side}": body_name(marker.body)}
     if marker.interface is not None:

@@ -22,13 +22,13 @@ from floatframe.files.signals.signals import Signals, equidistant_step
 
 __all__ = ["read_rpc", "write_rpc"]
 
-BLOCK, KEY, VALUE = 512, 32, 96  #: bytes
+BLOCK, KEY, VALUE = 512, 32, 96  #: sizes of a block, a key and a value in bytes
 RECORD = KEY + VALUE
 FULL_SCALE = 32768  #: full scale of a short integer, by which INT_FULL_SCALE is divided
 MOST_PARAMETERS, MOST_CHANNELS = 100000, 10000
 ORDERS = {"BINARY": "<", "BINARY_IEEE_LITTLE_END": "<", "BINARY_IEEE_BIG_END": ">"}
 TYPES = {"SHORT_INTEGER": "i2", "FLOATING_POINT": "f4"}
-PER_FRAME = 1024  #: samples per frame in written files, with one frame per group
+PER_FRAME = 1024  #: number of samples per frame in written files, with one frame per group
 
 
 def read_rpc(path: str | os.PathLike[str]) -> Signals:
@@ -167,7 +167,7 @@ def real(path: Path, head: Mapping[str, str], key: str) -> float:
 
 
 def scales_of(path: Path, head: Mapping[str, str], n_channels: int, kind: str) -> tuple[Array, list[str]]:
-    """Return the factors on the numbers of each channel, and notes."""
+    """Return the scale factor of each channel, and notes."""
     if kind == "f4":
         return np.ones(n_channels), []
     scale = np.array([real(path, head, f"SCALE.CHAN_{k}") for k in range(1, n_channels + 1)])
@@ -179,7 +179,7 @@ def scales_of(path: Path, head: Mapping[str, str], n_channels: int, kind: str) -
 
 
 def constant_tail(values: Array, per_frame: int) -> int:
-    """Return the number of final samples within the last frame, that repeat the last one in all channels, 0 for few."""
+    """Return the number of last samples in the last frame that repeat in all channels; 0 if they are few."""
     last = values[-per_frame:]
     changes = np.flatnonzero((last != last[-1]).any(axis=1))
     n = len(last) - (int(changes[-1]) + 1 if len(changes) else 0)

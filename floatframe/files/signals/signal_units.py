@@ -14,7 +14,7 @@ from floatframe.errors import SignalError
 
 __all__ = ["STANDARD_GRAVITY", "SignalUnit", "parsed_unit", "per_hertz", "signal_unit", "system_factor", "unit_factor"]
 
-STANDARD_GRAVITY = 9.80665  #: m/s²
+STANDARD_GRAVITY = 9.80665  #: standard gravity [m/s²]
 LONGEST = 40  #: largest number of characters of a unit
 DEEPEST = 9  #: largest exponent
 
@@ -66,7 +66,7 @@ def base(factor: float, length: int = 0, mass: int = 0, time: int = 0, angle: in
     return SignalUnit(factor, (length, mass, time, angle, voltage))
 
 
-POUND_FORCE = 4.4482216152605  #: N
+POUND_FORCE = 4.4482216152605  #: one pound-force [N]
 PLAIN = {  # units that take no prefix
     "": base(1.0), "1": base(1.0), "-": base(1.0), "%": base(0.01),
     "kg": base(1.0, mass=1), "t": base(1e3, mass=1), "lb": base(0.45359237, mass=1), "lbm": base(0.45359237, mass=1),
