@@ -58,12 +58,12 @@ _ORDER = {
 }  # meshio (VTK) place -> Gmsh place, for types that differ: the edges are numbered in another sequence
 
 
-_BINARY = {"real": "<f8", "int": "<i4", "size": "<u8"}  #: kinds of numbers in binary files
-MOST_EXACT = 2.0**53  #: whole numbers up to here are exact as float64
+_BINARY = {"real": "<f8", "int": "<i4", "size": "<u8"}  #: numpy type of each kind of number in binary files
+MOST_EXACT = 2.0**53  #: largest integer up to which all integers are exact as float64
 
 
 class _Text:
-    """Numbers of one section of a text file, in sequence."""
+    """Numbers in one section of a text file, in sequence."""
 
     def __init__(self, text: bytes, where: str) -> None:
         with warnings.catch_warnings():
@@ -76,7 +76,7 @@ class _Text:
         self._where = where
 
     def take(self, kind: str, count: int) -> np.ndarray:
-        """Return the next numbers of a kind in `_BINARY`: float64, or int64."""
+        """Return the next numbers of a kind in `_BINARY` as float64 or int64."""
         end = self._at + int(count)
         if count < 0 or end > len(self._values):
             raise MeshError(f"{self._where}: ends too early; the file is truncated or damaged")
@@ -92,14 +92,14 @@ class _Text:
 
 @dataclass
 class _Binary:
-    """Numbers of a binary file, in sequence from a place in it."""
+    """Numbers in a binary file, in sequence from a start position."""
 
     data: bytes
-    at: int  #: place of the next number
-    where: str  #: for messages
+    at: int  #: position of the next number
+    where: str  #: file and section, for messages
 
     def take(self, kind: str, count: int) -> np.ndarray:
-        """Return the next numbers of a kind in `_BINARY`: float64, or int64."""
+        """Return the next numbers of a kind in `_BINARY` as float64 or int64."""
         dtype = np.dtype(_BINARY[kind])
         size = dtype.itemsize * int(count)
         if count < 0 or self.at + size > len(self.data):
@@ -182,7 +182,7 @@ def _header(where: str, data: bytes) -> tuple[str, bool]:
 
 
 def _sections(where: str, data: bytes, is_binary: bool) -> dict[str, tuple[int, int]]:
-    """Return section name -> start and end of its content."""
+    """Return start and end of the content of each section, by name."""
     sections: dict[str, tuple[int, int]] = {}
     at = 0
     while (at := data.find(b"$", at)) >= 0:
@@ -201,7 +201,7 @@ def _sections(where: str, data: bytes, is_binary: bool) -> dict[str, tuple[int, 
 
 
 def _physical_names(where: str, data: bytes, sections: dict[str, tuple[int, int]]) -> _Names:
-    """Return (dimension, tag) -> name."""
+    """Return the name of each physical group, by (dimension, tag)."""
     if "PhysicalNames" not in sections:
         return _Names()
     start, end = sections["PhysicalNames"]
@@ -217,7 +217,7 @@ def _physical_names(where: str, data: bytes, sections: dict[str, tuple[int, int]
 
 
 def _places(where: str, node_numbers: IntArray) -> IntArray:
-    """Return node number -> row, -1 where there is none, (largest number + 2,)."""
+    """Return the row of each node number, (largest number + 2,); -1 for a missing node."""
     if len(node_numbers) == 0:
         return np.full(1, -1)
     if node_numbers.min() < 0 or node_numbers.max() > 100 * len(node_numbers) + 10_000_000:
@@ -305,7 +305,7 @@ def _nodes_22(where: str, data: bytes, section: tuple[int, int], is_binary: bool
 def _cells_22(
     where: str, data: bytes, section: tuple[int, int], is_binary: bool, place_of: IntArray, names: _Names
 ) -> list[RawBlock]:
-    """Return a block for every run of cells of one type and number of tags."""
+    """Return one block for each run of cells with equal type and number of tags."""
     start, end = section
     first = data.index(b"\n", start, end) + 1
     count = int(data[start:first])

@@ -1,4 +1,4 @@
-"""The content of a deck of any program: mesh, materials, sections, attachments, couplings, supports, loads, ledger.
+"""Content of a deck of any program: mesh, materials, sections, attachments, couplings, supports, loads, ledger.
 
 Nodes are referred to by groups of the mesh (`RawMesh.node_sets`). Readers add groups such as `node_17` or `rbe2_5` for
 what the deck refers to by number, so that a job can name it.
@@ -33,19 +33,19 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class DeckMaterial:
-    """A linear material, isotropic or orthotropic. Constants that the deck does not give are None."""
+    """Linear material, isotropic or orthotropic. Constants missing in the deck are None."""
 
     name: str
-    young: float | Vector | None = None  #: three: orthotropic, E_1, E_2, E_3
-    poisson: float | Vector | None = None  #: or nu_12, nu_13, nu_23
+    young: float | Vector | None = None  #: Young's modulus; three values E_1, E_2, E_3 if orthotropic
+    poisson: float | Vector | None = None  #: Poisson's ratio; three values nu_12, nu_13, nu_23 if orthotropic
     density: float | None = None
-    shear: Vector | None = None  #: orthotropic: G_12, G_13, G_23
-    axes: tuple[Vector, Vector, Vector] | None = None  #: rows: axes 1, 2, 3 in basic axes; None: basic axes
+    shear: Vector | None = None  #: shear moduli G_12, G_13, G_23 of an orthotropic material
+    axes: tuple[Vector, Vector, Vector] | None = None  #: material axes 1, 2, 3 as rows in basic axes; None: basic axes
     #: anisotropic: stress by strain in its axes, six rows 11 22 33 23 13 12, shear strains doubled; no other constants
     elasticity: tuple[tuple[float, ...], ...] | None = None
 
     def in_plane_strain(self, name: str) -> "DeckMaterial | None":
-        """Return the sheet that acts in its plane as this isotropic material without strain across; None for others.
+        """Return the sheet material for plane strain of this isotropic material; None for other materials.
 
         eps_z = 0 gives sigma_z = nu (sigma_x + sigma_y). In the plane the material is then a sheet in plane stress with
         E' = E/(1 - nu²), nu' = nu/(1 - nu), and G as before.
@@ -59,42 +59,43 @@ class DeckMaterial:
 
 @dataclass(frozen=True)
 class SolidSection:
-    """Solid cells of one material and one formulation."""
+    """Solid cells with the same material and formulation."""
 
-    group: str  #: of cells
+    group: str  #: name of the cell group
     material: str
-    integration: str = "full"  #: one of `fe_models.elements.solids.elements.INTEGRATIONS`, or "incompatible"
+    integration: str = "full"  #: rule, one of `fe_models.elements.solids.elements.INTEGRATIONS`, or "incompatible"
     mass: str = "consistent"
-    orientation: str = ""  #: name of the axes of its material
+    orientation: str = ""  #: name of the material axes
 
 
 @dataclass(frozen=True)
 class DeckLayer:
-    """One layer of a shell."""
+    """Layer of a shell."""
 
     material: str
     thickness: float
-    angle: float = 0.0  #: of axis 1 of its material from the direction of the layup, about the normal [degree]
+    angle: float = 0.0  #: angle from the layup direction to material axis 1, about the normal [degree]
     orientation: str = ""  #: name of axes or an angle, as written in the deck; used only while the deck is read
 
 
 @dataclass(frozen=True)
 class ShellSection:
-    """Shell cells of one thickness, or of the same layers."""
+    """Shell cells with the same thickness or the same layers."""
 
     group: str
-    material: str  #: empty: each of the layers has its own
-    thickness: float  #: of all layers
-    offset: float = 0.0  #: of the middle surface from the nodes, along the normal
+    material: str  #: name of the material; empty: each layer has its own
+    thickness: float  #: total thickness of all layers
+    offset: float = 0.0  #: distance of the middle surface from the nodes along the normal
     added_mass: float = 0.0  #: additional mass per area
-    layers: tuple[DeckLayer, ...] = ()  #: bottom to top
-    direction: Vector = (1.0, 0.0, 0.0)  #: its projection onto the shell is angle 0 of the layers
+    layers: tuple[DeckLayer, ...] = ()  #: layers from bottom to top
+    direction: Vector = (1.0, 0.0, 0.0)  #: direction whose projection onto the shell is angle 0 of the layers
     orientation: str = ""  #: name of the axes of the material; used only while the deck is read
-    bending_ratio: float = 1.0  #: bending stiffness divided by that of the material and thickness
-    shear_ratio: float = 1.0  #: transverse shear stiffness divided by that of the material and thickness
+    bending_ratio: float = 1.0  #: bending stiffness over that of the material and thickness
+    shear_ratio: float = 1.0  #: transverse shear stiffness over that of the material and thickness
     #: rows of [[A, B], [B, D]] over N_x N_y N_xy M_x M_y M_xy; if given, the section has neither material nor layers
     stiffness: tuple[tuple[float, ...], ...] = ()
-    shear_stiffness: tuple[tuple[float, ...], ...] = ()  #: rows of the transverse shear stiffness, with `stiffness`
+    #: rows of the transverse shear stiffness; used together with `stiffness`
+    shear_stiffness: tuple[tuple[float, ...], ...] = ()
 
     @property
     def materials(self) -> tuple[str, ...]:
@@ -106,12 +107,13 @@ class ShellSection:
 
 @dataclass(frozen=True)
 class LineSection:
-    """Lines of one cross-section."""
+    """Lines with the same cross-section."""
 
     group: str
     material: str
-    shape: Mapping[str, object]  #: keys of a table [sections.NAME] of a job: shape and its dimensions
-    orientation: Vector | None = None  #: towards the local y axis; None: each line has its own in the mesh, or none
+    shape: Mapping[str, object]  #: keys of a table [sections.NAME] of a job: shape and dimensions
+    #: vector towards the local y axis; None: each line has its own in the mesh, or none
+    orientation: Vector | None = None
     offset: tuple[float, float] = (0.0, 0.0)
     shear: bool = True
     rotary_inertia: bool = True
@@ -129,23 +131,23 @@ class RodSection:
 
 @dataclass(frozen=True)
 class DeckMass:
-    """A point mass with inertia at each node of a group."""
+    """Point mass with inertia at each node of a group."""
 
     nodes: str
     mass: float
-    inertia: tuple[tuple[float, float, float], ...] = ((0.0,) * 3,) * 3  #: about its centre of mass, basic axes
+    inertia: tuple[tuple[float, float, float], ...] = ((0.0,) * 3,) * 3  #: inertia about the centre of mass, basic axes
     offset: Vector = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
 class DeckSpring:
-    """A spring between two nodes; each is a group of one node."""
+    """Spring between two nodes; each node is given by a group with one node."""
 
     nodes: tuple[str, str]
-    stiffness: tuple[float, ...]  #: along and about x, y, z of the triad
+    stiffness: tuple[float, ...]  #: stiffness along and about the axes x, y, z of the triad
     damping: tuple[float, ...] | None = None
-    triad: tuple[Vector, Vector, Vector] | None = None  #: rows: its axes in basic axes; None: basic axes
-    point: Vector | None = None  #: point at which it acts; None: midway between its nodes
+    triad: tuple[Vector, Vector, Vector] | None = None  #: axes of the spring as rows in basic axes; None: basic axes
+    point: Vector | None = None  #: point at which the spring acts; None: midway between its nodes
 
 
 @dataclass(frozen=True)
@@ -153,7 +155,7 @@ class RigidGroup:
     """Nodes that move rigidly with one node (RBE2, *RIGID BODY, *KINEMATIC COUPLING, *MPC BEAM)."""
 
     name: str
-    node: str  #: group of the leading node
+    node: str  #: group of the leader node
     followers: str
     components: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
 
@@ -166,33 +168,33 @@ class Coupling:
     node: str
     #: groups of nodes, and the weight of each of their nodes: one number for translations, or six
     members: tuple[tuple[str, float | tuple[float, ...]], ...]
-    components: tuple[int, ...] = (0, 1, 2, 3, 4, 5)  #: of the node that follow
+    components: tuple[int, ...] = (0, 1, 2, 3, 4, 5)  #: components of the follower node
 
 
 @dataclass(frozen=True)
 class Equation:
-    """Σ coefficient × component of a node = 0; the first component is eliminated (*EQUATION, MPC)."""
+    """Linear equation Σ coefficient × component of a node = 0; the first component is eliminated (*EQUATION, MPC)."""
 
-    terms: tuple[tuple[str, int, float], ...]  #: group of one node, component 0-5, coefficient
+    terms: tuple[tuple[str, int, float], ...]  #: group with one node, component 0-5, and coefficient of each term
 
 
 @dataclass(frozen=True)
 class Support:
-    """Components that are held at the nodes of a group, or kept as the boundary of a superelement."""
+    """Components that are fixed at the nodes of a group, or kept as the boundary of a superelement."""
 
     name: str
     nodes: str
     components: tuple[int, ...]
     is_boundary: bool = False
-    axes: tuple[Vector, Vector, Vector] | None = None  #: rows: directions of the components; None: basic axes
+    axes: tuple[Vector, Vector, Vector] | None = None  #: directions of the components as rows; None: basic axes
 
 
 @dataclass(frozen=True)
 class Load:
-    """One load: forces at nodes, a pressure on faces, or gravity. Only the fields of its kind are set."""
+    """Load of one kind: forces at nodes, a pressure on faces, or gravity. Only the fields of its kind are set."""
 
     name: str
-    forces: Mapping[str, tuple[float, ...]] | None = None  #: group -> force and moment at each of its nodes, (6,)
+    forces: Mapping[str, tuple[float, ...]] | None = None  #: force and moment at each node of a group, (6,), by group
     faces: str | None = None
     pressure: float | None = None
     acceleration: Vector | None = None
@@ -200,7 +202,7 @@ class Load:
 
 @dataclass(frozen=True, eq=False)
 class Deck:
-    """A whole deck, and the ledger of what was not converted."""
+    """Complete deck, and the ledger of unconverted data."""
 
     path: Path
     program: str
@@ -218,6 +220,6 @@ class Deck:
     supports: tuple[Support, ...] = ()
     loads: tuple[Load, ...] = ()
     rods: tuple[RodSection, ...] = ()
-    plane: int | None = None  #: axis across the plane in which the deck holds all of its points; None: space
+    plane: int | None = None  #: axis normal to the plane in which the deck fixes all of its points; None: not planar
     lumped: frozenset[str] = frozenset()  #: kinds of elements whose mass the program lumps: "lines", "shells", "rods"
-    is_plain_mesh: bool = False  #: only nodes, elements and their sets, as a mesher writes them
+    is_plain_mesh: bool = False  #: whether the deck contains only nodes, elements and sets, as written by a mesher

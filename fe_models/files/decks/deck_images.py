@@ -1,4 +1,4 @@
-"""A deck that is moved, mirrored or renamed, so that it can stand beside others in one deck."""
+"""Decks that are moved, reflected or renamed, so that several decks can be combined."""
 
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -23,28 +23,28 @@ MIRRORED = {
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """x -> Q x + t with Q orthogonal, (3, 3): a rigid motion, or with det Q = -1 one and a reflection."""
+    """Motion x -> Q x + t with orthogonal Q, (3, 3): a rigid motion, combined with a reflection if det Q = -1."""
 
     Q: Array = field(default_factory=lambda: np.eye(3))
     t: Array = field(default_factory=lambda: np.zeros(3))
 
     @property
     def is_mirror(self) -> bool:
-        """Whether it changes left and right."""
+        """Whether the motion includes a reflection."""
         return bool(np.linalg.det(self.Q) < 0)
 
     @property
     def is_turned(self) -> bool:
-        """Whether directions change."""
+        """Whether the motion changes directions."""
         return bool(np.any(np.eye(3) != self.Q))
 
     def point(self, x: Array) -> Array:
-        """Return the new place of a point, (3,)."""
+        """Return the new position of a point, (3,)."""
         return np.asarray(self.Q @ x + self.t)
 
 
 def moved_deck(deck: Deck, motion: Motion, ledger: Ledger, what: str) -> Deck:
-    """Return the deck where a motion puts it. Forces are mapped as vectors, moments as pseudovectors.
+    """Return the deck after a motion. Forces transform as vectors, moments as pseudovectors.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def moved_deck(deck: Deck, motion: Motion, ledger: Ledger, what: str) -> Deck:
 
 
 def renamed_deck(deck: Deck, prefix: str) -> Deck:
-    """Return the deck with a prefix before the names of its groups, materials, links, supports and pressures."""
+    """Return the deck with a prefix on the names of its groups, materials, links, supports and pressures."""
 
     def new(name: str) -> str:
         return prefix + name if name else name
@@ -156,12 +156,12 @@ def renamed_deck(deck: Deck, prefix: str) -> Deck:
 
 
 def _in_halves(components: tuple[int, ...]) -> bool:
-    """Whether components are all or none of the translations, and all or none of the rotations."""
+    """Return whether the components contain all or no translations, and all or no rotations."""
     return all(set(half) <= set(components) or not set(half) & set(components) for half in HALVES)
 
 
 def _is_whole(weight: float | tuple[float, ...]) -> bool:
-    """Whether weights are the same along three axes and about three axes."""
+    """Return whether weights are equal along all three axes, and about all three axes."""
     return isinstance(weight, float) or (len(set(weight[:3])) == 1 and len(set(weight[3:])) == 1)
 
 
@@ -200,7 +200,7 @@ def _rows_of(axes: tuple[Vector, Vector, Vector] | None) -> Array:
 
 
 def _right_handed(rows: Array) -> tuple[Vector, Vector, Vector]:
-    """Return axes, (3, 3) rows, right-handed: the third is turned round in a mirror, along which all stays the same."""
+    """Return right-handed axes as rows, (3, 3): the third row is reversed after a reflection, without any effect."""
     return _rows(rows * np.array([[1.0], [1.0], [np.sign(np.linalg.det(rows))]]))
 
 

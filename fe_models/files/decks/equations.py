@@ -7,12 +7,12 @@ from scipy.linalg import qr
 
 __all__ = ["Row", "solved_equations"]
 
-NEGLIGIBLE = 1e-14  #: coefficients smaller than this, relative to the largest one, are zero
-Row = dict[tuple[int, int], float]  #: (node, component in basic axes) -> coefficient; the sum of all is zero
+NEGLIGIBLE = 1e-14  #: coefficient over the largest one, below which it counts as zero
+Row = dict[tuple[int, int], float]  #: coefficient of each (node, component in basic axes); the sum of all terms is zero
 
 
 def solved_equations(rows: Iterable[tuple[tuple[int, int], Row]]) -> tuple[list[Row], list[tuple[int, int]]]:
-    """Return equations whose first component can be eliminated, and (node, count) of those that have none.
+    """Return equations whose first component can be eliminated, and (node, count) of equations without any.
 
     The first terms of some equations are components of one node along its own axes. These equations are solved together
     for as many components of the node in basic axes. Pivoting chooses the components that are determined best.

@@ -1,4 +1,4 @@
-"""The tables of fields of all programs in Markdown, for the page docs/deck_fields.md."""
+"""Tables of the fields of all programs in Markdown, for the page docs/deck_fields.md."""
 
 from fe_models.files.decks.abaqus.keywords import PARAMETERS, parameters_of
 from fe_models.files.decks.ansys.command_fields import COLUMNS, COMMANDS, fields_of_command
@@ -9,7 +9,7 @@ __all__ = ["field_tables"]
 
 
 def field_tables() -> str:
-    """Return a section for each program: every card, keyword or command that is read, and its fields."""
+    """Return a section for each program: every supported card, keyword or command, and its fields."""
     abaqus = {f"*{name}": parameters_of(name) for name in sorted(PARAMETERS)}
     ansys = {name: fields_of_command(name) for name in sorted(COMMANDS)}
     ansys["EBLOCK, columns"] = parse_fields(COLUMNS.split())
@@ -23,7 +23,7 @@ def field_tables() -> str:
 
 
 def _with_rest(name: str) -> tuple[TableField, ...]:
-    """Return the fields of a card of Nastran, and in words those behind them."""
+    """Return the fields of a Nastran card, with a description of the remaining fields."""
     fields, last = fields_of(name), CARDS[name].split()[-1]
     if not last.startswith("..."):
         return fields

@@ -1,4 +1,4 @@
-"""Tables of what is read of the cards, keywords and commands of a program, one line of symbols each.
+"""Tables of the supported fields of cards, keywords and commands of a program, one line of symbols each.
 
 NAME        read
 NAME=value  refused unless it is blank or has this value, the default
@@ -26,14 +26,14 @@ USES = {"": "read", "=": "default", "!": "default", "~": "harmless", "^": "left 
 class TableField:
     """One field of a card or command, or one parameter of a keyword."""
 
-    number: int  #: of the field, from 1; 0 for several fields, which `name` describes
+    number: int  #: number of the field, from 1; 0 for several fields, which `name` describes
     name: str
     use: str  #: "read", "default", "blank", "harmless" or "left out"
     default: str = ""  #: value that means the same as a blank field, if `use` is "default"
 
 
 def parse_fields(words: Iterable[str]) -> tuple[TableField, ...]:
-    """Return the fields of a line of a table, without those that the reader takes as a repeating rest."""
+    """Return the fields in a line of a table, without the repeating fields at its end."""
     found = []
     for number, word in enumerate(words, start=1):
         if word.startswith("..."):
@@ -46,7 +46,7 @@ def parse_fields(words: Iterable[str]) -> tuple[TableField, ...]:
 
 
 def has_default(word: str, default: str) -> bool:
-    """Whether a field has its default, as text or as a number."""
+    """Return whether a field has its default value, as text or as a number."""
     if not default:
         return False
     if word.upper() == default:
@@ -58,7 +58,7 @@ def has_default(word: str, default: str) -> bool:
 
 
 def markdown_table(what: str, fields: Mapping[str, tuple[TableField, ...]]) -> str:
-    """Return a table of Markdown: a row for each name, a column for each use."""
+    """Return a table in Markdown with one row for each name and one column for each use."""
     columns = (("read", "read"), ("default", "refused unless blank or"), ("left out", "left out, named"))
     lines = [
         f"| {what} | {' | '.join(title for _, title in columns)} | no effect on the body |",

@@ -1,4 +1,4 @@
-"""The ledger of a deck: every card or keyword that is not converted, its count, and the consequence."""
+"""Ledger of a deck: every card or keyword that is not converted, how often it occurs, and the consequence."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -11,12 +11,12 @@ __all__ = ["Entry", "Ledger"]
 
 @dataclass
 class Entry:
-    """One kind of card."""
+    """Ledger entry for one kind of card."""
 
     name: str
     consequence: str
     count: int = 0
-    is_body: bool = False  #: whether it carries mass or stiffness; it is then left out only on request
+    is_body: bool = False  #: whether the card has mass or stiffness; it is then omitted only on request
     first_line: int = 0
 
 
@@ -28,11 +28,11 @@ class Ledger:
     entries: dict[tuple[str, str], Entry] = field(default_factory=dict)
 
     def note(self, name: str, consequence: str, *, count: int = 1, line: int = 0) -> None:
-        """Count something that changes neither mass nor stiffness."""
+        """Record data that change neither mass nor stiffness."""
         self._add(name, consequence, count, line, False)
 
     def refuse(self, name: str, consequence: str, *, count: int = 1, line: int = 0) -> None:
-        """Count something that carries mass or stiffness and cannot be converted."""
+        """Record data with mass or stiffness that cannot be converted."""
         self._add(name, consequence, count, line, True)
 
     def _add(self, name: str, consequence: str, count: int, line: int, is_body: bool) -> None:
@@ -44,7 +44,7 @@ class Ledger:
         return [(entry.name, str(entry.count), entry.consequence) for entry in self.entries.values()]
 
     def require_whole(self, leave_out: Iterable[str] = ()) -> None:
-        """Raise unless everything that carries mass or stiffness is converted, or left out by name on request.
+        """Raise an error unless all mass and stiffness is converted, or omitted by name on request.
 
         Raises
         ------

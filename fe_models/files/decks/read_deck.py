@@ -1,4 +1,4 @@
-"""One door for whole decks: the program by the suffix, one error for everything that can be wrong with a file."""
+"""Reading of complete decks: the suffix selects the program, and all faults of a file raise the same error."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -25,11 +25,11 @@ DECK_FORMATS: dict[str, Callable[..., Deck]] = {
     ".bulk": read_nastran_deck,
     ".asm": read_nastran_deck,
     ".pch": read_nastran_deck,
-}  #: suffix -> reader (path, content, program)
+}  #: reader (path, content, program) for each suffix
 
 
 def read_deck(path: str | Path, *, program: str | None = None) -> Deck:
-    """Read a whole deck: mesh, materials, sections, couplings, supports, loads, and the ledger of the rest.
+    """Read a complete deck: mesh, materials, sections, couplings, supports, loads, and the ledger of other data.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def read_deck(path: str | Path, *, program: str | None = None) -> Deck:
 
 
 def _note_means_of_followers(deck: Deck) -> None:
-    """Note the mean motions whose members follow another mean: their second order is not known exactly."""
+    """Note mean motions whose members follow another mean, because their second order is only approximate."""
     sets = deck.mesh.node_sets
     followers = {int(node) for coupling in deck.couplings for node in sets[coupling.node]}
     n_found = -1

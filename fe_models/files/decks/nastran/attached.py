@@ -20,9 +20,10 @@ from fe_models.meshes.cell_shapes import CELL_SHAPES
 
 __all__ = ["read_attached"]
 
-SAME = 1e-9  #: entries of a mass matrix count as equal if they differ by less than this, relative to the largest one
+SAME = 1e-9  #: relative difference up to which entries of a mass matrix are equal
 
-_FACED = {"CTETRA": ("tetra", 4), "CPENTA": ("wedge", 6), "CHEXA": ("hexahedron", 8)}  #: card -> kind, corner grids
+#: kind of cell and number of corner grids of each solid card
+_FACED = {"CTETRA": ("tetra", 4), "CPENTA": ("wedge", 6), "CHEXA": ("hexahedron", 8)}
 
 
 def read_attached(model: NastranModel) -> None:
@@ -64,7 +65,7 @@ def _mass(model: NastranModel, card: Card) -> None:
 
 
 def _mass_matrix(model: NastranModel, card: Card) -> None:
-    """CONM1: the mass matrix of a rigid piece in the axes of CID; other matrices are refused.
+    """Read CONM1: the mass matrix of a rigid piece in the axes of CID; other matrices go to the ledger.
 
     With v_c = v + omega × r, the piece has M_tt = m, M_rt = m [r]×, M_rr = J - m [r]× [r]×.
     """
@@ -88,7 +89,7 @@ def _mass_matrix(model: NastranModel, card: Card) -> None:
 
 
 def _scalar_masses(model: NastranModel) -> None:
-    """CMASS1 and CMASS2 of one grid point: equal masses along all axes are a point mass; others are refused.
+    """Read CMASS1 and CMASS2 at one grid point: equal masses along all axes form a point mass.
 
     Axes along which the deck holds the point do not count: no mass moves there.
     """
@@ -121,7 +122,7 @@ def _scalar_masses(model: NastranModel) -> None:
 
 
 def _holds_along(model: NastranModel, node: int) -> list[bool]:
-    """Whether the deck holds a point along each of its displacement axes, by a support or in the plane of the deck."""
+    """Return whether the deck fixes a point along each of its displacement axes, by supports or by its plane."""
     held = model.held.get(node, set())
     across = -1 if model.plane is None else int(np.argmax(np.abs(model.axes(node)[model.plane])))
     return [k in held or k == across for k in range(3)]
@@ -156,7 +157,7 @@ def _rigid(model: NastranModel, card: Card) -> None:
 def _rigid_rows(
     model: NastranModel, card: Card, leader: int, node: int, components: tuple[int, ...]
 ) -> list[tuple[tuple[int, int], Row]]:
-    """Return an equation for each component, along the axes of a point, that follows another point rigidly.
+    """Return an equation for each component of a point, along its axes, that rigidly follows another point.
 
     e · u = e · (u_L + theta_L × r) = e · u_L + theta_L · (r × e), and e · theta = e · theta_L.
     """
@@ -173,7 +174,7 @@ def _rigid_rows(
 
 
 def _rod_of_constant_length(model: NastranModel, card: Card) -> None:
-    """RROD: the distance of two grid points is constant; one component of one of them, CMA or CMB, is eliminated."""
+    """Read RROD: the distance of two grid points is constant; one component, CMA or CMB, is eliminated."""
     ends = [card.integer(2), card.integer(3)]
     x = model.point(card, ends[1]) - model.point(card, ends[0])
     words = [card.text(k) or "0" for k in (4, 5)]
@@ -188,7 +189,7 @@ def _rod_of_constant_length(model: NastranModel, card: Card) -> None:
 
 
 def _mean(model: NastranModel, card: Card) -> None:
-    """RBE3: reference grid, its components, then sets of weight, components and grids; six weights for each grid.
+    """Read RBE3: reference grid and its components, then sets of weight, components and grids.
 
     The mean motion is that of `fe_models.assembly.constraints`. A grid in several sets has the sum of their weights.
     """
@@ -226,7 +227,7 @@ def _mean(model: NastranModel, card: Card) -> None:
 def _mean_rows(
     model: NastranModel, card: Card, node: int, components: tuple[int, ...], weights: dict[int, Array]
 ) -> list[tuple[tuple[int, int], Row]]:
-    """Return an equation for each component of a mean motion, with weights and components along the axes of points.
+    """Return an equation for each component of a mean motion, with weights and components along nodal axes.
 
     e · u = Σ A_i u_i, where e is the axis of the component and A that of `weighted_motion`.
     """
@@ -250,7 +251,7 @@ def _mean_rows(
 
 
 def _weights(card: Card, words: list[str]) -> dict[int, Array]:
-    """Return grid -> weight of each of its components, (6,), of the words `weight, components, grids` of an RBE3."""
+    """Return the weight of each component of each grid, (6,), from the words `weight, components, grids` of an RBE3."""
     weights: dict[int, Array] = {}
     six = np.zeros(0)
     k = 0
@@ -274,7 +275,7 @@ def _weights(card: Card, words: list[str]) -> dict[int, Array]:
 
 
 def _equations(model: NastranModel) -> None:
-    """Read MPC of the sets that the case control selects, or of all sets if there is no case control."""
+    """Read the MPC sets that the case control selects, or all sets if there is no case control."""
     chosen = selected_sets(model, "MPC")
     found = []
     for card in model.of("MPC"):
@@ -309,7 +310,7 @@ def _attached_points(model: NastranModel) -> set[int]:
 
 
 def _terms(card: Card) -> list[tuple[int, int, float]]:
-    """Return grid point, component from 0, and coefficient of the terms of an MPC."""
+    """Return grid point, component from 0, and coefficient of each term of an MPC."""
     terms = []
     for first in range(2, len(card.fields), 8):
         for k in (first, first + 3):
@@ -319,7 +320,7 @@ def _terms(card: Card) -> list[tuple[int, int, float]]:
 
 
 def _add_row(model: NastranModel, terms: list[tuple[int, int, float]]) -> None:
-    """Add an equation; the components of grid points with axes of their own are turned to basic axes."""
+    """Add an equation; components in nodal axes are transformed to basic axes."""
     row: Row = {}
     for node, c, a in terms:
         for j, part in enumerate(model.axes(node)[:, c % 3].tolist()):
@@ -344,7 +345,7 @@ def _close_equations(model: NastranModel) -> None:
 
 
 def _loads(model: NastranModel) -> None:
-    """Read forces and moments by their set, gravity, and pressure on solids; count other loads in the ledger."""
+    """Read forces and moments by set, gravity, and pressure on solids; add other loads to the ledger."""
     forces: dict[int, dict[str, Array]] = {}
     attached = _attached_points(model) | {node for row in model.plain_rows for node, _ in row}
     attached |= {node for _, row in model.rows for node, _ in row}
@@ -383,7 +384,7 @@ def _loads(model: NastranModel) -> None:
 
 
 def _untaken(card: Card, solid: Card | None) -> str:
-    """Return why a PLOAD4 is not a uniform pressure along the normal of one face of a solid, or an empty text."""
+    """Return why a PLOAD4 is not a uniform normal pressure on one face of a solid; empty if it is."""
     if solid is None:
         return "pressure on shells or on elements that are not there"
     if any(card.text(k) and card.real(k) != card.real(3) for k in (4, 5, 6)):

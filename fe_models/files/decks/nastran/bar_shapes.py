@@ -1,4 +1,4 @@
-"""Cross-sections of Nastran's bars and beams: PBAR, PBARL, PBEAM, PBEAML.
+"""Cross-sections of Nastran bars and beams: PBAR, PBARL, PBEAM, PBEAML.
 
 Element axes of Nastran: y lies in plane 1, z completes it. I1 = ∫ y² bends in plane 1, I2 = ∫ z² in plane 2, and
 I12 = ∫ y z.
@@ -16,24 +16,25 @@ from fe_models.files.decks.nastran.model import NastranModel
 
 __all__ = ["BarShape", "bar_shape"]
 
-Rectangle = tuple[float, float, float, float]  #: width along z, height along y, z and y of its centre
-Cells = tuple[list[float], list[list[float]]]  #: areas that closed walls enclose, and ∮ ds/t between them
+Rectangle = tuple[float, float, float, float]  #: width along z, height along y, and z and y of the centre
+Cells = tuple[list[float], list[list[float]]]  #: enclosed areas of closed walls, and ∮ ds/t between them
 
 
 @dataclass(frozen=True)
 class BarShape:
-    """A cross-section, as a table [sections.NAME] of a job has it."""
+    """Cross-section in the form of a table [sections.NAME] of a job."""
 
-    keys: dict[str, Any]  #: shape and its dimensions, in principal axes
-    added_mass: float = 0.0  #: per length, without stiffness
-    turn: float = 0.0  #: angle from the element's y axis to the first principal axis, about x [rad]
-    centroid: tuple[float, float] = (0.0, 0.0)  #: from the line of the ends, along the element's y and z
+    keys: dict[str, Any]  #: shape and dimensions in principal axes
+    added_mass: float = 0.0  #: additional mass per length without stiffness
+    turn: float = 0.0  #: angle about x from the y axis of the element to the first principal axis [rad]
+    #: position relative to the line of the ends, along y and z of the element
+    centroid: tuple[float, float] = (0.0, 0.0)
     notes: tuple[str, ...] = ()
-    has_torsion: bool = True  #: False: J = 0, and the torsion constant in `keys` has no meaning
+    has_torsion: bool = True  #: False: J = 0, and the torsion constant in `keys` is meaningless
 
 
 def bar_shape(model: NastranModel, card: Card) -> BarShape | str:
-    """Return the cross-section of a property; a text says why it cannot be taken."""
+    """Return the cross-section of a property, or a text with the reason if it cannot be converted."""
     makers: dict[str, Callable[[NastranModel, Card], BarShape | str]] = {
         "PBAR": _pbar, "PBEAM": _pbeam, "PBARL": _library, "PBEAML": _library,
     }  # fmt: skip
@@ -43,7 +44,7 @@ def bar_shape(model: NastranModel, card: Card) -> BarShape | str:
 def _general(
     A: float, I1: float, I2: float, I12: float, J: float, K1: float, K2: float, N: tuple[float, float] = (0.0, 0.0)
 ) -> tuple[dict[str, Any], float] | str:
-    """Return the keys in principal axes and their turn. A shear factor of 0 means no shear deformation in its plane.
+    """Return the keys in principal axes, and their angle. A shear factor of 0 means no shear deformation.
 
     N: the centroid from the shear centre, along the element's y and z.
     With tan 2a = 2 I12/(I1 - I2), I_a = (I1 + I2)/2 + hypot((I1 - I2)/2, I12) is the largest second moment, of y².
@@ -75,7 +76,7 @@ def _pbar(model: NastranModel, card: Card) -> BarShape | str:
 
 
 def _pbeam(model: NastranModel, card: Card) -> BarShape | str:
-    """A beam of one section along its length; `cut_tapers` has taken its stations out.
+    """Read a PBEAM with one section along its length; `cut_tapers` has removed its stations.
 
     (1) A, I1, I2, I12, J, NSM; four stress points
     (2) K1, K2 (default 1), shear relief, inertia of the added mass, warping; its offset; offset N1, N2 of the centroid
@@ -104,7 +105,7 @@ def _pbeam(model: NastranModel, card: Card) -> BarShape | str:
 
 
 def _library(model: NastranModel, card: Card) -> BarShape | str:
-    """Sections by name; Nastran's height is along y, its width along z."""
+    """Read a section by name; in Nastran its height is along y, and its width along z."""
     name = card.text(4).upper()
     if name not in DIMENSIONS:
         return f"shape {name or '(blank)'}: expected one of {', '.join(DIMENSIONS)}"
@@ -191,7 +192,7 @@ def _box1(b: float, h: float, top: float, bottom: float, left: float, right: flo
 def _dbox(
     b: float, h: float, middle: float, left: float, web: float, right: float, t1: float, t2: float, t3: float, t4: float
 ) -> tuple[list[Rectangle], Any]:
-    """Two cells side by side: a web between them, tops t1 and t3, bottoms t2 and t4."""
+    """Return two adjacent cells with a web between them, tops t1 and t3, bottoms t2 and t4."""
     w1, w2 = middle - web / 2 - left, b - middle - web / 2 - right
     z1, z2 = left + w1 / 2, b - right - w2 / 2
     parts = [
@@ -211,7 +212,7 @@ def _dbox(
 
 
 def _hat1(b: float, h: float, top: float, t: float, t_plate: float) -> tuple[list[Rectangle], Any]:
-    """A hat closed by a plate below it."""
+    """Return a hat section that is closed by a plate below."""
     brim, high = (b - top) / 2, h - t_plate - t
     parts: list[Rectangle] = [(b, t_plate, 0, t_plate / 2), (top, t, 0, h - t / 2)]
     parts += [(t, high, side * (top - t) / 2, t_plate + high / 2) for side in (-1, 1)]
@@ -221,7 +222,7 @@ def _hat1(b: float, h: float, top: float, t: float, t_plate: float) -> tuple[lis
 
 
 def _channel_centre(b: float, h: float, t_w: float, t_f: float) -> float:
-    """Return how far the centroid of a channel lies from its shear centre, towards its flanges.
+    """Return the distance of the centroid of a channel from its shear centre, towards its flanges.
 
     By the middle lines, b and h long: the shear centre lies 3 b² t_f/(6 b t_f + h t_w) behind the web.
     """
@@ -232,13 +233,13 @@ def _channel_centre(b: float, h: float, t_w: float, t_f: float) -> float:
 
 
 def _tee_centre(b: float, h: float, t_f: float, t_w: float) -> float:
-    """Return how far the centroid of a T lies from the middle of its flange, its shear centre, towards the web."""
+    """Return the distance of the centroid of a T from its shear centre (middle of the flange), towards the web."""
     web = (h - t_f) * t_w
     return web * h / 2 / (web + b * t_f)
 
 
 def _i_centre(h: float, b1: float, b2: float, t_w: float, t1: float, t2: float) -> float:
-    """Return how far the centroid of an I lies above its shear centre.
+    """Return the distance of the centroid of an I above its shear centre.
 
     The flanges, of second moments I_1 (below) and I_2, take the shear force in their ratio.
     """
@@ -248,7 +249,7 @@ def _i_centre(h: float, b1: float, b2: float, t_w: float, t1: float, t2: float) 
 
 
 def _angle_centre(b: float, h: float, t1: float, t2: float) -> tuple[float, float]:
-    """Return the centroid of an L from the crossing of its middle lines, its shear centre, along y and z."""
+    """Return the centroid of an L relative to its shear centre (crossing of middle lines), along y and z."""
     upright, level = (h - t1) * t2, (b - t2) * t1
     area = upright + level + t1 * t2
     return upright * h / 2 / area, level * b / 2 / area
@@ -257,14 +258,14 @@ def _angle_centre(b: float, h: float, t1: float, t2: float) -> tuple[float, floa
 DIMENSIONS = {
     "ROD": 1, "TUBE": 2, "TUBE2": 2, "BAR": 2, "BOX": 4, "I": 6, "CHAN": 4, "T": 4, "CROSS": 4, "H": 4, "T1": 4,
     "I1": 4, "CHAN1": 4, "CHAN2": 4, "T2": 4, "BOX1": 6, "HEXA": 3, "HAT": 4, "Z": 4, "L": 4, "HAT1": 5, "DBOX": 10,
-}  #: shape -> number of its dimensions  # fmt: skip
+}  #: number of dimensions of each shape  # fmt: skip
 PLAIN: dict[str, Callable[[list[float]], dict[str, Any]]] = {
     "ROD": lambda d: {"shape": "circle", "radius": d[0]},
     "TUBE": lambda d: {"shape": "tube", "radius": d[0], "thickness": d[0] - d[1]},
     "TUBE2": lambda d: {"shape": "tube", "radius": d[0], "thickness": d[1]},
     "BAR": lambda d: {"shape": "rectangle", "width": d[1], "height": d[0]},
     "BOX": lambda d: {"shape": "box", "width": d[1], "height": d[0], "web": d[2], "flange": d[3]},
-}  #: shapes that a job has by name
+}  #: shapes with a name in job files
 RECTANGLES: dict[str, Callable[..., Any]] = {
     "I": _i,
     "I1": lambda d1, d2, d3, d4: _i(d4, d1 + d2, d1 + d2, d2, (d4 - d3) / 2, (d4 - d3) / 2),

@@ -1,4 +1,4 @@
-"""Bars and beams of Nastran: CBAR, CBEAM with orientation, offsets and released ends."""
+"""Bars and beams of Nastran: CBAR and CBEAM with orientation, offsets and released ends."""
 
 from collections import Counter
 from dataclasses import replace
@@ -18,12 +18,12 @@ __all__ = ["BARS", "OFFSETS", "line_of_ends", "orientation_of", "read_bars", "wi
 
 BARS = ("CBAR", "CBEAM")
 ORIENTATION, OFFT = (5, 6, 7), 8
-OFFSETS = ((11, 12, 13), (14, 15, 16))  #: of ends A and B
-SAME = 1e-9  #: offsets are equal if they differ by less than this, relative to the length of the bar
+OFFSETS = ((11, 12, 13), (14, 15, 16))  #: field numbers of the offsets of ends A and B
+SAME = 1e-9  #: difference of offsets over the bar length, up to which they are equal
 
 
 def with_defaults(model: NastranModel) -> None:
-    """Fill blank fields of CBAR and CBEAM from BAROR and BEAMOR: property, orientation, OFFT."""
+    """Fill blank fields of CBAR and CBEAM with those of BAROR and BEAMOR: property, orientation, OFFT."""
     for name, source in (("CBAR", "BAROR"), ("CBEAM", "BEAMOR")):
         defaults = model.of(source)
         if not defaults:
@@ -45,7 +45,7 @@ def _filled(card: Card, default: Card) -> Card:
 
 
 def read_bars(model: NastranModel, known: Card, cards: list[Card]) -> None:
-    """Read bars of one property, with a group for each orientation and offset.
+    """Read the bars of one property, with a group for each orientation and offset.
 
     (1) axes of the element: x from GA to GB, y towards the orientation vector in plane 1, z
     (2) an offset that is the same at both ends and across the bar belongs to the section; any other one makes a node
@@ -116,7 +116,7 @@ def read_bars(model: NastranModel, known: Card, cards: list[Card]) -> None:
 
 
 def _uses(model: NastranModel) -> Counter[int]:
-    """Return how many bars and shells each grid point has, which may hold its rotation."""
+    """Return the number of bars and shells at each grid point, which may constrain its rotation."""
     names = [name for name in ELEMENT_TYPES if name in BARS or name.startswith(("CTRIA", "CQUAD"))]
     words = [word for card in model.of(*names) for word in card.fields[2 : 2 + max(ELEMENT_TYPES[card.name])]]
     return Counter(int(word) for word in words if word.isdigit())
@@ -146,13 +146,13 @@ def _with_own_shear(model: NastranModel, name: str, keys: dict[str, Any]) -> tup
 
 
 def line_of_ends(model: NastranModel, card: Card) -> Array:
-    """Return both ends of a bar with their offsets, (2, 3), basic axes."""
+    """Return both ends of a bar including offsets, (2, 3), basic axes."""
     ends = np.array([model.point(card, card.integer(k)) for k in (3, 4)])
     return ends + _offsets(model, card, ends)
 
 
 def orientation_of(model: NastranModel, card: Card) -> Array:
-    """Return the vector of a bar that spans plane 1 with its axis, (3,), basic axes."""
+    """Return the vector that spans plane 1 with the axis of a bar, (3,), basic axes."""
     return _orientation(model, card, model.point(card, card.integer(3)), line_of_ends(model, card)[0])
 
 
@@ -161,7 +161,7 @@ def _digits(length: float) -> int:
 
 
 def _axes(model: NastranModel, card: Card, grids: Array, ends: Array) -> Array | str:
-    """Return the axes of the element, (3, 3), columns: x along the offset ends, y in plane 1; a text says why not."""
+    """Return the axes of an element as columns, (3, 3), or a text with the reason if they are undefined."""
     x = ends[1] - ends[0]
     if not np.linalg.norm(x) > 0:
         return "has no length between its ends"
@@ -208,7 +208,7 @@ def _offsets(model: NastranModel, card: Card, ends: Array) -> Array:
 
 
 def _own_ends(model: NastranModel, card: Card, W: Array, R: Array, released: list[tuple[int, ...]]) -> None:
-    """Give a bar nodes of its own where an end has an offset or released motions; (2) and (3) of `read_bars`.
+    """Steps (2) and (3) of `read_bars`: add nodes to a bar whose end has an offset or released motions.
 
     A released motion is one along or about an axis of the element. The kept ones of its three say E d = 0 with E the
     rows of their axes and d the motion of the end against that of its place on the grid point, u + theta × W.
@@ -238,7 +238,7 @@ def _own_ends(model: NastranModel, card: Card, W: Array, R: Array, released: lis
 
 
 def _reduced(E: Array) -> list[tuple[Array, int]]:
-    """Return rows of the span of E, each with 1 in a column where the others have 0, and that column."""
+    """Return rows with the span of E, each with 1 in a column where all others have 0, and these columns."""
     rows: list[tuple[Array, int]] = []
     E = E.copy()
     for k in range(len(E)):

@@ -13,35 +13,35 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["read_bends"]
 
-N_POINTS = 40  #: of Gauss along an arc; the integrand is a product of sines and cosines
-LEAST_ANGLE, LARGEST_ANGLE = 1e-3, np.deg2rad(350.0)  #: of an arc [rad]
-SAME = 1e-3  #: relative difference of DELTAN from its default that is left to the digits of a card
+N_POINTS = 40  #: number of Gauss points along an arc; the integrand is a product of sines and cosines
+LEAST_ANGLE, LARGEST_ANGLE = 1e-3, np.deg2rad(350.0)  #: smallest and largest angle of an arc [rad]
+SAME = 1e-3  #: relative difference of DELTAN from its default up to which it is rounding on the card
 
 
 @dataclass(frozen=True)
 class _Arc:
-    """The circle through both grid points."""
+    """Circle through both grid points."""
 
-    center: Array  #: (3,)
+    center: Array  #: centre of the circle, (3,)
     radius: float
-    angle: float  #: from GA to GB
-    axes: Array  #: (3, 3), rows: x from the centre to the middle of the arc, y along the arc there, from GA to GB, z
+    angle: float  #: angle from GA to GB
+    axes: Array  #: rows, (3, 3): x from the centre to the middle of the arc, y along the arc from GA to GB, z normal
 
 
 @dataclass(frozen=True)
 class _Bend:
-    """The section of a PBEND."""
+    """Section of a PBEND."""
 
     A: float
-    I1: float  #: bending in the plane of the arc
-    I2: float  #: across it
+    I1: float  #: second moment for bending in the plane of the arc
+    I2: float  #: second moment for bending out of the plane of the arc
     J: float
-    shear: tuple[float, float]  #: areas in the plane and across it; infinite: no shear deformation
-    offset: float  #: of the neutral axis from the centroid, towards the centre of the arc
+    shear: tuple[float, float]  #: shear areas in and out of the plane; infinite: no shear deformation
+    offset: float  #: distance of the neutral axis from the centroid, towards the centre of the arc
 
 
 def read_bends(model: NastranModel) -> None:
-    """Take every CBEND as two springs between its grid points, and two rigid pieces of mass.
+    """Convert each CBEND to two springs between its grid points, and two rigid pieces with mass.
 
     (1) the circle through the grid points, by GEOM
     (2) the line of centroids lies RC outside of it and ZC along z; x points outward and z is across the arc, so that
@@ -58,7 +58,7 @@ def read_bends(model: NastranModel) -> None:
 
 
 def _curved_beam(model: NastranModel, card: Card) -> str:
-    """Add a curved beam; the text says why it cannot be taken."""
+    """Add a curved beam; return a text with the reason if it cannot be converted."""
     known = model.property_of(card, "PBEND")
     if known is None:
         return f"names PBEND {card.text(2) or card.text(1)}, which is not defined"
@@ -98,7 +98,7 @@ def _vector(x: Array) -> Vector:
 
 
 def _arc(model: NastranModel, card: Card, known: Card, RC: float) -> _Arc | str:
-    """Return the circle of a CBEND; a text says why there is none.
+    """Return the circle of a CBEND, or a text with the reason if there is none.
 
     With the chord d from GA to GB and the vector v from GA:
     GEOM = 1: the centre lies on the line of v, at equal distances: t v with t = d²/(2 v · d)
@@ -146,7 +146,7 @@ def _arc(model: NastranModel, card: Card, known: Card, RC: float) -> _Arc | str:
 
 
 def _section(known: Card, R: float, nu: float) -> _Bend | str:
-    """Return the section of a PBEND; a text says why it cannot be taken.
+    """Return the section of a PBEND, or a text with the reason if it cannot be converted.
 
     An integer in the field of A is FSI: a pipe of mean radius RM and thickness T, a solid circle of RM without T. Its
     flexibility factor is 1 for FSI = 1.
@@ -180,7 +180,7 @@ def _pipe(known: Card, R: float, nu: float) -> _Bend | str:
 
 
 def _flexibility(section: _Bend, E: float, G: float, R: float, angle: float) -> Array:
-    """Return the motion of one end against the other by forces and moments, both at the middle of the arc, (6, 6).
+    """Return the (6, 6) flexibility: motion of one end relative to the other per force at the middle of the arc.
 
     (1) A section at the angle phi has r and t, outward and along the arc. From forces F and moments M at the middle it
         has N = t · F, V = r · F, V2 = z · F, and T, M2, M1 = (t, r, z) · (M - s × F), s its place.
@@ -210,7 +210,7 @@ def _flexibility(section: _Bend, E: float, G: float, R: float, angle: float) -> 
 def _half(
     model: NastranModel, card: Card, arc: _Arc, middle: Array, R: float, side: int, added: float, node: str
 ) -> DeckMass:
-    """Return half of the line of centroids as a rigid piece of end A (side -1) or B (1).
+    """Return half of the centroid line as a rigid piece at end A (side -1) or B (1).
 
     A line of radius R and half angle b has its centroid at R sin(b)/b, and about the centre the means of the squares
     R² (1/2 ± sin(2 b)/(4 b)) along and across its middle direction.

@@ -124,12 +124,12 @@ NOMINAL = {
 
 
 def fields_of(name: str) -> tuple[TableField, ...]:
-    """Return the fields of a card that `CARDS` lists, without those the reader takes as a repeating rest."""
+    """Return the fields of a card listed in `CARDS`, without the repeating fields at its end."""
     return parse_fields(CARDS[name].split())
 
 
 def check_cards(model: NastranModel) -> None:
-    """Put into the ledger every card and every field that is not taken over.
+    """Add all cards and fields that are not converted to the ledger.
 
     (1) a card that is neither read nor harmless is refused by name
     (2) a field of a card that is read is refused where it has another value than its default

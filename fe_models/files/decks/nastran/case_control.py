@@ -1,4 +1,4 @@
-"""The case control of a deck of Nastran, and its parameters: which sets and matrices belong to the body."""
+"""Case control and parameters of a Nastran deck: they select the sets and matrices of the body."""
 
 import re
 from collections.abc import Iterable
@@ -20,13 +20,13 @@ PARAMETER = re.compile(r"(?im)^[ \t]*PARAM[ \t]*,[ \t]*([A-Z0-9_]+)[ \t]*,[ \t]*
 class CaseControl:
     """Content between CEND and BEGIN BULK."""
 
-    chosen: dict[str, set[int]]  #: "SPC", "MPC" -> selected sets of all subcases, 0 for a subcase without one
+    chosen: dict[str, set[int]]  #: selected sets of all subcases for "SPC" and "MPC"; 0 for a subcase without one
     has_temperature: bool  #: whether a temperature for materials is selected
     adding: tuple[str, ...]  #: commands of `ADDING`, as written
     parameters: tuple[Card, ...]
 
     def check(self, ledger: Ledger) -> None:
-        """Refuse commands that add mass, stiffness or damping. Modal damping is left out, with a note."""
+        """Record commands that add mass, stiffness or damping in the ledger; modal damping is omitted with a note."""
         for line in self.adding:
             if line.upper().startswith("SDAMP"):
                 ledger.note("SDAMPING", f"modal damping ({line}) is left out: give the job a table [damping]")
@@ -62,7 +62,7 @@ def case_control(text: str) -> CaseControl | None:
 
 
 def read_parameters(model: NastranModel, above: Iterable[Card]) -> None:
-    """Read PARAM: WTMASS and COUPMASS; G and other damping is named in the ledger.
+    """Read PARAM WTMASS and COUPMASS; record G and other damping in the ledger.
 
     Parameters
     ----------

@@ -23,13 +23,14 @@ __all__ = [
     "stiffness_shells",
 ]
 
-ANGLE_FIELD = {"CTRIA3": 6, "CTRIAR": 6, "CTRIA6": 9, "CQUAD4": 7, "CQUADR": 7, "CQUAD8": 15}  #: THETA or MCID
-MOST_DIRECTIONS = 200  #: of one property, each a table of the job
-DIGITS = 6  #: to which directions are the same
+#: field number of THETA or MCID
+ANGLE_FIELD = {"CTRIA3": 6, "CTRIAR": 6, "CTRIA6": 9, "CQUAD4": 7, "CQUADR": 7, "CQUAD8": 15}
+MOST_DIRECTIONS = 200  #: largest number of directions for one property; each becomes a table of the job
+DIGITS = 6  #: digits to which directions must agree
 
 
 def sheet_material(model: NastranModel, card: Card) -> None:
-    """Take MAT8: E1, E2, NU12, G12, G1Z, G2Z, RHO; what a sheet in plane stress does not have is filled in.
+    """Read MAT8: E1, E2, NU12, G12, G1Z, G2Z, RHO; constants that a sheet does not have are assumed.
 
     E_3 = E_2 and nu_13 = nu_23 = 0 have no part in shells.
     """
@@ -44,7 +45,7 @@ def sheet_material(model: NastranModel, card: Card) -> None:
 
 
 def layers_of_card(card: Card) -> tuple[DeckLayer, ...] | str:
-    """Return the layers of a PCOMP or PCOMPG, bottom to top; a text says why they cannot be taken."""
+    """Return the layers of PCOMP or PCOMPG, bottom to top, or a text with the reason if this is impossible."""
     kind = card.text(8).upper()
     if card.name == "PCOMPG":  # a number and four fields for each ply, in lines of eight
         first, step = 10, 8
@@ -68,7 +69,7 @@ def layers_of_card(card: Card) -> tuple[DeckLayer, ...] | str:
 
 
 def layered_shells(model: NastranModel, known: Card, cards: list[Card], offset_field: dict[str, int]) -> None:
-    """Take shells of one PCOMP: a section for each offset and direction of angle 0.
+    """Convert shells of one PCOMP: a section for each offset and layup direction.
 
     The direction is the side from G1 to G2 turned by THETA about the normal, or axis x of the system MCID. Z0 is the
     bottom of the layers from the grid points; ZOFFS moves them up.
@@ -101,13 +102,13 @@ def _layer_material(model: NastranModel, name: str) -> str:
 def orthotropic_shells(
     model: NastranModel, known: Card, cards: list[Card], offset_field: dict[str, int], section: ShellSection
 ) -> None:
-    """Take shells of a PSHELL of MAT8: one layer of its material, laid as that of a PCOMP."""
+    """Convert shells of a PSHELL with MAT8: one layer of its material, oriented as for PCOMP."""
     layers = (DeckLayer(section.material, section.thickness),)
     _laid_shells(model, known, cards, offset_field, replace(section, material="", layers=layers))
 
 
 def plane_strain_shells(model: NastranModel, known: Card, cards: list[Card], offset_field: dict[str, int]) -> None:
-    """Take membranes of a PLPLANE, or of a PSHELL with MID2 = -1: a planar body without strain across its plane.
+    """Convert membranes of PLPLANE, or of PSHELL with MID2 = -1, to a planar body in plane strain.
 
     The body is a slice of thickness T, 1 where it is blank; for its material see `DeckMaterial.in_plane_strain`.
     """
@@ -149,7 +150,7 @@ def plane_strain_shells(model: NastranModel, known: Card, cards: list[Card], off
 
 
 def needs_matrices(model: NastranModel, known: Card) -> bool:
-    """Whether the stiffness of a PSHELL is not that of one material: MAT2, MID4, or materials that differ in kind."""
+    """Return whether a PSHELL needs stiffness matrices: MAT2, MID4, or materials of different kinds."""
     if known.text(11):
         return True
     names = [known.text(2), known.text(4) or known.text(2), known.text(6) or known.text(2)]
@@ -161,7 +162,7 @@ def needs_matrices(model: NastranModel, known: Card) -> bool:
 
 
 def stiffness_shells(model: NastranModel, known: Card, cards: list[Card], offset_field: dict[str, int]) -> None:
-    """Take shells of a PSHELL whose membrane, bending, shear and coupling have materials of their own.
+    """Convert shells of a PSHELL with separate materials for membrane, bending, shear and coupling.
 
     (1) A = T G1, D = I G2 with I = (12I/T**3) T³/12, and H = TS G3 with TS = (TS/T) T
     (2) B = -T² G4: Nastran's curvatures have the other sign, G4 = -(1/T²) ∫ G z dz (NASTRAN-95, mis/ta1cpd.f)
@@ -199,7 +200,7 @@ def stiffness_shells(model: NastranModel, known: Card, cards: list[Card], offset
 
 
 def _is_positive(matrix: Array) -> bool:
-    """Whether a symmetric matrix is positive definite, whatever the units of its rows."""
+    """Return whether a symmetric matrix is positive definite, independently of the units of its rows."""
     diagonal = matrix.diagonal()
     if not (diagonal > 0).all():
         return False
@@ -207,12 +208,12 @@ def _is_positive(matrix: Array) -> bool:
 
 
 def _sheet(model: NastranModel, name: str) -> Card | None:
-    """Return the MAT2 of a number."""
+    """Return the MAT2 card with this number."""
     return next((card for card in model.of("MAT2") if card.text(1) == name), None)
 
 
 def _plane_matrix(model: NastranModel, name: str) -> Array | None:
-    """Return the matrix from eps_x eps_y gamma_xy to stress of a material, (3, 3)."""
+    """Return the (3, 3) matrix from eps_x eps_y gamma_xy to stress of a material."""
     card = _sheet(model, name)
     if card is not None:
         G = np.zeros((3, 3))
@@ -230,7 +231,7 @@ def _plane_matrix(model: NastranModel, name: str) -> Array | None:
 
 
 def _shear_matrix(model: NastranModel, name: str) -> Array | None:
-    """Return the matrix from gamma_xz gamma_yz to stress of a material, (2, 2): of a MAT2 its G11, G12 and G22."""
+    """Return the (2, 2) matrix from gamma_xz gamma_yz to stress of a material; MAT2: its G11, G12 and G22."""
     card = _sheet(model, name)
     if card is not None and any(card.real(k, 0.0) for k in (4, 6, 7)):
         return None
@@ -271,7 +272,7 @@ def _laid_shells(
 
 
 def _direction(model: NastranModel, card: Card) -> Array:
-    """Return the direction of angle 0 of an element, (3,), basic axes."""
+    """Return the layup direction (angle 0) of an element, (3,), basic axes."""
     word = card.text(ANGLE_FIELD[card.name])
     corners = [
         model.point(card, card.integer(k)) for k in ((3, 4, 5) if card.name.startswith("CTRI") else (3, 4, 5, 6))

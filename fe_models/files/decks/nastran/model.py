@@ -1,4 +1,4 @@
-"""A deck of Nastran while it is read: its cards by name, its grid points, and the results so far."""
+"""Nastran deck while it is read: its cards by name, its grid points, and the results so far."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -29,7 +29,7 @@ from fe_models.foundation.arrays import Array
 __all__ = ["ALL", "ALONG", "PROPERTIES", "NastranModel"]
 
 ALL = (0, 1, 2, 3, 4, 5)
-ALONG = 1e-9  #: a vector is along a line if its part across is smaller than this, relative to its length
+ALONG = 1e-9  #: component of a vector normal to a line over its length, below which it is along the line
 #: properties of solids, shells, bars and beams, which share one range of numbers
 PROPERTIES = ("PSOLID", "PLSOLID", "PSHELL", "PLPLANE", "PCOMP", "PCOMPG", "PBAR", "PBARL", "PBEAM", "PBEAML")
 
@@ -39,14 +39,15 @@ class NastranModel:
     """Cards of a deck, and what has been read from them so far."""
 
     where: str
-    cards: dict[str, list[Card]]  #: by name
+    cards: dict[str, list[Card]]  #: cards of the deck by name
     points: GridPoints
     ledger: Ledger
     #: "SPC", "MPC" -> the sets that subcases select, 0 for a subcase without one; None: there is no case control
     chosen: dict[str, set[int]] | None
-    has_temperature: bool | None = None  #: whether the case control selects one for materials; None: there is none
-    wtmass: float = 1.0  #: PARAM,WTMASS: all masses are multiplied by it
-    is_lumped: bool = True  #: unless PARAM,COUPMASS
+    #: whether the case control selects a material temperature; None: there is no case control
+    has_temperature: bool | None = None
+    wtmass: float = 1.0  #: value of PARAM,WTMASS, by which all masses are multiplied
+    is_lumped: bool = True  #: whether masses are lumped, which PARAM,COUPMASS changes
     materials: dict[str, DeckMaterial] = field(default_factory=dict)
     #: isotropic material -> G of its card, where it is not E/(2 (1 + nu))
     shear_moduli: dict[str, float] = field(default_factory=dict)
@@ -60,22 +61,25 @@ class NastranModel:
     equations: list[Equation] = field(default_factory=list)
     #: equations in basic axes whose first point has its own axes: (point, 0 or 3 for its rotations), coefficients
     rows: list[tuple[tuple[int, int], Row]] = field(default_factory=list)
-    plain_rows: list[Row] = field(default_factory=list)  #: other equations: the first component is eliminated
+    plain_rows: list[Row] = field(default_factory=list)  #: further equations, whose first component is eliminated
     supports: list[Support] = field(default_factory=list)
     loads: list[Load] = field(default_factory=list)
-    groups: dict[str, tuple[int, ...]] = field(default_factory=dict)  #: of nodes, by their numbers
-    faces: dict[str, list[tuple[int, ...]]] = field(default_factory=dict)  #: group -> corner grids of faces
-    elements: dict[int, tuple[str, str]] = field(default_factory=dict)  #: number -> card, group of cells
-    held: dict[int, set[int]] = field(default_factory=dict)  #: grid point -> components that are held
-    plane: int | None = None  #: axis of the basic system across the plane of a planar deck
-    grounded: dict[int, set[int]] = field(default_factory=dict)  #: grid point -> components that elements hold
-    shared: set[int] = field(default_factory=set)  #: grid points that belong to other superelements too
+    groups: dict[str, tuple[int, ...]] = field(default_factory=dict)  #: node numbers in each group
+    faces: dict[str, list[tuple[int, ...]]] = field(default_factory=dict)  #: corner grids of the faces in each group
+    #: card and cell group of each element, by number
+    elements: dict[int, tuple[str, str]] = field(default_factory=dict)
+    held: dict[int, set[int]] = field(default_factory=dict)  #: components that are fixed at each grid point
+    plane: int | None = None  #: axis of the basic system normal to the plane of a planar deck
+    #: components at each grid point that elements connect to the ground
+    grounded: dict[int, set[int]] = field(default_factory=dict)
+    shared: set[int] = field(default_factory=set)  #: grid points that also belong to other superelements
     last_point: int = 0  #: number of the last grid point that the reader added
-    properties: dict[str, dict[int, Card]] = field(default_factory=dict)  #: by kind and number, made on demand
-    ends: dict[tuple[int, int], int] = field(default_factory=dict)  #: element, end 0 or 1 -> a node of its own
+    #: property cards by kind and number, filled on demand
+    properties: dict[str, dict[int, Card]] = field(default_factory=dict)
+    ends: dict[tuple[int, int], int] = field(default_factory=dict)  #: separate node of an element at end 0 or 1
 
     def of(self, *names: str) -> list[Card]:
-        """Return the cards of these names, in their order by name."""
+        """Return the cards with these names, in the order of the names."""
         return [card for name in names for card in self.cards.get(name, ())]
 
     def point(self, card: Card, number: int) -> Array:
@@ -85,14 +89,14 @@ class NastranModel:
         return self.points.positions[number]
 
     def new_point(self, position: Array) -> int:
-        """Return the number of a new grid point at a position in basic axes, (3,)."""
+        """Return the number of a new grid point at this position in basic axes, (3,)."""
         self.last_point = max(self.last_point, *self.points.positions) if not self.last_point else self.last_point
         self.last_point += 1
         self.points.positions[self.last_point] = np.asarray(position)
         return self.last_point
 
     def add_equation(self, row: Row) -> None:
-        """Add an equation in basic axes without its zero terms; the first component, which is eliminated, stays."""
+        """Add an equation in basic axes without its zero terms; its first component is eliminated, so it stays."""
         terms = [(f"node_{node}", c, a) for k, ((node, c), a) in enumerate(row.items()) if a != 0 or k == 0]
         for node in dict.fromkeys(node for node, _ in row):
             self.groups[f"node_{node}"] = (node,)
@@ -114,21 +118,21 @@ class NastranModel:
         return found.union(*(self.groups[name] for name in groups)) & set(self.points.positions)
 
     def property_of(self, card: Card, *names: str) -> Card | None:
-        """Return the property card of an element: field 2, or the number of the element where that is blank."""
+        """Return the property card of an element, by field 2 or, if it is blank, by the element number."""
         key = " ".join(names)
         if key not in self.properties:
             self.properties[key] = {each.integer(1): each for each in self.of(*names)}
         return self.properties[key].get(card.integer(2, card.integer(1)))
 
     def shear_modulus(self, name: str) -> float:
-        """Return G of an isotropic material: what its card gives, else E/(2 (1 + nu))."""
+        """Return G of an isotropic material: from its card, otherwise E/(2 (1 + nu))."""
         material = self.materials[name]
         assert isinstance(material.young, float)
         assert isinstance(material.poisson, float)
         return self.shear_moduli.get(name, material.young / (2 * (1 + material.poisson)))
 
     def shear_factor(self, name: str) -> float:
-        """Return G of the card of an isotropic material over E/(2 (1 + nu)); 1 where the card gives no other G."""
+        """Return G on the card of an isotropic material over E/(2 (1 + nu)); 1 if the card has no other G."""
         material = self.materials.get(name)
         if name not in self.shear_moduli or material is None:
             return 1.0
@@ -137,7 +141,7 @@ class NastranModel:
         return self.shear_moduli[name] * 2 * (1 + material.poisson) / material.young
 
     def property_value(self, card: Card, name: str, size: int) -> float | None:
-        """Return the value of the property of an element; a card holds several properties of `size` fields each."""
+        """Return a property value of an element; a card contains several properties with `size` fields each."""
         number = card.integer(2, card.integer(1))
         for each in self.cards.get(name, ()):
             for k in range(1, len(each.fields) + 1, size):
@@ -146,11 +150,11 @@ class NastranModel:
         return None
 
     def axes(self, number: int) -> Array:
-        """Return the displacement axes of a grid point, (3, 3), columns in basic axes."""
+        """Return the displacement axes of a grid point as columns in basic axes, (3, 3)."""
         return self.points.axes.get(number, np.eye(3))
 
     def system(self, card: Card, number: int, at: Array) -> Array:
-        """Return the axes of a coordinate system at a point, (3, 3), columns in basic axes."""
+        """Return the axes of a coordinate system at a point as columns in basic axes, (3, 3)."""
         if number not in self.points.systems:
             raise MeshError(f"{card.where} {card.text(1)}: names coordinate system {number}, which is not defined")
         return self.points.systems[number].axes_at(at)
@@ -168,19 +172,19 @@ class NastranModel:
 
 
 def components_of(card: Card, word: str) -> tuple[int, ...]:
-    """Return the components of a field such as 123456."""
+    """Return the components in a field such as 123456."""
     if not word.isdigit() or not set(word) <= set("0123456"):
         raise MeshError(f"{card.where} {card.text(1)}: expected components such as 123, got {word!r}")
     return tuple(sorted({int(letter) - 1 for letter in word if letter != "0"}))
 
 
 def numbers_of(card: Card, first: int) -> list[int]:
-    """Return the numbers from a field on, ranges written out."""
+    """Return the numbers from a field on, with ranges expanded."""
     return numbers_in(card, [word for word in card.fields[first - 1 :] if word])
 
 
 def numbers_in(card: Card, words: list[str]) -> list[int]:
-    """Return the numbers of these words of a card, ranges written out."""
+    """Return the numbers in words of a card, with ranges expanded."""
     found: list[int] = []
     k = 0
     while k < len(words):

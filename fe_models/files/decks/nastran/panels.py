@@ -1,4 +1,4 @@
-"""Shear panels of Nastran: CSHEAR with PSHEAR, Garvey's panel and rods along its edges."""
+"""Shear panels of Nastran (CSHEAR with PSHEAR): Garvey's panel, and rods along its edges."""
 
 import numpy as np
 
@@ -12,12 +12,12 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["read_panels"]
 
-FULL = 1.01  #: effectiveness above which F1 and F2 count widths in thicknesses
-N_POINTS = 20  #: of Gauss along each side; the integrand is a rational function
+FULL = 1.01  #: effectiveness above which F1 and F2 are widths as multiples of the thickness
+N_POINTS = 20  #: number of Gauss points along each side; the integrand is a rational function
 
 
 def read_panels(model: NastranModel) -> None:
-    """Take every CSHEAR.
+    """Convert each CSHEAR.
 
     (1) One state of stress, a shear flow along the edges, has the energy U and the forces f at the corners
         (`shear_flow`). The stiffness is that of this state, K = f fᵀ/(2 U).
@@ -40,7 +40,7 @@ def read_panels(model: NastranModel) -> None:
 
 
 def _panel(model: NastranModel, card: Card) -> str:
-    """Add a panel; the text says why it cannot be taken."""
+    """Add a panel; return a text with the reason if it cannot be converted."""
     known = model.property_of(card, "PSHEAR")
     if known is None:
         return f"names PSHEAR {card.text(2) or card.text(1)}, which is not defined"
@@ -81,7 +81,7 @@ def _panel(model: NastranModel, card: Card) -> str:
 
 
 def _flat(corners: Array) -> tuple[Array, Array] | None:
-    """Return the corners in their mean plane, (4, 2), and its axes, (2, 3); None if they are not convex."""
+    """Return the corners in their mean plane, (4, 2), and the axes of the plane, (2, 3); None if not convex."""
     normal = np.cross(corners[2] - corners[0], corners[3] - corners[1])
     x = corners[1] - corners[0]
     size = np.linalg.norm(normal)
@@ -107,7 +107,7 @@ def _area(points: Array) -> float:
 
 
 def shear_flow(corners: Array, nu: float) -> tuple[Array, float]:
-    """Return the forces at the corners of a flat panel, (4, 2), and its energy times G T, in a state of shear flow.
+    """Return corner forces of a flat panel in shear flow, (4, 2), and its energy times G T.
 
     (1) X = (a + b r + c s)/w, w = 1 + g r + h s, maps the unit square to the panel: lines of equal r or s are straight
         and meet where opposite edges meet. Its tangents are X_r = (b - g X)/w and X_s = (c - h X)/w; J = det(X_r, X_s).
@@ -138,7 +138,7 @@ def shear_flow(corners: Array, nu: float) -> tuple[Array, float]:
 def _strain_spring(
     model: NastranModel, card: Card, grids: list[int], corners: Array, n: Array, stiffness: float
 ) -> None:
-    """Add the two points of (2) of `read_panels` and the spring between them; n: (4, 3)."""
+    """Step (2) of `read_panels`: add two points and the spring between them; n: (4, 3)."""
     middle = corners.mean(axis=0)
     weights = np.tile([1.0, 1.0, 1.0, 0.0, 0.0, 0.0], (4, 1))
     mean = weighted_motion(corners, weights, middle).reshape(6, 4, 6)[:, :, :3]

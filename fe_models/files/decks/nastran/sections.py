@@ -21,7 +21,7 @@ from fe_models.files.decks.spring_axes import as_triad, axes_along
 
 __all__ = ["SHELLS", "SOLIDS", "read_sections"]
 
-SAME_MODULUS = 1e-6  #: relative difference of G from E/(2 (1 + nu)) that is left to the digits of a card
+SAME_MODULUS = 1e-6  #: relative difference of G from E/(2 (1 + nu)) up to which it is rounding on the card
 
 SOLIDS = ("CTETRA", "CHEXA", "CPENTA", "CPYRAM", "CPYRA")
 SHELLS = ("CTRIA3", "CTRIAR", "CTRIA6", "CQUAD4", "CQUADR", "CQUAD8")
@@ -38,7 +38,8 @@ _MIDDLES: dict[str, tuple[int, tuple[tuple[int, int], ...]]] = {
 _MIDDLES["CPYRA"] = _MIDDLES["CPYRAM"]
 _MIDDLES |= {"CTRIA6": (3, ((0, 1), (1, 2), (2, 0))), "CQUAD8": (4, ((0, 1), (1, 2), (2, 3), (3, 0)))}
 _CORNERS = {"CTRIA3": (11, 12, 13), "CTRIAR": (11, 12, 13), "CTRIA6": (11, 12, 13)}
-_THICKNESS_FIELDS = {name: _CORNERS.get(name, (11, 12, 13, 14)) for name in SHELLS}  #: T1 to T4
+#: field numbers of T1 to T4 for each card
+_THICKNESS_FIELDS = {name: _CORNERS.get(name, (11, 12, 13, 14)) for name in SHELLS}
 
 
 def read_sections(model: NastranModel) -> None:
@@ -68,7 +69,7 @@ def read_sections(model: NastranModel) -> None:
 
 
 def _material(model: NastranModel, card: Card) -> None:
-    """Take MAT1; a blank E, G or NU follows from the other two by E = 2 G (1 + NU).
+    """Read MAT1; a blank E, G or NU follows from the other two by E = 2 G (1 + NU).
 
     Where all three are given and disagree, bars and rods have E and G, shells E and NU in their plane and G across it,
     and solids E and NU, as in Nastran. Where only E or only G is given, Nastran has zero for the other two.
@@ -92,7 +93,7 @@ def _material(model: NastranModel, card: Card) -> None:
 
 
 def _rubber(model: NastranModel, card: Card) -> None:
-    """Take the elastic constants of MATHP at small strain.
+    """Read the elastic constants of MATHP for small strain.
 
     Its energy A10 (I1 - 3) + A01 (I2 - 3) + D1 (J - 1)² + terms of higher order has G = 2 (A10 + A01) and K = 2 D1.
     """
@@ -117,7 +118,7 @@ def _cells(model: NastranModel, cards: list[Card], group: str) -> None:
 
 
 def _with_middles(model: NastranModel) -> None:
-    """Add points where a cell has some, but not all middle grids; each follows the mean of the corners of its edge.
+    """Add points to cells with some but not all middle grids; each is the mean of the corners of its edge.
 
     The edge is then straight and its displacement linear, as in Nastran. Cells without middle grids are of first order.
     """
@@ -202,7 +203,7 @@ def _shells(model: NastranModel, known: Card, cards: list[Card]) -> None:
 
 
 def _has_thickness(model: NastranModel, card: Card, thickness: float) -> bool:
-    """Whether a shell has the thickness of its property at its corners; refuse it otherwise."""
+    """Return whether a shell has the thickness of its property at all corners; otherwise add it to the ledger."""
     own = {card.real(k) for k in _THICKNESS_FIELDS[card.name] if card.text(k)}
     if own - {thickness}:
         model.ledger.refuse(card.name, "thickness of its own at the corners")
@@ -210,7 +211,7 @@ def _has_thickness(model: NastranModel, card: Card, thickness: float) -> bool:
 
 
 def _missing_parts(model: NastranModel, known: Card) -> str:
-    """Return why a PSHELL is no shell, or nothing."""
+    """Return why a PSHELL is not a shell; empty if it is."""
     if not known.text(2) or not known.text(3):
         return "without MID1 or T: a plate that only bends"
     if not known.text(4) and model.plane is None:
@@ -219,7 +220,7 @@ def _missing_parts(model: NastranModel, known: Card) -> str:
 
 
 def _ratios(model: NastranModel, known: Card) -> tuple[float, float] | str:
-    """Return the stiffness in bending and in transverse shear of a PSHELL over those of a plate of MID1; or why not.
+    """Return bending and transverse shear stiffness of a PSHELL over those of a plate of MID1, or the reason.
 
     Nastran has E_2 I with I = (12I/T**3) T³/12 for bending and G_3 T_S with T_S = (TS/T) T, 5/6 T where it is blank.
     """
@@ -241,7 +242,7 @@ def _ratios(model: NastranModel, known: Card) -> tuple[float, float] | str:
 
 
 def _rod(model: NastranModel, card: Card) -> None:
-    """A rod is a spring along and about its axis with half of its mass at each end, as Nastran lumps it."""
+    """Convert a rod to a spring along and about its axis, and half of its mass at each end as in Nastran."""
     if card.name == "CONROD":
         nodes, mid, A, J, nsm = (2, 3), card.text(4), card.real(5), card.real(6, 0.0), card.real(8, 0.0)
     else:

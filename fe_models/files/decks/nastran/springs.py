@@ -1,4 +1,4 @@
-"""Springs, dampers and bushings of Nastran, and gaps as the linear springs of their first state."""
+"""Springs, dampers, bushings and gaps of Nastran; gaps become linear springs in their initial state."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ __all__ = ["read_springs", "scalar_ends", "skip_scalar_points", "springs_to_grou
 
 
 def read_springs(model: NastranModel) -> None:
-    """Take what acts between two grid points, or between one and the ground."""
+    """Read elements between two grid points, or between one grid point and the ground."""
     for card in model.of("CBUSH"):
         _bush(model, card)
     for card in model.of("CBUSH1D"):
@@ -26,7 +26,7 @@ def read_springs(model: NastranModel) -> None:
 
 
 def springs_to_ground(model: NastranModel) -> None:
-    """Take springs to points that are held in all components and belong to nothing else as elements to the ground."""
+    """Treat springs to points without other elements, which are fixed in all components, as springs to the ground."""
     springs, model.springs = model.springs, []
     attached = model.used_points() | {node for row in model.plain_rows for node, _ in row}
     attached |= {node for _, row in model.rows for node, _ in row}
@@ -50,7 +50,7 @@ def springs_to_ground(model: NastranModel) -> None:
 
 
 def scalar_ends(model: NastranModel, card: Card) -> list[tuple[int, int] | None] | None:
-    """Return (grid point, component) of both ends of a scalar element, None for the ground.
+    """Return (grid point, component) of both ends of a scalar element; None for an end at the ground.
 
     None in place of the list if a point is scalar.
     """
@@ -67,7 +67,7 @@ def scalar_ends(model: NastranModel, card: Card) -> list[tuple[int, int] | None]
 
 
 def skip_scalar_points(model: NastranModel) -> None:
-    """Note and remove elements between scalar points: no grid point moves them, so they are no part of the body."""
+    """Remove elements between scalar points, with a note: no grid point moves them, so they are not in the body."""
     why = "between scalar points, which no grid point moves: no part of the body"
     for kind in ("CELAS", "CDAMP", "CMASS"):
         for name in (f"{kind}1", f"{kind}2"):
@@ -91,7 +91,7 @@ def _is_between_scalar_points(model: NastranModel, card: Card) -> bool:
 
 
 def _ground(model: NastranModel, card: Card, node: int, components: tuple[int, ...], what: str) -> None:
-    """Note an element to the ground: a body is free here, and gets an interface where it would be attached."""
+    """Record an element to the ground as an interface, because the body is free."""
     words = ", ".join(MOTION_COMPONENTS[c] for c in components)
     why = f"ties {words} of grid point {node} to the ground{what}; the body is free here: put it into the system file"
     model.ledger.note(card.name, why)
@@ -99,7 +99,7 @@ def _ground(model: NastranModel, card: Card, node: int, components: tuple[int, .
 
 
 def _axial_damper(model: NastranModel, card: Card) -> None:
-    """CVISC: a damper along and about the line between its grid points."""
+    """Read CVISC: a damper along and about the line between its grid points."""
     number = card.integer(2, card.integer(1))
     for known in model.of("PVISC"):
         for k in (1, 5):
@@ -183,7 +183,7 @@ def _bush_axes(model: NastranModel, card: Card, ends: list[Array]) -> Array | No
 
 
 def _scalar_spring(model: NastranModel, card: Card) -> None:
-    """A spring or damper between the same component of two grid points.
+    """Read a spring or damper between equal components of two grid points.
 
     Two forces along an axis balance only on one line: the points must lie at one place, or apart along this axis. Two
     moments always balance.
@@ -246,7 +246,7 @@ def _without_balance(model: NastranModel, card: Card, ends: list[tuple[int, int]
 
 
 def _bush_1d(model: NastranModel, card: Card) -> None:
-    """CBUSH1D: a spring and damper along the line of its grid points, or along axis x of CID."""
+    """Read CBUSH1D: a spring and damper along the line of its grid points, or along axis x of CID."""
     known = model.property_of(card, "PBUSH1D")
     if known is None:
         model.ledger.refuse("CBUSH1D", f"names PBUSH1D {card.text(2) or card.text(1)}, which is not defined")
@@ -284,7 +284,7 @@ def _axes_along(model: NastranModel, card: Card, field: int | None) -> Array | N
 
 
 def _gap(model: NastranModel, card: Card) -> None:
-    """CGAP: a linear spring of its first state, as in Nastran's linear solutions.
+    """Read CGAP: a linear spring in its initial state, as in linear solutions of Nastran.
 
     Closed (U0 <= 0): KA along x, KT (MU1 KA where it is blank) across. Open: KB along x, 1e-14 KA where it is blank,
     which is none here.

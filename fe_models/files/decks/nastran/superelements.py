@@ -1,4 +1,4 @@
-"""Superelements in one deck: the main bulk data and the section of each BEGIN SUPER become one body.
+"""Superelements in one deck: main bulk data and the section of each BEGIN SUPER become one body.
 
 (1) each section is read with numbers, properties and systems of its own
 (2) a superelement lies as its section says, or where SELOC puts it; SEBULK REPEAT and MIRROR make images of another one
@@ -26,27 +26,27 @@ __all__ = ["MAIN_CARDS", "Superelement", "connect_superelements", "join_superele
 #: distance within which points are one where TOL of SEBULK is blank: our choice of MSC's default, printed as 10E-5;
 #: OptiStruct's guide has 1e-5
 TOLERANCE = 1e-4
-SAME_SHAPE = 1e-4  #: difference of distances of the points of SELOC, relative to the largest
+SAME_SHAPE = 1e-4  #: difference of distances between SELOC points over the largest distance, up to which they agree
 KINDS = ("PRIMARY", "REPEAT", "MIRROR")
-MAIN_CARDS = ("SEBULK", "SELOC", "SEMPLN", "SECONCT", "SEEXCLD")  #: cards that only the main bulk data may hold
+MAIN_CARDS = ("SEBULK", "SELOC", "SEMPLN", "SECONCT", "SEEXCLD")  #: cards that are allowed only in the main bulk data
 #: fields of a deck that are those of its parts, one after another
 JOINED = ("solids", "shells", "lines", "masses", "springs", "rigid", "couplings", "equations", "supports", "rods")
 
-Key = tuple[int, int]  #: superelement, grid point
+Key = tuple[int, int]  #: number of the superelement, and of the grid point
 
 
 @dataclass(frozen=True, eq=False)
 class Superelement:
-    """A superelement: the section that describes it, and where it lies."""
+    """Superelement: the section that describes it, and its position."""
 
     number: int
-    source: int  #: number of the section that describes it; its own one unless it is an image
+    source: int  #: number of the section that describes it: its own, or another one if it is an image
     motion: Motion
-    tolerance: float | None  #: TOL of its SEBULK
-    is_automatic: bool  #: whether its boundary is searched, METHOD = AUTO
+    tolerance: float | None  #: value TOL of its SEBULK
+    is_automatic: bool  #: whether its boundary is searched (METHOD = AUTO)
 
     def positions(self, models: Mapping[int, NastranModel]) -> dict[int, Array]:
-        """Return grid point -> position in basic axes."""
+        """Return the position of each grid point in basic axes."""
         return {n: self.motion.point(x) for n, x in models[self.source].points.positions.items()}
 
 
@@ -117,7 +117,7 @@ def _main_point(main: NastranModel, card: Card, field: int) -> Array:
 
 
 def _located(card: Card, main: NastranModel, source: NastranModel, before: Motion) -> Motion:
-    """Return the motion that brings three points of a superelement to three of the main bulk data (SELOC)."""
+    """Return the motion that maps three points of a superelement to three of the main bulk data (SELOC)."""
     here = np.array([before.point(source.point(card, card.integer(k))) for k in (2, 3, 4)])
     there = np.array([_main_point(main, card, k) for k in (5, 6, 7)])
     sides = [np.linalg.norm(each - np.roll(each, 1, axis=0), axis=1) for each in (here, there)]
@@ -138,7 +138,7 @@ def _located(card: Card, main: NastranModel, source: NastranModel, before: Motio
 
 
 def connect_superelements(models: Mapping[int, NastranModel], placed: list[Superelement]) -> dict[Key, Key]:
-    """Step (3): return, for grid points that are one with another, the one that stands for both.
+    """Step (3): return the representative point of each group of connected grid points.
 
     What is held at such a point is held at the one that stands for it.
     """
@@ -175,7 +175,7 @@ def connect_superelements(models: Mapping[int, NastranModel], placed: list[Super
 def _share_supports(
     models: Mapping[int, NastranModel], source: Mapping[int, Superelement], stands: Key, keys: list[Key]
 ) -> None:
-    """Move what is held at a connected point to the one that stands for it."""
+    """Transfer supports at a connected point to its representative."""
     main = models[source[stands[0]].source]
     for number, point in keys:
         if (number, point) == stands:
@@ -194,7 +194,7 @@ def _share_supports(
 
 
 def _pairs_at_one_place(models: Mapping[int, NastranModel], placed: list[Superelement]) -> list[tuple[Key, Key]]:
-    """Return pairs of points of different superelements at one place."""
+    """Return pairs of points of different superelements with the same position."""
     main = models[0]
     left_out: set[tuple[int, int, int | str]] = set()  # superelement, point, the other superelement or ALL
     for card in main.of("SEEXCLD"):
@@ -222,7 +222,7 @@ def _pairs_at_one_place(models: Mapping[int, NastranModel], placed: list[Superel
 
 
 def _named_pairs(models: Mapping[int, NastranModel], placed: list[Superelement]) -> list[tuple[Key, Key]]:
-    """Return the pairs of SECONCT, whose points have to lie at one place."""
+    """Return the pairs of SECONCT, whose points must have the same position."""
     main, known = models[0], {each.number: each for each in placed}
     pairs = []
     for card in main.of("SECONCT"):
@@ -262,7 +262,7 @@ def join_superelements(
 
 
 def _joined_mesh(parts: list[Deck], placed: list[Superelement], connected: dict[Key, Key]) -> RawMesh:
-    """Return nodes, cells and groups of all superelements; connected points are one node.
+    """Return nodes, cells and groups of all superelements; connected points become one node.
 
     Where numbers repeat, those of the k-th superelement have k times a power of ten added.
     """
@@ -299,7 +299,7 @@ def _joined_mesh(parts: list[Deck], placed: list[Superelement], connected: dict[
 
 
 def _joined_loads(parts: list[Deck], main: NastranModel) -> tuple[Load, ...]:
-    """Return the loads of all parts: forces of one set are one load; gravity only where all parts have the same."""
+    """Return the loads of all parts: forces of the same set form one load; gravity must be equal in all parts."""
     made: dict[str, Load] = {}
     for part in parts:
         for load in part.loads:

@@ -1,4 +1,4 @@
-"""Supports of a deck of Nastran: they become interfaces; a deck that holds all points in a plane is planar."""
+"""Supports of a Nastran deck become interfaces; a deck that fixes all points in a plane is planar."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ JOINING = {"CROD": 2, "CTUBE": 2, "CSHEAR": 4, "CBEND": 2}
 
 
 def hold_points(model: NastranModel, *, find_plane: bool = True) -> None:
-    """Read SPC, SPC1, PS and GRDSET as held components of grid points, and find the plane of a planar deck.
+    """Read SPC, SPC1, PS and GRDSET as fixed components of grid points, and find the plane of a planar deck.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def hold_points(model: NastranModel, *, find_plane: bool = True) -> None:
 
 
 def _find_plane(model: NastranModel) -> None:
-    """Find the plane in which a deck holds all points of its elements, and remove the supports that hold them in it.
+    """Find the plane in which a deck fixes all element points, and remove the supports that define it.
 
     A point is held in a plane if its translation along the normal and its rotations about the other two axes are held.
     The remaining supports hold the body, or hold the rotation in the plane, for which membranes have no stiffness.
@@ -82,25 +82,25 @@ def _find_plane(model: NastranModel) -> None:
 
 
 def _across(model: NastranModel, node: int, normal: int) -> int:
-    """Return the displacement axis of a point that is nearest to an axis of the basic system."""
+    """Return the displacement axis of a point that is closest to an axis of the basic system."""
     return int(np.argmax(np.abs(model.axes(node)[normal])))
 
 
 def _holds(model: NastranModel, node: int, normal: int) -> bool:
-    """Whether a point is held in the plane across an axis of the basic system."""
+    """Return whether a point is fixed in the plane normal to an axis of the basic system."""
     own = _across(model, node, normal)
     out = {own, *(3 + k for k in range(3) if k != own)}
     return abs(model.axes(node)[normal, own]) > 1 - ALONG and out <= model.held.get(node, set())
 
 
 def in_basic(model: NastranModel, nodes: list[int], components: tuple[int, ...]) -> bool:
-    """Whether components along the axes of these points are those along basic axes."""
+    """Return whether components in the axes of these points equal components in basic axes."""
     whole = all(set(part) <= set(components) or not set(part) & set(components) for part in (ALL[:3], ALL[3:]))
     return whole or all(node not in model.points.axes for node in nodes)
 
 
 def selected_sets(model: NastranModel, kind: str) -> set[int] | None:
-    """Return the sets of SPC or MPC that the case control selects, those of SPCADD and MPCADD written out.
+    """Return the sets of SPC or MPC that the case control selects, with SPCADD and MPCADD expanded.
 
     None: the deck has no case control, and all sets are used. A body has one set of equations. Subcases with different
     sets of equations are therefore refused.
@@ -122,7 +122,7 @@ def selected_sets(model: NastranModel, kind: str) -> set[int] | None:
 
 
 def make_supports(model: NastranModel) -> None:
-    """Make interfaces of supports, of the boundary of a superelement, and of elements to the ground."""
+    """Make interfaces from supports, from the boundary of a superelement, and from elements to the ground."""
     held = model.held
     _groups_of(model, held, "support")
     boundary: dict[int, set[int]] = {}
@@ -139,7 +139,7 @@ def make_supports(model: NastranModel) -> None:
 
 
 def _groups_of(model: NastranModel, held: dict[int, set[int]], what: str) -> None:
-    """Make one support for each set of components and, where they matter, axes. A grid point is in one support."""
+    """Make a support for each set of components and, if relevant, axes. A grid point is in one support."""
     if not held:
         return
     card = model.cards["GRID"][0]

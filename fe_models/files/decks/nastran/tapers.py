@@ -1,4 +1,4 @@
-"""Tapered beams of Nastran: pieces of one section each, the mean of the taper over the piece."""
+"""Tapered beams of Nastran, divided into pieces whose section is the mean of the taper."""
 
 from dataclasses import dataclass
 
@@ -12,33 +12,33 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["N_PIECES", "cut_tapers"]
 
-N_PIECES = 12  #: of a tapered beam
+N_PIECES = 12  #: number of pieces of a tapered beam
 YES = ("YES", "YESA", "NO")
-FIRST = 3  #: field of the area of a PBEAM
-ALIKE = 1e-12  #: part of a size below which stations do not differ in it
-SIZES = 6  #: A, I1, I2, I12, J, NSM
-TORSION = 4  #: place of J among them
+FIRST = 3  #: field number of the area of a PBEAM
+ALIKE = 1e-12  #: relative difference of a section property up to which stations are equal
+SIZES = 6  #: number of section properties: A, I1, I2, I12, J, NSM
+TORSION = 4  #: index of J among them
 
 
 @dataclass(frozen=True)
 class Taper:
-    """What varies along a beam, linearly between its stations."""
+    """Section properties that vary linearly between stations along a beam."""
 
-    places: Array  #: x/L of the stations, (n,), rising from 0 to 1
-    sizes: Array  #: (n, n_sizes): A, I1, I2, I12, J, NSM of a PBEAM; dimensions and NSM of a PBEAML
+    places: Array  #: x/L of the stations, (n,), ascending from 0 to 1
+    sizes: Array  #: section properties, (n, n_sizes): A, I1, I2, I12, J, NSM of a PBEAM; dimensions and NSM of a PBEAML
 
     @property
     def is_none(self) -> bool:
-        """Whether all stations are alike."""
+        """Whether all stations are equal."""
         return bool((np.ptp(self.sizes, axis=0) <= ALIKE * np.abs(self.sizes).max(axis=0)).all())
 
     def at(self, x: float) -> Array:
-        """Return the sizes at a place x/L."""
+        """Return the section properties at x/L."""
         return np.array([np.interp(x, self.places, column) for column in self.sizes.T])
 
 
 def cut_tapers(model: NastranModel) -> None:
-    """Cut every tapered beam into pieces between new nodes on the line of its ends, each with a property of its own.
+    """Divide each tapered beam into pieces with separate properties, between new nodes on the line of its ends.
 
     The first piece keeps the number of the beam. Released ends and offsets stay at the ends; the nodes between are on
     the line from one offset end to the other.
@@ -83,7 +83,7 @@ def _property_number(beam: Card) -> int:
 
 
 def _pieces(model: NastranModel, beam: Card, properties: list[int], last: int, released: str) -> list[Card]:
-    """Return the pieces of a beam, from its first to its second end, with further motions released there."""
+    """Return the pieces of a beam, from its first end to its second end, where further motions are released."""
     ends = line_of_ends(model, beam)
     between = [ends[0] + (ends[1] - ends[0]) * k / N_PIECES for k in range(1, N_PIECES)]
     nodes = [beam.integer(3), *(model.new_point(point) for point in between), beam.integer(4)]
@@ -109,7 +109,7 @@ def _pieces(model: NastranModel, beam: Card, properties: list[int], last: int, r
 
 
 def _property(card: Card, number: int, sizes: Array) -> Card:
-    """Return a property of one section; what stands behind the stations of a PBEAM is kept."""
+    """Return a property with one section; fields after the stations of a PBEAM are kept."""
     words = [repr(float(value)) for value in sizes]
     if card.name == "PBEAML":
         return Card(card.name, (str(number), *card.fields[1:8], *words), card.where)
@@ -119,7 +119,7 @@ def _property(card: Card, number: int, sizes: Array) -> Card:
 
 
 def _stations(card: Card) -> tuple[list[int], int]:
-    """Return the first field of each station of a PBEAM, and the field behind them, of K1."""
+    """Return the first field of each station of a PBEAM, and the field K1 after them."""
     found: list[int] = []
     at = 9 if card.text(9).upper() in YES else 17
     while card.text(at).upper() in YES:
@@ -129,7 +129,7 @@ def _stations(card: Card) -> tuple[list[int], int]:
 
 
 def _pbeam_taper(card: Card) -> Taper | None:
-    """Return the taper of a PBEAM; None where it has no stations.
+    """Return the taper of a PBEAM; None if it has no stations.
 
     Blank fields of end B are those of end A, of other stations those between the ends.
     """
@@ -151,7 +151,7 @@ def _pbeam_taper(card: Card) -> Taper | None:
 
 
 def _pbeaml_taper(card: Card) -> Taper | None:
-    """Return the taper of a PBEAML; None where it has no stations, or its shape is not known."""
+    """Return the taper of a PBEAML; None if it has no stations, or if its shape is unknown."""
     n = DIMENSIONS.get(card.text(4).upper(), 0)
     words = list(card.fields[8:])
     first = _numbers(words[: n + 1], [0.0] * (n + 1))

@@ -1,4 +1,4 @@
-"""Welds of Nastran: CWELD with PWELD, a round bar between its piercing points on two patches of shells."""
+"""Welds of Nastran (CWELD with PWELD): a round bar between its piercing points on two shell patches."""
 
 from dataclasses import dataclass, field
 
@@ -16,22 +16,23 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["read_welds"]
 
-CORNERS = {"CTRIA3": 3, "CTRIAR": 3, "CQUAD4": 4, "CQUADR": 4}  #: shells that a patch takes -> corner grids
-INSIDE = 1e-6  #: a piercing point may lie this far outside its patch, in natural coordinates
-CLOSE = 1e-12  #: change of natural coordinates that ends an iteration
-SAME_LENGTH = 1e-3  #: relative difference of the length of a spot weld from half of both thicknesses
-LONGEST, SHORTEST = 5.0, 0.2  #: default of LDMAX and LDMIN
+#: number of corner grids of each shell card that a patch may contain
+CORNERS = {"CTRIA3": 3, "CTRIAR": 3, "CQUAD4": 4, "CQUADR": 4}
+INSIDE = 1e-6  #: largest distance of a piercing point outside its patch, in natural coordinates
+CLOSE = 1e-12  #: change of natural coordinates at which an iteration ends
+SAME_LENGTH = 1e-3  #: relative difference between the length of a spot weld and half of both thicknesses
+LONGEST, SHORTEST = 5.0, 0.2  #: defaults of LDMAX and LDMIN
 
 
 @dataclass(frozen=True)
 class _Patch:
-    """A flat or bilinear patch of three or four corners."""
+    """Flat or bilinear patch with three or four corners."""
 
     grids: tuple[int, ...]
-    corners: Array  #: (n, 3)
+    corners: Array  #: corner positions, (n, 3)
 
     def at(self, place: Array) -> tuple[Array, Array, Array]:
-        """Return N, (n,), its derivatives by natural coordinates, (2, n), and the tangents, (2, 3)."""
+        """Return N, (n,), its derivatives in natural coordinates, (2, n), and the tangents, (2, 3)."""
         r, s = place
         if len(self.grids) == 3:
             N, dN = np.array([1 - r - s, r, s]), np.array([[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])
@@ -41,13 +42,13 @@ class _Patch:
         return N, dN, dN @ self.corners
 
     def has(self, place: Array) -> bool:
-        """Whether natural coordinates lie in the patch."""
+        """Return whether a point, given in natural coordinates, is in the patch."""
         if len(self.grids) == 3:
             return bool(min(*place, 1 - place.sum()) > -INSIDE)
         return bool(np.abs(place).max() < 1 + INSIDE)
 
     def pierce(self, point: Array, along: Array) -> Array | None:
-        """Return the natural coordinates at which a line pierces the patch, (2,), None if there are none in it."""
+        """Return the natural coordinates at which a line pierces the patch, (2,); None if it does not."""
         place, t = np.full(2, 1 / 3) if len(self.grids) == 3 else np.zeros(2), 0.0
         for _ in range(30):
             N, _, tangents = self.at(place)
@@ -61,7 +62,7 @@ class _Patch:
         return None
 
     def foot(self, point: Array) -> Array | None:
-        """Return the natural coordinates of the normal projection of a point, (2,), None if it is not in the patch."""
+        """Return the natural coordinates of the normal projection of a point, (2,); None if it is not in the patch."""
         place: Array | None = np.full(2, 1 / 3) if len(self.grids) == 3 else np.zeros(2)
         for _ in range(100):
             assert place is not None
@@ -72,7 +73,7 @@ class _Patch:
         return None
 
     def motion(self, place: Array, *, rotations: bool = True) -> Array:
-        """Return the motion of a point of the patch by the translations of its corners, (6 or 3, 3 n).
+        """Return the motion of a point of the patch due to translations of its corners, (6 or 3, 3 n).
 
         (1) u = Σ N_i u_i
         (2) theta by Kirchhoff's condition: in axes x, y in the patch and z across it, theta_x = w,y, theta_y = -w,x
@@ -94,15 +95,15 @@ class _Patch:
 
 @dataclass
 class _Shells:
-    """The shells of a deck as patches, by number, property and corner."""
+    """Shells of the deck as patches, by number, property and corner."""
 
     patches: dict[int, _Patch] = field(default_factory=dict)
     cards: dict[int, Card] = field(default_factory=dict)
     by_property: dict[int, list[int]] = field(default_factory=dict)
-    at_corner: dict[tuple[int, int], list[int]] = field(default_factory=dict)  #: property, grid -> shells
+    at_corner: dict[tuple[int, int], list[int]] = field(default_factory=dict)  #: shells by property and corner grid
 
     def beside(self, number: int) -> list[int]:
-        """Return a shell, and the others of its property that share a corner with it."""
+        """Return a shell, and the other shells of its property with a common corner."""
         pid = _property(self.cards[number])
         around = [each for grid in self.patches[number].grids for each in self.at_corner[pid, grid]]
         return list(dict.fromkeys([number, *around]))
@@ -126,7 +127,7 @@ def _shells_of(model: NastranModel) -> _Shells:
 
 
 def read_welds(model: NastranModel) -> None:
-    """Take every CWELD as a massless round bar between two points that follow patches.
+    """Convert each CWELD to a massless round bar between two points that follow patches.
 
     (1) The ends are GA and GB, or else the feet of GS on both patches. Without a patch B, GS is end B.
     (2) GRIDID and ELEMID: an end has the motion of its patch there (`_Patch.motion`).
@@ -144,7 +145,7 @@ def read_welds(model: NastranModel) -> None:
 
 
 def _weld(model: NastranModel, shells: _Shells, card: Card) -> str:
-    """Add a weld; the text says why it cannot be taken."""
+    """Add a weld; return a text with the reason if it cannot be converted."""
     known = model.property_of(card, "PWELD")
     if known is None:
         return f"names PWELD {card.text(2)}, which is not defined"
@@ -184,7 +185,7 @@ def _weld(model: NastranModel, shells: _Shells, card: Card) -> str:
 
 
 def _length_why(model: NastranModel, known: Card, L: float, D: float, thickness: float) -> str:
-    """Return why the length of a weld has two readings, or nothing.
+    """Return why the length of a weld is ambiguous; empty if it is not.
 
     Older versions of Nastran scale the stiffness of a weld shorter or longer than LDMIN D and LDMAX D; newer ones do
     not. A spot weld has half of both thicknesses as its length; its ends are moved, or its stiffness is scaled.
@@ -259,14 +260,14 @@ def _patched_ends(
 
 
 def _arm(r: Array) -> Array:
-    """Return the motion of a point at r from another one by that of the other one, (6, 6)."""
+    """Return the (6, 6) motion of a point at r due to the motion of another point."""
     T = np.eye(6)
     T[:3, 3:] = [[0, r[2], -r[1]], [-r[2], 0, r[0]], [r[1], -r[0], 0]]
     return T
 
 
 def _place(model: NastranModel, card: Card) -> Array | None:
-    """Return the place of a weld: GS, or else GA, or else XS, YS, ZS in basic axes."""
+    """Return the position of a weld: GS, otherwise GA, otherwise XS, YS, ZS in basic axes."""
     for k in (3, 5):
         if card.integer(k, 0):
             return model.point(card, card.integer(k))
@@ -322,7 +323,7 @@ def _patch_at(
 def _mean_of_four(
     shells: _Shells, around: list[int], end: Array, along: Array, D: float
 ) -> tuple[Array, list[int]] | None:
-    """Return the motion of an end by the translations of grid points, (6, 3 n), and the points; (3) of `read_welds`."""
+    """Step (3) of `read_welds`: return the motion of an end due to grid translations, (6, 3 n), and the points."""
     _, y, z = axes_along(along)
     half = np.sqrt(np.pi) * D / 4
     points, parts = [], []
@@ -350,7 +351,7 @@ def _gap(patch: _Patch, place: Array, point: Array) -> float:
 
 
 def _thickness(model: NastranModel, shells: _Shells, around: list[int]) -> float:
-    """Return the thickness of the first of these shells, 0 if there is none."""
+    """Return the thickness of the first of these shells; 0 if there is none."""
     if not around:
         return 0.0
     known = model.property_of(shells.cards[around[0]], "PSHELL", "PCOMP", "PCOMPG")

@@ -1,4 +1,4 @@
-"""Whole decks of Nastran: bulk data with their includes, by the cards of `fe_models.files.bulk_data`."""
+"""Complete decks of Nastran: bulk data with include files, from the cards of `fe_models.files.bulk_data`."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -95,7 +95,7 @@ def _deck(path: Path, model: NastranModel, included: dict[str, str]) -> Deck:
 
 
 def _mesh(model: NastranModel) -> RawMesh:
-    """Return grid points, the elements that have a section, and groups."""
+    """Return the grid points, the elements with a section, and the groups."""
     numbers = np.array(list(model.points.positions), dtype=np.int64)
     place = {int(number): row for row, number in enumerate(numbers)}
     positions = np.array([model.points.positions[int(number)] for number in numbers])
