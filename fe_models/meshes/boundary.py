@@ -1,4 +1,4 @@
-"""The facets of the cells of a solid mesh; those of only one cell are its boundary."""
+"""Facets of the cells of a solid mesh; facets of only one cell form its boundary."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -30,18 +30,19 @@ _TRIANGLES = {
     "quad9": ((0, 4, 8), (4, 1, 8), (1, 5, 8), (5, 2, 8), (2, 6, 8), (6, 3, 8), (3, 7, 8), (7, 0, 8)),
 }  # flat triangles over the nodes of a face, with the orientation of the face
 
-CORNERS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}  #: corner nodes of a face
+#: number of corner nodes of each face type
+CORNERS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
 
 
 class Facets(NamedTuple):
-    """The facets of the cells of a solid mesh, compared by their corner nodes; cells are numbered through all types."""
+    """Facets of the cells of a solid mesh, compared by their corner nodes; cells are numbered over all types."""
 
-    boundary: Mapping[str, IntArray]  #: those of only one cell, as `boundary_facets` returns them
+    boundary: Mapping[str, IntArray]  #: facets of only one cell, as `boundary_facets` returns them
     triangles: IntArray  #: flat triangles over all nodes of the boundary, oriented outward, (n_tri, 3)
     cells: IntArray  #: cell of each triangle, (n_tri,)
     pairs: IntArray  #: cells with a common facet, (n_pairs, 2)
-    n_overlapping: int  #: facets that belong to more than two cells
-    n_mismatched: int  #: pairs whose facets have different middle nodes
+    n_overlapping: int  #: number of facets that belong to more than two cells
+    n_mismatched: int  #: number of cell pairs whose common facets have different middle nodes
 
 
 # facets of meshes that are still in use
@@ -119,7 +120,7 @@ def facets_of(mesh: Mesh) -> Facets:
 
 
 def first_of_equal_rows(rows: IntArray) -> tuple[IntArray, IntArray]:
-    """Return for every row the index of its class of equal rows, (n,), and the size of every class, (n_classes,)."""
+    """Return for each row the index of its class of equal rows, (n,), and the size of each class, (n_classes,)."""
     if len(rows) == 0:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     order = np.lexsort(rows.T[::-1])
@@ -150,7 +151,7 @@ def boundary_triangles(mesh: Mesh) -> IntArray:
 
 
 def facet_weights(nodes: Array, faces: Mapping[str, IntArray]) -> Array:
-    """Return the area of each node, (n_nodes,) [m²]: the integral of its shape function, summed over the faces.
+    """Return the area of each node, (n_nodes,) [m²]: the integral of its shape function over the faces.
 
     The sum is the area of the faces. Corners of flat quadratic triangles get exactly zero. Corners of eight-node quads
     would get a negative share (-1/12 of the face). These faces are distributed with the diagonal of their mass matrix
@@ -187,7 +188,7 @@ def area_centroid(nodes: Array, faces: Mapping[str, IntArray]) -> tuple[float, A
 
 
 def _area_elements(nodes: Array, kind: str, rows: IntArray) -> tuple[Array, Array]:
-    """Return shape functions (n_points, n_local) and weighted area elements (n_faces, n_points)."""
+    """Return shape functions, (n_points, n_local), and weighted area elements, (n_faces, n_points)."""
     points, weights = quadrature(kind)
     N, dN = shape_values(kind, points)
     tangents = np.einsum("fnd,pna->fpad", nodes[rows], dN)

@@ -14,24 +14,24 @@ __all__ = [
 ]  # fmt: skip
 
 
-TIP = 1e-14  #: height below the tip of a pyramid that counts as the tip
+TIP = 1e-14  #: distance below the tip of a pyramid, within which a point counts as the tip
 
 
 @dataclass(frozen=True)
 class CellShape:
     """One cell type: its corners, the corners of its middle nodes, and its polynomial space."""
 
-    name: str  #: meshio name
-    dim: int  #: 3 solid, 2 face
+    name: str  #: meshio name of the cell type
+    dim: int  #: dimension: 3 for a solid, 2 for a face
     corners: tuple[tuple[float, ...], ...]  #: reference coordinates of the corner nodes
-    middles: tuple[tuple[int, ...], ...]  #: for every further node, the corners of which it is the middle
+    middles: tuple[tuple[int, ...], ...]  #: for each further node, the corners whose mean it is
     facets: tuple[tuple[int, ...], ...]  #: corner nodes of each facet, anticlockwise from outside
     #: exponents of the monomials of the shape functions; for pyramids in x, y, 1 - z
     exponents: tuple[tuple[int, ...], ...]
 
     @property
     def is_pyramid(self) -> bool:
-        """Whether its shape functions are rational: polynomials in x/(1 - z), y/(1 - z) and 1 - z."""
+        """Whether the shape functions are rational: polynomials in x/(1 - z), y/(1 - z) and 1 - z."""
         return len(self.corners) == 5
 
     @property
@@ -43,17 +43,17 @@ class CellShape:
 
 
 def _grid(dim: int, order: int) -> tuple[tuple[int, ...], ...]:
-    """Return the exponents of the tensor-product space, each at most `order`."""
+    """Return the exponents of a tensor-product space with each exponent at most `order`."""
     return tuple(tuple(int(i) for i in e) for e in np.ndindex(*(order + 1,) * dim))
 
 
 def _total(dim: int, order: int) -> tuple[tuple[int, ...], ...]:
-    """Return the exponents of the complete space, with sum at most `order`."""
+    """Return the exponents of a complete polynomial space with sums up to `order`."""
     return tuple(e for e in _grid(dim, order) if sum(e) <= order)
 
 
 def _serendipity(dim: int) -> tuple[tuple[int, ...], ...]:
-    """Return the exponents of the quadratic serendipity space: at most one of them is 2."""
+    """Return the exponents of the quadratic serendipity space, in which at most one exponent is 2."""
     return tuple(e for e in _grid(dim, 2) if e.count(2) <= 1)
 
 
@@ -102,12 +102,12 @@ CELL_SHAPES = {
         CellShape("pyramid", 3, _PYRAMID, (), _PYRAMID_FACETS, _PYRAMID5),
         CellShape("pyramid13", 3, _PYRAMID, _PYRAMID_EDGES, _PYRAMID_FACETS, _PYRAMID13),
     )
-}  #: the reference cells are the unit simplex, unit square, unit cube, triangle x interval, and square with tip
+}  #: shape of each cell type; reference cells are unit simplex, square, cube, triangle x interval, square with tip
 
 
 @cache
 def facet_tables(kind: str) -> dict[str, IntArray]:
-    """Return the local nodes of the facets of a solid cell by face type, (n_facets, nodes per facet), outward.
+    """Return the local nodes of the facets of a solid cell, (n_facets, nodes per facet), outward, by face type.
 
     The facets are complete faces in meshio order: corners, then the middles of their edges, then their centre.
     """
@@ -124,7 +124,7 @@ def facet_tables(kind: str) -> dict[str, IntArray]:
 
 
 def shape_values(kind: str, points: Array) -> tuple[Array, Array]:
-    """Return shape functions and their reference gradients at reference points.
+    """Return shape functions and their gradients in reference coordinates, at reference points.
 
     The functions are the nodal basis of the monomials of the cell: N = p(x) V⁻¹, with V the monomials at the nodes.
 
@@ -169,7 +169,7 @@ def _collapsed_monomials(points: Array, exponents: IntArray) -> Array:
 
 @cache
 def quadrature(kind: str) -> tuple[Array, Array]:
-    """Return reference points (n_points, dim) and weights (n_points,), exact for the volume of any cell of this type.
+    """Return reference points, (n_points, dim), and weights, (n_points,), exact for the volume of such a cell.
 
     The Jacobian determinant has degree <= 5 in each direction of a hexahedron (3 Gauss points each), and total degree 3
     in a quadratic tetrahedron. Simplices use the square collapsed onto them, x = 1 - s, y = s t (Gauss points, Jacobian
@@ -250,7 +250,7 @@ SKFEM_ELEMENTS = {
 
 
 def skfem_node_order(kind: str) -> IntArray:
-    """Return, for each meshio node of a cell type, the local number of the same node in scikit-fem, (n_nodes,)."""
+    """Return the local node number in scikit-fem for each meshio node of a cell type, (n_nodes,)."""
     import skfem
 
     positions = np.asarray(getattr(skfem, SKFEM_ELEMENTS[kind])().doflocs)

@@ -17,10 +17,11 @@ class Connectivity:
 
     part_cells: tuple[int, ...]  #: number of cells of each part, largest first; parts have no node in common
     part_node: tuple[int, ...]  #: one node of each part
-    n_facet_parts: int  #: parts without a common facet; more than `part_cells` if parts meet in a node or an edge
-    n_overlapping: int  #: facets that belong to more than two cells
-    n_mismatched: int  #: facets on which two cells meet with different middle nodes
-    n_transitions: int  #: quadrilateral facets that touch a triangular facet of another cell
+    #: number of parts without a common facet; more than `part_cells` if parts meet at a node or an edge
+    n_facet_parts: int
+    n_overlapping: int  #: number of facets that belong to more than two cells
+    n_mismatched: int  #: number of facets on which two cells meet with different middle nodes
+    n_transitions: int  #: number of quadrilateral facets that touch a triangular facet of another cell
 
 
 def connectivity(mesh: Mesh) -> Connectivity:
@@ -61,7 +62,7 @@ def connectivity(mesh: Mesh) -> Connectivity:
 
 
 def _transitions(mesh: Mesh) -> int:
-    """Return how many boundary quadrilaterals contain a boundary triangle of three of their corners."""
+    """Return the number of boundary quadrilaterals that contain a boundary triangle of three of their corners."""
     facets = boundary_facets(mesh)
     triangles = [np.sort(rows[:, :3], axis=1) for kind, rows in facets.items() if CORNERS[kind] == 3]
     quads = [rows[:, :4] for kind, rows in facets.items() if CORNERS[kind] == 4]
@@ -75,7 +76,7 @@ def _transitions(mesh: Mesh) -> int:
 
 
 def coincident_nodes(mesh: Mesh, distance: float) -> IntArray:
-    """Return the used nodes that have another used node within the distance [m], ascending, (n,)."""
+    """Return the used nodes with another used node within the distance [m], ascending, (n,)."""
     from scipy.spatial import cKDTree
 
     nodes = np.flatnonzero(used_nodes(mesh))

@@ -105,7 +105,7 @@ class Mesh:
 
 
 def used_nodes(mesh: Mesh) -> np.ndarray:
-    """Return which nodes belong to a solid cell, (n_nodes,) bool."""
+    """Return whether each node belongs to a solid cell, (n_nodes,) bool."""
     used = np.zeros(len(mesh.nodes), dtype=bool)
     for cells in mesh.cells.values():
         used[cells] = True
@@ -113,7 +113,7 @@ def used_nodes(mesh: Mesh) -> np.ndarray:
 
 
 def drop_unused_nodes(mesh: Mesh) -> Mesh:
-    """Return the mesh without the nodes that belong to no solid cell, with everything renumbered.
+    """Return the mesh without nodes that belong to no solid cell; everything is renumbered.
 
     Faces with such a node are dropped too; groups that become empty are kept. `Mesh.notes` reports the numbers. A mesh
     without unused nodes is returned unchanged.

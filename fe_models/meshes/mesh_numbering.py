@@ -1,4 +1,4 @@
-"""The user's names of nodes, elements and sets of a mesh, as the `Numbering` of the body."""
+"""User's names of nodes, elements and sets of a mesh, as the `Numbering` of the body."""
 
 from collections.abc import Mapping
 
@@ -17,7 +17,7 @@ CellSets = Mapping[str, Mapping[str, IntArray]]
 
 
 def solid_numbering(mesh: Mesh) -> Numbering:
-    """Return the numbering of the body of a solid mesh: its nodes, the cells of the boundary triangles, and the sets.
+    """Return the numbering of the body of a solid mesh: nodes, cells of the boundary triangles, and sets.
 
     Groups of faces become sets of their nodes.
     """
@@ -90,7 +90,7 @@ def skin_flags(n_nodes: int, n_skin: int) -> IntArray:
 
 
 def node_sets(sets: Mapping[str, IntArray], mover: IntArray | None = None, n_nodes: int = 0) -> list[NamedSet]:
-    """Return sets of nodes, including the skin points that their nodes move."""
+    """Return node sets with the skin points that follow their nodes."""
     made = []
     for name, nodes in sets.items():
         members = np.unique(nodes)
@@ -101,7 +101,7 @@ def node_sets(sets: Mapping[str, IntArray], mover: IntArray | None = None, n_nod
 
 
 def cell_sets(sets: CellSets, counts: Mapping[str, int], cell_of: IntArray) -> list[NamedSet]:
-    """Return sets of cells as sets of their triangles; cells are numbered through all types."""
+    """Return sets of cells as sets of their triangles; cells are numbered over all types."""
     first = dict(zip(counts, np.cumsum([0, *counts.values()]), strict=False))
     made = []
     for name, by_type in sets.items():

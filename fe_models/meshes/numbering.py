@@ -19,17 +19,17 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["NONE", "NO_NUMBERS", "NamedSet", "Numbering", "node_place", "numbering_side_by_side"]
 
-NONE = -1  #: marks a node or element without a user number, such as the reference node of an interface
-SHOWN = 3  #: how many of the nearest numbers a message lists
+NONE = -1  #: number of a node or element without user number, such as the reference node of an interface
+SHOWN = 3  #: number of closest user numbers that a message lists
 KINDS = ("nodes", "elements")
-NO_NUMBERS = frozen(np.zeros(0), np.int64)  #: stands for unknown numbers
+NO_NUMBERS = frozen(np.zeros(0), np.int64)  #: empty array for unknown numbers
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class NamedSet:
-    """A set of the user, with the members that the body has kept.
+    """Set of the user, with the members that the body keeps.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ class Numbering:
         return self._name(int(self.nodes[row]), self.node_instance, row)
 
     def called(self, row: int) -> str:
-        """Return the name of a node in messages: its `node_name`, or its row if no node has a number."""
+        """Return the name of a node for messages: its `node_name`, or its row if no node has a number."""
         return self.node_name(int(row)) if self.nodes.size else str(int(row))
 
     def element_name(self, triangle: int) -> str:
@@ -173,7 +173,7 @@ class Numbering:
         return self._found(where, "element", element, self.elements, self.element_instance)
 
     def named_set(self, where: str, name: str) -> NamedSet:
-        """Return the set of that name, node sets first; raise `BodyError` if there is none or it is empty."""
+        """Return the set with this name, node sets first; raise `BodyError` if there is none or it is empty."""
         for kind in KINDS:
             for each in self.sets:
                 if (each.kind, each.name) == (kind, name):
@@ -212,7 +212,7 @@ class Numbering:
         return np.asarray(found)
 
     def _near(self, what: str, number: int, numbers: IntArray, instance: IntArray) -> str:
-        """Describe the range of known numbers, and the nearest ones."""
+        """Describe the range of known numbers, and the closest numbers."""
         rows = np.flatnonzero(numbers != NONE)
         if not rows.size:
             return f": no {what} that is kept has a number"
@@ -231,14 +231,14 @@ class Numbering:
     # Numberings of derived bodies -------------------------------------------------------------------------------------
 
     def with_nodes_added(self, n: int) -> "Numbering":
-        """Return the numbering with n more nodes at the end, which have no user number."""
+        """Return the numbering with n more nodes at the end without user numbers."""
         given = {"nodes": NONE, "on_skin": 0, "node_instance": NONE}
         known = {name: getattr(self, name) for name in given if getattr(self, name).size}
         extended: dict[str, Any] = {name: np.append(a, np.full(n, given[name])) for name, a in known.items()}
         return replace(self, **extended)
 
     def of_rows(self, rows: IntArray, n_nodes: int) -> "Numbering":
-        """Return the numbering of the given rows of n_nodes, in that order, (n,); triangles stay the same.
+        """Return the numbering of the given rows of n_nodes, in this order, (n,); triangles do not change.
 
         Node numbers that equal the indices of the rows are left out.
         """
@@ -350,7 +350,7 @@ def distinguished_instances(
 
 
 def overlap(numberings: Iterable[Numbering], name: str) -> bool:
-    """Whether two of the numberings have a number in common."""
+    """Return whether two of the numberings have a common number."""
     own = [np.unique(a[a != NONE]) for a in (getattr(each, name) for each in numberings)]
     together = np.concatenate([*own, np.zeros(0, np.int64)])
     return len(np.unique(together)) < len(together)

@@ -1,4 +1,4 @@
-"""The same mesh with cells of the next order, and the interpolation from its old nodes to its new nodes."""
+"""Conversion of a mesh to second-order cells, and the interpolation from old nodes to new nodes."""
 
 import numpy as np
 import scipy.sparse as sp
@@ -9,13 +9,13 @@ from fe_models.meshes.mesh import Mesh
 
 __all__ = ["FIRST_ORDER", "quadratic_mesh", "tetrahedra_of"]
 
-FIRST_ORDER = ("tetra", "hexahedron", "wedge", "pyramid")  #: solid cells with corner nodes only
+FIRST_ORDER = ("tetra", "hexahedron", "wedge", "pyramid")  #: solid cell types with corner nodes only
 #: raised cell type, whose field contains that of the first-order cell
 RAISED = {"tetra": "tetra10", "hexahedron": "hexahedron27"}
 
 
 def quadratic_mesh(mesh: Mesh) -> tuple[Mesh, sp.csr_array]:
-    """Return a mesh of tetrahedra or bricks with middle nodes added on straight edges.
+    """Return a mesh of tetrahedra or bricks with middle nodes on straight edges.
 
     Returns
     -------

@@ -13,7 +13,7 @@ __all__ = ["DIVIDED", "refined_mesh"]
 
 #: cells that can be divided: tetrahedra and bricks of any order
 DIVIDED = tuple(name for name, shape in CELL_SHAPES.items() if shape.dim == 3 and len(shape.corners) in (4, 8))
-PARTS = 64  #: corner weights are whole multiples of 1/64, at a quarter of each direction
+PARTS = 64  #: corner weights are integer multiples of 1/64: a quarter in each direction
 
 
 def refined_mesh(mesh: Mesh) -> Mesh:
@@ -61,7 +61,7 @@ def refined_mesh(mesh: Mesh) -> Mesh:
 
 @cache
 def division(kind: str) -> tuple[IntArray, Array, IntArray]:
-    """Return the subdivision of a cell type.
+    """Return the subdivision of a cell type into eight cells.
 
     Returns
     -------
@@ -90,7 +90,7 @@ def brick_pieces() -> list[Array]:
 
 
 def tetrahedron_pieces() -> list[Array]:
-    """Return the corners of the eight tetrahedra in the unit tetrahedron: four at its corners, four in between."""
+    """Return the corners of the eight tetrahedra in the unit tetrahedron: four at its corners, four between."""
     corners = np.array(CELL_SHAPES["tetra"].corners, dtype=float)
     pieces = [(corner + corners) / 2 for corner in corners]
 

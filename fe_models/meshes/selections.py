@@ -33,7 +33,7 @@ class Selection(Protocol):
     """A rule that selects nodes of a mesh."""
 
     def members(self, mesh: AnyMesh) -> IntArray:
-        """Return the selected nodes, ascending; raise `InterfaceError` if there are none."""
+        """Return the selected nodes, ascending; raise `InterfaceError` if none is selected."""
 
 
 @dataclass(frozen=True)
@@ -293,19 +293,19 @@ class NearestNode:
     point: Vector
 
     def members(self, mesh: AnyMesh) -> IntArray:
-        """Return that node, (1,)."""
+        """Return the selected node, (1,)."""
         surface = candidates(mesh)
         point = _point("nearest node", self.point)
         return surface[[int(np.linalg.norm(mesh.nodes[surface] - point, axis=1).argmin())]]
 
 
 def candidates(mesh: AnyMesh) -> IntArray:
-    """Return the nodes that geometry can select, ascending: surface nodes of a solid, all nodes of any other mesh."""
+    """Return the nodes that geometric selections consider, ascending: surface nodes of a solid, else all nodes."""
     return boundary_nodes(mesh) if isinstance(mesh, Mesh) else np.arange(len(mesh.nodes))
 
 
 def selected_facets(mesh: AnyMesh, selection: Selection) -> dict[str, IntArray]:
-    """Return the facets of a selection by type: those of a face group, else boundary facets with all nodes selected.
+    """Return the facets of a selection by type: of a face group, or boundary facets with all nodes selected.
 
     The facets of a shell are its cells.
     """
@@ -352,7 +352,7 @@ def _require_on_solid(mesh: AnyMesh, what: str, nodes: IntArray) -> None:
 
 
 def _other_kind(mesh: AnyMesh, name: str, wanted: str) -> str:
-    """Say so if the name belongs to another kind of group."""
+    """Return a text if the name belongs to another kind of group."""
     if isinstance(mesh, LineMesh):
         return f" ({name!r} is a group of lines)" if name in mesh.line_sets else ""
     kinds = {"node set": mesh.node_sets} | ({} if isinstance(mesh, NodeCloud) else {"cell group": mesh.cell_sets})

@@ -13,7 +13,7 @@ from fe_models.foundation.records import FrozenMapping, checked_fields, frozen_c
 
 __all__ = ["FLAT_TYPES", "ShellMesh", "flat_plate", "mapped_shell"]
 
-FLAT_TYPES = ("triangle", "quad")  #: meshio names and node order
+FLAT_TYPES = ("triangle", "quad")  #: cell types, with meshio names and node order
 
 
 @presented
@@ -21,7 +21,7 @@ FLAT_TYPES = ("triangle", "quad")  #: meshio names and node order
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class ShellMesh:
-    """Nodes and flat cells of one body; lines between its nodes may stiffen it.
+    """Nodes and flat cells of one body; lines between its nodes may represent stiffeners.
 
     Parameters
     ----------
@@ -116,14 +116,14 @@ class ShellMesh:
         return sum(len(cells) for cells in self.cells.values())
 
     def cell_name(self, kind: str, row: int) -> str:
-        """Return the name of a cell in messages, with its number in the file if it has one."""
+        """Return the name of a cell for messages, with its number in the file if it has one."""
         return f"{kind} {self.cell_numbers[kind][row] if kind in self.cell_numbers else row}"
 
 
 def mapped_shell(
     surface: Callable[[Array, Array], Array], n_u: int, n_v: int, *, kind: str = "quad", name: str = "shell"
 ) -> ShellMesh:
-    """Return a grid of n_u × n_v quads, or twice as many triangles, on a surface over the unit square.
+    """Return a grid of n_u × n_v quads, or twice as many triangles, mapped from the unit square to a surface.
 
     The cells form the group `name`; the nodes of the sides form the node sets "u0", "u1", "v0", "v1". The normal is
     along ∂X/∂u × ∂X/∂v. Diagonals of triangles alternate.

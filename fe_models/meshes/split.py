@@ -55,7 +55,7 @@ class Cut:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class Split(Generic[AnyMesh]):
-    """A mesh in parts along an axis; cut k is between parts k and k + 1, counted from 1.
+    """Mesh in parts along an axis; cut k is between parts k and k + 1, counted from 1.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def cut_name(k: int) -> str:
 def split_mesh(
     mesh: AnyMesh, n: int | None = None, *, at: ArrayLike | None = None, axis: ArrayLike | None = None
 ) -> Split[AnyMesh]:
-    """Divide a mesh into parts along an axis, of equal length or at given positions, by the centres of the cells.
+    """Divide a mesh along an axis, by the cell centres, into parts of equal length or at given positions.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""Cells of foreign meshes: node orders, cells by shape, and one mesh as a file or an object gives it."""
+"""Cells of meshes from files and other libraries: node orders, and cells by shape."""

@@ -1,4 +1,4 @@
-"""The lines of a mesh file as the mesh of a frame."""
+"""Conversion of the lines in a mesh file to the mesh of a frame."""
 
 from pathlib import Path
 
@@ -82,7 +82,7 @@ def line_mesh_from_raw(raw: RawMesh, path: Path, digest: str, groups: tuple[str,
 def collect_lines(
     where: str, blocks: list[RawBlock], raw: RawMesh, notes: list[str]
 ) -> tuple[IntArray, dict[str, IntArray], IntArray]:
-    """Return the lines of two nodes, (n_lines, 2), those of three as two each, group -> rows of them, and numbers."""
+    """Return lines with two nodes, (n_lines, 2), rows of each group, and numbers; three-node lines are divided."""
     halves = [_two_nodes(block) for block in blocks if block.kind in ("line", "line3")]
     cells, sets, numbers = collect_cells(where, halves, ("line",), raw.repeats_are_memberships, notes)
     line_sets = {group: by_type["line"] for group, by_type in sets.items()}
@@ -90,7 +90,7 @@ def collect_lines(
 
 
 def _two_nodes(block: RawBlock) -> RawBlock:
-    """Return lines of three nodes (ends, middle) as two lines each, the halves side by side in every group."""
+    """Return three-node lines (ends, middle) as two lines each; both halves are adjacent in every group."""
     if block.kind == "line":
         return block
     first, second, middle = block.nodes.T

@@ -1,4 +1,4 @@
-"""What a file says, before it is judged: blocks of cells of any type with their groups; and the judgement."""
+"""Unchecked content of a mesh file: blocks of cells of any type with their groups; and the checks."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -28,36 +28,37 @@ __all__ = [
 ]
 
 
-LINES = ("vertex", "line", "line3", "line4")  #: cells below two dimensions: they select nodes
+LINES = ("vertex", "line", "line3", "line4")  #: cell types below two dimensions, which only select nodes
 
 
 @dataclass(frozen=True, eq=False)
 class RawBlock:
     """Cells of one type, as listed in a file."""
 
-    kind: str  #: meshio name where there is one, else the name in the file
-    nodes: IntArray  #: indices of nodes, (n_cells, nodes per cell), meshio order
-    groups: Mapping[str, IntArray] = field(default_factory=dict)  #: group -> rows of this block
+    kind: str  #: meshio name of the cell type, or its name in the file if meshio has none
+    nodes: IntArray  #: node indices in meshio order, (n_cells, nodes per cell)
+    groups: Mapping[str, IntArray] = field(default_factory=dict)  #: rows of this block in each group
     numbers: IntArray | None = None  #: numbers of the cells in the file, (n_cells,)
 
 
 @dataclass(frozen=True, eq=False)
 class RawMesh:
-    """Nodes and blocks of a file."""
+    """Nodes and cell blocks of a file."""
 
-    nodes: Array  #: (n_nodes, 3)
+    nodes: Array  #: node positions, (n_nodes, 3)
     blocks: tuple[RawBlock, ...]
     node_sets: Mapping[str, IntArray] = field(default_factory=dict)
-    node_numbers: IntArray | None = None  #: numbers of the nodes in the file, (n_nodes,)
-    repeats_are_memberships: bool = False  #: Gmsh 2.2 lists a cell once for every group it is in
+    node_numbers: IntArray | None = None  #: node numbers in the file, (n_nodes,)
+    repeats_are_memberships: bool = False  #: whether a repeated cell only adds a group to it, as in Gmsh 2.2
     notes: tuple[str, ...] = ()
-    instances: tuple[str, ...] = ()  #: of a deck that repeats numbers: the k-th has k `instance_step` added to them
-    instance_step: int = 0  #: 0: numbers are those of the deck
-    included: Mapping[str, str] = field(default_factory=dict)  #: files that the file includes -> their sha256
+    #: instances in a deck with repeated numbers; numbers of the k-th are increased by k `instance_step`
+    instances: tuple[str, ...] = ()
+    instance_step: int = 0  #: step between numbers of instances; 0: numbers are those of the deck
+    included: Mapping[str, str] = field(default_factory=dict)  #: sha256 of each file that the file includes
 
 
 def mesh_from_raw(raw: RawMesh, path: Path, digest: str) -> Mesh:
-    """Return the mesh of a file, or say what is wrong with it.
+    """Return the mesh of a file after checks; raise an error that describes what is wrong.
 
     Parameters
     ----------
@@ -111,7 +112,7 @@ def mesh_from_raw(raw: RawMesh, path: Path, digest: str) -> Mesh:
 
 
 def chosen_cells(raw: RawMesh, kinds: tuple[str, ...], groups: tuple[str, ...] | None) -> RawMesh:
-    """Return a mesh with the cells of some kinds and groups only, beside faces that select; its nodes all stay.
+    """Return a mesh with only some cell types and groups, and the faces that select; all nodes remain.
 
     Parameters
     ----------
@@ -138,7 +139,7 @@ def chosen_cells(raw: RawMesh, kinds: tuple[str, ...], groups: tuple[str, ...] |
 
 
 def require_nodes(where: str, raw: RawMesh) -> tuple[Array, list[RawBlock]]:
-    """Return nodes and blocks that hold cells, after checking that coordinates are numbers and nodes are there."""
+    """Return nodes and non-empty blocks, after checking that there are nodes and that coordinates are finite."""
     nodes = np.asarray(raw.nodes, dtype=float)
     if nodes.ndim != 2 or len(nodes) == 0:
         raise MeshError(f"{where}: expected nodes, got none; is the file complete?")
@@ -182,7 +183,7 @@ def _number(block: RawBlock, row: int) -> str:
 def collect_cells(
     where: str, blocks: list[RawBlock], kinds: tuple[str, ...], repeats_allowed: bool, notes: list[str]
 ) -> tuple[dict[str, IntArray], dict[str, dict[str, IntArray]], dict[str, IntArray]]:
-    """Join the blocks of each kind, drop repeats, and renumber the groups."""
+    """Join the blocks of each cell type, drop repeated cells, and renumber the groups."""
     cells: dict[str, IntArray] = {}
     sets: dict[str, dict[str, IntArray]] = {}
     numbers: dict[str, IntArray] = {}
@@ -216,7 +217,7 @@ def collect_cells(
 def _without_repeats(
     where: str, kind: str, rows: IntArray, names: IntArray, allowed: bool
 ) -> tuple[IntArray, IntArray]:
-    """Return the rows to keep, (n_kept,), and for every row its place among them, (n_rows,)."""
+    """Return the rows to keep, (n_kept,), and the position of each row among them, (n_rows,)."""
     classes, count = first_of_equal_rows(np.sort(rows, axis=1))
     if len(count) == len(rows):
         everything = np.arange(len(rows))
@@ -250,7 +251,7 @@ _REFLECTED_CORNERS = {
     "pyramid": (0, 3, 2, 1, 4),
     "pyramid13": (0, 3, 2, 1, 4),
 }
-_CHUNK = 20_000  #: cells judged at a time, so that a million dofs need 100 MB
+_CHUNK = 20_000  #: number of cells that are checked at a time, so that a million dofs need 100 MB
 
 
 def require_node_order(where: str, kind: str, nodes: Array, cells: IntArray) -> None:
@@ -295,7 +296,7 @@ def _numbers(local: tuple[int, ...]) -> str:
 
 
 def mirrored_order(kind: str) -> IntArray:
-    """Return the local node order that turns a cell inside out and keeps middles between their corners, (n_nodes,)."""
+    """Return the local node order that reverses the orientation of a cell, (n_nodes,), with valid middle nodes."""
     corners = _REFLECTED_CORNERS[kind]
     n_corners = len(corners)
     place = {frozenset(parents): n_corners + k for k, parents in enumerate(CELL_SHAPES[kind].middles)}
@@ -304,12 +305,12 @@ def mirrored_order(kind: str) -> IntArray:
 
 
 def mirrored_cells(kind: str, nodes: Array, cells: IntArray) -> bool:
-    """Whether every cell is numbered inside out: a negative Jacobian at the middle of all of them."""
+    """Return whether every cell is numbered inside out: its Jacobian at the centre is negative."""
     return bool(_is_mirrored(kind, nodes, cells).all())
 
 
 def turned_upright(kind: str, nodes: Array, cells: IntArray) -> IntArray:
-    """Return the cells, each that is numbered inside out turned: for programs to which both senses are one."""
+    """Return the cells with inverted ones reversed, for programs that accept both orientations."""
     upright = cells.copy()
     for start in range(0, len(cells), _CHUNK):
         rows = start + np.flatnonzero(_is_mirrored(kind, nodes, cells[start : start + _CHUNK]))
@@ -318,7 +319,7 @@ def turned_upright(kind: str, nodes: Array, cells: IntArray) -> IntArray:
 
 
 def _is_mirrored(kind: str, nodes: Array, cells: IntArray) -> np.ndarray:
-    """Whether the Jacobian at the middle of each cell is negative, (n_cells,) bool."""
+    """Return whether the Jacobian at the centre of each cell is negative, (n_cells,) bool."""
     middle = CELL_SHAPES[kind].nodes[: len(CELL_SHAPES[kind].corners)].mean(axis=0)[None]
     return np.asarray(cell_jacobians(kind, nodes[cells], middle)[:, 0] < 0)
 
@@ -327,7 +328,7 @@ def _is_mirrored(kind: str, nodes: Array, cells: IntArray) -> np.ndarray:
 
 
 def groups_apart(raw: RawMesh, kinds: Iterable[str], groups: Iterable[str]) -> list[tuple[str, ...]]:
-    """Split groups, in their order, into parts without two cells on the same nodes: one part if no cell is doubled.
+    """Split groups, in their order, into parts without two cells on the same nodes; one part if none is doubled.
 
     Each group goes to the first part that it fits. Cells of one group on the same nodes stay together: they are a
     fault, or one cell that is listed twice.
@@ -357,7 +358,7 @@ def groups_apart(raw: RawMesh, kinds: Iterable[str], groups: Iterable[str]) -> l
 
 
 def _doubled(raw: RawMesh, kinds: tuple[str, ...]) -> list[IntArray]:
-    """Return for each block the number of the place of each cell that shares its nodes with another, -1 for others."""
+    """Return for each cell of each block the number of its node set if it is shared with another cell; else -1."""
     found = [np.full(len(block.nodes), -1) for block in raw.blocks]
     first = 0
     for kind in kinds:

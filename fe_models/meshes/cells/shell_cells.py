@@ -1,4 +1,4 @@
-"""The triangles and quads of a mesh file as the mesh of a shell."""
+"""Conversion of triangles and quads in a mesh file to the mesh of a shell."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -14,14 +14,14 @@ from fe_models.meshes.shell_mesh import FLAT_TYPES, ShellMesh
 
 __all__ = ["SHELL_TYPES", "shell_mesh_from_raw", "with_centres"]
 
-SHELL_TYPES = ("triangle", "triangle6", "quad", "quad8", "quad9")  #: cells that can be shells
+SHELL_TYPES = ("triangle", "triangle6", "quad", "quad8", "quad9")  #: cell types that can be shells
 
 _PARTS: dict[str, tuple[str, list[tuple[int, ...]]]] = {
     "triangle": ("triangle", [(0, 1, 2)]),
     "quad": ("quad", [(0, 1, 2, 3)]),
     "triangle6": ("triangle", [(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)]),
     "quad9": ("quad", [(0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3)]),
-}  #: type in the file -> type and nodes of its flat parts
+}  #: type and nodes of the flat parts of each cell type in the file
 _LOWER = ("vertex", "line", "line3", "line4")
 
 
@@ -105,7 +105,7 @@ def shell_mesh_from_raw(
 
 
 def with_centres(raw: RawMesh) -> RawMesh:
-    """Return a mesh whose quads of eight nodes have a ninth, where the quadratic field has its middle.
+    """Return a mesh in which quads with eight nodes get a ninth node at the middle of the quadratic field.
 
     The new nodes come last, with the number -1: the file does not number them.
     """
@@ -126,7 +126,7 @@ def with_centres(raw: RawMesh) -> RawMesh:
 
 
 def _flat_parts(block: RawBlock) -> RawBlock:
-    """Return a block as flat cells, the parts of a cell side by side in every group."""
+    """Return a block as flat cells; the parts of a cell are adjacent in every group."""
     kind, parts = _PARTS[block.kind]
     n = len(parts)
     cells: IntArray = np.asarray(block.nodes)[:, np.array(parts)].reshape(-1, len(parts[0]))
@@ -141,7 +141,7 @@ def _only(
     sets: dict[str, dict[str, IntArray]],
     numbers: dict[str, IntArray],
 ) -> tuple[dict[str, IntArray], dict[str, dict[str, IntArray]], dict[str, IntArray]]:
-    """Keep the cells of some groups only."""
+    """Keep only the cells of some groups."""
     unknown = [group for group in groups if group not in sets]
     if unknown:
         raise MeshError(f"{where}: no group of triangles or quads {unknown[0]!r}{nearest(unknown[0], sets)}")

@@ -1,1 +1,1 @@
-"""Meshes of other Python libraries, taken as objects: meshio, pyvista, scikit-fem."""
+"""Mesh objects of other Python libraries: meshio, pyvista, scikit-fem."""

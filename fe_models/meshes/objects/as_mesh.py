@@ -1,4 +1,4 @@
-"""One door for meshes of other Python libraries: told by their class, none of them imported here."""
+"""Conversion of mesh objects of other Python libraries, recognised by class without importing the libraries."""
 
 from pathlib import Path
 from typing import Any
@@ -78,11 +78,11 @@ KNOWN = {
     ("pyvista", "UnstructuredGrid"): raw_from_pyvista,
     ("skfem", "AbstractBasis"): raw_from_basis,
     ("skfem", "Mesh"): raw_from_skfem,
-}  #: library and class, or base class -> what it says
+}  #: reader of each class or base class, by library and class name
 
 
 def as_mesh(mesh_like: Any) -> Mesh:
-    """Return the solid mesh that an object is: one of ours as it is, or of meshio, pyvista or scikit-fem.
+    """Return a solid mesh from an object: a `Mesh` unchanged, or one of meshio, pyvista or scikit-fem converted.
 
     Parameters
     ----------
@@ -101,12 +101,12 @@ def as_mesh(mesh_like: Any) -> Mesh:
 
 
 def selectable(mesh_like: Any) -> Mesh | ShellMesh | LineMesh | NodeCloud:
-    """Return a mesh or nodes on which selections choose: ours as they are, of other libraries their solid mesh."""
+    """Return a mesh or nodes for selections: objects of this package unchanged, others as their solid mesh."""
     return mesh_like if isinstance(mesh_like, Mesh | ShellMesh | LineMesh | NodeCloud) else as_mesh(mesh_like)
 
 
 def as_shell_mesh(mesh_like: Any) -> ShellMesh:
-    """Return the mesh of all triangles and quads of an object, as `as_mesh`; `MeshTri1`, `MeshQuad1` lie at z = 0.
+    """Return the mesh of all triangles and quads of an object; `MeshTri1`, `MeshQuad1` are at z = 0.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def as_shell_mesh(mesh_like: Any) -> ShellMesh:
 
 
 def as_line_mesh(mesh_like: Any) -> LineMesh:
-    """Return the mesh of all lines of an object, as `as_mesh`.
+    """Return the mesh of all lines of an object.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def as_line_mesh(mesh_like: Any) -> LineMesh:
 
 
 def _said(mesh_like: Any) -> tuple[RawMesh, Path, str]:
-    """Return what an object says, a name for messages, and no digest."""
+    """Return the raw mesh of an object, a name for messages, and no digest."""
     bases = [(base.__module__.partition(".")[0], base.__name__) for base in type(mesh_like).__mro__]
     for base in bases:
         if base in KNOWN:

@@ -1,4 +1,4 @@
-"""What a `meshio.Mesh` says: its cells; named sets and whole-number data become groups."""
+"""Content of a `meshio.Mesh`: its cells; named sets and integer data become groups."""
 
 from typing import Any
 
@@ -9,9 +9,9 @@ from fe_models.meshes.cells.raw_mesh import RawBlock, RawMesh, mirrored_cells, m
 
 __all__ = ["CELL_NUMBERS", "NODE_NUMBERS", "groups_of_values", "numbers_among", "raw_from_meshio", "upright_wedges"]
 
-NODE_NUMBERS = ("node", "node_id", "GlobalNodeId")  #: point data that are numbers of nodes
-CELL_NUMBERS = ("element", "element_id", "GlobalElementId")  #: cell data that are numbers of cells
-MOST_GROUPS = 1000  #: cell data with more distinct values are numbers of cells, not groups
+NODE_NUMBERS = ("node", "node_id", "GlobalNodeId")  #: names of point data that contain node numbers
+CELL_NUMBERS = ("element", "element_id", "GlobalElementId")  #: names of cell data that contain cell numbers
+MOST_GROUPS = 1000  #: number of distinct values above which cell data are cell numbers, not groups
 
 
 def raw_from_meshio(mesh: Any) -> RawMesh:
@@ -58,7 +58,7 @@ def numbers_of_cells(mesh: Any) -> list[IntArray] | None:
 
 
 def numbers_among(data: Any, names: tuple[str, ...], n: int) -> IntArray | None:
-    """Return the first of these arrays that numbers n things: a whole number from 0 for each, no two the same."""
+    """Return the first of these arrays that can number n things: distinct nonnegative integers."""
     for name in names:
         values = np.asarray(data[name]).reshape(-1) if name in data else np.zeros(0)
         if values.size == n and n and values.dtype.kind in "iu" and values.min() >= 0 and len(np.unique(values)) == n:
@@ -67,7 +67,7 @@ def numbers_among(data: Any, names: tuple[str, ...], n: int) -> IntArray | None:
 
 
 def upright_wedges(kind: str, nodes: Array, cells: IntArray) -> IntArray:
-    """Return the cells; linear wedges that are inside out in VTK's own definition are turned."""
+    """Return the cells; linear wedges that are inverted by the definition of VTK are reversed."""
     inside = cells.size and cells.min() >= 0 and cells.max() < len(nodes)
     if kind == "wedge" and inside and np.isfinite(nodes).all() and mirrored_cells("wedge", nodes, cells):
         return np.asarray(cells[:, mirrored_order("wedge")])
@@ -75,7 +75,7 @@ def upright_wedges(kind: str, nodes: Array, cells: IntArray) -> IntArray:
 
 
 def groups_of_values(name: str, values: np.ndarray) -> dict[str, IntArray]:
-    """Return group -> rows for whole-number data, one group for each value."""
+    """Return the rows of each group for integer data, with one group for each value."""
     if values.ndim == 2 and values.shape[1] == 1:
         values = values[:, 0]
     if values.ndim != 1 or values.dtype.kind not in "iub":

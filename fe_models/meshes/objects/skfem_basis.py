@@ -1,4 +1,4 @@
-"""The nodes behind a vector basis of scikit-fem: which dof is which component of which node."""
+"""Nodes of a vector basis of scikit-fem: node and component of each dof."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -12,21 +12,21 @@ from fe_models.meshes.objects.skfem_mesh import SOLID_KINDS, raw_from_cells
 
 __all__ = ["BasisNodes", "nodes_of_basis", "raw_from_basis"]
 
-COMPARED = 8  #: cells in which shape functions are compared
+COMPARED = 8  #: number of cells in which shape functions are compared
 SAME = 1e-12  #: largest difference between equal shape functions, and of exact sums
 
 
 @dataclass(frozen=True, eq=False)
 class BasisNodes:
-    """Nodes and dofs of a basis whose dofs are values of one component at a point."""
+    """Nodes and dofs of a basis in which each dof is the value of one component at a point."""
 
-    nodes: Array  #: (n_nodes, 3)
-    dofs: IntArray  #: node and component of every dof of the basis, (N, 2)
+    nodes: Array  #: node positions, (n_nodes, 3)
+    dofs: IntArray  #: node and component of each dof of the basis, (N, 2)
     cells: IntArray  #: nodes of each cell in the order of the scalar element, (n_cells, n)
 
 
 def nodes_of_basis(basis: Any) -> BasisNodes:
-    """Return the nodes of a basis, found and checked by its shape functions, whatever the element is called.
+    """Return the nodes of a basis, which its shape functions determine, whatever the name of the element.
 
     (1) each shape function must have one component that is not zero, the same in all cells;
     (2) functions of equal values belong to one node, three to each;
@@ -80,7 +80,7 @@ def nodes_of_basis(basis: Any) -> BasisNodes:
 
 
 def _require_nodal(where: str, basis: Any, scalars: list[Array], of_component: IntArray, places: Array) -> None:
-    """Step (3); places: of the nodes of each cell, (n, n_cells, 3)."""
+    """Step (3): check the nodal basis; places: positions of the nodes of each cell, (n, n_cells, 3)."""
     phi = np.array([scalars[k] for k in of_component[:, 0]])
     x = np.asarray(basis.global_coordinates())
     size = float(np.ptp(x.reshape(3, -1), axis=1).max())

@@ -1,4 +1,4 @@
-"""What a mesh of scikit-fem says, or a basis on it: cells, named subdomains and boundaries."""
+"""Content of a scikit-fem mesh, or of a basis on it: cells, named subdomains and boundaries."""
 
 from typing import Any
 
@@ -39,7 +39,7 @@ def raw_from_skfem(mesh: Any) -> RawMesh:
 
 
 def raw_from_cells(mesh: Any, element: str, nodes: Array, cells: IntArray, of_vertex: IntArray) -> RawMesh:
-    """Return the raw mesh of cells in scikit-fem's order with the groups of a mesh.
+    """Return the raw mesh of cells in scikit-fem's order, with the groups of a mesh.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def raw_from_cells(mesh: Any, element: str, nodes: Array, cells: IntArray, of_ve
 
 
 def _faces(nodes: Array, facets: IntArray) -> dict[str, IntArray]:
-    """Return triangles and quads; corners of quads in turn, triangles among four columns repeat a node or hold -1."""
+    """Return triangles and quads, with quad corners in sequence; triangles in four columns repeat a node or have -1."""
     if facets.shape[1] == 3:
         return {"triangle": facets}
     ordered = np.sort(facets, axis=1)
