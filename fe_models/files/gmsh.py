@@ -337,7 +337,7 @@ def _runs_text(where: str, text: bytes, count: int) -> list[tuple[int, int, IntA
 
 
 def _runs_binary(where: str, data: bytes, at: int, count: int) -> list[tuple[int, int, IntArray]]:
-    """Return the same of a binary section: heads (type, cells that follow, number of tags), each with its rows."""
+    """Return the runs in a binary section: heads (type, number of cells, number of tags), each with its rows."""
     source = _Binary(data, at, f"{where}: section $Elements")
     tables: dict[tuple[int, int], list[IntArray]] = {}
     found = 0

@@ -104,7 +104,7 @@ def _oriented(kind: str, nodes: np.ndarray, cells: IntArray) -> IntArray:
 
 
 def _family_names(families: Any) -> dict[int, list[str]]:
-    """Return family number -> names of its groups (80 characters each)."""
+    """Return the names of the groups (80 characters each) of each family number."""
     names = {}
     for family in families.values():
         if "GRO" in family:
@@ -119,7 +119,7 @@ def _family_names(families: Any) -> dict[int, list[str]]:
 
 
 def _members(tags: np.ndarray, names: dict[int, list[str]]) -> dict[str, IntArray]:
-    """Return group -> members, from the family of each."""
+    """Return the members of each group, from the family of each node or cell."""
     groups: dict[str, list[IntArray]] = {}
     for tag in np.unique(tags):
         for name in names.get(int(tag), []):

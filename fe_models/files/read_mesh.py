@@ -1,4 +1,4 @@
-"""One door for mesh files: the format by its suffix, one error for everything that can be wrong with a file."""
+"""Reading of mesh files: the suffix selects the format, and all faults of a file raise the same error."""
 
 from collections.abc import Callable, Iterable
 from hashlib import sha256
@@ -95,7 +95,7 @@ MESH_FORMATS: dict[str, tuple[str, Callable[[Path, bytes], RawMesh]]] = {
     ".blk": ("Nastran", read_nastran),
     ".bulk": ("Nastran", read_nastran),
     ".med": ("MED", read_med),
-}  #: suffix -> format and its reader (path, content)
+}  #: format and reader (path, content) for each suffix
 
 
 def read_mesh(path: str | Path) -> Mesh:
@@ -125,7 +125,7 @@ def read_mesh(path: str | Path) -> Mesh:
 
 
 def read_geometry(path: str | Path) -> Mesh | NodeCloud:
-    """Read nodes, numbers and groups from a deck or mesh beside matrices, by the readers of meshes and whole decks.
+    """Read nodes, numbers and groups from a deck or mesh that accompanies matrices.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def read_geometry(path: str | Path) -> Mesh | NodeCloud:
 
 
 def read_line_mesh(path: str | Path, *, groups: Iterable[str] | None = None) -> LineMesh:
-    """Read the lines of a frame from a mesh file, by the same readers as `read_mesh`.
+    """Read the lines of a frame from a mesh file, with the readers of `read_mesh`.
 
     Cells with two nodes, and those with three as two lines, are beams: Gmsh curves, VTK lines, Abaqus B31 and B32,
     Nastran CBAR and CBEAM, MED SE2. Their groups name sections (Gmsh physical curves, Abaqus element sets, Nastran
@@ -203,7 +203,7 @@ def read_shell_mesh(
 
 
 def _read(path: str | Path, convert: Callable[[RawMesh, Path, str], M]) -> M:
-    """Find the reader of a file and convert what it says; whatever is wrong becomes one message."""
+    """Read a file and convert its content; every fault becomes one message."""
     path = Path(path)
     where = f"mesh {path}"
     suffix = path.suffix.lower()
@@ -234,7 +234,7 @@ def _read(path: str | Path, convert: Callable[[RawMesh, Path, str], M]) -> M:
 
 
 def _neighbours(path: Path) -> str:
-    """Name the meshes beside a missing file."""
+    """Name the mesh files in the folder of a missing file."""
     if not path.parent.is_dir():
         return f"; the directory {path.parent} does not exist"
     files = [p.name for p in path.parent.iterdir() if p.suffix.lower() in MESH_FORMATS]

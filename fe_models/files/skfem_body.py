@@ -1,4 +1,4 @@
-"""Bodies made of a vector basis of scikit-fem and the stiffness and mass that its user assembled."""
+"""Bodies from a vector basis of scikit-fem, and stiffness and mass matrices that its user assembled."""
 
 from collections.abc import Iterable
 from importlib.metadata import version
@@ -31,7 +31,7 @@ def body_from_skfem(
     held: bool = False,
     accept: Iterable[str] = (),
 ) -> FEBody:
-    """Make a body of matrices that the user assembled over a vector basis of scikit-fem, from any forms.
+    """Return a body of matrices that the user assembled over a vector basis of scikit-fem, from any forms.
 
     The basis may use any element whose dofs are the values of a component at a point (`ElementVector` of P1, P2, Q1,
     Q2, serendipity, wedges, Crouzeix-Raviart, higher orders). The shape functions are checked for this property. If M
@@ -89,7 +89,7 @@ def body_from_skfem(
 
 
 def _surface(basis: Any) -> IntArray:
-    """Return triangles for drawing; none if no cell type of this package has the nodes of the element."""
+    """Return triangles for drawing; none if no cell type of this package has the same nodes as the element."""
     try:
         return boundary_triangles(as_mesh(basis))
     except MeshError:

@@ -91,7 +91,7 @@ def read_tables(nodes: str | Path, lines: str | Path) -> LineMesh:
 
 
 def line_numbers(rows: list[dict[str, str]]) -> IntArray:
-    """Return the numbers of the column `line`, (n_lines,); none where a line has none."""
+    """Return the numbers in the column `line`, (n_lines,); none if any line has no number."""
     if not all(row.get("line") for row in rows):
         return np.zeros(0, np.int64)
     numbers = np.array([_integer(row, "line") for row in rows])
@@ -101,7 +101,7 @@ def line_numbers(rows: list[dict[str, str]]) -> IntArray:
 
 
 def _table(path: Path, columns: tuple[str, ...], required: tuple[str, ...]) -> tuple[list[dict[str, str]], str]:
-    """Rows of a table by column name, each with its place under "where"; and the sha256 of the file."""
+    """Return the rows of a table by column name, each with its position under "where", and the sha256 of the file."""
     where = f"table {path}"
     try:
         data = path.read_bytes()
@@ -156,7 +156,7 @@ def _node(row: dict[str, str], key: str, place: dict[int, int]) -> int:
 
 
 def _orientation(row: dict[str, str], pair: IntArray, X: Array, place: dict[int, int]) -> Array:
-    """Vector towards the local y axis, from the row's own vector or its third node; NaN: default."""
+    """Return the vector towards the local y axis, from the row's own vector or its third node; NaN: default."""
     given = [key for key in ("vx", "vy", "vz") if row.get(key)]
     if row.get("third"):
         if given:

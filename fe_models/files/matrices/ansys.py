@@ -35,7 +35,7 @@ def read_full_part(path: Path, request: Request) -> ForeignMatrices:
 
 
 def read_sub_part(path: Path, request: Request) -> ForeignMatrices:
-    """Read a superelement; its modal coordinates are numbered behind its nodes.
+    """Read a superelement; its modal coordinates are numbered after its nodes.
 
     Raises
     ------

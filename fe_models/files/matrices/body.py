@@ -1,4 +1,4 @@
-"""A body from what the files of another program say: rows find their nodes, then they pass the gate of free bodies."""
+"""Body from matrix files of another program: rows are assigned to nodes, then the body must prove to be free."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -30,7 +30,7 @@ __all__ = ["MatrixReport", "body_from_foreign", "nodes_of", "with_geometry", "wi
 def without_supports(
     where: str, K: sp.csc_array, M: sp.csc_array, nodes: Array, dofs: IntArray
 ) -> tuple[sp.csc_array, str]:
-    """Return the stiffness of the released body, and what was taken out.
+    """Return the stiffness without supports, and a description of the removed supports.
 
     A support between a node and the ground adds to the block K_nn of that node and nowhere else. In a free body the
     rigid-body motions Psi about n, which are 1 on the dofs of n, meet no force, K_nn + K_n,rest Psi_rest = 0:
@@ -85,18 +85,18 @@ def without_supports(
 
 
 def supported_nodes(forces: RigidForces, dofs: IntArray) -> IntArray:
-    """Return the nodes whose rows answer rigid-body motion, ascending."""
+    """Return the nodes whose rows resist rigid-body motion, ascending."""
     return np.unique(dofs[forces.rows, 0])
 
 
 # body -----------------------------------------------------------------------------------------------------------------
 
 
-NODE_MAJOR = (3, 6)  #: rows of every node where no list of dofs is given
+NODE_MAJOR = (3, 6)  #: possible numbers of rows per node if there is no list of dofs
 
 
 def nodes_of(read: ForeignMatrices) -> NodeCloud:
-    """Return the nodes that the files of the matrices bring themselves.
+    """Return the nodes contained in the matrix files.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def nodes_of(read: ForeignMatrices) -> NodeCloud:
 
 
 def with_geometry(read: ForeignMatrices, geometry: Mesh | NodeCloud) -> ForeignMatrices:
-    """Return the record with the nodes of a deck or mesh, and dofs for its rows where the files name none.
+    """Return the record with the nodes of a deck or mesh, and with dofs for its rows if the files name none.
 
     Without a list of dofs the rows are taken as 3 (or 6) to a node in ascending order of their numbers 1, 2, ..., of
     which a note tells; whether that is so, the stiffness says of a free body: in another order it is not free.
@@ -158,7 +158,7 @@ def body_from_foreign(
     repair_mass: bool = False,
     accept: Iterable[str] = (),
 ) -> FEBody:
-    """Make a body of matrices that were read, with the nodes of a deck or mesh beside them.
+    """Return the body of imported matrices with the nodes of a deck or mesh.
 
     (1) dofs and nodes of the rows (`with_geometry`); the nodes of the body are those of the geometry, in its order
     (2) rows without any stiffness and mass leave: what they hold shows as a support in (4)
@@ -224,7 +224,7 @@ def body_from_foreign(
 
 
 def foreign_numbering(read: ForeignMatrices, geometry: Mesh | NodeCloud | None) -> Numbering:
-    """Return what the other program calls nodes, and elements and sets where a mesh says it."""
+    """Return the node numbers of the other program, and elements and sets if a mesh contains them."""
     numbers = np.zeros(0, np.int64) if read.node_numbers is None else read.node_numbers
     if isinstance(geometry, Mesh):
         return replace(solid_numbering(geometry), nodes=numbers)
@@ -233,7 +233,7 @@ def foreign_numbering(read: ForeignMatrices, geometry: Mesh | NodeCloud | None) 
 
 
 def rows_of_nodes(where: str, read: ForeignMatrices) -> IntArray:
-    """Return (index of the node, component) of every row, (n_dof, 2)."""
+    """Return (node index, component) of each row, (n_dof, 2)."""
     if read.dofs is None or read.node_numbers is None:
         raise MatrixError(f"{where}: the dofs of the rows are not known; give the list of dofs with the matrices")
     scalars = np.flatnonzero(read.dofs[:, 1] == SCALAR)
@@ -255,12 +255,12 @@ def rows_of_nodes(where: str, read: ForeignMatrices) -> IntArray:
 
 
 def numbers_of(geometry: Mesh | NodeCloud) -> IntArray:
-    """Return the numbers of the nodes: those of the file, or 1, 2, ... where it has none."""
+    """Return the node numbers of the file; 1, 2, ... if it has none."""
     return geometry.node_numbers if geometry.node_numbers.size else np.arange(1, len(geometry.nodes) + 1)
 
 
 def where_of(read: ForeignMatrices) -> str:
-    """Return the beginning of a message: the files."""
+    """Return the names of the files, as the beginning of a message."""
     return f"matrices {', '.join(read.files) or 'in memory'}"
 
 
@@ -269,17 +269,17 @@ def where_of(read: ForeignMatrices) -> str:
 
 @dataclass(frozen=True, eq=False)
 class MatrixReport:
-    """Numbers and notes of matrices that were read, shown before they are judged."""
+    """Numbers and notes of imported matrices, shown before the checks."""
 
     read: ForeignMatrices
 
     @property
     def title(self) -> str:
-        """Head of the table."""
+        """Title of the table."""
         return "Matrices"
 
     def rows(self) -> list[tuple[str, str]]:
-        """Return (what, value) of a table."""
+        """Return (description, value) of each row of a table."""
         read = self.read
         rows = [("files", ", ".join(path.rpartition("/")[2] for path in read.files))]
         rows += [("program", read.program)] if read.program else []

@@ -1,4 +1,4 @@
-"""What the files of another program say of mass and stiffness, before it is judged: one record for all readers."""
+"""Unchecked mass and stiffness matrices of another program, in one record for all readers."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -15,7 +15,7 @@ from fe_models.foundation.records import FrozenMapping, checked_fields, frozen_c
 
 __all__ = ["SCALAR", "ForeignMatrices", "pair_keys"]
 
-SCALAR = -1  #: component of a dof without place: a scalar point, a modal coordinate
+SCALAR = -1  #: component number of a dof without position: a scalar point or a modal coordinate
 ROLES = ("K", "M", "D")
 
 
@@ -24,7 +24,7 @@ ROLES = ("K", "M", "D")
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class ForeignMatrices:
-    """Matrices, the dofs of their rows and the nodes behind them, as far as files say it.
+    """Matrices, the dofs of their rows and the nodes of these, as far as the files contain them.
 
     A reader of one file fills what that file knows and leaves the rest; `joined` puts the files of a model together.
     Matrices are full: a reader that meets one stored triangle mirrors it, and says in `triangle` which it was.
@@ -141,7 +141,7 @@ class ForeignMatrices:
 
     @property
     def n_dof(self) -> int | None:
-        """Number of rows; None where only nodes are known."""
+        """Number of rows; None if only nodes are known."""
         for role in ROLES:
             if (matrix := getattr(self, role)) is not None:
                 return int(matrix.shape[0])
@@ -149,12 +149,12 @@ class ForeignMatrices:
 
 
 def pair_keys(dofs: IntArray) -> IntArray:
-    """Return one number for each (node number, component), (n,), to find them in each other's lists."""
+    """Return one integer for each (node number, component), (n,), for look-up in other lists."""
     return np.asarray(dofs[:, 0] * 8 + dofs[:, 1], dtype=np.int64)
 
 
 def joined(parts: Iterable[ForeignMatrices], where: str) -> ForeignMatrices:
-    """Put together what several files say of one model.
+    """Combine the contents of several files of one model.
 
     (1) each matrix from the one file that has it; rows in the order of the first file that names their dofs
     (2) rows that another file lacks are zero there (dofs without mass), of which a note tells
@@ -219,7 +219,7 @@ def joined(parts: Iterable[ForeignMatrices], where: str) -> ForeignMatrices:
 
 
 def with_dofs(parts: list[ForeignMatrices], where: str) -> list[ForeignMatrices]:
-    """Return the parts with a list of nodes, 3 or 6 rows to each, as a list of dofs."""
+    """Return the parts with a list of nodes, which have 3 or 6 rows each, converted to a list of dofs."""
     sizes = [part.n_dof or 0 for part in parts if part.K is not None or part.M is not None or part.D is not None]
     made = []
     for part in parts:
@@ -235,7 +235,7 @@ def with_dofs(parts: list[ForeignMatrices], where: str) -> list[ForeignMatrices]
 
 
 def order_of(parts: list[ForeignMatrices], where: str) -> IntArray | None:
-    """Return the dofs of all files in the order of the file with the most; None if no file names them."""
+    """Return the dofs of all files in the order of the file with most dofs; None if no file names them."""
     named = [part.dofs for part in parts if part.dofs is not None]
     if not named:
         return None
@@ -250,14 +250,14 @@ def order_of(parts: list[ForeignMatrices], where: str) -> IntArray | None:
 
 
 def rows_in(dofs: IntArray, wanted: IntArray) -> IntArray:
-    """Return the rows of wanted dofs in a list that has all of them."""
+    """Return the rows of the wanted dofs in a list that contains all of them."""
     keys = pair_keys(dofs)
     order = np.argsort(keys)
     return np.asarray(order[np.searchsorted(keys[order], pair_keys(wanted))])
 
 
 def placed(matrix: sp.csc_array, rows: IntArray, n: int) -> sp.csc_array:
-    """Return a matrix with its rows and columns at other places of a larger one."""
+    """Return a matrix with its rows and columns moved to other positions of a larger matrix."""
     if len(rows) == n and np.array_equal(rows, np.arange(n)):
         return matrix
     entries = sp.coo_array(matrix)

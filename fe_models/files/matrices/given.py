@@ -1,4 +1,4 @@
-"""Bodies made of the mass and stiffness matrices of another program, given as arrays or as an .npz file."""
+"""Bodies from mass and stiffness matrices of another program, given as arrays or as an .npz file."""
 
 import logging
 import zipfile
@@ -32,7 +32,7 @@ __all__ = ["ScalarMassModel", "body_from_matrices", "body_from_npz", "scalar_mas
 
 log = logging.getLogger(__name__)
 
-PATTERN_TOLERANCE = 1e-10  #: largest |M - M_s ⊗ 1₃| / |M| that counts as rounding of the other program
+PATTERN_TOLERANCE = 1e-10  #: largest |M - M_s ⊗ 1₃| / |M| that is rounding of the other program
 INTERFACE_KEYS = ("kind", "nodes", "reference", "triad", "weights")
 
 
@@ -42,12 +42,12 @@ class ScalarMassModel:
 
     name: str
     M_s: sp.csr_array  #: scalar mass, (n_nodes, n_nodes) [kg]
-    nodes: Array  #: (n_nodes, 3) [m]
-    dofs: IntArray  #: (node, component) of every dof, (n_dof, 2)
+    nodes: Array  #: node positions, (n_nodes, 3) [m]
+    dofs: IntArray  #: (node, component) of each dof, (n_dof, 2)
 
     @property
     def has_nodal_stress(self) -> bool:
-        """False, because bare matrices do not know the elements."""
+        """Return False, because elements of bare matrices are unknown."""
         return False
 
     def mass_gram(self, u: Array) -> Array:
@@ -58,19 +58,19 @@ class ScalarMassModel:
         return scalar_mass_gram(SymmetricProduct(self.M_s), self.nodes, translations.reshape(n_nodes, -1), n_nodes)
 
     def nodal_stress(self, u: Array, *, nodes: IntArray | None = None) -> Array:
-        """Raise `BodyError`, because bare matrices do not know the elements."""
+        """Raise `BodyError`, because elements of bare matrices are unknown."""
         raise BodyError(
             f"body {self.name!r}: it came as bare matrices, which know no stress; build it from its mesh "
             f"(fe_models.elements.solids.body.solid_body) for stresses"
         )
 
     def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
-        """Return NaN, (n, 3, k), because bare matrices do not know the elements."""
+        """Return NaN, (n, 3, k), because elements of bare matrices are unknown."""
         return np.full((len(nodes), 3, np.shape(u)[1]), np.nan)
 
     @property
     def has_geometric_stiffness(self) -> bool:
-        """False, because bare matrices do not know the elements."""
+        """Return False, because elements of bare matrices are unknown."""
         return False
 
     def mass_forces(self, loads: MassLoads) -> Array:
@@ -78,11 +78,11 @@ class ScalarMassModel:
         raise self._no_elements()
 
     def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
-        """Raise `BodyError`, because bare matrices do not know the elements."""
+        """Raise `BodyError`, because elements of bare matrices are unknown."""
         raise self._no_elements()
 
     def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Array) -> Array:
-        """Raise `BodyError`, because bare matrices do not know the elements."""
+        """Raise `BodyError`, because elements of bare matrices are unknown."""
         raise self._no_elements()
 
     def _no_elements(self) -> BodyError:
@@ -109,7 +109,7 @@ def body_from_matrices(
     accept: Iterable[str] = (),
     numbering: Numbering | None = None,
 ) -> FEBody:
-    """Make a body of the mass and stiffness matrices of any program.
+    """Return a body from the mass and stiffness matrices of any program.
 
     If M is M_s ⊗ 1₃ on the translations and zero elsewhere (solid elements, lumped masses), the body gets an element
     model that gives every mass integral exactly. Otherwise it has no element model, and approximate results are
@@ -190,7 +190,7 @@ def body_from_matrices(
 
 
 def require_freedom(body: FEBody, *, held: bool) -> None:
-    """Raise `BodyError` unless the body is free, or held as declared and not by a mistake."""
+    """Raise `BodyError` unless the body is free, or fixed as declared and not by a mistake."""
     where = f"body {body.name!r}"
     forces = rigid_forces(body.K, body.M, body.nodes, body.dofs)
     mass = np.diag(forces.mass)[:3]
@@ -220,7 +220,7 @@ def require_freedom(body: FEBody, *, held: bool) -> None:
 
 
 def require_positive_mass(body: FEBody) -> None:
-    """Raise `BodyError` if M is indefinite beyond rounding; large matrices are left to the eigensolver."""
+    """Raise `BodyError` if M is indefinite beyond rounding; the eigensolver checks large matrices."""
     if body.n_dof > DENSE:
         return
     values, _ = negative_mass(body.M, body.dofs)
@@ -253,7 +253,7 @@ def require_units(body: FEBody, *, accept: tuple[str, ...]) -> None:
 
 
 def wave_speeds(body: FEBody) -> Array:
-    """Return sqrt(K_kk / M_kk) times the distance to the nearest node, for translations with mass, (k,).
+    """Return sqrt(K_kk / M_kk) times the distance to the closest node, for translations with mass, (k,).
 
     In a fine mesh this is the wave speed times a factor between 1 and 10.
     """
@@ -269,7 +269,7 @@ def wave_speeds(body: FEBody) -> Array:
 
 
 def scalar_mass_of(body: FEBody) -> sp.csr_array | None:
-    """Return M_s, (n_nodes, n_nodes), if M is M_s ⊗ 1₃ on the translations and zero elsewhere; else None.
+    """Return M_s, (n_nodes, n_nodes), if M is M_s ⊗ 1₃ for translations and zero elsewhere; otherwise None.
 
     None means that rotations carry mass, that directions differ or are coupled, or that a node lacks a direction.
     """
@@ -293,7 +293,7 @@ def scalar_mass_of(body: FEBody) -> sp.csr_array | None:
 
 
 def require_both_triangles(where: str, matrix: sp.csc_array) -> None:
-    """Raise `BodyError` if the matrix is square and holds only one triangle."""
+    """Raise `BodyError` if a square matrix has entries in only one triangle."""
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
         return  # `FEBody` raises the error with the expected shape
     column = np.repeat(np.arange(matrix.shape[1]), np.diff(matrix.indptr))
@@ -445,7 +445,7 @@ def sparse_of(path: Path, arrays: Mapping[str, np.ndarray], key: str, n_dof: int
 
 
 def units_of(path: Path, arrays: Mapping[str, np.ndarray], units: Units | None) -> Units:
-    """Return the unit system passed, or the one in the file; raise `MeshError` if there is none or they differ."""
+    """Return the given unit system, or that of the file; raise `MeshError` if both differ or are missing."""
     if "units" not in arrays:
         if units is None:
             raise MeshError(f"{path}: the file names no units; pass units=unit_system(...) or add a key 'units'")

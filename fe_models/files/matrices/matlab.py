@@ -19,17 +19,17 @@ NAMED = {
     "K": ("k", "stiffness", "kaa", "kgg", "kff"),
     "M": ("m", "mass", "maa", "mgg", "mff"),
     "D": ("d", "c", "damping", "baa", "bgg", "bff"),
-}  #: usual names, in lower case
-MOST_INFLATED = 1100  #: bytes that deflate makes of one at most
+}  #: usual names of the matrices, in lower case
+MOST_INFLATED = 1100  #: largest compression ratio of deflate
 
 
 def is_matlab_7(head: bytes) -> bool:
-    """Whether the file is MATLAB 7.3, which is HDF5 behind 512 bytes of words."""
+    """Return whether the file has the format of MATLAB 7.3: HDF5 after a text header of 512 bytes."""
     return head[512:520] == b"\x89HDF\r\n\x1a\n" or head[:8] == b"\x89HDF\r\n\x1a\n"
 
 
 def is_matlab_5(head: bytes) -> bool:
-    """Whether the file is MATLAB 5 to 7.2."""
+    """Return whether the file has the format of MATLAB 5 to 7.2."""
     return head[:6] == b"MATLAB" and head[126:128] in (b"IM", b"MI")
 
 
@@ -79,7 +79,7 @@ def read_matlab_7(path: Path, request: Request) -> ForeignMatrices:
 
 
 def array_of(where: str, name: str, entry: Any) -> np.ndarray:
-    """Return an array of an HDF5 file after comparing what it claims with the bytes it has."""
+    """Return an array of an HDF5 file after checking that its declared size fits the stored bytes."""
     claimed, stored = entry.size * entry.dtype.itemsize, entry.id.get_storage_size()
     if claimed > MOST_INFLATED * max(stored, 1):
         raise MatrixError(f"{where}: {name} claims {claimed} bytes and has {stored}; the file is damaged")
@@ -87,7 +87,7 @@ def array_of(where: str, name: str, entry: Any) -> np.ndarray:
 
 
 def from_named(where: str, content: Mapping[str, Any], request: Request, program: str) -> ForeignMatrices:
-    """Return the record of named arrays: matrices, and `dofs` and `nodes` as they count from 1.
+    """Return the record of named arrays: matrices, and `dofs` and `nodes` with numbers from 1.
 
     `dofs`: (node number, component 1-6) of every row, or (number, 0) of a modal coordinate, (n_dof, 2); `nodes`:
     (number, x, y, z) or, numbered 1, 2, ..., (x, y, z), one row each.
@@ -126,7 +126,7 @@ def from_named(where: str, content: Mapping[str, Any], request: Request, program
 
 
 def real_matrix(where: str, value: Any) -> tuple[sp.csc_array, str]:
-    """Return a real, symmetric matrix with both triangles, and what was stored."""
+    """Return a real, symmetric matrix with both triangles, and the description of the stored triangle."""
     if sp.issparse(value):
         kind = value.dtype
         if value.format in ("csc", "csr"):

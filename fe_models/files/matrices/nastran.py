@@ -1,4 +1,4 @@
-"""Nastran's matrix files as parts of a model: OP4, OP2, DMIG in punch files and decks, rows of superelements."""
+"""Matrix files of Nastran: OP4, OP2, DMIG in punch files and decks, and rows of superelements."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -27,19 +27,19 @@ __all__ = ["dmig_matrices", "read_op2_part", "read_op4_part", "read_punch_part"]
 # Matrices of Nastran's bulk data (DMIG), by the grid points of their rows and columns: punch files and decks.
 
 
-DMIG_SQUARE, GENERAL, SYMMETRIC, RECTANGULAR = 1, 2, 6, 9  #: forms (IFO)
-MOST_COLUMNS = 10_000_000  #: of a rectangular matrix, which its numbers of columns take memory for
+DMIG_SQUARE, GENERAL, SYMMETRIC, RECTANGULAR = 1, 2, 6, 9  #: forms of a matrix (IFO)
+MOST_COLUMNS = 10_000_000  #: largest number of columns of a rectangular matrix
 
 
 @dataclass
 class _Entries:
-    """What the cards of one matrix say."""
+    """Content of the cards of one matrix."""
 
     header: Card
     form: int
     kind: int
     is_polar: bool
-    n_columns: int  #: of a rectangular matrix; 0: not said
+    n_columns: int  #: number of columns of a rectangular matrix; 0: not given
     columns: list[tuple[int, int]] = field(default_factory=list)  # point and component, of each entry
     rows: list[tuple[int, int]] = field(default_factory=list)
     values: list[complex] = field(default_factory=list)
@@ -116,7 +116,7 @@ def _read_column(card: Card, entries: _Entries) -> None:
 
 
 def _point(card: Card, k: int) -> tuple[int, int]:
-    """Return point and component 0-5, or `SCALAR`, of two fields."""
+    """Return the point, and the component 0-5 or `SCALAR`, in two fields."""
     number, component = card.integer(k), card.integer(k + 1, 0)
     if number < 1 or not 0 <= component <= 6:
         raise MatrixError(
@@ -169,7 +169,7 @@ def _matrix(name: str, entries: _Entries) -> NastranMatrix:
 
 
 def _numbered(points: IntArray, asked: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the points in the order of their numbers, (n, 2), and the place of each that is asked for."""
+    """Return the points in ascending order, (n, 2), and the index of each requested point."""
     keys = 8 * points[:, 0] + points[:, 1] + 1
     unique, first = np.unique(keys, return_index=True)
     return points[first], np.searchsorted(unique, 8 * asked[:, 0] + asked[:, 1] + 1)
@@ -178,19 +178,19 @@ def _numbered(points: IntArray, asked: IntArray) -> tuple[IntArray, IntArray]:
 # nastran --------------------------------------------------------------------------------------------------------------
 
 
-SETS = ("aa", "xx", "gg", "aax", "2gg")  #: endings of the usual names: analysis set, EXTSEOUT, all grid points, DMIG
+SETS = ("aa", "xx", "gg", "aax", "2gg")  #: endings of usual matrix names: analysis set, EXTSEOUT, all grid points, DMIG
 USUAL = {
     "K": tuple(f"k{end}" for end in SETS),
     "M": tuple(f"m{end}" for end in SETS),
     "D": ("bxx1", *(f"b{end}" for end in SETS)),
 }
-LOADS = ("PX", "PX1", "PA", "PAX", "PG")  #: of which each column is a load
+LOADS = ("PX", "PX1", "PA", "PAX", "PG")  #: names of matrices whose columns are loads
 STRUCTURAL_DAMPING = ("K4XX", "K4XX1", "K4AA", "K4GG", "K4AAX")
 SQUARE = 1  #: form of a matrix with both triangles
 
 
 def read_op4_part(path: Path, request: Request) -> ForeignMatrices:
-    """Read an OP4 file; rows and places come from the .pch file of the same name, where one stands beside it.
+    """Read an OP4 file; the .pch file with the same name, if there is one, gives rows and positions.
 
     Raises
     ------
@@ -215,7 +215,7 @@ def read_op4_part(path: Path, request: Request) -> ForeignMatrices:
 
 
 def read_op2_part(path: Path, request: Request) -> ForeignMatrices:
-    """Read the matrices of an OP2 file; the dofs of the rows are not said.
+    """Read the matrices of an OP2 file, which does not contain the dofs of the rows.
 
     Raises
     ------
@@ -246,7 +246,7 @@ def read_punch_part(path: Path, request: Request) -> ForeignMatrices:
 
 
 def _with_points(cards: list[Card]) -> dict:
-    """Return the grid points of the cards as fields of `ForeignMatrices`; none: no fields."""
+    """Return the grid points of the cards as fields of `ForeignMatrices`; empty if there are none."""
     points = read_grid_points(cards)
     numbers = sorted(points.positions)
     if not numbers:
@@ -267,7 +267,7 @@ def _part(
     notes: tuple[str, ...] = (),
     **points: object,
 ) -> ForeignMatrices:
-    """Return the named matrices of a file, rows of DMIG matrices brought together."""
+    """Return the named matrices of a file, with the rows of DMIG matrices unified."""
     there = [matrix for matrix in matrices if matrix.matrix.nnz]  # Nastran writes a single zero for what it has not
     by_name = {matrix.name: matrix for matrix in there}
     chosen = request.chosen(where, USUAL, by_name)
@@ -305,7 +305,7 @@ def _part(
 
 
 def _common_rows(picked: dict[str, NastranMatrix], full: dict) -> tuple[IntArray | None, dict]:
-    """Bring matrices that name their rows to the union of these; those that do not are left as they are."""
+    """Extend matrices with named rows to the union of all rows; other matrices do not change."""
     named = {role: raw.rows for role, raw in picked.items() if raw.rows is not None}
     if not named:
         return None, full

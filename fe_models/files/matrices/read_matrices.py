@@ -1,4 +1,4 @@
-"""One door for matrix files: formats by suffix and content, several files that make one model, one error."""
+"""Reading of matrix files: formats by suffix and content, several files of one model, one kind of error."""
 
 import io
 import os
@@ -60,11 +60,11 @@ __all__ = [
 # dofs that another program writes in local axes of their nodes, turned to basic axes: K_basic = D K Dᵀ ----------------
 
 
-ORTHONORMAL = 1e-8  #: largest |Rᵀ R - 1| of axes as files with nine digits have them
+ORTHONORMAL = 1e-8  #: largest |Rᵀ R - 1| of axes from files with nine digits
 
 
 def in_basic_axes(read: ForeignMatrices) -> ForeignMatrices:
-    """Return the matrices and loads with all rows in basic axes, and no local systems left.
+    """Return matrices and loads with all rows in basic axes, without local systems.
 
     u_basic = D u_local with D = blockdiag(R) on the three translations and the three rotations of a node, so that
     K_basic = D K Dᵀ and f_basic = D f.
@@ -134,7 +134,7 @@ SPARSE = {"format", "shape", "data"}  #: keys that `save_npz` always writes
 
 
 def read_npz(path: Path, request: Request) -> ForeignMatrices:
-    """Read one sparse matrix of `scipy.sparse.save_npz`, or several dense arrays by name, as a MATLAB file has them.
+    """Read one sparse matrix from `scipy.sparse.save_npz`, or several named dense arrays.
 
     Pickled objects are refused.
 
@@ -160,7 +160,7 @@ def read_npz(path: Path, request: Request) -> ForeignMatrices:
 
 
 def is_harwell_boeing(head: bytes) -> bool:
-    """Whether the third line begins with the type of a matrix, such as RSA."""
+    """Return whether the third line begins with the type of a matrix, such as RSA."""
     lines = head.split(b"\n", 3)
     kind = lines[2][:3].upper() if len(lines) > 2 else b""
     return len(kind) == 3 and kind[:1] in b"RCP" and kind[1:2] in b"SUHZR" and kind[2:3] in b"AE"
@@ -200,7 +200,7 @@ def read_harwell_boeing(path: Path, request: Request) -> ForeignMatrices:
 # read matrices --------------------------------------------------------------------------------------------------------
 
 
-HEAD = 4096  #: bytes by which the format of a file is told
+HEAD = 4096  #: number of first bytes that identify the format of a file
 
 MATRIX_FORMATS: tuple[MatrixFormat, ...] = (
     MatrixFormat("Nastran OP4", (".op4",), read_op4_part, is_op4),
@@ -218,9 +218,10 @@ MATRIX_FORMATS: tuple[MatrixFormat, ...] = (
     MatrixFormat("ANSYS full", (".full",), read_full_part, is_ansys_binary),
     MatrixFormat("ANSYS superelement", (".sub",), read_sub_part, is_ansys_binary),
     MatrixFormat("Abaqus matrix (COORDINATE)", (".mtx",), read_coordinates, is_coordinates),
-)  #: every format that is read; of those with one suffix the first that knows the content
+)  #: supported formats; if several have the same suffix, the first that recognises the content is used
 
-MatrixFiles = str | Path | Iterable[str | Path] | Mapping[str, str | Path]  #: one file, several, or role -> file
+#: one file, several files, or the file of each role
+MatrixFiles = str | Path | Iterable[str | Path] | Mapping[str, str | Path]
 
 
 def read_matrices(files: MatrixFiles, *, names: Mapping[str, str] | None = None) -> ForeignMatrices:
@@ -267,7 +268,7 @@ def read_matrices(files: MatrixFiles, *, names: Mapping[str, str] | None = None)
 
 
 def read_part(path: Path, request: Request) -> ForeignMatrices:
-    """Read what one file says; whatever is wrong with it becomes one message."""
+    """Read the content of one file; every fault becomes one message."""
     where = f"matrices {path}"
     if not path.exists():
         raise MatrixError(f"{where}: there is no such file{near_file(path)}")
@@ -296,7 +297,7 @@ def read_part(path: Path, request: Request) -> ForeignMatrices:
 
 
 def format_of(where: str, path: Path, head: bytes) -> MatrixFormat:
-    """Return the format of a file: by its suffix, and by its content where several share one."""
+    """Return the format of a file by its suffix, and by its content if several formats have this suffix."""
     suffix = path.suffix.lower()
     mine = [form for form in MATRIX_FORMATS if suffix in form.suffixes]
     if not mine:

@@ -1,4 +1,4 @@
-"""What is asked of a reader of matrices, and what a reader is."""
+"""Request to a reader of matrices, and the description of a reader."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -13,13 +13,14 @@ __all__ = ["MatrixFormat", "Request", "anything"]
 
 @dataclass(frozen=True)
 class Request:
-    """What the caller says of a file."""
+    """Information from the caller about a file."""
 
-    role: str | None = None  #: K, M or D: what the only matrix of the file is; None: the file has to say it
-    names: Mapping[str, str] = field(default_factory=dict)  #: role -> name of its matrix, in files that hold several
+    role: str | None = None  #: role (K, M or D) of the only matrix in the file; None: the file must contain the role
+    #: name of the matrix for each role, for files with several matrices
+    names: Mapping[str, str] = field(default_factory=dict)
 
     def role_of(self, where: str, found: str | None, hint: str = "") -> str:
-        """Return the role of the only matrix of a file: as the caller says, else as the file does.
+        """Return the role of the only matrix in a file, as given by the caller or in the file.
 
         Raises
         ------
@@ -36,7 +37,7 @@ class Request:
     def chosen(
         self, where: str, usual: Mapping[str, tuple[str, ...]], available: Mapping[str, object]
     ) -> dict[str, str]:
-        """Return role -> name of its matrix in a file of named matrices: as the caller says, else the usual name.
+        """Return the matrix name for each role in a file of named matrices: as given, otherwise the usual name.
 
         Parameters
         ----------
@@ -72,17 +73,17 @@ class Request:
 
 
 def anything(head: bytes) -> bool:
-    """Whether a file may be of a format: always, where the suffix is enough."""
+    """Return True, for formats whose suffix identifies them."""
     return True
 
 
 @dataclass(frozen=True)
 class MatrixFormat:
-    """One format of matrix files and its reader."""
+    """Format of matrix files, and its reader."""
 
-    name: str  #: in messages: "Abaqus matrix"
-    suffixes: tuple[str, ...]  #: in lower case
-    read: Callable[[Path, Request], ForeignMatrices]  #: fills what this file knows
+    name: str  #: name for messages, such as "Abaqus matrix"
+    suffixes: tuple[str, ...]  #: suffixes in lower case
+    read: Callable[[Path, Request], ForeignMatrices]  #: function that reads the content of a file
     is_it: Callable[[bytes], bool] = (
-        anything  #: asked with the first `HEAD` bytes; of one suffix, the first that says yes
+        anything  #: test of the first `HEAD` bytes; the first format with the suffix that returns True is used
     )

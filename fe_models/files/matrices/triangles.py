@@ -1,4 +1,4 @@
-"""Full symmetric matrices from what files store: both triangles, one of them, or each pair once."""
+"""Full symmetric matrices from stored entries: both triangles, one triangle, or each pair once."""
 
 import numpy as np
 import scipy.sparse as sp
@@ -8,12 +8,12 @@ from fe_models.foundation.arrays import SYMMETRY_DEFECT, Array, IntArray, symmet
 
 __all__ = ["LARGEST", "full_matrix", "require_size", "stored_as"]
 
-COLUMNS = 4096  #: that are looked at together
-LARGEST = 10_000_000  #: rows that are believed without looking; beyond, a file has at least a byte for each
+COLUMNS = 4096  #: number of columns that are compared at a time
+LARGEST = 10_000_000  #: number of rows that needs no check; a file with more rows has at least one byte for each
 
 
 def require_size(where: str, n_rows: int, n_bytes: int) -> None:
-    """Raise `MatrixError` if a header speaks of more rows than its file can hold, before any memory is taken."""
+    """Raise `MatrixError` if a header declares more rows than its file can contain, before memory is allocated."""
     if n_rows > max(LARGEST, n_bytes):
         raise MatrixError(
             f"{where}: expected at most {n_bytes} rows in a file of {n_bytes} bytes, got {n_rows}; it is damaged"
@@ -23,7 +23,7 @@ def require_size(where: str, n_rows: int, n_bytes: int) -> None:
 def full_matrix(
     where: str, rows: IntArray, columns: IntArray, values: Array, n: int, *, declared: str | None = None
 ) -> tuple[sp.csc_array, str]:
-    """Return the full matrix of listed entries, (n, n), and which triangle was stored.
+    """Return the full matrix from listed entries, (n, n), and which triangle was stored.
 
     An entry listed once for each pair is mirrored: a matrix with one triangle only is no symmetric matrix, so nothing
     is guessed. Where both entries of pairs are listed they have to be equal.
@@ -68,7 +68,7 @@ def full_matrix(
 
 
 def mirrored(where: str, stored: sp.csc_array, *, declared: str | None = None) -> tuple[sp.csc_array, str]:
-    """Return the full matrix of stored entries, and what was stored, as `full_matrix` does."""
+    """Return the full matrix from stored entries, and which triangle was stored."""
     try:
         stored.check_format(full_check=True)  # an index beyond the matrix would be read from anywhere in memory
     except ValueError as error:
@@ -103,7 +103,7 @@ def mirrored(where: str, stored: sp.csc_array, *, declared: str | None = None) -
 
 
 def stored_as(matrix: sp.csc_array) -> str:
-    """Return which triangle has entries: both, lower, upper or diagonal; ends where both were seen."""
+    """Return which triangle has entries: both, lower, upper or diagonal."""
     below = above = False
     n = matrix.shape[1]
     for first in range(0, n, COLUMNS):

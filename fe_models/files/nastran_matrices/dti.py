@@ -1,4 +1,4 @@
-"""Tables of Nastran (DTI) that say which row of a recovery matrix is what."""
+"""Tables of Nastran (DTI) that describe the rows of a recovery matrix."""
 
 from collections.abc import Callable
 
@@ -11,7 +11,7 @@ from fe_models.foundation.arrays import IntArray
 __all__ = ["EMPTY", "SCALAR", "RecoveryRows", "element_rows", "grid_rows"]
 
 RecoveryRows = Callable[[str, list[Card], str, int], IntArray]
-GRID, POINT = 1, 2  #: types of points
+GRID, POINT = 1, 2  #: codes of point types
 SCALAR, EMPTY = -1, -2  #: components of the rows of a scalar point
 END = "ENDREC"
 

@@ -1,4 +1,4 @@
-"""Matrix data blocks of OUTPUT2 files of Nastran (.op2), through pyYeti."""
+"""Matrix data blocks in OUTPUT2 files of Nastran (.op2), read by pyYeti."""
 
 import struct
 from pathlib import Path
@@ -12,18 +12,18 @@ from fe_models.foundation.extras import extra_module
 
 __all__ = ["is_op2", "read_op2"]
 
-MOST_BYTES = 2_000_000_000  #: of a matrix in full, as pyYeti reads it
-SMALL_BYTES = 50_000_000  #: of a matrix in full that is read from any file
-FULLNESS = 200  #: bytes of a matrix in full for each byte of the file: beyond, the file is damaged or nearly empty
+MOST_BYTES = 2_000_000_000  #: largest size of a full matrix, as pyYeti reads it [bytes]
+SMALL_BYTES = 50_000_000  #: size of a full matrix that is accepted from any file [bytes]
+FULLNESS = 200  #: size of a full matrix over that of its file, above which the file is damaged or nearly empty
 
 
 def is_op2(content: bytes) -> bool:
-    """Whether a file that begins so may be an OP2 file: a record of one integer of 32 or 64 bits, in either order."""
+    """Return whether the first bytes can be those of an OP2 file: a record of one 32- or 64-bit integer."""
     return content[:4] in (b"\4\0\0\0", b"\0\0\0\4", b"\10\0\0\0", b"\0\0\0\10")
 
 
 def read_op2(path: str | Path) -> tuple[NastranMatrix, ...]:
-    """Read all matrices of an OP2 file, in the order of the file; tables are left out.
+    """Read all matrices of an OP2 file, in the order of the file; tables are omitted.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def read_op2(path: str | Path) -> tuple[NastranMatrix, ...]:
 
 
 def _require_size(where: str, name: str, trailer: tuple[int, ...], size: int) -> None:
-    """Refuse a matrix whose header says more than memory should be taken for."""
+    """Raise an error for a matrix whose header declares an unreasonable size."""
     n_columns, n_rows, kind = trailer[1], trailer[2], trailer[4]
     if kind not in (1, 2, 3, 4) or n_columns < 1 or n_rows < 1:
         raise MatrixError(f"{where}: matrix {name}: {n_rows} rows, {n_columns} columns of type {kind}: it is damaged")

@@ -17,13 +17,13 @@ __all__ = ["is_op4", "read_op4", "read_text"]
 # OP4 files as text: numbers in columns of fixed width, in the format that the header of a matrix names ----------------
 
 
-DEFAULT = (5, 16)  #: numbers in a line and their width, of the format 5E16.9 of a header that names none
+DEFAULT = (5, 16)  #: numbers in a line and their width, in the format 5E16.9 of a header without format
 FORMAT = re.compile(rb"(?:1P,?)?\s*(\d+)[ED](\d+)\.\d+(?:E\d+)?$", re.IGNORECASE)
-NO_LETTER = re.compile(r"(?<=\d)([+-]\d+)$")  #: an exponent of three digits leaves the letter E no room
+NO_LETTER = re.compile(r"(?<=\d)([+-]\d+)$")  #: exponent of three digits, which leaves no room for the letter E
 
 
 def read_text(where: str, path: Path) -> Iterator[NastranMatrix]:
-    """Yield the matrices of an OP4 file that is text.
+    """Yield the matrices of a text OP4 file.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def read_text(where: str, path: Path) -> Iterator[NastranMatrix]:
 
 
 class _Lines:
-    """The lines of a file one by one, with the number of the last one for messages."""
+    """Lines of a file in sequence, with the number of the last line for messages."""
 
     def __init__(self, where: str, lines: list[bytes]) -> None:
         self.file = where
@@ -49,11 +49,11 @@ class _Lines:
 
     @property
     def here(self) -> str:
-        """The beginning of a message about the last line."""
+        """Beginning of a message about the last line."""
         return f"{self.file}: {self.name}line {self.at}"
 
     def more(self) -> bool:
-        """Whether a line with something in it follows."""
+        """Whether a non-empty line follows."""
         while self.at < len(self.lines) and not self.lines[self.at].strip():
             self.at += 1
         return self.at < len(self.lines)
@@ -73,7 +73,7 @@ class _Lines:
         return self.lines[self.at - n : self.at]
 
     def integers(self, count: int, width: int = 8) -> list[int]:
-        """Return the integers of the next line, in columns of that width."""
+        """Return the integers in the next line, in columns of this width."""
         line = self.next()
         words = [line[width * k : width * (k + 1)] for k in range(count)]
         try:
@@ -113,7 +113,7 @@ def _matrix(lines: _Lines, number: int, size: int) -> NastranMatrix:
     values: list[np.ndarray] = []
 
     def string(first: int, n_reals: int) -> None:
-        """Read one string of reals that begins in this row, from 1."""
+        """Read one string of real numbers that begins in this row, counted from 1."""
         n, rest = divmod(n_reals, reals)
         if n < 1 or rest:
             raise MatrixError(f"{lines.here}: expected at least one value in a string, got {n_reals} numbers")
@@ -166,7 +166,7 @@ def _matrix(lines: _Lines, number: int, size: int) -> NastranMatrix:
 
 
 def _format(lines: _Lines, text: bytes) -> tuple[int, int]:
-    """Return numbers in a line and their width."""
+    """Return the number of values in a line and their width."""
     if not text:
         return DEFAULT
     found = FORMAT.match(text.strip(b"()"))
@@ -201,7 +201,7 @@ def _reals(lines: _Lines, n: int, per_line: int, width: int) -> np.ndarray:
 def _compressed(
     values: np.ndarray, columns: list[int], firsts: list[int], counts: list[int], n_rows: int, n_columns: int
 ) -> sp.csc_array:
-    """Return the matrix of strings in the order of columns and rows."""
+    """Return the matrix of strings, sorted by columns and rows."""
     index = np.int32 if max(len(values), n_rows) < LARGEST else np.int64
     n = np.array(counts, dtype=np.int64)
     ends = np.cumsum(n)
@@ -221,11 +221,11 @@ def _compressed(
 # op4 ------------------------------------------------------------------------------------------------------------------
 
 
-FEWEST_BYTES = 32  #: of an OP4 file: the record of one header
+FEWEST_BYTES = 32  #: size of the smallest OP4 file: the record of one header [bytes]
 
 
 def is_op4(content: bytes) -> bool:
-    """Whether a file that begins so is an OP4 file: a record of 24 or 48 bytes, or a line of integers."""
+    """Return whether the first bytes are those of an OP4 file: a record of 24 or 48 bytes, or a line of integers."""
     if len(content) < FEWEST_BYTES:
         return False
     if HEADER_BYTES & {int.from_bytes(content[:4], order) for order in ("little", "big")}:

@@ -11,10 +11,10 @@ from fe_models.files.nastran_matrices.raw_matrix import NastranMatrix
 
 __all__ = ["HEADER_BYTES", "LARGEST", "read_binary", "require_sizes"]
 
-HEADER_BYTES = {24, 48}  #: of the header of a matrix, with integers of 32 and 64 bits
-LARGEST = 2**31 - 2  #: rows or columns
-EMPTY_COLUMNS = 20_000_000  #: columns that need not have a byte in the file
-NOT_BIGMAT = 65536  #: rows from which on strings cannot have one word as their head
+HEADER_BYTES = {24, 48}  #: size of the header of a matrix with 32-bit and with 64-bit integers [bytes]
+LARGEST = 2**31 - 2  #: largest number of rows or columns
+EMPTY_COLUMNS = 20_000_000  #: largest number of columns without any byte in the file
+NOT_BIGMAT = 65536  #: number of rows from which strings need a head of more than one word
 
 
 def read_binary(where: str, path: Path) -> Iterator[NastranMatrix]:
@@ -95,7 +95,7 @@ def read_binary(where: str, path: Path) -> Iterator[NastranMatrix]:
 
 
 def require_sizes(here: str, n_columns: int, n_rows: int, kind: int, size: int) -> None:
-    """Refuse a header that no matrix has, or not one in a file of this size [bytes]."""
+    """Raise an error for a header that is invalid, or too large for a file of this size [bytes]."""
     if kind not in (1, 2, 3, 4):
         raise MatrixError(f"{here}: expected a type of 1 to 4 (real, complex, single, double), got {kind}")
     if not (0 < n_columns <= LARGEST and 0 < abs(n_rows) <= LARGEST):
@@ -115,7 +115,7 @@ def _name(words: np.ndarray, step: int, swapped: bool) -> str:
 
 
 def _numbers(values: np.ndarray, kind: int) -> np.ndarray:
-    """Return the words as float64 or complex128."""
+    """Return the words as float64 or complex128 numbers."""
     is_single = values.dtype == np.int32
     real = values.view(np.float32).astype(np.float64) if is_single else values.view(np.float64)
     return real if kind < 3 else real.view(np.complex128)

@@ -18,7 +18,7 @@ FAULTS = {
     ROWS: "values lie outside the rows of the matrix",
     LENGTH: "the numbers of words in a column do not add up",
     ORDER: "strings of a column overlap or are not in the order of the rows",
-}  #: status of `read_columns` -> what is wrong
+}  #: description of the error for each status of `read_columns`
 
 LOW = np.int64(0xFFFFFFFF)
 
@@ -140,7 +140,7 @@ def read_columns(words, at, step, is_swapped, n_rows, n_columns, is_bigmat, real
 
 @jit
 def record_words(indptr, indices):
-    """Return the words that the columns of a matrix of doubles take with strings as bigmat, without the last record."""
+    """Return the number of words for columns of doubles as bigmat strings, without the last record."""
     total = 0
     for j in range(indptr.size - 1):
         if indptr[j] == indptr[j + 1]:
@@ -154,7 +154,7 @@ def record_words(indptr, indices):
 
 @jit
 def fill_records(indptr, indices, values, words):
-    """Write the columns as records of bigmat strings, `values` as words of 4 bytes; see `record_words`."""
+    """Write columns as records of bigmat strings, with `values` as words of 4 bytes; see `record_words`."""
     at = 0
     for j in range(indptr.size - 1):
         begin, stop = indptr[j], indptr[j + 1]

@@ -1,4 +1,4 @@
-"""A matrix as a file of Nastran says it."""
+"""Unchecked matrix from a file of Nastran."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -14,26 +14,24 @@ __all__ = ["NastranMatrix", "dense_matrix", "matrix_named", "real_square"]
 
 @dataclass(frozen=True, eq=False)
 class NastranMatrix:
-    """One matrix of an OP4, DMIG or OP2 file."""
+    """Matrix in an OP4, DMIG or OP2 file."""
 
-    name: str  #: upper case
-    matrix: sp.csc_array  #: (n_rows, n_columns), both triangles, float64 or complex128; units of the model
-    form: int  #: 1 square, 2 rectangular, 6 symmetric, 9 rectangular DMIG, ...
-    kind: int  #: of numbers in the file: 1, 2 real, 3, 4 complex, single and double
-    where: str = ""  #: file and name, for messages
-    rows: IntArray | None = (
-        None  #: (id, component) of each row, component 0 a scalar point; None: the file does not say
-    )
-    columns: IntArray | None = None  #: (id, component) of each column, or its number and 0; None: the file does not say
+    name: str  #: name of the matrix in upper case
+    matrix: sp.csc_array  #: matrix (n_rows, n_columns), both triangles, float64 or complex128, in units of the model
+    form: int  #: form code: 1 square, 2 rectangular, 6 symmetric, 9 rectangular DMIG, ...
+    kind: int  #: number type: 1, 2 real and 3, 4 complex, in single and double precision
+    where: str = ""  #: file and matrix name, for messages
+    rows: IntArray | None = None  #: (id, component) of each row, component 0 for a scalar point; None: not in the file
+    columns: IntArray | None = None  #: (id, component) of each column, or its number and 0; None: not in the file
 
     @property
     def is_complex(self) -> bool:
-        """Whether its numbers are complex."""
+        """Whether the numbers are complex."""
         return self.matrix.dtype.kind == "c"
 
 
 def matrix_named(where: str, matrices: Iterable[NastranMatrix], *names: str) -> NastranMatrix:
-    """Return the one matrix that has one of these names.
+    """Return the matrix with one of these names; there must be exactly one.
 
     Raises
     ------
@@ -54,7 +52,7 @@ def matrix_named(where: str, matrices: Iterable[NastranMatrix], *names: str) -> 
 
 
 def real_square(matrix: NastranMatrix) -> sp.csc_array:
-    """Return a mass, damping or stiffness matrix, (n, n).
+    """Return a mass, damping or stiffness matrix, (n, n), after checking that it is real and square.
 
     Raises
     ------

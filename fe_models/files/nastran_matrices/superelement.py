@@ -22,53 +22,53 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["SCALAR", "ElementRows", "NastranSuperelement", "Recovery", "extrn_rows", "read_superelement"]
 
-COMPANIONS = (".op4", ".pch", ".asm")  #: that are read with one of them
+COMPANIONS = (".op4", ".pch", ".asm")  #: suffixes of files that are read together
 STIFFNESS, MASS, DAMPING = ("KXX", "KAA"), ("MXX", "MAA"), ("BXX", "BXX1", "BAA")
 LOADS, OTHER_DAMPING = ("PX", "PX1", "PA", "PAA"), ("K4XX", "K4XX1", "K4AA")
 
 
 @dataclass(frozen=True, eq=False)
 class Recovery:
-    """Displacements of grid points from those of the superelement, u = matrix @ u_superelement."""
+    """Recovery of grid point displacements, u = matrix @ u_superelement."""
 
-    matrix: Array  #: (n_rows, n_dof), rows in basic axes where the axes of their grid point are known
+    matrix: Array  #: recovery matrix, (n_rows, n_dof); rows are in basic axes if the axes of the grid point are known
     rows: IntArray  #: (id, component 0-5 or `SCALAR`) of each row, (n_rows, 2)
-    unplaced: IntArray  #: ids of grid points whose position and axes no file says: their rows are in axes of their own
+    unplaced: IntArray  #: ids of grid points with unknown position and axes; their rows are in their own axes
 
 
 @dataclass(frozen=True, eq=False)
 class ElementRows:
-    """Forces or stresses of elements from the displacements of the superelement."""
+    """Recovery of element forces or stresses from the displacements of the superelement."""
 
-    matrix: Array  #: (n_rows, n_dof), in the axes of each element
+    matrix: Array  #: recovery matrix, (n_rows, n_dof), in the axes of each element
     elements: IntArray  #: (element type of Nastran, id, item from 1) of each row, (n_rows, 3); type 34 is CBAR
 
 
 @dataclass(frozen=True, eq=False)
 class NastranSuperelement:
-    """What the files of an external superelement say, in basic axes and the units of its model."""
+    """Content of the files of an external superelement, in basic axes and units of its model."""
 
-    where: str  #: its files, for messages
+    where: str  #: names of its files, for messages
     K: sp.csc_array  #: stiffness, (n_dof, n_dof)
     M: sp.csc_array  #: mass, (n_dof, n_dof)
     D: sp.csc_array | None  #: viscous damping, (n_dof, n_dof)
-    dofs: IntArray  #: (id, component 0-5 or `SCALAR`) of every row, (n_dof, 2)
-    positions: Mapping[int, Array]  #: id of a grid point -> (3,), of all that the files define
-    loads: Array  #: (n_dof, n_loads); none: (n_dof, 0)
-    displacement: Recovery | None  #: MUG1
-    forces: ElementRows | None  #: MEF1
-    stresses: ElementRows | None  #: MES1
-    files: Mapping[str, str] = field(default_factory=dict)  #: path -> sha256
-    notes: tuple[str, ...] = ()  #: what was taken along, assumed or left out
+    dofs: IntArray  #: (id, component 0-5 or `SCALAR`) of each row, (n_dof, 2)
+    positions: Mapping[int, Array]  #: position of each grid point defined in the files, (3,), by id
+    loads: Array  #: load vectors, (n_dof, n_loads); (n_dof, 0) if there are none
+    displacement: Recovery | None  #: recovery matrix MUG1
+    forces: ElementRows | None  #: recovery matrix MEF1
+    stresses: ElementRows | None  #: recovery matrix MES1
+    files: Mapping[str, str] = field(default_factory=dict)  #: sha256 of each file, by path
+    notes: tuple[str, ...] = ()  #: notes on data that were included, assumed or omitted
 
     @property
     def grid_ids(self) -> list[int]:
-        """Return the grid points of the rows, in their order."""
+        """Return the grid points of the rows, in the order of the rows."""
         return list(dict.fromkeys(self.dofs[self.dofs[:, 1] != SCALAR, 0].tolist()))
 
     @property
     def scalar_ids(self) -> list[int]:
-        """Return the scalar points of the rows, in their order: modal coordinates."""
+        """Return the scalar points (modal coordinates) of the rows, in the order of the rows."""
         return self.dofs[self.dofs[:, 1] == SCALAR, 0].tolist()
 
 
@@ -151,7 +151,7 @@ def read_superelement(files: str | Path | Iterable[str | Path]) -> NastranSupere
 
 
 def _companions(path: Path) -> list[Path]:
-    """Return the paths of the files that belong together, in lower or upper case as this one."""
+    """Return the paths of the files that belong together, with suffixes in the same letter case."""
     return [path.with_suffix(suffix.upper() if path.suffix.isupper() else suffix) for suffix in COMPANIONS]
 
 
@@ -211,7 +211,7 @@ def extrn_rows(where: str, cards: list[Card]) -> IntArray:
 
 
 def _turn(where: str, rows: IntArray, points: GridPoints) -> sp.csr_array:
-    """Return T, (n, n), with u_basic = T u: the axes of each grid point at its translations and rotations."""
+    """Return T in u_basic = T u, (n, n): the axes of each grid point for its translations and rotations."""
     index = {(int(number), int(component)): k for k, (number, component) in enumerate(rows)}
     T = sp.lil_array((len(rows), len(rows)))
     T.setdiag(1.0)
@@ -235,7 +235,7 @@ def _turn(where: str, rows: IntArray, points: GridPoints) -> sp.csr_array:
 def _optional(
     where: str, matrices: list[NastranMatrix], names: tuple[str, ...], n: int, *, square: bool = True
 ) -> NastranMatrix | None:
-    """Return a matrix with n rows, None where Nastran wrote none or the single zero that stands for none."""
+    """Return a matrix with n rows; None if it is missing, or represented by a single zero."""
     given = [matrix for matrix in matrices if matrix.name in names and matrix.matrix.nnz]
     if not given:
         return None

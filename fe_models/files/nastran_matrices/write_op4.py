@@ -1,4 +1,4 @@
-"""OUTPUT4 files written: binary with 32-bit integers in the order of PCs, or text; always double precision."""
+"""Writing of OUTPUT4 files: little-endian binary with 32-bit integers, or text; always double precision."""
 
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
@@ -14,13 +14,13 @@ from fe_models.foundation.paths import replace_file
 
 __all__ = ["op4_parts", "write_op4"]
 
-LARGEST_TEXT = 9_999_998  #: rows or columns that fit the 8 characters of an integer, with a sign
-PER_LINE, WIDTH, DIGITS = 3, 24, 16  #: of numbers as text: 17 significant digits give every double back
-RECTANGULAR, SYMMETRIC, SQUARE = 2, 6, 1  #: forms
+LARGEST_TEXT = 9_999_998  #: largest number of rows or columns that fits into 8 characters with a sign
+PER_LINE, WIDTH, DIGITS = 3, 24, 16  #: numbers per line, width and digits; 17 significant digits reproduce every double
+RECTANGULAR, SYMMETRIC, SQUARE = 2, 6, 1  #: form codes of matrices
 
 
 def write_op4(path: str | Path, matrices: Mapping[str, Any], *, text: bool = False) -> None:
-    """Write matrices into an OP4 file: columns of bigmat strings, in double precision, entries of zero left out.
+    """Write matrices to an OP4 file in double precision, as columns of bigmat strings without zero entries.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def op4_parts(where: str, matrices: Mapping[str, Any], *, text: bool = False) ->
 
 
 def _compressed(here: str, values: Any) -> sp.csc_array:
-    """Return the matrix as float64 in compressed columns without entries of zero."""
+    """Return the matrix as float64 in compressed columns without zero entries."""
     matrix = sp.csc_array(values)
     if matrix.dtype.kind not in "fiub":
         raise MatrixError(f"{here}: expected real numbers, got {matrix.dtype}")
@@ -80,7 +80,7 @@ def _form(matrix: sp.csc_array) -> int:
 
 
 def _binary(name: str, matrix: sp.csc_array) -> Iterator[bytes]:
-    """Yield the header, the columns and the last record of a matrix."""
+    """Yield the header, the columns and the last record of a binary matrix."""
     from fe_models.files.nastran_matrices import op4_kernels
 
     n_rows, n_columns = matrix.shape
@@ -94,7 +94,7 @@ def _binary(name: str, matrix: sp.csc_array) -> Iterator[bytes]:
 
 
 def _text(name: str, matrix: sp.csc_array) -> Iterator[bytes]:
-    """Yield the same as lines."""
+    """Yield the header, the columns and the last record of a matrix as text lines."""
     n_rows, n_columns = matrix.shape
     yield f"{n_columns:8d}{-n_rows:8d}{_form(matrix):8d}{2:8d}{name:8s}1P,{PER_LINE}E{WIDTH}.{DIGITS}\n".encode()
     for column in range(n_columns):

@@ -30,11 +30,11 @@ __all__ = [
 
 
 ROLES_OF_SUFFIXES = {".sti": "K", ".mas": "M"}
-WRITTEN_TOGETHER = (".sti", ".mas", ".dof")  #: by one run, under one name
+WRITTEN_TOGETHER = (".sti", ".mas", ".dof")  #: suffixes of files that one run writes with the same name
 
 
 def calculix_neighbours(paths: Sequence[Path]) -> list[Path]:
-    """Return the files that CalculiX wrote beside the given ones: all have one name, and these stand there unnamed.
+    """Return the files that CalculiX wrote with the same name as the given files, and that are not given.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def calculix_neighbours(paths: Sequence[Path]) -> list[Path]:
 
 
 def read_calculix_matrix(path: Path, request: Request) -> ForeignMatrices:
-    """Read lines `row column value` of the upper triangle, numbered from 1; the rows are those of the .dof beside it.
+    """Read lines `row column value` of the upper triangle, numbered from 1; the .dof file next to it has the rows.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def read_calculix_matrix(path: Path, request: Request) -> ForeignMatrices:
 
 
 def read_calculix_dofs(path: Path, request: Request) -> ForeignMatrices:
-    """Read lines `node.component`, one for each row, components from 1.
+    """Read lines `node.component`, one for each row, with components from 1.
 
     Raises
     ------
@@ -87,16 +87,16 @@ def read_calculix_dofs(path: Path, request: Request) -> ForeignMatrices:
 
 LABELLED = re.compile(rb"\s*-?\d+\s*,\s*\d+\s*,\s*-?\d+\s*,\s*\d+\s*,\s*[-+.\d]")
 COMMA, BLANK, LINE = b",", b" ", b"\n"
-DENSE = 4  #: keys per row up to which rows are found by a table of all keys
+DENSE = 4  #: number of keys per row up to which a table of all keys finds the rows
 
 
 def is_labelled(head: bytes) -> bool:
-    """Whether the first line is `node, dof, node, dof, value`."""
+    """Return whether the first line has the form `node, dof, node, dof, value`."""
     return LABELLED.match(head) is not None
 
 
 def read_labelled(path: Path, request: Request) -> ForeignMatrices:
-    """Read lines `node, dof, node, dof, value`, each pair once; rows in ascending order of node and dof.
+    """Read lines `node, dof, node, dof, value`, where each pair appears once; rows are sorted by node and dof.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def read_labelled(path: Path, request: Request) -> ForeignMatrices:
 
 
 def joined_labels(where: str, data: bytes) -> bytes:
-    """Return the lines as `key key value` with key = 10 node + dof + 1, by taking out and replacing commas.
+    """Return the lines as `key key value` with key = 10 node + dof + 1, by removing and replacing commas.
 
     Node 12, dof 3 are written `12,3,`: without the comma between them they are the number 123, as a dof has one digit.
     """
@@ -145,7 +145,7 @@ def joined_labels(where: str, data: bytes) -> bytes:
 
 
 def unique_keys(first: IntArray, second: IntArray) -> IntArray:
-    """Return all keys of both, ascending, plus one, as the parser counts from 0."""
+    """Return all keys of both arrays, ascending, plus one, because the parser subtracts one."""
     largest = int(max(first.max(initial=-1), second.max(initial=-1))) + 1
     if largest > DENSE * max(len(first), 1_000_000):
         return np.unique(np.concatenate([first, second])) + 1
@@ -155,7 +155,7 @@ def unique_keys(first: IntArray, second: IntArray) -> IntArray:
 
 
 def rows_of_keys(keys: IntArray, wanted: IntArray) -> IntArray:
-    """Return the place of each wanted key, counted from 0, in ascending keys, counted from 1."""
+    """Return the index (from 0) of each wanted key (from 1) in ascending keys."""
     largest = int(keys[-1])
     if largest > DENSE * max(len(wanted), 1_000_000):
         return np.searchsorted(keys, wanted + 1)
@@ -171,7 +171,7 @@ TYPES = {"STIFFNESS": "K", "MASS": "M", "VISCOUS DAMPING": "D"}
 
 
 def is_user_element(head: bytes) -> bool:
-    """Whether the file begins with comments or a keyword of a deck."""
+    """Return whether the file begins with comments or a keyword of a deck."""
     return head.lstrip().startswith(b"*")
 
 
@@ -227,13 +227,13 @@ def read_user_element(path: Path, request: Request) -> ForeignMatrices:
 
 
 def words_of(lines: list[str]) -> Iterator[str]:
-    """Yield all fields of lines with commas."""
+    """Yield all fields of lines that are separated by commas."""
     for line in lines:
         yield from (word for word in (part.strip() for part in line.split(",")) if word)
 
 
 def integers(where: str, line: str) -> list[int]:
-    """Return the whole numbers of a line with commas."""
+    """Return the integers in a line, separated by commas."""
     try:
         return [int(word) for word in words_of([line])]
     except ValueError as error:
@@ -241,7 +241,7 @@ def integers(where: str, line: str) -> list[int]:
 
 
 def dofs_of_element(where: str, nodes: list[int], lines: list[list[int]]) -> IntArray:
-    """Return (node number, component) of every row, (n_dof, 2), of the lists below `*USER ELEMENT`."""
+    """Return (node number, component) of each row, (n_dof, 2), from the lists below `*USER ELEMENT`."""
     if not lines or not lines[0]:
         raise MatrixError(f"{where}: expected the dofs of the first node below *USER ELEMENT, got none")
     of_node: dict[int, list[int]] = {1: lines[0]}  # (2)
@@ -267,7 +267,7 @@ def dofs_of_element(where: str, nodes: list[int], lines: list[list[int]]) -> Int
 
 
 def role_of_matrix(where: str, keyword: str) -> str:
-    """Return K, M or D of a line `*MATRIX, TYPE=...`."""
+    """Return the role K, M or D in a line `*MATRIX, TYPE=...`."""
     kind = keyword.partition("TYPE=")[2].partition(",")[0]
     for name, role in TYPES.items():
         if kind == name.replace(" ", ""):
@@ -276,7 +276,7 @@ def role_of_matrix(where: str, keyword: str) -> str:
 
 
 def from_columns(where: str, values: Array, n: int) -> sp.csc_array:
-    """Return the full matrix of the upper triangle by columns."""
+    """Return the full matrix, given its upper triangle by columns."""
     if len(values) != n * (n + 1) // 2:
         raise MatrixError(
             f"{where}: expected {n * (n + 1) // 2} entries, one triangle of {n} rows, got {len(values)}; the file is "

@@ -10,17 +10,17 @@ from fe_models.files.matrices.text_files.triplet_text import triplet_matrix
 
 __all__ = ["is_coordinates", "read_coordinates", "role_by_name"]
 
-NAMED = {"K": ("STIF",), "M": ("MASS",), "D": ("DMPV",)}  #: job_STIF1.mtx: how Abaqus names its files
+NAMED = {"K": ("STIF",), "M": ("MASS",), "D": ("DMPV",)}  #: parts of file names by role; Abaqus writes job_STIF1.mtx
 COORDINATES = re.compile(rb"\s*\d+\s+\d+\s+[-+.\d]")
 
 
 def is_coordinates(head: bytes) -> bool:
-    """Whether the first line is `row column value`."""
+    """Return whether the first line has the form `row column value`."""
     return COORDINATES.match(head) is not None
 
 
 def role_by_name(path: Path) -> str | None:
-    """Return which matrix a file of Abaqus holds by its name, job_STIF1.mtx; None if that does not say it."""
+    """Return the role of an Abaqus file by its name, such as job_STIF1.mtx; None if the name has another form."""
     for role, marks in NAMED.items():
         if any(re.search(rf"_{mark}\d+$", path.stem, re.IGNORECASE) for mark in marks):
             return role
@@ -28,7 +28,7 @@ def role_by_name(path: Path) -> str | None:
 
 
 def read_coordinates(path: Path, request: Request) -> ForeignMatrices:
-    """Read lines `row column value`, numbered from 1; the dofs of the rows are not said.
+    """Read lines `row column value`, numbered from 1; they do not contain the dofs of the rows.
 
     Raises
     ------

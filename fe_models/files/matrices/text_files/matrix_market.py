@@ -1,4 +1,4 @@
-"""Matrix Market files: matrices, and vectors that say which node or dof a row is (ANSYS `*EXPORT, ..., MMF`)."""
+"""Matrix Market files: matrices, and vectors with node or dof of each row (ANSYS `*EXPORT, ..., MMF`)."""
 
 import re
 from dataclasses import dataclass
@@ -18,32 +18,33 @@ from fe_models.foundation.arrays import Array, IntArray
 __all__ = ["is_matrix_market", "read_matrix_market"]
 
 BANNER = re.compile(rb"%%MatrixMarket\s+matrix\s+(\w+)\s+(\w+)\s+([\w-]+)\s*", re.IGNORECASE)
-NAMES = {"K": ("k", "stiffness", "stiff"), "M": ("m", "mass"), "D": ("d", "c", "damping")}  #: of files
+#: file names without suffix, by role
+NAMES = {"K": ("k", "stiffness", "stiff"), "M": ("m", "mass"), "D": ("d", "c", "damping")}
 
 
 @dataclass(frozen=True)
 class Header:
-    """What the first lines of a file say."""
+    """Content of the first lines of a file."""
 
-    form: str  #: coordinate or array
-    symmetry: str  #: general or symmetric
-    sizes: tuple[int, ...]  #: rows, columns, and entries of a coordinate file
-    length: int  #: bytes of these lines
+    form: str  #: form of the file: coordinate or array
+    symmetry: str  #: symmetry: general or symmetric
+    sizes: tuple[int, ...]  #: numbers of rows, columns and, in a coordinate file, entries
+    length: int  #: length of these lines [bytes]
     n_lines: int
 
 
 def is_matrix_market(head: bytes) -> bool:
-    """Whether the file begins with the banner."""
+    """Return whether the file begins with the banner of Matrix Market."""
     return head[:14].lower() == b"%%matrixmarket"
 
 
 def role_by_stem(path: Path) -> str | None:
-    """Return K, M or D of a file that is named so: K.mtx, mass.mtx."""
+    """Return the role K, M or D that a file name such as K.mtx or mass.mtx indicates."""
     return next((role for role, names in NAMES.items() if path.stem.lower() in names), None)
 
 
 def read_matrix_market(path: Path, request: Request) -> ForeignMatrices:
-    """Read a matrix, coordinate or array, or a vector of the nodes or dofs of its rows.
+    """Read a matrix in coordinate or array form, or a vector with the node or dof of each row.
 
     A file of one column is such a list: node numbers, one for every row or one for every 3 or 6 rows, and one of two
     columns is (node, component from 1).
@@ -80,7 +81,7 @@ def read_matrix_market(path: Path, request: Request) -> ForeignMatrices:
 
 
 def header_of(where: str, data: bytes) -> Header:
-    """Return what the banner, the comments and the line of sizes say."""
+    """Return the content of banner, comments and size line."""
     banner = BANNER.match(data)
     if banner is None:
         raise MatrixError(f"{where}: expected %%MatrixMarket matrix FORM FIELD SYMMETRY, got {data[:60]!r}")
@@ -108,7 +109,7 @@ def header_of(where: str, data: bytes) -> Header:
 
 
 def dense_values(where: str, data: bytes, header: Header) -> Array:
-    """Return the numbers of an array file, or of a list in coordinate form, column by column, (n,)."""
+    """Return the numbers of an array file, or of a vector in coordinate form, column by column, (n,)."""
     n_rows, n_columns = header.sizes[:2]
     content = data[header.length :]
     _, n_words = judged(where, content, header.n_lines + 1)
@@ -132,7 +133,7 @@ def dense_values(where: str, data: bytes, header: Header) -> Array:
 
 
 def rows_said(where: str, table: Array) -> ForeignMatrices:
-    """Return the dofs of a list of nodes, or of nodes and components from 1."""
+    """Return the dofs in a list of nodes, or of nodes with components from 1."""
     numbers = np.rint(table).astype(np.int64)
     if not np.array_equal(numbers, table) or numbers[:, 0].min() < 1:
         raise MatrixError(f"{where}: expected whole numbers of nodes from 1, got others")
@@ -145,7 +146,7 @@ def rows_said(where: str, table: Array) -> ForeignMatrices:
 
 
 def repeated_nodes(where: str, nodes: IntArray) -> IntArray:
-    """Return the dofs of a node number for every row: x, y, z (and rotations) in the order of its rows."""
+    """Return the dofs if each row has a node number: x, y, z (and rotations) in the order of the rows."""
     order = np.argsort(nodes, kind="stable")
     first = np.flatnonzero(np.diff(nodes[order], prepend=nodes[order][0] - 1))
     per_node = np.diff(np.append(first, len(nodes)))

@@ -1,4 +1,4 @@
-"""Compiled look at every byte of a text of numbers; imported where it is used, since numba takes half a second."""
+"""Compiled check of every byte in a text of numbers; imported only when used, because importing numba is slow."""
 
 import numpy as np
 from numba import njit
@@ -17,12 +17,13 @@ FOLLOWS = {
     SIGN: (DIGIT, DOT),
     DOT: (DIGIT, EXPONENT, BLANK, LINE),
     EXPONENT: (SIGN, DIGIT),
-}  #: kind -> kinds that may follow it
-FORBIDDEN, FINE, WORD, FULL_LINE = range(4)  #: no number has such a pair; it may stand; a word begins; a line ends
+}  #: kinds of bytes that may follow each kind
+#: meaning of a pair of bytes: not allowed in numbers; allowed; start of a word; end of a line
+FORBIDDEN, FINE, WORD, FULL_LINE = range(4)
 
 
 def kinds_of_bytes() -> np.ndarray:
-    """Return the kind of every byte, (256,) uint8."""
+    """Return the kind of each possible byte, (256,) uint8."""
     kinds = np.full(256, OTHER, np.uint8)
     for letters, kind in ((b" \t\r", BLANK), (b"0123456789", DIGIT), (b"+-", SIGN), (b".", DOT), (b"eE", EXPONENT)):
         kinds[np.frombuffer(letters, np.uint8)] = kind
@@ -31,7 +32,7 @@ def kinds_of_bytes() -> np.ndarray:
 
 
 def judgement_of_pairs() -> np.ndarray:
-    """Return what it says that one kind follows another, (8, 8) uint8."""
+    """Return the meaning of each pair of successive kinds, (8, 8) uint8."""
     judgement = np.full((8, 8), FORBIDDEN, np.uint8)
     for first, seconds in FOLLOWS.items():
         judgement[first, list(seconds)] = FINE
@@ -47,7 +48,7 @@ KINDS, JUDGEMENT = kinds_of_bytes(), judgement_of_pairs()
 
 
 def judged_bytes(data: np.ndarray) -> tuple[int, int, int]:
-    """Return the number of words, of lines that are not empty, and the place of the first byte that no number has.
+    """Return the number of words and of non-empty lines, and the position of the first invalid byte.
 
     Parameters
     ----------
@@ -67,7 +68,7 @@ def judged_bytes(data: np.ndarray) -> tuple[int, int, int]:
 
 @jit
 def judged_pairs(data: np.ndarray, kinds: np.ndarray, judgement: np.ndarray) -> tuple[IntArray, int]:
-    """Count the judgements of all pairs of neighbouring bytes, the first after a line; stop at a forbidden one."""
+    """Count the meanings of all pairs of successive bytes, the first after a line end; stop at an invalid pair."""
     count = np.zeros(4, np.int64)
     words = lines = 0
     before = np.uint8(LINE)

@@ -1,4 +1,4 @@
-"""Text of matrix entries `row column value`: read by a compiled parser, after a look at every byte.
+"""Text of matrix entries `row column value`, read by a compiled parser after a check of every byte.
 
 SciPy's Matrix Market parser is quick and reads what it can: of `3.0D+03` it takes 3.0, of a line with more columns the
 first three, of `1.5e` 1.5. So the bytes are judged before: only numbers in the grammar of C, three to a line, and a
@@ -17,11 +17,11 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["HeadAndData", "judged", "parsed_triplets", "triplet_matrix"]
 
-UNBOUNDED = 2**40  #: rows told to the parser, which only compares
+UNBOUNDED = 2**40  #: number of rows given to the parser, which only compares it
 
 
 def parsed_triplets(where: str, data: bytes, *, first_line: int = 1) -> tuple[IntArray, IntArray, Array]:
-    """Return rows, columns, both from 0, and values of the lines of a text.
+    """Return rows and columns, both from 0, and values in the lines of a text.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def parsed_triplets(where: str, data: bytes, *, first_line: int = 1) -> tuple[In
 
 
 def triplet_matrix(where: str, role: str, data: bytes) -> tuple[sp.csc_array, str, bool]:
-    """Return the matrix of a text of entries alone, what was stored of it, and whether any entry is not zero.
+    """Return the matrix in a text of entries, the stored triangle, and whether any entry is nonzero.
 
     It has as many rows as the largest number says.
 
@@ -78,7 +78,7 @@ def triplet_matrix(where: str, role: str, data: bytes) -> tuple[sp.csc_array, st
 
 
 def judged(where: str, data: bytes, first_line: int) -> tuple[int, int]:
-    """Return the numbers of lines that are not empty and of words, after a look at every pair of neighbouring bytes."""
+    """Return the number of non-empty lines and of words, after a check of every pair of successive bytes."""
     from fe_models.files.matrices.text_files.text_kernels import judged_bytes
 
     n_words, n_lines, bad = judged_bytes(np.frombuffer(data, np.uint8))
@@ -90,17 +90,17 @@ def judged(where: str, data: bytes, first_line: int) -> tuple[int, int]:
 
 
 class HeadAndData(io.RawIOBase):
-    """A stream of a head and data behind it, without a copy of both."""
+    """Stream of a head followed by data, without a copy of both."""
 
     def __init__(self, head: bytes, data: bytes) -> None:
         self.parts = [memoryview(head), memoryview(data)]
 
     def readable(self) -> bool:
-        """Whether it can be read: always."""
+        """Return True: the stream can be read."""
         return True
 
     def read(self, size: int = -1) -> bytes:
-        """Return the next bytes, of one part."""
+        """Return the next bytes of one part."""
         while self.parts:
             part = self.parts[0]
             taken = part if size < 0 else part[:size]
@@ -112,7 +112,7 @@ class HeadAndData(io.RawIOBase):
 
 
 def located(text: str, shift: int) -> str:
-    """Return a message of the parser with the number of the line in the file."""
+    """Return a message of the parser with the line number in the file."""
     head, _, rest = text.partition(":")
     number = head.removeprefix("Line ")
     return f"line {int(number) + shift}:{rest}" if head.startswith("Line ") and number.isdigit() else text
