@@ -29,7 +29,7 @@ MOTION_COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz")
 
 STRESS_COMPONENTS = ("xx", "yy", "zz", "yz", "xz", "xy")  #: components of a symmetric tensor, in Voigt's order
 
-SYMMETRY_DEFECT = 1e-8  #: largest |A - A.T| / |A| that counts as rounding
+SYMMETRY_DEFECT = 1e-8  #: largest |A - A.T| / |A| that is rounding
 
 
 @overload
@@ -39,7 +39,7 @@ def frozen(values: Any, kind: type[np.int64]) -> IntArray: ...
 @overload
 def frozen(values: Any, kind: type[Any]) -> Any: ...
 def frozen(values: Any, kind: type[Any] = np.float64) -> Any:
-    """Return a read-only array of that kind in C order; the values are copied only if necessary."""
+    """Return a read-only array of this type in C order; values are copied only if necessary."""
     array = np.ascontiguousarray(values, dtype=kind)
     if array.flags.writeable:
         array = array.view()
@@ -56,7 +56,7 @@ def require_finite(where: str, array: Array, error: type[Exception] = BodyError)
 
 
 def require_shape(where: str, array: Array | IntArray, shape: tuple[int, ...]) -> None:
-    """Raise `BodyError` that names `where` unless the array has that shape."""
+    """Raise `BodyError` that names `where` unless the array has this shape."""
     if array.shape != shape:
         raise BodyError(f"{where}: expected shape {shape}, got {array.shape}")
 

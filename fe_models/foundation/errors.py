@@ -44,7 +44,7 @@ class CmsError(ReportedError):
 
 
 class ArgumentError(FeModelsError, CmsError, TypeError):
-    """A public function was given an object of another kind than its argument asks for."""
+    """A public function received an argument of the wrong type."""
 
 
 class BodyError(FeModelsError, CmsError, ValueError):
@@ -52,11 +52,11 @@ class BodyError(FeModelsError, CmsError, ValueError):
 
 
 class UnitsError(FeModelsError, CmsError, ValueError):
-    """The unit system is unknown, or units do not fit together."""
+    """The unit system is unknown, or units are inconsistent."""
 
 
 class StorageError(FeModelsError, CmsError, RuntimeError):
-    """There is not enough disk space for arrays that should go to disk."""
+    """Disk space is insufficient for arrays that are stored on disk."""
 
 
 class TableError(FeModelsError, CmsError, ValueError):

@@ -38,7 +38,7 @@ DIGEST = "digest"  #: name of the root attribute
 SHA256 = "sha256"  #: name of the attribute of a dataset
 MOST_COMPRESSED = 1032  #: largest compression ratio of deflate, for files that another tool has repacked
 BLOCK_VALUES = 1 << 20  #: number of values that are hashed at a time
-LARGE = 1 << 20  #: size of an array, in bytes, above which compression is tried
+LARGE = 1 << 20  #: size of an array above which compression is tried [bytes]
 PAYS = 0.75  #: largest share of its size that a compressed array may have; dense numbers do not compress enough
 SAMPLES, SAMPLE = 16, 4096  #: number of samples of an array that are compressed on trial, and number of values in each
 Attribute = str | int | float
@@ -148,24 +148,24 @@ def write_sealed_file(path: Path, kind: Kind, fill: Callable[[Any], None], *, pa
 
 
 class Entry(NamedTuple):
-    """What the manifest of a file says about an attribute or dataset."""
+    """Manifest entry of an attribute or dataset."""
 
-    path: str  #: of a dataset, or "<path>@<name>" of an attribute
-    kind: str  #: "utf8", "int64" or "float64"
+    path: str  #: path of a dataset, or "<path>@<name>" of an attribute
+    kind: str  #: type of the values: "utf8", "int64" or "float64"
     shape: tuple[int, ...]
-    sha256: str  #: of the values
+    sha256: str  #: sha256 of the values
 
 
 @dataclass(eq=False)
 class Manifest:
-    """Writes attributes and datasets into a file, and finally the digest over all of them.
+    """Writer of attributes and datasets to a file, and of a digest over all of them at the end.
 
     The digest, a root attribute, is the sha256 over the paths, types, shapes and sha256 of all contents. It does not
     depend on the layout of HDF5. It therefore survives repacking, and equal digests mean equal contents.
     """
 
-    file: Any  #: an open `h5py.File`
-    entries: list[Entry] = field(default_factory=list)  #: of all attributes and datasets
+    file: Any  #: open `h5py.File`
+    entries: list[Entry] = field(default_factory=list)  #: entries of all attributes and datasets
 
     def attributes(self, path: str, values: Mapping[str, Attribute]) -> None:
         """Write the attributes of a group, which is created if it does not exist."""

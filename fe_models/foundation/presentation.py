@@ -1,4 +1,4 @@
-"""How public objects show themselves: a few lines as text, a small table in a notebook."""
+"""Display of public objects: a few lines as text, a small table in a notebook."""
 
 import html
 from collections.abc import Mapping, Sequence
@@ -15,10 +15,10 @@ __all__ = ["Summary", "listed", "presented", "text_of"]
 
 Class = TypeVar("Class", bound=type)
 
-LONGEST_VALUE = 70  #: characters of a value
-MOST_ROWS = 12  #: rows of the table of a summary
-FEW = 6  #: names, or items of a list, that are shown
-SMALL_ARRAY = 12  #: entries of an array that is shown with its numbers
+LONGEST_VALUE = 70  #: largest number of characters of a value
+MOST_ROWS = 12  #: largest number of rows in the table of a summary
+FEW = 6  #: largest number of names or list items in the output
+SMALL_ARRAY = 12  #: largest number of entries of an array whose numbers are in the output
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def summary_of_fields(value: Any) -> Summary:
 
 
 def is_same(a: Any, b: Any) -> bool:
-    """Whether a value is the default."""
+    """Return whether a value equals the default."""
     if a is b:
         return True
     try:
@@ -112,7 +112,7 @@ def is_same(a: Any, b: Any) -> bool:
 
 
 def text_of(value: Any) -> str:
-    """Return a value in one short line."""
+    """Return a value as a short text on one line."""
     if isinstance(value, np.ndarray):
         if not 0 < value.size <= SMALL_ARRAY:
             return f"array {value.shape}"
@@ -144,6 +144,6 @@ def text_of(value: Any) -> str:
 
 
 def listed(names: Sequence[str]) -> str:
-    """Return the number of names and the first of them."""
+    """Return the number of names, and the first names."""
     more = f", ... and {len(names) - FEW} more" if len(names) > FEW else ""
     return f"{len(names)}: {', '.join(names[:FEW])}{more}" if names else "none"

@@ -36,8 +36,8 @@ __all__ = [
     "frozen_copies",
 ]  # fmt: skip
 
-MOST_KINDS = 3  #: named in a message
-ORTHONORMAL = 1e-6  #: defect of axes that counts as rounding of printed digits
+MOST_KINDS = 3  #: largest number of types that a message names
+ORTHONORMAL = 1e-6  #: largest defect of orthonormal axes that is rounding of printed digits
 
 Class = TypeVar("Class", bound=type)
 Key = TypeVar("Key")
@@ -183,7 +183,7 @@ def put_arrays(record: object, where: str, error: type[Exception]) -> None:
 
 
 class Takes(NamedTuple):
-    """What a field or argument takes, if that is more than what its type says: `Annotated[type, Takes(taken)]`."""
+    """Description of the values that a field or argument accepts, if the type alone is not enough."""
 
     hint: Any
 
@@ -233,7 +233,7 @@ def conformed(hint: Any, value: Any) -> Any:
 
 
 def _first_conformed(hints: Sequence[Any], value: Any) -> Any:
-    """Return the value for the first of some annotations that takes it as it is, else for the first that takes it."""
+    """Return the value for the first annotation that accepts it unchanged, else for the first that converts it."""
     found, expected = [], []
     for hint in hints:
         try:

@@ -87,5 +87,7 @@ class Solver:
 
     name: str
     factor: MakeFactor
-    missing: Callable[[], str] = lambda: ""  #: "" if the solver can be used, else what is missing and what to install
-    spread: MakeSpreadFactor | None = None  #: None: the solver only accepts matrices of a single process
+    #: returns "" if the solver can be used, else what is missing and what to install
+    missing: Callable[[], str] = lambda: ""
+    #: factorisation of distributed matrices; None: only matrices of a single process
+    spread: MakeSpreadFactor | None = None

@@ -13,7 +13,7 @@ __all__ = ["Stages"]
 class Stages:
     """The stages of a job: a progress bar for the current stage, and durations of finished stages [s]."""
 
-    show: Any = None  #: `rich.progress.Progress`; None: no bar
+    show: Any = None  #: display of `rich.progress.Progress`; None: no progress bar
     seconds: dict[str, float] = field(default_factory=dict)
 
     @contextmanager

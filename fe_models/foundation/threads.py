@@ -21,7 +21,7 @@ def n_processors() -> int:
 
 
 def n_threads() -> int:
-    """Return the number of threads for one task: of processors, limited by `MOST_THREADS` and the set bound."""
+    """Return the number of threads for a task: the number of processors, limited by `MOST_THREADS` and `bound`."""
     return min(n_processors(), MOST_THREADS, bound or MOST_THREADS)
 
 
@@ -33,13 +33,13 @@ def in_threads(kernel: Callable[..., Any], inputs: tuple[Any, ...], outputs: tup
 
 
 def thread_environment(n: int) -> dict[str, str]:
-    """Return the environment variables that limit the libraries of a new process to n threads."""
+    """Return the environment variables that limit the libraries in a new process to n threads."""
     return {f"{name}_NUM_THREADS": str(n) for name in LIBRARIES}
 
 
 @contextmanager
 def bounded_threads(n: int | None) -> Iterator[None]:
-    """Limit this process to n threads, its own and those of the libraries loaded so far; None: no limit."""
+    """Limit this process to n threads, including those of loaded libraries; None: no limit."""
     global bound
     before, bound = bound, n if n is not None else bound
     limits: Any = nullcontext()

@@ -34,14 +34,15 @@ class Table(BaseModel):
 
 
 Model = TypeVar("Model", bound=Table)
-Location = tuple[str | int, ...]  #: a key path: keys of tables, and indices in lists
+Location = tuple[str | int, ...]  #: key path: keys of tables and indices in lists
 DEEPEST = 20  #: largest depth of nested tables and lists in a file
-GREATEST = 1e100  #: largest number in a file: products of three stay finite, and no physical quantity is larger
+#: largest number in a file: products of three such numbers are finite, and no physical quantity is larger
+GREATEST = 1e100
 MOST_PROBLEMS = 20  #: largest number of problems in one message
 
 
 class FileContent(dict[str, Any]):
-    """The tables of a TOML file, with the places where its values stand.
+    """Tables of a TOML file, with the line numbers of their values.
 
     Parameters
     ----------

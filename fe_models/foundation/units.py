@@ -54,7 +54,7 @@ class Units:
 
     @staticmethod
     def of_name(name: str) -> "Units":
-        """Return the unit system of that name, as `unit_system` does."""
+        """Return the unit system with this name, as `unit_system` does."""
         return unit_system(name)
 
     def to_si(self, *, length: int = 0, mass: int = 0, time: int = 0) -> float:
@@ -75,7 +75,7 @@ UNIT_SYSTEMS = {
 
 
 def unit_system(name: str) -> Units:
-    """Return the unit system of that name.
+    """Return the unit system with this name.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def unit_words(units: Units, dimensions: Dimensions) -> str:
 
 SI = unit_system("m-kg-s")
 LENGTH, TIME = Dimensions(length=1), Dimensions(time=1)
-SPEED, RATE = Dimensions(length=1, time=-1), Dimensions(time=-1)  #: rates of positions, and of angles
+SPEED, RATE = Dimensions(length=1, time=-1), Dimensions(time=-1)  #: dimensions of rates of positions and of angles
 
 
 class Quantity(float):
@@ -138,7 +138,7 @@ class Quantity(float):
     dimensions: Dimensions
 
     def __new__(cls, value: float, dimensions: Dimensions) -> "Quantity":
-        """Make a quantity of a value in SI units."""
+        """Create a quantity from a value in SI units."""
         made = super().__new__(cls, value)
         made.dimensions = dimensions
         return made

@@ -1,5 +1,5 @@
-"""Tables and documents: what commands and results write for people and for other programs."""
+"""Tables and documents: output of commands and results for people and for other programs."""
 
 __all__ = ["TABLE_SUFFIXES"]
 
-TABLE_SUFFIXES = (".csv", ".json", ".mat", ".npz", ".parquet")  #: endings of the files in which tables are written
+TABLE_SUFFIXES = (".csv", ".json", ".mat", ".npz", ".parquet")  #: suffixes of table files

@@ -14,13 +14,13 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["INK", "Axis", "Bars", "Chart", "LimitLine", "Line", "Matrix", "chart_record", "thinned"]
 
-INK = "#1b1f24"  #: the colour of text, which a page turns with its ground
-DIGITS = 6  #: of a number in a page
+INK = "#1b1f24"  #: text colour, which is inverted on a dark page
+DIGITS = 6  #: number of digits of a number in a page
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A line; points that are not finite are gaps."""
+    """Line in a chart; non-finite points are gaps."""
 
     x: ArrayLike
     y: ArrayLike
@@ -30,11 +30,11 @@ class Line:
     width: float = 2.0
     opacity: float = 1.0
     symbol: str = ""  #: circle, square, diamond, triangle-up, triangle-down, cross, x or star; empty: no markers
-    is_step: bool = False  #: constant from each point to the next
-    is_hill: bool = False  #: filled from the bottom over a quarter of the height, without an axis
+    is_step: bool = False  #: whether the value is constant from each point to the next
+    is_hill: bool = False  #: whether the line is a filled background, a quarter of the height, without an axis
     panel: int = 0
-    other_x: ArrayLike | None = None  #: places across after a switch of the page
-    notes: tuple[str, ...] = ()  #: what is told of each point; empty: x and y
+    other_x: ArrayLike | None = None  #: horizontal positions after the page is switched to another axis
+    notes: tuple[str, ...] = ()  #: tooltip of each point; empty: x and y
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,17 +48,17 @@ class Bars:
 
 @dataclass(frozen=True, eq=False)
 class Matrix:
-    """Numbers from 0 (light) to 1 (dark) in cells, rows from the top; both are counted from 1."""
+    """Matrix of numbers from 0 (light) to 1 (dark) as cells; rows start at the top, both indices at 1."""
 
     values: Array
-    row: str  #: what a row is
+    row: str  #: meaning of a row
     column: str
-    notes: tuple[str, ...] = ()  #: told of each row besides
+    notes: tuple[str, ...] = ()  #: additional tooltip of each row
 
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis with its label; without a range it fits what is drawn."""
+    """Axis with its label; without a range it fits the data."""
 
     label: str = ""
     is_log: bool = False
@@ -67,7 +67,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class LimitLine:
-    """A horizontal line with words; or a band from `low` to `value` of a panel."""
+    """Horizontal line with a text, or a band from `low` to `value` of a panel."""
 
     value: float
     label: str = ""
@@ -104,11 +104,11 @@ class Chart:
     limits: tuple[LimitLine, ...] = ()
     names: tuple[str, ...] = ()
     has_legend: bool = True
-    other_label: str = ""  #: of the axis across after a switch of the page
+    other_label: str = ""  #: label of the horizontal axis after the page is switched
 
 
 def thinned(line: Line, most: int = 1500) -> Line:
-    """Return a line with at most so many points, the largest and smallest values among them."""
+    """Return a line with at most this number of points, including the largest and smallest values."""
     x, y = np.asarray(line.x, dtype=float), np.asarray(line.y, dtype=float)
     if len(x) <= most:
         return line
@@ -138,7 +138,7 @@ def axis_record(axis: Axis) -> dict[str, Any]:
 
 
 def item_record(item: Line | Bars | Matrix) -> dict[str, Any]:
-    """Return what is drawn in plain types."""
+    """Return a chart item in plain types."""
     if isinstance(item, Bars):
         return {"kind": "bars", "values": plain(item.values), "name": item.name, "color": item.color}
     if isinstance(item, Matrix):
@@ -149,11 +149,11 @@ def item_record(item: Line | Bars | Matrix) -> dict[str, Any]:
 
 
 def plain(values: ArrayLike) -> list[float | int | None]:
-    """Return numbers with few digits; None for those that are not finite."""
+    """Return numbers with few digits; None for non-finite numbers."""
     return [shortest(float(value)) if math.isfinite(value) else None for value in np.asarray(values, dtype=float)]
 
 
 def shortest(value: float) -> float | int:
-    """Return a number with `DIGITS` digits, as an integer where it is one."""
+    """Return a number with `DIGITS` digits, as an integer if it is one."""
     short = float(f"{value:.{DIGITS}g}")
     return int(short) if short.is_integer() and abs(short) < 1e15 else short

@@ -17,7 +17,7 @@ __all__ = [
     "Section", "Terms", "TextTable", "cells_of", "document_record",
 ]  # fmt: skip
 
-MARKS = {"pass": "\u2713", "warn": "!", "fail": "\u2715", "error": "!", "info": ""}  #: signs of verdicts
+MARKS = {"pass": "\u2713", "warn": "!", "fail": "\u2715", "error": "!", "info": ""}  #: symbols of the verdicts
 
 
 @dataclass(frozen=True)
@@ -25,10 +25,10 @@ class Cell:
     """A cell of a table."""
 
     text: str
-    kind: str = ""  #: "n" for numbers, "name", "pass", "warn", "fail", "blank"; several separated by blanks
+    kind: str = ""  #: cell kinds, separated by blanks: "n" for numbers, "name", "pass", "warn", "fail", "blank"
     note: str = ""  #: smaller text below
-    badge: str = ""  #: verdict in whose colour the words stand in a badge
-    line: tuple[str, str] | None = None  #: colour and dash of a line before the words
+    badge: str = ""  #: verdict whose colour the badge around the text has
+    line: tuple[str, str] | None = None  #: colour and dash of a line before the text
     span: int = 1
 
 
@@ -59,7 +59,7 @@ class TextTable:
 
 @dataclass(frozen=True)
 class Paragraph:
-    """A sentence or some; kind: "", "why" (small) or "notice" (framed)."""
+    """Paragraph of one or more sentences; kind: "", "why" (small) or "notice" (framed)."""
 
     text: str
     kind: str = ""
@@ -78,14 +78,14 @@ class Picture:
 
     png: bytes
     caption: str = ""
-    share: float = 1.0  #: of the width
+    share: float = 1.0  #: share of the page width
 
 
 @dataclass(frozen=True, eq=False)
 class Figure:
     """A chart with its title and caption."""
 
-    key: str  #: of the element on the page
+    key: str  #: id of the element on the page
     chart: Chart
     caption: str
     title: str = ""
@@ -93,7 +93,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Terms:
-    """Words and what they mean."""
+    """Words with their meanings."""
 
     items: Sequence[tuple[str, str]]
 
@@ -108,7 +108,7 @@ class Gallery:
 
 @dataclass(frozen=True)
 class Markup:
-    """HTML of a page alone, such as a view in 3D, with its script, and data by id of the element that holds it."""
+    """HTML for the page only, such as a 3D view, with its script, and data by element id."""
 
     html: str
     script: str = ""
@@ -126,12 +126,12 @@ class Section:
     title: str
     blocks: Sequence[Block]
     lead: str = ""  #: first sentence
-    short: str = ""  #: in the contents; empty: the title
+    short: str = ""  #: title in the contents; empty: the title of the section
 
 
 @dataclass(frozen=True)
 class Answer:
-    """The answer at the top.
+    """Answer at the top of the document.
 
     Parameters
     ----------
@@ -156,19 +156,19 @@ class Answer:
 
 @dataclass(frozen=True)
 class Document:
-    """What is shown and printed."""
+    """Content of a document."""
 
     title: str
-    facts: str  #: what was looked at, in a sentence
+    facts: str  #: sentence about the object of the document
     answer: Answer
     sections: Sequence[Section]
-    brand: str = ""  #: name of what it is about, above the contents
-    kind: str = ""  #: kind of document, below it
-    signatures: Sequence[str] = ()  #: lines to sign
+    brand: str = ""  #: name of the object, above the contents
+    kind: str = ""  #: kind of document, below the name
+    signatures: Sequence[str] = ()  #: labels of signature lines
     footer: str = ""
 
     def blocks(self) -> Iterator[Block]:
-        """Yield all blocks, those of galleries one by one."""
+        """Yield all blocks; blocks of galleries are yielded one by one."""
         for section in self.sections:
             for block in section.blocks:
                 yield from block.blocks if isinstance(block, Gallery) else (block,)
@@ -192,12 +192,12 @@ def cells_of(table: TextTable) -> list[list[Cell]]:
 
 
 def verdict_kind(words: str) -> str:
-    """Return the colour of a word."""
+    """Return the colour class of a verdict word."""
     return words if words in MARKS else {"": "", "unchanged": "pass", "not found": "warn"}.get(words, "fail")
 
 
 def document_record(document: Document) -> dict[str, Any]:
-    """Return a document in plain types: text, tables and charts; pictures with their captions alone."""
+    """Return a document in plain types: text, tables and charts, but only captions of pictures."""
     return {
         "title": document.title,
         "facts": document.facts,

@@ -16,7 +16,7 @@ __all__ = ["asset", "html_page", "text"]
 
 
 def html_page(document: Document) -> str:
-    """Return the page; the script and the data of charts are carried if there is one."""
+    """Return the page; it includes the script and data of charts if there are any."""
     charts = {block.key: chart_record(block.chart) for block in document.blocks() if isinstance(block, Figure)}
     extras = [block for block in document.blocks() if isinstance(block, Markup)]
     data = {key: words for block in extras for key, words in block.data.items()}

@@ -38,17 +38,17 @@ __all__ = ["pdf_pages"]
 INK, TEXT, SOFT, LINE = "#1b1f24", "#3d4650", "#66727e", "#dde2e7"
 GROUNDS = {"pass": "#e4f3ec", "warn": "#fdf1dd", "fail": "#fbe8e3", "error": "#fbe8e3", "info": "#eef1f4"}
 WORDS = {"pass": "#0a6b4d", "warn": "#8a5300", "fail": "#a32a12", "error": "#a32a12", "info": "#66727e"}
-MARGIN = 15.0  #: [mm]
-PADDING = 6.0  #: of reportlab's frame on each side [points]
-FOOTER = 6.5  #: size of the words of the footer [points]
-LONGEST_FOOTER = 230  #: characters, two lines beside the number of the page
-DPI = 150  #: of charts
-HIGHEST = 560.0  #: height of a picture on a sheet [points]
-WIDEST = 150.0  #: of a text that counts for the width of its column [points]
+MARGIN = 15.0  #: page margin [mm]
+PADDING = 6.0  #: padding of the frame of reportlab on each side [points]
+FOOTER = 6.5  #: font size of the footer [points]
+LONGEST_FOOTER = 230  #: largest number of characters in the footer: two lines next to the page number
+DPI = 150  #: resolution of charts [dots per inch]
+HIGHEST = 560.0  #: largest height of a picture on a page [points]
+WIDEST = 150.0  #: largest text width that counts for the width of a column [points]
 
 
 def pdf_pages(document: Document) -> bytes:
-    """Return the PDF.
+    """Return the document as a PDF.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def pdf_pages(document: Document) -> bytes:
 
 
 def fonts() -> None:
-    """Register the fonts that matplotlib ships: they have Greek letters, exponents and signs."""
+    """Register the fonts included in matplotlib, which have Greek letters, superscripts and symbols."""
     import matplotlib
     from reportlab.pdfbase import pdfmetrics
     from reportlab.pdfbase.ttfonts import TTFont
@@ -113,7 +113,7 @@ def words_of(words: str, *, size: float = 8.0, bold: bool = False, color: str = 
 
 
 def head(document: Document, width: float) -> list[Any]:
-    """Return title, verdict, figures and the lines to sign."""
+    """Return title, verdict, facts and signature lines."""
     from reportlab.platypus import Spacer
     from reportlab.platypus import Table as Grid
 
@@ -156,7 +156,7 @@ def head(document: Document, width: float) -> list[Any]:
 
 
 def section_flow(section: Section, width: float) -> list[Any]:
-    """Return the blocks of a section; its title is kept together with the first of them."""
+    """Return the blocks of a section; its title stays together with the first block."""
     from reportlab.platypus import CondPageBreak, Spacer
 
     first = next((block for block in section.blocks if not isinstance(block, Markup)), None)
@@ -171,7 +171,7 @@ def section_flow(section: Section, width: float) -> list[Any]:
 
 
 def block_flow(block: Block, width: float, is_inside: bool = False) -> list[Any]:
-    """Return a block."""
+    """Return a block as elements of the PDF."""
     from reportlab.platypus import Spacer
 
     match block:
@@ -222,7 +222,7 @@ def image_flow(png: bytes, shown: float, title: str, caption: str, is_inside: bo
 
 
 def table_flow(block: TextTable, width: float) -> list[Any]:
-    """Return a table whose headings are repeated on every page."""
+    """Return a table whose headings repeat on every page."""
     from reportlab.platypus import Spacer
     from reportlab.platypus import Table as Grid
 
@@ -267,7 +267,7 @@ def table_flow(block: TextTable, width: float) -> list[Any]:
 
 
 def automatic_widths(headings: Sequence[str], rows: Sequence[Sequence[Cell]], width: float) -> list[float]:
-    """Return the widths of columns: each has room for its longest word, and the rest goes by the longest texts."""
+    """Return column widths: each fits its longest word, and the remaining width follows the longest texts."""
     from reportlab.pdfbase.pdfmetrics import stringWidth
 
     def wide(words: str, size: float) -> float:
@@ -301,7 +301,7 @@ SYMBOLS = {
 
 
 def chart_png(chart: Chart, width: float) -> bytes:
-    """Return a chart as a picture of a width [points]."""
+    """Return a chart as a PNG of this width [points]."""
     from matplotlib.figure import Figure as Drawing
 
     high = min(max(1.6, chart.height / 110), HIGHEST / 72)
@@ -336,7 +336,7 @@ def chart_png(chart: Chart, width: float) -> bytes:
 
 
 def put_legend(drawing: "Drawing", panels: Sequence["Axes"]) -> None:
-    """List every name of the panels once above them, in as many columns as the drawing has room for, at most three."""
+    """Draw one legend for all panels above them, with as many columns as fit, at most three."""
     named: dict[str, Any] = {}
     for axes in panels:
         for handle, name in zip(*axes.get_legend_handles_labels(), strict=True):

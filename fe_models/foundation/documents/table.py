@@ -41,7 +41,7 @@ __all__ = ["Table", "read_table"]
 Column = NDArray[Any]
 
 FORMAT, VERSION = "floatframe table", 1
-KINDS = {"b": "boolean", "i": "integer", "f": "float", "c": "complex", "U": "text"}  #: by kind of the array
+KINDS = {"b": "boolean", "i": "integer", "f": "float", "c": "complex", "U": "text"}  #: name of each array type
 TYPES = {"boolean": bool, "integer": np.int64, "float": np.float64, "complex": np.complex128, "text": np.str_}
 MOST_SHOWN = 60  #: largest number of printed rows
 
@@ -98,7 +98,7 @@ class Table:
         cls, names: Sequence[str], rows: Iterable[Sequence[Any]], units: Mapping[str, str] | None = None,
         meta: Mapping[str, Any] | None = None,
     ) -> "Table":  # fmt: skip
-        """Return the table of rows, each with a value for every name.
+        """Return a table of rows, each with a value for every name.
 
         Raises
         ------
@@ -140,7 +140,7 @@ class Table:
         return zip(*(self[name].tolist() for name in self.columns), strict=True)
 
     def write(self, path: str | os.PathLike[str]) -> Path:
-        """Write the table in the format of the ending of the file, one of `TABLE_SUFFIXES`; completely or not at all.
+        """Write the table in the format of the suffix, one of `TABLE_SUFFIXES`; the file is complete or not written.
 
         .parquet needs pyarrow (`pip install "floatframe[parquet]"`).
 
@@ -158,7 +158,7 @@ class Table:
         return target
 
     def content(self, suffix: str, where: str = "table") -> bytes:
-        """Return the bytes of a file with that ending.
+        """Return the bytes of a file with this suffix.
 
         Raises
         ------
@@ -196,7 +196,7 @@ class Table:
         return found
 
     def known(self, name: str) -> str:
-        """Return the name of a column; `TableError` if there is none."""
+        """Return the name after checking that such a column exists; raise `TableError` otherwise."""
         self[name]
         return name
 
@@ -205,7 +205,7 @@ class Table:
         return Summary(f"Table of {self.n_rows} rows", [], self.heads, [shown_row(row) for row in self.rows()])
 
     def __rich__(self) -> "RichTable":
-        """Return the table as rich prints it: the first `MOST_SHOWN` rows, numbers to the right."""
+        """Return the table for printing by rich: the first `MOST_SHOWN` rows, with numbers right-aligned."""
         from rich import box
         from rich.markup import escape
         from rich.table import Table as RichTable
@@ -243,7 +243,7 @@ def column_of(name: str, values: ArrayLike) -> Column:
 
 
 def typed(name: str, values: list[Any]) -> Column:
-    """Return values of Python, None for missing ones, as an array of one type."""
+    """Return Python values (None for missing ones) as an array of one type."""
     known = [value for value in values if value is not None]
     for value in known:
         if not isinstance(value, str | bool | int | float | complex | np.generic):
@@ -268,7 +268,7 @@ def typed(name: str, values: list[Any]) -> Column:
 
 
 def shown_row(row: Sequence[Any]) -> list[str]:
-    """Return the cells of a row for the eye."""
+    """Return the cells of a row as short texts."""
     return [f"{cell:.6g}" if isinstance(cell, float | complex) else str(cell) for cell in row]
 
 
@@ -276,7 +276,7 @@ def shown_row(row: Sequence[Any]) -> list[str]:
 
 
 def header_of(table: Table) -> dict[str, Any]:
-    """Return everything but the values."""
+    """Return all data of a table except its values."""
     columns = [
         {"name": name, "unit": table.units[name], "type": KINDS[table[name].dtype.kind]} for name in table.columns
     ]
@@ -297,7 +297,7 @@ def table_of(header: Any, values: Callable[[int, str], Any]) -> Table:
 
 
 def head(name: str, unit: str) -> str:
-    """Return "name [unit]", or the name; a name that ends like this is followed by empty brackets."""
+    """Return "name [unit]", or the name; empty brackets follow a name that itself ends with brackets."""
     return f"{name} [{unit}]" if unit or HEAD.fullmatch(name) else name
 
 
@@ -313,7 +313,7 @@ def real_columns(table: Table) -> Iterator[tuple[str, str, Column]]:
 
 
 def complex_column(real: Column, imag: Column) -> Column:
-    """Return complex numbers from their parts, which 1j * imag would spoil where they are not finite."""
+    """Return complex numbers from their parts; 1j * imag would be wrong for non-finite parts."""
     found = np.empty(len(real), dtype=complex)
     found.real, found.imag = real, imag
     return found
@@ -359,7 +359,7 @@ def cells_of(values: Column) -> list[str]:
 
 
 def csv_text(text: str) -> str:
-    """Return a text, in quotes if it has delimiters, or looks like another value."""
+    """Return a text, in quotes if it contains delimiters or resembles another value."""
     is_plain = not (set(',"\r\n') & set(text) or NUMBER.fullmatch(text) or text in BOOLEANS or text != text.strip())
     return text if is_plain else '"' + text.replace('"', '""') + '"'
 
@@ -400,7 +400,7 @@ def read_csv(content: bytes) -> Table:
 
 
 def column_of_cells(cells: list[tuple[str, bool]]) -> Column:
-    """Return the values of cells, each with whether it stood in quotes: integers, floats, True and False, or text."""
+    """Return the values of cells, each given with whether it was in quotes: integers, floats, booleans, or text."""
     texts = [text for text, _ in cells]
     is_text = any(is_quoted for _, is_quoted in cells) or (bool(texts) and not any(texts))
     if is_text:
@@ -494,7 +494,7 @@ MATLAB_WORDS = {
 
 
 def matlab_names(names: Iterable[str]) -> list[str]:
-    """Return different names of variables of MATLAB, similar to those of columns."""
+    """Return distinct MATLAB variable names that resemble column names."""
     found: list[str] = []
     for name in names:
         stem = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_")[:50]
@@ -598,14 +598,14 @@ FORMATS = dict(
 
 
 def format_of(suffix: str, where: str) -> TableFormat:
-    """Return the format of an ending; `TableError` if there is none."""
+    """Return the format of a suffix; raise `TableError` if there is none."""
     if suffix.lower() not in FORMATS:
         raise TableError(f"{where}: unknown ending {quoted(suffix)}{nearest(suffix.lower(), FORMATS)}")
     return FORMATS[suffix.lower()]
 
 
 def read_table(path: str | os.PathLike[str]) -> Table:
-    """Return the table of a file that `Table.write` has written, by the ending of the file.
+    """Return the table in a file written by `Table.write`, by the suffix of the file.
 
     Parameters
     ----------

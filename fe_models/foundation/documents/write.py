@@ -1,4 +1,4 @@
-"""Documents in files: a page, a PDF, or JSON, by the ending."""
+"""Documents in files: a page, a PDF or JSON, depending on the suffix."""
 
 import json
 import os
@@ -23,12 +23,12 @@ DOCUMENTS: dict[str, Callable[[Document], bytes]] = {
 
 
 def document_content(document: Document, suffix: str) -> bytes:
-    """Return the bytes of a file with an ending of `DOCUMENTS`."""
+    """Return the bytes of a file with a suffix of `DOCUMENTS`."""
     return DOCUMENTS[suffix.lower()](document)
 
 
 def write_document(document: Document, path: str | os.PathLike[str]) -> Path:
-    """Write a document in the format of the ending of the file, one of `DOCUMENTS`; completely or not at all.
+    """Write a document in the format of the suffix, one of `DOCUMENTS`; the file is complete or not written.
 
     Raises
     ------

@@ -13,7 +13,7 @@ from fe_models.foundation.ranks.ranks import OneRank, RankError, Ranks, started_
 
 __all__ = ["MpiRanks", "all_ranks"]
 
-NAP = 5e-4  #: seconds between checks whether all ranks have arrived
+NAP = 5e-4  #: time between checks whether all ranks have arrived [s]
 FAILED = 2  #: exit code of all ranks if one of them failed
 
 
@@ -56,7 +56,7 @@ class MpiRanks:
             self.comm.bcast(None, root=0)
 
     def _wake(self) -> None:
-        """Wait for rank 0 in sleep. MPI waits by polling, which takes processors from the threads of rank 0."""
+        """Wait for rank 0 while sleeping; MPI would poll, which takes processor time from the threads of rank 0."""
         waiting = self.comm.Ibarrier()
         while not waiting.Test():
             time.sleep(NAP)

@@ -23,8 +23,8 @@ class RowLayout:
     """Assignment of rows to ranks: position k, counted through all ranks in order, holds row order[k]."""
 
     ranks: Ranks
-    order: IntArray  #: (n,)
-    rows: Rows  #: which positions each rank holds
+    order: IntArray  #: row at each position, (n,)
+    rows: Rows  #: positions on each rank
 
     @property
     def n(self) -> int:

@@ -10,12 +10,12 @@ from fe_models.foundation.ranks.ranks import Ranks
 
 __all__ = ["Rows", "collected", "even_rows", "own_rows", "spread"]
 
-PIECE = 2**24  #: numbers in one message; MPI counts bytes with 32 bits
+PIECE = 2**24  #: largest number of values in one message; MPI counts bytes with 32 bits
 
 
 @dataclass(frozen=True)
 class Rows:
-    """The rows of each rank: rank r holds the rows from starts[r] to starts[r + 1]."""
+    """Distribution of rows: rank r has the rows from starts[r] to starts[r + 1]."""
 
     starts: tuple[int, ...]
 
@@ -29,12 +29,12 @@ class Rows:
         return slice(self.starts[rank], self.starts[rank + 1])
 
     def count(self, rank: int) -> int:
-        """Return how many rows a rank has."""
+        """Return the number of rows on a rank."""
         return self.starts[rank + 1] - self.starts[rank]
 
 
 def even_rows(indptr: np.ndarray, size: int) -> Rows:
-    """Return `size` consecutive parts with about equally many stored entries."""
+    """Return `size` consecutive parts of rows with about equal numbers of stored entries."""
     cuts = np.searchsorted(indptr, np.linspace(0, int(indptr[-1]), size + 1)[1:-1])
     return Rows((0, *(int(cut) for cut in cuts), len(indptr) - 1))
 

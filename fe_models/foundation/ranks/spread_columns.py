@@ -50,7 +50,7 @@ class SpreadColumns:
         if source is None:
             layout.free_with(self, part.key)
 
-    __iter__ = None  #: no iteration over rows
+    __iter__ = None  #: iteration over rows is not supported
 
     def __len__(self) -> int:
         return self.shape[0]

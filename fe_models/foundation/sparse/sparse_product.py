@@ -15,9 +15,9 @@ from fe_models.foundation.threads import n_threads
 
 __all__ = ["SymmetricProduct"]
 
-SMALL = 200_000  #: stored entries below which threads cost more than they save
-NARROW = 4  #: numbers in a row of columns below which SciPy's product is faster
-COLUMNS = 16  #: columns per pass over the matrix; the rows of x in use then stay in the cache
+SMALL = 200_000  #: number of stored entries below which threads cost more than they save
+NARROW = 4  #: number of values in a row of the block below which the product of SciPy is faster
+COLUMNS = 16  #: number of columns per pass over the matrix; the rows of x in use then stay in the cache
 
 
 class SymmetricProduct:

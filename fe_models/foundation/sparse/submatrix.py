@@ -22,7 +22,7 @@ class PrincipalBlock:
     """The submatrix A[index][:, index], (n, n); gives products and the diagonal without forming the submatrix."""
 
     A: sp.csc_array
-    index: IntArray  #: rows and columns, in any order, each once, (n,)
+    index: IntArray  #: rows and columns in any order, each once, (n,)
 
     @property
     def shape(self) -> tuple[int, int]:

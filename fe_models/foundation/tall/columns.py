@@ -30,7 +30,7 @@ __all__ = [
     "in_memory", "inner", "of_this_process", "ordered", "put", "rows_times", "subtract",
 ]  # fmt: skip
 
-SMALL = 20_000  #: rows below which threads cost more than they save
+SMALL = 20_000  #: number of rows below which threads cost more than they save
 SLICE = 8192  #: number of rows at a time; intermediate results stay in the cache
 
 
@@ -91,7 +91,7 @@ def gram(X: Any, AX: Any) -> Array:
 
 
 def dots(X: Any, Y: Any, d: Array | None = None) -> Array:
-    """Return Σ_n X_nk Y_nk for every column, (k,); with weights d, (n,) or (n, 1): Σ_n d_n X_nk Y_nk."""
+    """Return Σ_n X_nk Y_nk for each column, (k,); with weights d, (n,) or (n, 1): Σ_n d_n X_nk Y_nk."""
     if (far := elsewhere(X, Y)) is not None:
         there = [far.like(X), far.like(Y), *([] if d is None else [far.like(d.reshape(-1, 1))])]
         return np.asarray(sum(far.on_rows(dots, *there)))
@@ -180,7 +180,7 @@ def beside(*blocks: Any) -> Any:
 
 
 def copied(X: Any) -> Any:
-    """Return a copy in the same place."""
+    """Return a copy in the same kind of storage: memory, disk or ranks."""
     return beside(X)
 
 
@@ -201,7 +201,7 @@ def in_memory(X: Any) -> Array:
 
 
 def are_finite(X: Any) -> bool:
-    """Return whether all numbers are finite."""
+    """Return whether all entries are finite."""
     if (far := elsewhere(X)) is not None:
         return all(far.on_rows(are_finite, X))
     return all(np.isfinite(X[rows]).all() for rows in row_slices(len(X), X))

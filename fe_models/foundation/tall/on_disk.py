@@ -20,8 +20,8 @@ __all__ = ["is_on_disk", "on_disk", "release", "row_slices", "zeros_like"]
 
 Array = NDArray[np.float64]
 
-SLICE_BYTES = 32e6  #: size of the slice of rows that is processed at a time
-LARGE = 64e6  #: size above which a result computed from an array on disk also goes to disk
+SLICE_BYTES = 32e6  #: size of a slice of rows that is processed at a time [bytes]
+LARGE = 64e6  #: size above which a result computed from an array on disk is also stored on disk [bytes]
 
 
 def on_disk(shape: tuple[int, ...]) -> Array:

@@ -32,13 +32,13 @@ class CampaignTask(Protocol[Given, Made]):
         """Return the row of a value."""
 
     def failed(self, value: Given, words: str, is_lasting: bool, /) -> Made:
-        """Return the row of a value whose computation failed, and whether another attempt would fail the same way."""
+        """Return the row of a value whose computation failed; `is_lasting`: another attempt would also fail."""
 
     def key(self, value: Given, /) -> Any:
-        """Return in plain types what identifies a value, with digests of files that it names."""
+        """Return the identification of a value in plain types, with digests of files that it names."""
 
     def record(self, row: Made, /) -> dict[str, Any] | None:
-        """Return what a row holds besides its value in plain types; None: it is computed again by the next call."""
+        """Return the content of a row besides its value in plain types; None: the next call computes it again."""
 
     def row(self, value: Given, record: dict[str, Any], /) -> Made:
         """Return the row of a record; KeyError, TypeError or ValueError: the record is not used."""
@@ -58,10 +58,10 @@ class Campaign(Generic[Value, Row]):
     def __init__(self, task: CampaignTask[Value, Row], journal: "TaskJournal | None" = None) -> None:
         self.task, self.journal = task, journal
         self.records = {} if journal is None else {json.dumps(each.get("key")): each for each in journal.records}
-        self.n_known = 0  #: rows that were taken from the journal
+        self.n_known = 0  #: number of rows read from the journal
 
     def known(self, value: Value) -> Row | None:
-        """Return the row of a value that is in the journal."""
+        """Return the row of a value from the journal."""
         record = self.records.get(json.dumps(self.task.key(value), default=str)) if self.records else None
         try:
             return None if record is None else self.task.row(value, record)
@@ -72,7 +72,7 @@ class Campaign(Generic[Value, Row]):
         self, values: Sequence[Value], workers: Workers, *, threads: int | None = 1, progress: Progress | None = None,
         files: Sequence[str] = (),
     ) -> list[Row]:  # fmt: skip
-        """Return the rows of all values; those that are not in the journal are computed.
+        """Return the rows of all values; rows that are not in the journal are computed.
 
         Parameters
         ----------
@@ -107,14 +107,14 @@ class Campaign(Generic[Value, Row]):
         return self.task.failed(value, " ".join(words.split()) or type(error).__name__, is_lasting)
 
     def append(self, value: Value, row: Row) -> None:
-        """Write a row to the journal, if there is one and the row is to be kept."""
+        """Write a row to the journal, if there is one and the row should be stored."""
         record = None if self.journal is None else self.task.record(row)
         if record is not None and self.journal is not None:
             self.journal.append({"key": self.task.key(value), **record})
 
 
 def campaign_digest(asked: Any, files: Iterable[str]) -> str:
-    """Return the SHA-256 of what results depend on: the program, what is asked, and the content of files."""
+    """Return the SHA-256 of everything that determines results: program, request, and content of files."""
     digest = hashlib.sha256(repr((source_mark(), asked)).encode())
     for name in files:
         digest.update(file_digest(name).encode())

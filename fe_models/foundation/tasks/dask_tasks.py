@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 
 EXTRA = {"extra": "cluster", "purpose": "workers on a Dask cluster"}
 CONNECT = 5.0  #: time within which a scheduler must answer [s]
-LONGEST_GREETING = 1_000_000  #: bytes
+LONGEST_GREETING = 1_000_000  #: largest size of the first message of a scheduler [bytes]
 START = 60.0  #: time within which a cluster started here must have its workers [s]
 MARK = "fe_models.foundation.tasks.installation:INSTALLATION"
 SAME = "install the same version of the project and its libraries on all workers and start them anew"
@@ -319,8 +319,9 @@ def lost(error: Exception) -> str:
     )
 
 
-one_at_a_time = threading.Lock()  #: threads of one worker share the libraries' threads and caches
-for_good = ExitStack()  #: contexts of a worker, never closed
+#: one value at a time, because threads of a worker share the threads and caches of libraries
+one_at_a_time = threading.Lock()
+for_good = ExitStack()  #: contexts of a worker that are never closed
 
 
 def call(value: bytes, common: tuple[dict[str, str], tuple[str, ...], bytes]) -> bytes:

@@ -69,7 +69,7 @@ class ThisProcess:
 # workers --------------------------------------------------------------------------------------------------------------
 
 
-Workers = int | str | TaskMap | None  #: None: one process per processor
+Workers = int | str | TaskMap | None  #: choice of workers; None: one process per processor
 
 WORKERS_HELP = "a number of processes, dask (a local cluster; dask:4 of 4 workers), or dask://host:port of a scheduler"
 PORT = 8786  #: default port of a scheduler
