@@ -27,12 +27,12 @@ from floatframe.results.trajectory import BodyMotion, Trajectory
 
 __all__ = ["animate", "bodies_of", "motion_scene"]
 
-VISIBLE = 0.02  #: if displacement / diagonal of a body is smaller, the displacement is magnified
-DRAWN = 0.06  #: largest displacement / diagonal of a body after magnification
+VISIBLE = 0.02  #: displacement, relative to the diagonal of a body, below which displacements are magnified
+DRAWN = 0.06  #: largest magnified displacement, relative to the diagonal of a body
 LARGEST = 0.2  #: half edge of the box of a rigid body, divided by the size of the scene
 HIDDEN = 0.1  #: fraction of the nodes of a flexible body within a box from which the box is drawn transparent
-GLASS = 0.35  #: its opacity then
-MOST_TRIADS = 11  #: if more axes have names, none are drawn
+GLASS = 0.35  #: opacity of a transparent box
+MOST_TRIADS = 11  #: number of named axes above which no axes are drawn
 TRAIL_COLOR, RIGID_COLOR = "#7d5ba6", "#9fb0bf"
 TRAIL_POINTS = 1500  #: largest number of points of a trail
 

@@ -9,9 +9,10 @@ from floatframe.errors import ResultsError
 
 __all__ = ["FilmTimes", "film_times", "round_below", "speed_words", "time_words"]
 
-SHORT, LONG = 2.0, 12.0  #: range of the length of a film in real time; outside it, another speed is chosen [s]
-CHOSEN_LENGTH = 6.0  #: least length of the film with a chosen speed [s]
-MOST_COORDINATES = 2e7  #: largest frames × nodes of a film, which limits the memory; longer films get fewer frames
+SHORT, LONG = 2.0, 12.0  #: range of film lengths in real time [s], outside which another speed is chosen
+CHOSEN_LENGTH = 6.0  #: smallest length of a film with a chosen speed [s]
+#: largest product of frames and nodes of a film, which limits the memory; longer films get fewer frames
+MOST_COORDINATES = 2e7
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,8 +36,8 @@ from floatframe.results.trajectory import Trajectory
 __all__ = ["BUSHING_COLOR", "JOINT_COLOR", "SPRING_COLOR", "glyphs"]
 
 JOINT_COLOR, SPRING_COLOR, BUSHING_COLOR, GROUND_COLOR = "#33414d", "#2a7f62", "#b5651d", "#7b8790"
-SIZE = 0.022  #: size of a glyph, divided by the size of the scene
-TURNS, POINTS_A_TURN = 7, 14  #: of a coil
+SIZE = 0.022  #: size of a glyph, relative to the size of the scene
+TURNS, POINTS_A_TURN = 7, 14  #: turns of a coil, and points in a turn
 ROUND = np.linspace(0.0, 2 * np.pi, 25)
 RINGS = ("RevoluteJoint", "ScrewJoint", "RollingDisc")
 RAILS = ("PrismaticJoint", "CylindricalJoint", "PlanarJoint")
@@ -50,10 +50,10 @@ RODS = ("DistanceJoint",)
 class Ends:
     """Positions and axes of both markers in all frames."""
 
-    a: Array  #: positions, (n_frames, 3)
-    b: Array  #: (n_frames, 3)
-    axes: Array  #: of A, columns, (n_frames, 3, 3)
-    on_ground: bool  #: whether one of them is on the ground
+    a: Array  #: positions of marker A, (n_frames, 3)
+    b: Array  #: positions of marker B, (n_frames, 3)
+    axes: Array  #: axes of marker A as columns, (n_frames, 3, 3)
+    on_ground: bool  #: whether one of the markers is on the ground
 
 
 def glyphs(

@@ -19,8 +19,8 @@ __all__ = ["Look", "carrier_of", "looks_of", "places_over"]
 class Look:
     """A piece with its carrier in the body."""
 
-    piece: Piece  #: in the axes of the carrier
-    carrier: MarkerShape  #: in the body frame, as in the results file
+    piece: Piece  #: piece in the axes of the carrier
+    carrier: MarkerShape  #: carrier in the body frame of the results file
 
 
 def looks_of(body: Body) -> tuple[Look, ...]:

@@ -24,9 +24,9 @@ from floatframe.pictures.stage import box_of, ground_grid, view_axes
 
 __all__ = ["animate_mode", "draw_mode", "mode_scene"]
 
-N_FRAMES = 40  #: in one period
+N_FRAMES = 40  #: number of frames in one period
 FPS = 20.0
-SWING = 0.12  #: largest displacement, divided by the size of the system
+SWING = 0.12  #: largest displacement, relative to the size of the system
 LARGEST_TURN = 0.5  #: largest rotation of a body in the film [rad]
 #: scale of the undeformed body relative to the moving one; below 1, so that it is hidden where nothing moves
 INSIDE = 0.99

@@ -22,7 +22,7 @@ __all__ = [
     "plot_reaction",
 ]
 
-SHOWN = 1e-6  #: least drift shown on the axis / largest drift
+SHOWN = 1e-6  #: smallest drift on the axis, relative to the largest drift
 
 
 def plot_energies(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":

@@ -10,8 +10,8 @@ from floatframe.pictures.film_times import round_below
 __all__ = ["box_of", "film_size", "ground_grid", "view_axes"]
 
 GRID_COLOR = "#cfd6dc"
-WIDTH, LEAST_HEIGHT, MOST_HEIGHT = 960, 480, 720  #: of a film [px]
-ROOM = 190  #: height that texts and margins take [px]
+WIDTH, LEAST_HEIGHT, MOST_HEIGHT = 960, 480, 720  #: width and range of heights of a film [px]
+ROOM = 190  #: height for texts and margins [px]
 
 
 def box_of(

@@ -23,9 +23,9 @@ GROUND_CARRIER = 0  #: index of the first carrier, the ground
 class Carrier:
     """A point with axes in a body: rho = position + d, axes = exp(theta) axes; (d, theta) is its motion in the body."""
 
-    body: int  #: index; -1 for the ground
-    position: Array  #: undeformed, body frame, (3,) [m]
-    axes: Array  #: undeformed, columns, (3, 3)
+    body: int  #: index of the body, -1 for the ground
+    position: Array  #: position on the undeformed body, body frame, (3,) [m]
+    axes: Array  #: axes on the undeformed body as columns, (3, 3)
     motion: Array | None = None  #: (d, theta) in the shown rows, (n, 6); None: at rest in its body
     psi: Array | None = None  #: derivative of (d, theta) by the modal coordinates, (6, n_q); None: at rest in its body
 
@@ -35,7 +35,7 @@ class Carriers:
     """All carriers of a drawing, without repetition."""
 
     trajectory: Trajectory
-    rows: IntArray  #: the rows shown
+    rows: IntArray  #: rows of the motion that are shown
     system: System | None
     found: list[Carrier] = field(default_factory=lambda: [Carrier(-1, np.zeros(3), np.eye(3))])
     numbers: dict[object, int] = field(default_factory=dict)  #: indices of the carriers requested so far

@@ -27,7 +27,7 @@ class Placed:
 
     piece: Piece
     carrier: int
-    kind: str = "body"  #: its group: "body", "scene", "joint" or "force"
+    kind: str = "body"  #: group of the piece: "body", "scene", "joint" or "force"
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,10 +45,10 @@ class Force:
     """An arrow at a carrier."""
 
     name: str
-    values: Array  #: in ground axes, (n, 3) [N]
+    values: Array  #: force vectors in ground axes, (n, 3) [N]
     carrier: int
     color: str = "#c2452d"
-    at: Array | None = None  #: its start in ground axes, (n, 3) [m]; None: the carrier
+    at: Array | None = None  #: start of the arrow in ground axes, (n, 3) [m]; None: the carrier
     is_of_element: bool = False  #: whether an element requested it
 
 

@@ -20,28 +20,28 @@ from floatframe.pictures.viewer.surface import ShownSurface, shown_surface
 
 __all__ = ["FlexibleSurface", "flexible_surface", "nodes_within"]
 
-MOVES, STRESSES = 1e-5, 1e-3  #: shares of the largest displacement and stress below which a mode is left out
-FEWEST, MOST = 300, 20_000  #: nodes shown of a body
-CHUNK_SIZE = 2_000_000  #: numbers of displacement held at a time
+MOVES, STRESSES = 1e-5, 1e-3  #: fractions of the largest displacement and stress below which a mode is omitted
+FEWEST, MOST = 300, 20_000  #: smallest and largest number of shown nodes of a body
+CHUNK_SIZE = 2_000_000  #: largest count of displacement values in memory at a time
 
 
 @dataclass(frozen=True, eq=False)
 class FlexibleSurface:
-    """What a page knows of a flexible body."""
+    """The data of a flexible body in a page."""
 
-    body: int  #: number
+    body: int  #: index of the body
     surface: ShownSurface
-    nodes: Array  #: (n, 3) [m]
-    shapes: Array  #: phi_k, (n_a, n, 3)
-    stress: Array | None  #: s_k, (n_a, n, 6); None: there is none
+    nodes: Array  #: positions of the shown nodes, (n, 3) [m]
+    shapes: Array  #: shapes phi_k of the shown nodes, (n_a, n, 3)
+    stress: Array | None  #: stress modes s_k, (n_a, n, 6); None if the body has none
     amplitudes: Array  #: a_k in the shown rows, (n_rows, n_a)
-    largest_displacement: float  #: of shown nodes in the shown rows [m]
-    largest_stress: float  #: [Pa]
-    n_modes: int  #: modes of the body
+    largest_displacement: float  #: largest displacement of the shown nodes in the shown rows [m]
+    largest_stress: float  #: largest stress of the shown nodes in the shown rows [Pa]
+    n_modes: int  #: number of modes of the body
 
 
 def nodes_within(n_bytes: float, bodies: dict[str, ReducedBody], *, with_stress: bool) -> dict[str, int]:
-    """Return how many nodes of each body may be shown so that all its numbers fit into so many bytes.
+    """Return how many nodes of each body may be shown so that all its data fit into `n_bytes`.
 
     Bodies get nodes by the root of those they have, so that a small one beside a large one stays fine.
     """
@@ -59,7 +59,7 @@ def nodes_within(n_bytes: float, bodies: dict[str, ReducedBody], *, with_stress:
 def flexible_surface(
     number: int, body: ReducedBody, q: Array, most: int, *, is_stiffened: bool, with_stress: bool
 ) -> FlexibleSurface:
-    """Return the surface of a body with at most about a number of nodes.
+    """Return the surface of a body with at most about `most` nodes.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def largest_displacement(shapes: Array, amplitudes: Array) -> float:
 
 
 def second_order(body: ReducedBody, surface: ShownSurface, q: Array) -> tuple[Array, Array]:
-    """Return amplitudes (n_rows, k) and shapes (k, n, 3) of the part of second order, leading ones of its history."""
+    """Return amplitudes (n_rows, k) and shapes (k, n, 3) of the leading second-order displacements in its history."""
     assert body.quadratic is not None  # asked by the caller
     g = np.asarray(body.quadratic)[surface.rows]
     n, n_q = len(g), body.n_q

@@ -68,16 +68,16 @@ log = logging.getLogger(__name__)
 # which rows of a motion a page carries --------------------------------------------------------------------------------
 
 
-MOST_ROWS = 4000  #: of a page
+MOST_ROWS = 4000  #: largest number of rows in a page
 FASTEST = 2.6  #: rotation of a body between rows [rad] up to which its direction of rotation is visible correctly
 
 
 @dataclass(frozen=True, eq=False)
 class Timeline:
-    """The rows."""
+    """The rows of a motion that a page shows."""
 
-    rows: IntArray  #: of the trajectory, (n,)
-    largest_turn: float  #: of a body from row to row [rad]
+    rows: IntArray  #: rows of the trajectory, (n,)
+    largest_turn: float  #: largest rotation of a body between two rows [rad]
 
     @property
     def turns_too_far(self) -> bool:
@@ -86,7 +86,7 @@ class Timeline:
 
 
 def timeline(trajectory: Trajectory, most: int) -> Timeline:
-    """Return at most so many rows, evenly spaced in time, with the first and the last."""
+    """Return at most `most` rows, evenly spaced in time, including the first and the last."""
     rows = evenly(trajectory.t, min(most, MOST_ROWS))
     steps = np.diff(trajectory.t[rows], prepend=trajectory.t[rows[0]])
     fastest = [np.linalg.norm(trajectory.body(name).omega_B[rows], axis=1) for name in trajectory.body_names]
@@ -94,7 +94,7 @@ def timeline(trajectory: Trajectory, most: int) -> Timeline:
 
 
 def evenly(t: Array, most: int) -> IntArray:
-    """Return rows of ascending times, at most so many, evenly spaced in time, with the first and the last."""
+    """Return at most `most` rows of ascending times, evenly spaced, including the first and the last."""
     if len(t) <= most:
         return np.arange(len(t))
     wanted = np.linspace(t[0], t[-1], most)
@@ -105,8 +105,8 @@ def evenly(t: Array, most: int) -> IntArray:
 # the plots of a page: measurements of sensors, and quantities of every motion -----------------------------------------
 
 
-MOST_CURVES, MOST_PANELS = 6, 14  #: in a panel; for sensors
-SEEN = 1e-4  #: relative to the largest curve of a panel; smaller curves would coincide with zero
+MOST_CURVES, MOST_PANELS = 6, 14  #: largest number of curves in a panel, and of sensor panels
+SEEN = 1e-4  #: size relative to the largest curve of a panel below which a curve counts as zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +115,7 @@ class Panel:
 
     title: str
     unit: str
-    curves: Mapping[str, Array]  #: name -> values in the rows of the plots, (n,)
+    curves: Mapping[str, Array]  #: values of each curve by name in the rows of the plots, (n,)
     n_all: int = 0  #: number of curves before the selection of the largest
 
 
@@ -225,8 +225,8 @@ class Page:
     """A written page."""
 
     path: Path
-    size: int  #: bytes
-    notes: tuple[str, ...]  #: omissions, as listed in the page
+    size: int  #: size of the page in bytes
+    notes: tuple[str, ...]  #: omissions, which the page lists
 
 
 def view(

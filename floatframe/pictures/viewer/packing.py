@@ -17,7 +17,7 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["Block", "Packed"]
 
-TOP = 32767  #: of whole numbers of 16 bit
+TOP = 32767  #: largest integer of 16 bits with sign
 LEVEL = 6  #: compression level; 9 takes five times as long for 1 %
 
 Packed = dict[str, Any]  #: at, type and shape (location and meaning); scale, offset and each for quantised numbers

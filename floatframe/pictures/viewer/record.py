@@ -149,22 +149,22 @@ class Shown:
     trajectory: Trajectory
     system: System | None
     bodies: dict[str, RigidBody | FlexibleBody | None]  #: all bodies, by name; None: unknown
-    reduced: dict[str, ReducedBody]  #: of the flexible bodies
-    rows: IntArray  #: of the trajectory
+    reduced: dict[str, ReducedBody]  #: reduced bodies of the flexible bodies, by name
+    rows: IntArray  #: rows of the trajectory that are shown
 
 
 @dataclass(frozen=True, eq=False)
 class Stage:
     """Size, range of motion and orientation of the machine."""
 
-    low: Array  #: of the box in which it stays, ground axes, (3,) [m]
+    low: Array  #: lower corner of the box in which the machine stays, ground axes, (3,) [m]
     high: Array
     size: float  #: size of the machine, the diagonal of its box in the first row [m]
-    center: Array  #: of that box, (3,) [m]
-    half: Array  #: half of its edges, (3,) [m]
-    up: Array  #: (3,)
-    direction: Array  #: of the first view, from the eye, (3,)
-    follows: int  #: body the camera follows, -1: none
+    center: Array  #: centre of the machine's box in the first row, (3,) [m]
+    half: Array  #: half edges of this box, (3,) [m]
+    up: Array  #: upward direction, (3,)
+    direction: Array  #: direction of the first view, away from the eye, (3,)
+    follows: int  #: body that the camera follows, -1 for none
 
 
 def stage_of(shown: Shown, cast: Cast) -> Stage:

@@ -21,16 +21,16 @@ ENOUGH = 1.15  #: ratio of nodes to desired nodes at which thinning stops
 class ShownSurface:
     """A surface of selected nodes of a body."""
 
-    rows: IntArray  #: of the shown nodes of the body, (n,)
+    rows: IntArray  #: rows of the shown nodes in the body, (n,)
     corner: IntArray  #: for each corner point with its own normal, the drawn node at its position, (n_corners,)
-    triangles: IntArray  #: of corner points, (n_triangles, 3)
-    edges: IntArray  #: sharp edges, of shown nodes, (n_edges, 2)
-    n_nodes: int  #: nodes of the complete surface
-    n_triangles: int  #: triangles of the complete surface
+    triangles: IntArray  #: corner points of each triangle, (n_triangles, 3)
+    edges: IntArray  #: shown nodes at the ends of sharp edges, (n_edges, 2)
+    n_nodes: int  #: number of nodes of the complete surface
+    n_triangles: int  #: number of triangles of the complete surface
 
 
 def shown_surface(nodes: Array, triangles: IntArray, most: int) -> ShownSurface:
-    """Return a surface with at most about a number of nodes: some of its own, so that their modes stay exact.
+    """Return a surface with at most about `most` nodes, which are original nodes so that their modes are exact.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def shown_surface(nodes: Array, triangles: IntArray, most: int) -> ShownSurface:
 
 
 def thinned(nodes: Array, triangles: IntArray, most: int) -> tuple[IntArray, IntArray]:
-    """Return rows of retained nodes, and triangles of them; nodes are removed where the surface is flattest.
+    """Return rows of the remaining nodes and their triangles; nodes are removed where the surface is flattest.
 
     Nodes are deleted and never moved (`vtkDecimatePro`).
     """
