@@ -69,9 +69,9 @@ class Frame:
 
     name: str
     node: int
-    marker: ElasticMarker | None  #: marker that carries the frame, if modes move it
+    marker: ElasticMarker | None  #: marker that carries the frame; None if modes do not move it
     axes: Terms  #: axes in the node frame, or in the marker, (3, 3)
-    origin: Terms  #: (3,) [m]
+    origin: Terms  #: origin in the node frame, or in the marker, (3,) [m]
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class JointSpring:
     position: int  #: index of the coordinate among the positions
     rate: int  #: index of the rate
     stiffness: float  #: [N/m, N m/rad]
-    free: float  #: coordinate at which the spring is free [m, rad]
+    free: float  #: force-free value of the coordinate [m, rad]
     damping: float  #: [N s/m, N m s/rad]
     preload: float  #: [N, N m]
 

@@ -37,11 +37,11 @@ class Modes:
     n: int
     x0: int  #: index of the first mode among the positions
     v0: int  #: index of the first mode among the rates
-    C1: Terms  #: (n, 3)
+    C1: Terms  #: first-order coupling with translation, (n, 3)
     X: Terms  #: (n, 3, 3) [k, a, b]: component a of phi_k, component b of the position
     S: Terms  #: (n, n, 3, 3) [k, l, a, b]: component a of phi_k, component b of phi_l
-    C4: Terms  #: (n, n, 3) [k, l]
-    M: Terms  #: (n, n)
+    C4: Terms  #: coupling C4 [k, l] with rotation, (n, n, 3)
+    M: Terms  #: modal mass matrix, (n, n)
     K: Terms
     D: Terms
     K_t: Terms  #: (n, n, 3) [k, l]; zero unless stiffened
@@ -58,7 +58,7 @@ class ElasticMarker:
     """A marker that moves with modes, in the node frame of its body."""
 
     x0: int  #: index of the first mode among the positions
-    v0: int  #: among the rates
+    v0: int  #: index of the first mode among the rates
     place: Terms  #: undeformed position, (3,)
     axes: Terms  #: undeformed axes, (3, 3)
     shift: Terms  #: displacement per modal coordinate, (n, 3)

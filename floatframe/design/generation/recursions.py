@@ -1,4 +1,4 @@
-"""The recursions of the engine with terms; every sum and product is simplified when it is created.
+"""The recursions of the engine evaluated with terms; every sum and product is simplified when it is created.
 
 Positions, motions and forces come from the kernels of engine/tree/recursion, which are called with terms (`Traced`).
 Only what flexible bodies and their markers do is written here anew (elastic.py), because it needs fewer products
@@ -30,7 +30,7 @@ DENSE = 6  #: largest number of products of two matrices that are applied one af
 
 
 class Traced:
-    """Kernels called with terms: what they compute becomes expressions of the graph.
+    """Calls kernels with terms, so that their results become expressions of the graph.
 
     A kernel is a function of Python that numba compiles. Without numba it accepts arrays of any objects. Here it calls
     other kernels without numba as well, and functions of `math` that accept terms.
@@ -44,7 +44,7 @@ class Traced:
         self.math = SimpleNamespace(sin=lambda x: graph.sin(graph.scalar(x)), cos=lambda x: graph.cos(graph.scalar(x)))
 
     def __call__(self, kernel: Any) -> Callable:
-        """Return a kernel as a function of Python that accepts terms."""
+        """Return a kernel as a Python function that accepts terms."""
         source = kernel.py_func
         if source.__name__ in self.given:
             return self.given[source.__name__]
@@ -59,12 +59,12 @@ class Traced:
 
 
 def n_products(R: Terms) -> int:
-    """Return the number of products to rotate a vector by a matrix."""
+    """Return the number of products needed to rotate a vector by a matrix."""
     return sum(not any(value.is_constant(whole) for whole in (0.0, 1.0, -1.0)) for value in R.ravel())
 
 
 def divided(tree: TreeTerms, is_divided: bool) -> tuple[list[Link], list[int]]:
-    """Return the nodes of a tree divided for terms, and the last one of each node before."""
+    """Return the nodes of a tree divided for terms, and the last new node for each original node."""
     graph, one, zero = tree.graph, terms(tree.graph, np.eye(3)), terms(tree.graph, np.zeros(3))
     links: list[Link] = []
     last: list[int] = []
@@ -87,7 +87,7 @@ def divided(tree: TreeTerms, is_divided: bool) -> tuple[list[Link], list[int]]:
 
 
 class Recursion:
-    """The nodes of a tree at its positions, and its motions and forces.
+    """The nodes of a tree at its positions, with their motions and forces.
 
     is_divided: whether vectors always go through A and E one after the other, because few of them do.
     """
@@ -125,11 +125,11 @@ class Recursion:
         return np.full(shape, self.graph.zero, dtype=object)
 
     def ones(self) -> Any:
-        """Return an identity for each node."""
+        """Return one identity matrix for each node."""
         return terms(self.graph, np.tile(np.eye(3), (len(self.links), 1, 1)))
 
     def arguments(self, v: Terms, a: Terms, gravity: Terms) -> tuple[Any, Any, None, Any]:
-        """Return arguments of kernels: nodes and working arrays."""
+        """Return arguments for kernels: nodes and working arrays."""
         names = {size.name for each in NodeWork() for size in each.shape if isinstance(size, Size)}
         sizes = dict.fromkeys(sorted(names), 0) | {"nodes": len(self.links), "rates": len(v)}
         arrays: Any = (self.zeros(*each.shape) for each in zeros(NodeWork(), sizes))
@@ -143,7 +143,7 @@ class Recursion:
         return self.nodes, work, None, SimpleNamespace(markers=SimpleNamespace(**markers), bodies=bodies)
 
     def motion(self, v: Terms, a: Terms, gravity: Terms) -> tuple[Any, Any, None, Any]:
-        """Return arguments of kernels for a motion of the placed nodes, with that of the markers."""
+        """Return arguments for kernels with a motion of the placed nodes and their markers."""
         nodes, work, _, marker_work = self.at_rest(v, a, gravity)
         for m, place in self.places.items():
             rates, markers = MarkerRates(place, v, a), marker_work.markers
@@ -152,13 +152,13 @@ class Recursion:
         return nodes, work, None, marker_work
 
     def at_rest(self, v: Terms, a: Terms, gravity: Terms) -> tuple[Any, Any, None, Any]:
-        """Return arguments of kernels for a motion of the placed nodes, without that of the markers."""
+        """Return arguments for kernels with a motion of the placed nodes, but markers at rest."""
         nodes, work, _, marker_work = self.arguments(v, a, gravity)
         placed = {name: getattr(self.placed[1], name) for name in ("A", "rho", "R", "p", "R_own")}
         return nodes, work._replace(**placed), None, marker_work
 
     def moved_by(self, rate: int, k: int) -> Any:
-        """Return the working arrays after node k alone has moved, by a unit acceleration of one of its rates."""
+        """Return the working arrays after a unit acceleration of one rate of node k alone."""
         a = self.zeros(len(self.tree.v))
         a[rate] = self.graph.one
         made = self.at_rest(self.zeros(len(a)), a, self.zeros(3))
@@ -166,7 +166,7 @@ class Recursion:
         return made[1]
 
     def forces_of(self, k: int, wrench: tuple[Terms, Terms]) -> Terms:
-        """Return the forces along all rates for a wrench that node k alone needs."""
+        """Return the forces along all rates for a wrench on node k alone."""
         rest = self.zeros(len(self.tree.v))
         made = self.at_rest(rest, rest, self.zeros(3))
         made[1].f[k], made[1].t[k] = wrench
@@ -192,7 +192,7 @@ class Recursion:
         return self.places[m].E
 
     def marker_rates(self, model: None, marker_work: Any, m: int) -> tuple[Terms, Terms]:
-        """Return rho_ddot and nu_dot of a marker."""
+        """Return rho_ddot and nu_dot of a marker, its second rates in the body."""
         return marker_work.markers.rho_ddot[m], marker_work.markers.nu_dot[m]
 
     def add_modal_forces(
@@ -229,7 +229,7 @@ def turned_moment(R: Terms, P: Terms) -> Terms:
 
 
 def shifted_moments(m: Scalar, s: Terms, P: Terms, r: Terms) -> tuple[Terms, Terms]:
-    """Return first and second moment about another point; r is the vector from it to the present one."""
+    """Return first and second moments about another point, from which r leads to the present point."""
     s_r = s + m * r
     out = np.empty((3, 3), dtype=object)
     for i in range(3):
@@ -271,7 +271,7 @@ def mass_matrix(recursion: Recursion) -> Terms:
 
 
 def wrench(m: Scalar, s: Terms, P: Terms, v: Terms, w: Terms) -> tuple[Terms, Terms]:
-    """Return the wrench of an acceleration of moments m, s, P."""
+    """Return the wrench for an acceleration of a body with given moments."""
     return m * v + cross(w, s), cross(s, v) + (P[0, 0] + P[1, 1] + P[2, 2]) * w - P @ w
 
 
@@ -282,11 +282,12 @@ class Composite:
         nodes, modes = recursion.nodes, recursion.links[k].modes
         self.m, self.s, self.P = nodes.mass[k], nodes.s[k], nodes.P[k]
         if modes is not None:
-            self.H = modes.M  #: by modes, the frame held, (n, n)
-            self.f, self.t = recursion.moments[k].first, recursion.moments[k].B  #: wrench by each, (n, 3)
+            self.H = modes.M  #: modal mass matrix at fixed frame, (n, n)
+            #: force and moment for unit accelerations of the modes, (n, 3) each
+            self.f, self.t = recursion.moments[k].first, recursion.moments[k].B
 
     def modal_block(self, own: MarkerPlace | None) -> tuple[Terms, list[tuple[Terms, Terms]]]:
-        """Return the modal mass matrix with the joint fixed at the marker, and the wrench of each mode."""
+        """Return the modal mass matrix for a joint that is fixed at its marker, and the wrench of each mode."""
         if own is None:
             return self.H, list(zip(self.f, self.t, strict=True))
         shift, turn = own.columns()
@@ -302,7 +303,7 @@ class Composite:
         return H, wrenches
 
     def carry(self, recursion: Recursion, k: int, body: "Composite") -> None:
-        """Add the subtree of child k."""
+        """Add the composite body of child k."""
         nodes, (_, work, _, marker_work) = recursion.nodes, recursion.placed
         m, s, P = body.m, body.s, body.P
         if nodes.own[k] >= 0:
@@ -333,7 +334,7 @@ def rates_of(link: Link) -> list[int]:
 
 
 def solved(tree: TreeTerms, M: Terms, right: Terms) -> Terms:
-    """Return M⁻¹ right, (n,), by M = Lᵀ D L from the tips inwards, which creates no fill-in."""
+    """Return M⁻¹ right, (n,), by M = Lᵀ D L from the tips inwards, without fill-in."""
     order = [rate for link in tree.links for rate in rates_of(link)]
     H, y, graph = M.copy(), right.copy(), tree.graph
     inverse: dict[int, Scalar] = {}
@@ -356,7 +357,7 @@ def solved(tree: TreeTerms, M: Terms, right: Terms) -> Terms:
 
 
 def forward_dynamics(recursion: Recursion, force: Terms) -> Terms:
-    """Return the accelerations under forces along the rates, (n,)."""
+    """Return the accelerations for given forces along the rates, (n,)."""
     tree = recursion.tree
     h = inverse_dynamics(recursion, tree.v, recursion.zeros(len(tree.v)))
     return solved(tree, mass_matrix(recursion), force - h)

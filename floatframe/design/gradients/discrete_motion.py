@@ -87,7 +87,7 @@ def computed_motion(
 def start_columns(
     family: Family, group: Configurations, own: Neighbour, motion: ComputedMotion, t_start: float, state: State | None
 ) -> tuple[Array, Array]:
-    """Return dS/dp, (4 n_u, n_p), of what the steps begin with, and that of (x, u, u_dot, w), (3 n_u + n_w, n_p).
+    """Return derivatives by p of the start state S, (4 n_u, n_p), and of (x, u, u_dot, w), (3 n_u + n_w, n_p).
 
     The latter of what results begin with; both by differences of the whole consistent start.
     """
@@ -108,7 +108,7 @@ def start_columns(
 
 
 def begun_beside(each: Neighbour, t: float, state: State | None) -> Memory:
-    """Return what `GeneralizedAlpha.start` makes of a neighbour: what it checks has been checked of the system."""
+    """Return the start of `GeneralizedAlpha` for a neighbouring system, without checks done for the system itself."""
     compiled, work = each.compiled, each.work
     given = compiled.placed if state is None else checked(compiled, state)
     work.state.time[...] = t
@@ -117,10 +117,10 @@ def begun_beside(each: Neighbour, t: float, state: State | None) -> Memory:
 
 
 class ScaledSolver:
-    """LU factors of a matrix with rows and columns of one size, and a step of refinement: units do not cost digits."""
+    """LU factors of a matrix with scaled rows and columns, so that units cost no accuracy, and one refinement step."""
 
     def __init__(self, matrix: Array, t: float) -> None:
-        """Factorise; `ModelError` if the matrix is singular."""
+        """Factorise the matrix; `ModelError` if it is singular."""
         self.matrix = matrix
         with np.errstate(divide="ignore"):
             self.rows = 1 / np.abs(matrix).max(axis=1)
@@ -130,7 +130,7 @@ class ScaledSolver:
         self.lu = la.lu_factor(self.rows[:, None] * matrix * self.columns)
 
     def solve(self, right: Array, *, is_transposed: bool = False) -> Array:
-        """Return the solution of A x = right, or of Aᵀ x = right."""
+        """Return the solution of A x = right, or of Aᵀ x = right, with one refinement step."""
         matrix = self.matrix.T if is_transposed else self.matrix
         x = self.once(right, is_transposed)
         return x + self.once(right - matrix @ x, is_transposed)
@@ -143,7 +143,7 @@ class ScaledSolver:
 
 
 class Step:
-    """One step, linearised at its end."""
+    """One time step, linearised at its end."""
 
     def __init__(self, structure: Structure, own: Neighbour, group: Configurations, motion: ComputedMotion, k: int):
         """Linearise step k of a motion, from point k to point k + 1."""

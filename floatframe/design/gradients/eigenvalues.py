@@ -53,23 +53,23 @@ SINGULAR_EQUILIBRIUM = 1e-12  #: smallest singular value of the scaled matrix, b
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """The matrix [K, -Jᵀ; G, V] with rows and columns of one size: neither units nor the size of the system decide."""
+    """The matrix [K, -Jᵀ; G, V] with scaled rows and columns, independent of units and system size."""
 
-    scaled: Array  #: of_rows[:, None] * matrix * of_columns
+    scaled: Array  #: scaled matrix, of_rows[:, None] * matrix * of_columns
     of_columns: Array
     of_rows: Array
 
     def solve(self, right: Array) -> Array:
-        """Return the solutions of matrix @ x = right, of columns."""
+        """Return the solutions of matrix @ x = right for columns `right`."""
         return np.asarray(self.of_columns[:, None] * la.solve(self.scaled, self.of_rows[:, None] * right))
 
     def solve_transposed(self, right: Array) -> Array:
-        """Return the solutions of matrix.T @ x = right, of columns."""
+        """Return the solutions of matrix.T @ x = right for columns `right`."""
         return np.asarray(self.of_rows[:, None] * la.solve(self.scaled.T, self.of_columns[:, None] * right))
 
 
 def balance_of(K: NDArray[Any], J: Array, G: NDArray[Any], V: Array, displacements: Array) -> Balance:
-    """Return the balance of these matrices; displacements, (n_u,): typical ones, by which K is scaled to one."""
+    """Return the scaled matrix; displacements, (n_u,): typical sizes that scale K to one."""
     work = np.abs(K * displacements[:, None] * displacements).max(initial=0.0)
     diagonal = (work if work > 0 else 1.0) / displacements**2
     of_columns, of_rows = balanced_scales(diagonal, np.abs(J), np.abs(G), np.abs(V))
@@ -77,7 +77,7 @@ def balance_of(K: NDArray[Any], J: Array, G: NDArray[Any], V: Array, displacemen
 
 
 def typical_displacements(compiled: CompiledSystem) -> Array:
-    """Return displacements, (n_u,), that move a system by about its length: the length, a radian, and so of modes."""
+    """Return displacements, (n_u,), that move a system by about its size: its length, a radian, and modes alike."""
     return np.asarray(compiled.length / compiled.motion_lengths)
 
 

@@ -77,20 +77,20 @@ __all__ = [
 # .. [1] Gautier & Khalil (1990), IEEE Transactions on Robotics and Automation 6, 368-373.
 
 
-SAME = 1e-9  #: sine of an angle, or distance over the size of the system, that is none
+SAME = 1e-9  #: sine of an angle, or distance relative to the size of the system, that counts as zero
 
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """A coordinate of a joint at the placed configuration."""
+    """A joint coordinate at the placed configuration, as a rotation or translation."""
 
-    turn: Array  #: direction of its rotation, (3,); zero: a translation
-    shift: Array  #: direction of its translation, (3,); zero: a rotation
-    point: Array  #: on the axis, (3,)
+    turn: Array  #: direction of the rotation, (3,); zero for a translation
+    shift: Array  #: direction of the translation, (3,); zero for a rotation
+    point: Array  #: point on the axis, (3,)
 
 
 def silent_directions(form: LinearForm) -> Array:
-    """Return directions of the parameters, (p, k), along which no torque of the tree changes; independent.
+    """Return independent directions of the parameters, (p, k), that do not change any torque of the tree.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def silent_directions(form: LinearForm) -> Array:
     found: list[Array] = []
 
     def note(i: int, phi: Array, parent: int = -1, drive: int = -1) -> None:
-        """Note that phi at body i, less phi at its parent, less one at a drive, does nothing."""
+        """Record that phi at body i, minus phi at its parent, minus one at a drive, has no effect."""
         direction = np.zeros(len(form.names))
         direction[10 * i : 10 * i + 10] = la.solve(to_ground[i], phi)
         if parent >= 0:
@@ -143,7 +143,7 @@ def silent_directions(form: LinearForm) -> Array:
 
 
 def moves_of(form: LinearForm, placed: TreeSamples, tree: Tree, i: int, size: float) -> list[Move]:
-    """Return the moves of the joint of body i, from its parent on, in lengths of the system."""
+    """Return the coordinates of the joint of body i, starting at its parent, in lengths of the system."""
     made = []
     first, end = int(tree.column0[i]), int(tree.column0[i + 1])
     for k in range(first, end):
@@ -168,24 +168,24 @@ def chain(tree: Tree, i: int) -> list[int]:
 
 
 def line_masses(move: Move) -> Array:
-    """Return what masses along the axis of a rotation span, (3, 10)."""
+    """Return a basis of the parameters of masses on the axis of a rotation, (3, 10)."""
     one, p, a = point_mass(move.point), move.point, move.turn
     ahead, behind = point_mass(p + a), point_mass(p - a)
     return np.array([one, 0.5 * (ahead - behind), 0.5 * (ahead + behind) - one])
 
 
 def tensors() -> Array:
-    """Return what inertia tensors without mass span, (6, 10)."""
+    """Return a basis of the inertia tensors without mass, (6, 10)."""
     return np.eye(10)[4:]
 
 
 def dipole(p: Array, d: Array) -> Array:
-    """Return a first moment d at p without mass, (10,)."""
+    """Return the parameters of a first moment d at p without mass, (10,)."""
     return 0.5 * (point_mass(p + d) - point_mass(p - d))
 
 
 def common(spaces: list[Array]) -> Array:
-    """Return a basis, rows, of what lies in all row spaces, in lengths of the system."""
+    """Return a basis, as rows, of the intersection of row spaces, in lengths of the system."""
     kept = spaces[0]
     for space in spaces[1:]:
         if not len(kept):
@@ -196,7 +196,7 @@ def common(spaces: list[Array]) -> Array:
 
 
 def passing(own: list[Move], before: list[Move], dipoles: Callable[[list[Move], Array], Array]) -> Array:
-    """(1) Return what passes from a body to its parent, rows of 10.
+    """(1) Return the parameters that can be transferred from a body to its parent, as rows of 10.
 
     dipoles: the first moments without mass, (k, 10), that a translation lets through, by the moves before it and its
     direction.
@@ -214,7 +214,7 @@ def passing(own: list[Move], before: list[Move], dipoles: Callable[[list[Move], 
 
 
 def unweighed_dipoles(before: list[Move], shift: Array) -> Array:
-    """Return the first moments square to a translation along the common axis of all rotations before it."""
+    """Return the first moments normal to a translation along the common axis of all previous rotations."""
     e, _ = rotations(before)
     if e is None or np.linalg.norm(np.cross(e, shift)) >= SAME:
         return np.zeros((0, 10))
@@ -222,7 +222,7 @@ def unweighed_dipoles(before: list[Move], shift: Array) -> Array:
 
 
 def rotations(moves: list[Move]) -> tuple[Array | None, bool]:
-    """Return the common direction of all rotations (None: none, or several), and whether there are several."""
+    """Return the common direction of all rotations (None if there is none), and whether there are several."""
     e: Array | None = None
     for move in moves:
         if move.turn.any():
@@ -234,7 +234,7 @@ def rotations(moves: list[Move]) -> tuple[Array | None, bool]:
 
 
 def square_to(e: Array) -> Array:
-    """Return two unit vectors square to e, (2, 3)."""
+    """Return two unit vectors normal to e, (2, 3)."""
     return la.null_space(e[None]).T
 
 
@@ -244,7 +244,7 @@ def tensor_row(J: Array) -> Array:
 
 
 def without_effect(way: list[Move], gravity: Array) -> list[Array]:
-    """(2) Return parameters of a body that its ways to move never show."""
+    """(2) Return the parameters of a body that have no effect for its possible motions."""
     e, are_several = rotations(way)
     shifts = [move.shift for move in way if move.shift.any()]
     turns = [move for move in way if move.turn.any()]
@@ -278,7 +278,7 @@ def without_effect(way: list[Move], gravity: Array) -> list[Array]:
 
 
 def common_point(turns: list[Move]) -> Array | None:
-    """Return the point in which all axes of rotation meet, or None."""
+    """Return the common point of all axes of rotation, or None."""
     A, b = np.zeros((3, 3)), np.zeros(3)
     for move in turns:
         a = move.turn / np.linalg.norm(move.turn)
@@ -291,7 +291,7 @@ def common_point(turns: list[Move]) -> Array | None:
 
 
 def drive_twins(move: Move, earlier: list[Move], gravity: Array) -> list[tuple[Array, bool]]:
-    """(3) Return parameters of a body that act as the inertia of its drive, and whether less those at its parent."""
+    """(3) Return body parameters that act like drive inertia, and whether the parent's parameters are subtracted."""
     if move.turn.any():
         if all(abs(move.turn @ other.turn) < SAME for other in earlier if other.turn.any()):
             directions = [other for other in earlier if other.turn.any()]
@@ -326,7 +326,7 @@ def drive_twins(move: Move, earlier: list[Move], gravity: Array) -> list[tuple[A
 
 
 def silent_at_base(form: LinearForm) -> Array:
-    """Return independent directions of the parameters, (p, k), along which no ground reaction changes.
+    """Return independent directions of the parameters, (p, k), that do not change any ground reaction.
 
     Raises
     ------
@@ -369,7 +369,7 @@ def silent_at_base(form: LinearForm) -> Array:
 
 
 def unseen(weights: Array, least: np.floating) -> Array:
-    """Return orthonormal directions, (k, n), whose weight is at most `least`, the rounding error of transfers."""
+    """Return orthonormal directions, (k, n), with a weight of at most `least`, the rounding error of transfers."""
     _, s, Vt = la.svd(weights)
     return Vt[int((s > least).sum()) :].T
 

@@ -1,4 +1,4 @@
-"""An estimate as a document, and as a record for JSON."""
+"""An estimate as a report, and as a record for JSON."""
 
 from dataclasses import replace
 from typing import Any
@@ -18,14 +18,15 @@ from floatframe.engine.tree.topology import tree_of
 
 __all__ = ["identification_document", "identification_record", "verdict_of"]
 
-SURE, DOUBTFUL = 0.05, 0.3  #: relative deviations up to which a parameter is well known, and from which it is not known
+#: relative deviations up to which a parameter is well determined, and above which it is undetermined
+SURE, DOUBTFUL = 0.05, 0.3
 UNREAL = (
     "no real bodies, with positive masses and inertias, fit within the noise: look at signs, units and places of the "
     "joints in the system file, or at what the model lacks"
 )
-OFF = 3.0  #: deviations by which a value differs from the system file for sure
-NEARER = 0.7  #: share of its deviation that another motion leaves where it helps
-MOST_NAMES = 8  #: combinations that a list names
+OFF = 3.0  #: number of deviations above which a value differs significantly from the system file
+NEARER = 0.7  #: ratio of deviations below which another motion is a significant improvement
+MOST_NAMES = 8  #: largest number of combinations in a list
 VERDICTS = {"well known": "pass", "roughly known": "", "not known": "fail", "zero within its deviation": "warn"}
 COLORS = {
     "measured": INK, "modelled": "#0072B2", "predicted": "#0072B2", "residual": "#CC79A7", "position": "#0072B2",
@@ -36,7 +37,7 @@ def identification_record(
     made: Estimate, real: RealParameters | None, check: Measured | None, notes: tuple[str, ...],
     better: NextMotion | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Return an estimate as plain numbers and words."""
+    """Return an estimate as plain numbers and texts."""
     form = made.base.form
     told = set(made.base.names)
     others = {}
@@ -134,7 +135,7 @@ def unit_of(form: LinearForm, k: int) -> str:
 
 
 def verdict_of(value: float, deviation: float) -> str:
-    """Return how well a value is known, in words."""
+    """Return a text that states how well a value is determined."""
     if deviation <= SURE * abs(value):
         return "well known"
     if deviation < DOUBTFUL * abs(value):
@@ -143,7 +144,7 @@ def verdict_of(value: float, deviation: float) -> str:
 
 
 def channel_words(made: Estimate) -> list[str]:
-    """Return what the channels are called in files."""
+    """Return the column names of the channels in files."""
     units = {column.name: column.unit for column in made.base.form.columns}
     return [
         name if name.startswith("base ") else f"{name} {'force' if units[name] == 'm' else 'torque'}"
@@ -159,7 +160,7 @@ def channel_units(made: Estimate) -> list[str]:
 
 
 def identification_document(made: Estimate, record: dict[str, Any], check: Measured | None) -> Document:
-    """Return the document of an estimate whose record was made."""
+    """Return the report of an estimate from its record."""
     sections = [parameter_section(record), fit_section(made, record), residual_section(made)]
     if check is not None:
         sections.append(validation_section(made, record, check))
@@ -175,7 +176,7 @@ def identification_document(made: Estimate, record: dict[str, Any], check: Measu
 
 
 def head(record: dict[str, Any]) -> tuple[str, Answer]:
-    """Return the facts, and the answer."""
+    """Return the key figures and the conclusion."""
     n = {words: sum(each["verdict"] == words for each in record["parameters"]) for words in VERDICTS}
     facts = [
         f"{record['n_base']} combinations of {record['n_parameters']} parameters from {record['source']} at "
@@ -198,7 +199,7 @@ def head(record: dict[str, Any]) -> tuple[str, Answer]:
 
 
 def parameter_section(record: dict[str, Any]) -> Section:
-    """The combinations with their deviations."""
+    """Return the section with the combinations and their deviations."""
     rows = [
         (
             Cell(each["name"], "name"),
@@ -223,12 +224,12 @@ def parameter_section(record: dict[str, Any]) -> Section:
 
 
 def share_words(each: dict[str, Any]) -> str:
-    """Return the deviation over the value, where that says something."""
+    """Return the relative deviation as text, if it is meaningful."""
     return "" if each["verdict"] == "zero within its deviation" else f"{each['relative']:.1%}"
 
 
 def number(value: float, deviation: float) -> str:
-    """Return a value with the digits that its deviation leaves, two of which are doubtful."""
+    """Return a value with the digits that are significant for its deviation, two of them uncertain."""
     if not deviation > 0:
         return f"{value:.5g}"
     places = 1 - int(np.floor(np.log10(deviation)))
@@ -236,7 +237,7 @@ def number(value: float, deviation: float) -> str:
 
 
 def fit_section(made: Estimate, record: dict[str, Any]) -> Section:
-    """Measured and modelled; noise of the channels."""
+    """Return the section with measured and modelled channels, and the noise of the channels."""
     rows = [
         (
             Cell(each["name"], "name"),
@@ -256,7 +257,7 @@ def fit_section(made: Estimate, record: dict[str, Any]) -> Section:
 
 
 def residual_section(made: Estimate) -> Section:
-    """What is left, in its own scale."""
+    """Return the section with the residuals, at their own scale."""
     words = "Measured less modelled; grey: two standard deviations, where 95 % of noise lies."
     drawn = Figure("residuals-chart", residual_chart(made), words)
     return Section(
@@ -267,7 +268,7 @@ def residual_section(made: Estimate) -> Section:
 
 
 def validation_section(made: Estimate, record: dict[str, Any], check: Measured) -> Section:
-    """A motion that the estimate has not seen."""
+    """Return the section on another motion that was not used in the estimate."""
     rows = [(Cell(name, "name"), Cell(f"{misfit:.2%}", "n")) for name, misfit in record["validation"].items()]
     drawn = Figure("check", prediction_chart(made, check), "Measured and predicted (blue).")
     return Section(
@@ -277,7 +278,7 @@ def validation_section(made: Estimate, record: dict[str, Any], check: Measured) 
 
 
 def unseen_section(record: dict[str, Any]) -> Section:
-    """What no motion tells, and what else to measure."""
+    """Return the section on combinations that no motion determines, and on further measurements."""
     words = ", ".join(record["without_effect"]) or "none"
     rows = [
         (
@@ -295,7 +296,7 @@ def unseen_section(record: dict[str, Any]) -> Section:
 
 
 def next_section(made: Estimate, record: dict[str, Any]) -> Section:
-    """The motion that would tell more, and how much."""
+    """Return the section on a more informative motion and its expected accuracy."""
     each_helped = [
         each
         for each in record["parameters"]
@@ -334,7 +335,7 @@ def next_section(made: Estimate, record: dict[str, Any]) -> Section:
 
 
 def real_section(made: Estimate, record: dict[str, Any]) -> Section:
-    """Real bodies that fit."""
+    """Return the section on physically consistent bodies that fit the measurements."""
     rows = []
     for name, phi in record["real_bodies"]["bodies"].items():
         size = max(abs(x / phi[0]) for x in phi[1:4]) or 1.0
@@ -363,31 +364,31 @@ def real_section(made: Estimate, record: dict[str, Any]) -> Section:
 
 
 def plain_number(value: float, size: float) -> str:
-    """Return a number, rounding beside a size as zero."""
+    """Return a number; rounding errors relative to a size become zero."""
     return "0" if abs(value) < 1e-9 * size else f"{value:.4g}"
 
 
 def fit_chart(made: Estimate) -> Chart:
-    """Return the channels over time, below each other."""
+    """Return a chart of the channels over time, one panel below the other."""
     _, y = made.measured.rows(made.base.form)
     return stacked(made, made.measured.times, {"measured": y, "modelled": y - made.residuals})
 
 
 def residual_chart(made: Estimate) -> Chart:
-    """Return the residuals over time, with the band of their noise."""
+    """Return a chart of the residuals over time, with the band of the noise."""
     chart = stacked(made, made.measured.times, {"residual": made.residuals})
     bands = tuple(LimitLine(2 * sigma, low=-2 * sigma, panel=k) for k, sigma in enumerate(made.sigma.tolist()))
     return replace(chart, limits=bands)
 
 
 def prediction_chart(made: Estimate, check: Measured) -> Chart:
-    """Return the channels of another motion."""
+    """Return a chart of the channels of another motion."""
     _, y = check.rows(made.base.form)
     return stacked(made, check.times, {"measured": y, "predicted": made.predicted(check)})
 
 
 def next_chart(motion: dict[str, Any], units: list[str]) -> Chart:
-    """Return the positions of a motion over its period."""
+    """Return a chart of the positions in a motion over its period."""
     rows = np.array(list(motion["coordinates"].values()))
     t = np.linspace(0, motion["period"], 201)
     made = ExcitingMotion(tuple(motion["coordinates"]), motion["period"], rows, motion["condition"])
@@ -402,7 +403,7 @@ def stacked(made: Estimate, t: Array, curves: dict[str, Array]) -> Chart:
 
 
 def panels(t: Array, curves: dict[str, Array], names: list[str], height: int = 160) -> Chart:
-    """Return a chart with a panel for each name, below each other; curves: (n_t, n) by what they are."""
+    """Return a chart with one panel for each name; curves: (n_t, n) arrays by their meaning."""
     lines = [
         thinned(Line(t, values[:, k], label, COLORS[label], width=1.3, panel=k))
         for k in range(len(names))

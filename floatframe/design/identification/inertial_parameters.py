@@ -22,7 +22,8 @@ __all__ = [
 ]  # fmt: skip
 
 INERTIAL = ("m", "S_x", "S_y", "S_z", "J_xx", "J_xy", "J_xz", "J_yy", "J_yz", "J_zz")
-PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  #: elements of J in their order
+#: elements of the inertia tensor J in the order of the parameters
+PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
 def parameters_of(body: RigidBody) -> Array:
@@ -32,7 +33,7 @@ def parameters_of(body: RigidBody) -> Array:
 
 
 def tensor(phi: Array) -> Array:
-    """Return J, (..., 3, 3), of parameters, (..., 10)."""
+    """Return the inertia tensors J, (..., 3, 3), for parameters, (..., 10)."""
     xx, xy, xz, yy, yz, zz = np.moveaxis(np.asarray(phi)[..., 4:], -1, 0)
     return np.stack([np.stack(row, -1) for row in ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))], -2)
 
@@ -83,7 +84,7 @@ def inertia_columns(x: Array) -> Array:
 
 
 def body_from_parameters(body: RigidBody, phi: Array) -> RigidBody:
-    """Return a body with other parameters, (10,); `ModelError` if no mass distribution has them."""
+    """Return a body with other parameters, (10,); `ModelError` if they are physically impossible."""
     phi = np.asarray(phi, dtype=float)
     if not phi[0] > 0:
         raise ModelError(f"rigid body {body.name!r}: mass: expected a number above 0, got {phi[0]:.6g}")

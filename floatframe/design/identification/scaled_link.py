@@ -1,4 +1,4 @@
-"""A flexible link with other mass, stiffness and damping than its finite element model says: what is identified of it.
+"""A flexible link whose mass, stiffness and damping differ from its finite element model by identified factors.
 
 With the density times mu and the moduli times kappa, shapes are the same; with M-orthonormal modes q goes over to
 sqrt(mu) q, so that
@@ -27,7 +27,7 @@ __all__ = ["scaled_link"]
 def scaled_link(
     body: FlexibleBody, *, mass: float = 1.0, stiffness: float = 1.0, damping: Sequence[float] | None = None
 ) -> FlexibleBody:
-    """Return a flexible body whose mass and stiffness are those of its model times factors.
+    """Return a flexible body with mass, stiffness and damping of its model multiplied by factors.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def scaled_link(
 
 
 def scaled_body(reduced: ReducedBody, mass: float, stiffness: float) -> ReducedBody:
-    """Return a reduced body with density and moduli times factors."""
+    """Return a reduced body with density and moduli multiplied by factors."""
     lighter = replace(reduced.units, name="scaled", mass=reduced.units.mass / mass)
     made = replace(convert_units(replace(reduced, recovery={}), lighter), units=reduced.units)
     ratio = stiffness / mass  # numbers in the lighter unit are those of moduli times `mass`

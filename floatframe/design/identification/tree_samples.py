@@ -1,4 +1,4 @@
-"""Motions of a tree of rigid bodies at many instants, as arrays: what linear forms are made of.
+"""Motions of a tree of rigid bodies at many instants as arrays, from which linear forms are computed.
 
 For sample s, body i and column k of the joints (docs/relative.md §2): pose, angular velocity and accelerations of the
 body, direction of the column, and the place of the marker that it moves. The velocity that a unit rate of column k
@@ -30,25 +30,25 @@ __all__ = [
 
 @dataclass(frozen=True, eq=False)
 class TreeSamples:
-    """n instants of a motion of n_b bodies by n_c columns of joints; ground axes but where said."""
+    """A motion of n_b bodies by n_c joint columns at n instants, in ground axes unless stated otherwise."""
 
     x: Array  #: coordinates, (n, n_c) [m or rad]
-    rate: Array  #: (n, n_c)
-    acceleration: Array  #: (n, n_c)
-    r: Array  #: origins of the bodies, (n, n_b, 3) [m]
-    R: Array  #: their axes, (n, n_b, 3, 3)
+    rate: Array  #: rates of the coordinates, (n, n_c)
+    acceleration: Array  #: accelerations of the coordinates, (n, n_c)
+    r: Array  #: positions of the body origins, (n, n_b, 3) [m]
+    R: Array  #: axes of the bodies as columns, (n, n_b, 3, 3)
     omega: Array  #: angular velocity, axes of the body, (n, n_b, 3) [rad/s]
-    a: Array  #: acceleration of the origin less gravity, axes of the body, (n, n_b, 3) [m/s²]
+    a: Array  #: acceleration of the origin minus gravity, axes of the body, (n, n_b, 3) [m/s²]
     alpha: Array  #: angular acceleration, axes of the body, (n, n_b, 3) [rad/s²]
-    t: Array  #: velocity of the moved marker by unit rate, (n, n_c, 3)
-    turn: Array  #: angular velocity by unit rate, (n, n_c, 3)
-    point: Array  #: marker that the column moves, (n, n_c, 3) [m]
-    #: rates of all coordinates by those of the independent ones, (n, n_c, n_i); None: all are independent
+    t: Array  #: velocity of the moved marker for unit rate, (n, n_c, 3)
+    turn: Array  #: angular velocity for unit rate, (n, n_c, 3)
+    point: Array  #: position of the marker that the column moves, (n, n_c, 3) [m]
+    #: derivatives of all coordinates by the independent ones, (n, n_c, n_i); None: all are independent
     gamma: Array | None = None
 
     @property
     def n_independent(self) -> int:
-        """Number of coordinates that move independently, whose torques are measured."""
+        """Number of independent coordinates, whose torques are measured."""
         return int(self.x.shape[1] if self.gamma is None else self.gamma.shape[2])
 
 
@@ -110,7 +110,7 @@ def tree_samples(system: System, x: Array, rate: Array, acceleration: Array) -> 
 def motion_of_tree(
     system: System, tree: Tree, x: Array, rate: Array, acceleration: Array, gamma: Array | None = None
 ) -> TreeSamples:
-    """Return the motion of a tree, or of what cut loops leave, by all its coordinates."""
+    """Return the motion of a tree (without its cut joints) for all its coordinates."""
     compiled = compiled_system(system)
     model, work, joints = compiled.model, new_work(compiled.model), joints_as_placed(system)
     start = distances(tree, joints)
@@ -132,13 +132,13 @@ def motion_of_tree(
 
 
 def marker_places(model: Model, m: int, r: Array, R: Array) -> Array:
-    """Return the places of a marker of a rigid body or the ground, (n, 3)."""
+    """Return the positions of a marker on a rigid body or the ground, (n, 3)."""
     i, position = int(model.markers.body[m]), model.markers.position[m]
     return np.broadcast_to(position, r[:, 0].shape) if i < 0 else r[:, i] + R[:, i] @ position
 
 
 def joints_as_placed(system: System) -> JointWork:
-    """Return the working arrays of the joints of a tree that begin as the system is placed."""
+    """Return working arrays for the tree joints in the placed configuration."""
     tree, compiled = tree_of(system).tree, compiled_system(system)
     model, work, joints = compiled.model, new_work(compiled.model), new_joint_work(compiled.model, tree)
     set_iterate(work, compiled.placed, None, None)
@@ -148,12 +148,12 @@ def joints_as_placed(system: System) -> JointWork:
 
 
 def as_placed(system: System) -> Array:
-    """Return the coordinates of a tree as its system is placed, (n_c,): distances of markers, angles zero."""
+    """Return the coordinates of a tree in the placed configuration, (n_c,): distances of markers, and zero angles."""
     return distances(tree_of(system).tree, joints_as_placed(system))
 
 
 def distances(tree: Tree, joints: JointWork) -> Array:
-    """Return the distances of the markers of joints along their columns, zero for those that turn, (n_c,)."""
+    """Return the distances of joint markers along their columns, zero for rotations, (n_c,)."""
     is_distance = ~tree.alpha.any(axis=1)
     return np.einsum("ka,ka->k", tree.tau, joints.d[owners(tree)]) * is_distance
 

@@ -20,7 +20,7 @@ __all__ = ["ExactBeam", "with_exact_beams"]
 @dataclass(frozen=True)
 @checked_fields(ModelError)
 class ExactBeam:
-    """Reference: the lines of the body as geometrically exact beams, of this many elements and of twice as many.
+    """Reference with geometrically exact beams on the lines of the body: given number of elements, and twice as many.
 
     The finer motion is the reference; errors fall with the square of the element, so that a third of the difference of
     both is its own error.
@@ -39,12 +39,12 @@ class ExactBeam:
 
     @property
     def description(self) -> str:
-        """The reference in words."""
+        """Description of the reference as text."""
         return "geometrically exact beams"
 
 
 def with_exact_beams(system: System, name: str, model: FEBody, elements: int) -> System:
-    """Return the system with its flexible body as exact beams of so many elements, and the sensors that they know.
+    """Return the system with its flexible body as exact beams, and the sensors that exist for them.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The full finite element model as a reference: the body with all of its dofs in the multibody system.
+"""The full finite element model as a reference: the unreduced body in the multibody system.
 
 With every displacement of the mesh among its shapes the floating frame loses nothing: no mode is left out, static or
 vibrating, so that what differs from it is the truncation of a case. It stays a description of small deformation about
@@ -23,7 +23,7 @@ MOST_DOFS = 1200  #: largest number of dofs, because dense matrices of this size
 @dataclass(frozen=True)
 @checked_fields(ModelError)
 class FullModel:
-    """Reference: the body of the job unreduced, all of its dofs run in the system by the integrator of the study.
+    """Reference with the unreduced body, whose dofs are integrated by the integrator of the study.
 
     Parameters
     ----------
@@ -35,12 +35,12 @@ class FullModel:
 
     @property
     def description(self) -> str:
-        """The reference in words."""
+        """Description of the reference as text."""
         return "the full finite element model"
 
 
 def all_dofs(body: FEBody, most_dofs: int = MOST_DOFS) -> ModeSet:
-    """Return unit columns of every dof of a coupled body: the set that leaves nothing out.
+    """Return unit columns for all dofs of a coupled body, a complete mode set.
 
     The reference node of a distributing interface follows its members, C_r u_r + C_m u_m = 0 (its multiplier rows of
     K), and has no column of its own; multipliers have none.

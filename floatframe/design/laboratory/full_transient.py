@@ -1,4 +1,4 @@
-"""A linear transient of a whole finite element model, by direct integration: nothing is reduced.
+"""A linear transient of a complete finite element model by direct integration without reduction.
 
 With h the dofs whose motion is given, i the others, in the axes of the mesh and relative to a frame that may move,
 

@@ -360,7 +360,7 @@ def distance(a: Array, b: Array, scale: float) -> float:
 
 
 class BodyShelf:
-    """Reduced bodies of one job by case, each made once; a context manager, whose folder has the jobs of parts.
+    """Reduced bodies of one job, each computed once for its case; a context manager with a folder for jobs of parts.
 
     The finite element model of a job is built and factorised once: all mode sets, numbers of modes and frames share its
     families, and vibration modes are sought once, as many as the largest case asks for. With stiffening or without it
@@ -368,7 +368,7 @@ class BodyShelf:
     """
 
     def __init__(self, job: str | Path, cut: str = "rigid", *, cases: Iterable[Case] = ()) -> None:
-        """Name the job, and the cases that will be asked for; nothing is read yet."""
+        """Store the job and the cases that may be requested; nothing is read yet."""
         self.job, self.cut = Path(job), cut
         self._most: dict[str, int] = {}
         for case in cases:
@@ -402,7 +402,7 @@ class BodyShelf:
         return self._made[key]
 
     def unreduced(self, asked: FullModel) -> ReducedBody:
-        """Return the body with all of its dofs.
+        """Return the unreduced body with all its dofs.
 
         Raises
         ------
@@ -421,7 +421,7 @@ class BodyShelf:
         return self._families_of(self.job).body
 
     def part_jobs(self, n: int) -> list[Path]:
-        """Return the jobs of the parts, written on first use."""
+        """Return the jobs of the parts, which are written at the first request."""
         folder = Path(self._folder.name) / f"parts_{n}"
         files = sorted(folder.glob("part_*.toml")) if folder.exists() else split_job(
             SplitRequest(self.job.resolve(), n, kind=self.cut, folder=folder))[:-1]  # fmt: skip
@@ -447,7 +447,7 @@ class BodyShelf:
         return self._families[path]
 
     def _states_of(self, path: Path, job: Job, plan: Plan, families: Families, n_modes: int) -> UnitStates | None:
-        """Return the static states of the unit loads, which differ by the frame alone; None where none are wanted."""
+        """Return the static states for unit loads, which depend only on the frame; None if they are not required."""
         if not plan.needs_states(n_modes):
             return None
         require_geometric_stiffness(families.body)
@@ -458,7 +458,7 @@ class BodyShelf:
 
 
 def changed_job(job: Job, case: Case) -> Job:
-    """Return the job with mode set, number of modes and frame of a case; the rest stays as it is."""
+    """Return the job with mode set, number of modes and frame of a case, otherwise unchanged."""
     kind, _, at = case.frame.partition(":")
     section = job.reduction.model_dump(exclude_unset=True)
     for key in ("cutoff", "at", "dofs", "origin", "axes", "select"):

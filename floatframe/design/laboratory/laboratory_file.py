@@ -40,7 +40,7 @@ Words = Annotated[tuple[str, ...], BeforeValidator(as_tuple), Field(min_length=1
 
 
 class VaryTable(Table):
-    """[vary]: every combination is a case."""
+    """[vary]: parameters whose combinations are the cases."""
 
     mode_sets: Words = Field(("craig-bampton",), description="a list of names of mode sets")
     n_modes: Annotated[tuple[int, ...], BeforeValidator(counts), Field(min_length=1)] = Field(
@@ -56,7 +56,7 @@ class VaryTable(Table):
 
 
 class ReferenceTable(Table):
-    """[reference]: the full model, exact beams, a finer case, or a table of columns from elsewhere."""
+    """[reference]: the full model, exact beams, a finer case, or a table of columns from another source."""
 
     kind: Literal["case", "full-model", "exact-beam", "file"] | None = Field(
         None, description='"case", "full-model", "exact-beam" or "file"'
@@ -95,7 +95,7 @@ class ReferenceTable(Table):
 
 
 class LaboratoryFile(Table):
-    """A whole file."""
+    """The content of a laboratory file."""
 
     kind: str = kind_field("laboratory")
     system: PathBeside = Field(description="the path of a system file with [run] and sensors")
@@ -110,7 +110,7 @@ class LaboratoryFile(Table):
 
 
 def read_laboratory(path: str | Path) -> LaboratoryFile:
-    """Read and check a file; `ModelError` with every problem."""
+    """Read and check a laboratory file; `ModelError` lists every problem."""
     path = Path(path)
     return validated(LaboratoryFile, read_toml(path, ModelError), path, ModelError, context=path.parent)
 

@@ -51,7 +51,7 @@ class SuspendedMotion:
     """Motion of the full body relative to the frame of the rigid body, and the forces of its bushings."""
 
     t: Array  #: (n_t,) [s]
-    u: Array  #: displacement over the dofs of the body, mesh axes, with what little it moves as a whole, (n_dof, n_t)
+    u: Array  #: displacement of the dofs, mesh axes, with a small rigid motion of the whole body, (n_dof, n_t)
     u_dot: Array  #: rate of the displacement, (n_dof, n_t)
     forces: dict[str, Array]  #: bushing -> force and moment on the body at its interface, body axes, (n_t, 6) [N, N m]
     rigid: Trajectory  #: the rigid motion (1) at every step

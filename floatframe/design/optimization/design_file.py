@@ -38,10 +38,10 @@ __all__ = ["COMBINATIONS", "DIFFERENCES", "GOALS", "METHODS", "SMALLEST_TOLERANC
 METHODS = ("least-squares", "slsqp", "trust-constr", "differential-evolution")
 DIFFERENCES = ("central", "forward")
 COMBINATIONS = ("sum", "largest")
-RESPONSE = "response"  #: the analysis that studies do not know
+RESPONSE = "response"  #: name of the analysis that only designs use
 RESPONSE_TAKES = ("greatest", "least", "mean", "rms")
 GOALS = ("smallest", "greatest")
-SMALLEST_TOLERANCE = 1e-15  #: above the rounding of numbers, which SciPy's methods ask for
+SMALLEST_TOLERANCE = 1e-15  #: smallest tolerance above the rounding of numbers, required by SciPy's methods
 
 
 class PathSection(Table):
@@ -107,7 +107,7 @@ class QuantitySection(Table):
         return interval(value)
 
     def output(self, name: str, analysis: str) -> Output:
-        """Return what is taken, of a frequency response by default the greatest; `ValueError` if it does not fit."""
+        """Return the reduction of an output, by default the maximum of a response; `ValueError` if it does not fit."""
         analysis = self.analysis or analysis
         if analysis != RESPONSE:
             if self.band is not None or self.at is not None:
@@ -129,7 +129,7 @@ class QuantitySection(Table):
 
 
 class ObjectiveSection(QuantitySection):
-    """[objectives.NAME]: what is to be small or great, or near a number or a table."""
+    """[objectives.NAME]: a quantity to minimise or maximise, or to fit to a number or a table."""
 
     goal: choice("goal", lambda: GOALS) | None = Field(  # type: ignore[valid-type]
         None, description=f"one of {', '.join(GOALS)}; default: smallest"

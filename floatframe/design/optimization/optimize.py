@@ -184,7 +184,7 @@ class Evaluator:
         return (start - self.lower) / (self.upper - self.lower)
 
     def at(self, points: Sequence[Array], *, n_trials: int | None = None) -> list[Evaluated]:
-        """Return the rows of scaled points, of which the first `n_trials` (default: all) are no ends of differences.
+        """Return the rows at scaled points, of which the first `n_trials` (default: all) are not for differences.
 
         What is not known is computed by the workers.
         """
@@ -212,7 +212,7 @@ class Evaluator:
         return Evaluated(evaluation, scalar(self.design, evaluation), max(violation, 0.0), is_difference, is_known)
 
     def derivatives(self, z: Array, of: Callable[[Evaluation], Array]) -> Array:
-        """Return d of / d z, (n_of, n_parameters), by differences whose points are computed at once.
+        """Return d(of)/dz, (n_of, n_parameters), by differences whose points are evaluated together.
 
         At a bound, or where one side fails, the difference is one-sided.
         """
@@ -333,7 +333,7 @@ def minimum_of(evaluator: Evaluator, start: Array) -> tuple[bool, str]:
 
 
 def evolution_of(evaluator: Evaluator, start: Array) -> tuple[bool, str]:
-    """Make F small by differential evolution, a generation at once; what fails or breaks limits drops out."""
+    """Minimise F by differential evolution, one generation at a time; failed or infeasible points are discarded."""
     from scipy.optimize import NonlinearConstraint, differential_evolution
     from scipy.stats import qmc
 
