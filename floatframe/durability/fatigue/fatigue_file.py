@@ -174,12 +174,12 @@ class FactorMethod:
     """A formula of the fatigue file."""
 
     description: str
-    needs: tuple[str, ...]  #: keys beside the method
+    needs: tuple[str, ...]  #: required keys in addition to the method
     needs_strength: bool
-    value: Callable[[Mapping[str, Number], float], float]  #: of the keys and the tensile strength [MPa]
+    value: Callable[[Mapping[str, Number], float], float]  #: function of these keys and the tensile strength [MPa]
 
 
-#: formulas by name
+#: formulas by their names
 FACTOR_METHODS: dict[str, FactorMethod] = {
     "fkm-roughness": FactorMethod(
         "K_R = 1 - a_R lg Rz lg(2 Rm/Rm,min)", ("roughness", "group"), True,
@@ -218,7 +218,7 @@ def word(given: Mapping[str, Number], key: str) -> str:
 STRESS_UNITS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "N/mm^2": 1e6, "GPa": 1e9, "psi": 6894.757293168361,
                 "ksi": 6894757.293168361}  # fmt: skip
 
-#: which places are looked at, by name
+#: which places are assessed, by name
 PLACES = {
     "all": "nodes of the surface and stress points of elements",
     "nodes": "nodes of the surface, whose stress is a mean over elements",
@@ -321,7 +321,7 @@ class FactorSection(Table):
 
     @property
     def description(self) -> str:
-        """The formula and what went in."""
+        """The formula and its inputs as text."""
         method = FACTOR_METHODS[self.method]
         return f"{method.description}, " + ", ".join(f"{key} {getattr(self, key)}" for key in method.needs)
 
@@ -359,7 +359,7 @@ class PlacesSection(MaterialSection):
 
 
 class CriterionSection(Table):
-    """[criterion]: what does damage, and how mean stress enters."""
+    """[criterion]: the stress that causes damage, and the effect of mean stress."""
 
     name: choice("criterion", lambda: tuple(CRITERIA)) = Field(  # type: ignore[valid-type]
         "signed-von-mises", description=f"one of {', '.join(CRITERIA)}"
@@ -429,7 +429,7 @@ class SpectrumSection(Table):
 
 
 class ProgrammeSection(Table):
-    """[programme]: what one pass through all blocks stands for."""
+    """[programme]: the service that one pass through all blocks represents."""
 
     amount: Positive = Field(1.0, description="a number above 0, such as kilometres")
     unit: str = Field("passes", description="text, such as km, flights, h")
@@ -437,7 +437,7 @@ class ProgrammeSection(Table):
 
 
 class OutputsSection(Table):
-    """[outputs]: what is looked at and shown."""
+    """[outputs]: the places that are assessed, and the results that are shown."""
 
     worst: Annotated[int, Field(ge=1, le=10_000)] = Field(20, description="a whole number, 1 to 10000, nodes of tables")
     set: str | None = Field(None, description="a set of the mesh; only its nodes and points are looked at")
@@ -496,7 +496,7 @@ class FatigueFile(Table):
 
     @property
     def all_materials(self) -> dict[str, MaterialSection]:
-        """The materials by their keys in the file, that of the rest first."""
+        """The materials by their keys in the file, beginning with the material of all other places."""
         rest = {} if self.material is None else {"material": self.material}
         return {**rest, **{f"materials.{name}": each for name, each in self.materials.items()}}
 

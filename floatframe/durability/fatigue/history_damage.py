@@ -68,10 +68,10 @@ CHUNK_SIZE = 20_000  #: number of nodes processed at a time
 class Envelope:
     """An ellipsoid q.T C^-1 q = rho² about the modal history of a block, with the frequency of each rho."""
 
-    L: Array  #: (n_q, n_q), C = L L.T
-    rho: Array  #: upper limits of the classes, (n_bins,)
+    L: Array  #: Cholesky factor of C = L L.T, (n_q, n_q)
+    rho: Array  #: upper limits of the classes of rho, (n_bins,)
     counts: Array  #: number of times in each class, (n_bins,)
-    largest_q: Array  #: max |q_k|, (n_q,)
+    largest_q: Array  #: largest absolute value of each coordinate, max |q_k|, (n_q,)
     n_times: int
 
 

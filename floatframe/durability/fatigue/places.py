@@ -48,9 +48,9 @@ class FatigueMaterial:
 class Places:
     """Places in the order of their materials; a node or point with two materials is two places."""
 
-    nodes: IntArray  #: kept node, -1 at a stress point, (n,)
+    nodes: IntArray  #: index of the kept node, -1 at a stress point, (n,)
     points: IntArray  #: row of the stress points of the body, -1 at a node, (n,)
-    material: IntArray  #: index of its material, (n,)
+    material: IntArray  #: index of the material at each place, (n,)
     n_left_out: int  #: number of nodes and points without a material
 
 

@@ -146,7 +146,7 @@ def sine_record(model: ShakenModel, run: SineRun) -> dict[str, Any]:
 
 
 def level_scale(model: ShakenModel, direction: str) -> float:
-    """Return the factor of a level from the model to the tables: to g; that of a rotation stays."""
+    """Return the factor of a level from the model to the tables: to g for accelerations, 1 for rotations."""
     return 1.0 if direction.rpartition(":")[2].startswith("r") else 1 / model.gravity
 
 

@@ -107,8 +107,8 @@ class ShakeJob:
 class EffectiveMasses:
     """The effective mass of each mode relative to its base."""
 
-    frequencies: Array  #: (n_m,) [Hz]
-    damping: Array  #: ratios, (n_m,)
+    frequencies: Array  #: natural frequencies, (n_m,) [Hz]
+    damping: Array  #: damping ratios, (n_m,)
     directions: tuple[str, ...]
     mass: Array  #: effective masses and inertias about the points of the bases, (n_m, 6 n_bases)
     total: Array  #: masses and inertias of the rigid structure, (6 n_bases,)

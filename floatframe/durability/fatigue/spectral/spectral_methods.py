@@ -29,8 +29,8 @@ class Density:
     """Cycles with a Weibull distribution of amplitudes."""
 
     rate: Array  #: cycles per second, (n,) [Hz]
-    theta: Array  #: scale, (n,) [Pa]
-    shape: Array  #: b, (n,)
+    theta: Array  #: scale parameter theta of the distribution, (n,) [Pa]
+    shape: Array  #: shape parameter b of the distribution, (n,)
 
 
 def widths(moments: Array) -> tuple[Array, Array, Array, Array]:

@@ -1,1 +1,1 @@
-"""Tests: levels, sine, random, shocks and transients, uncertainty, and notches in what is applied."""
+"""Tests: levels, sine, random, shocks and transients, uncertainty, and notches in the input."""

@@ -129,7 +129,7 @@ Limit = ResponseLimit | ForceLimit
 class Notch:
     """A frequency range in which one limit reduces the input."""
 
-    first: float  #: [Hz]
+    first: float  #: lower end of the notch [Hz]
     last: float
     deepest: float  #: frequency of the largest depth [Hz]
     depth: float  #: largest depth [dB]
@@ -143,9 +143,9 @@ class Notch:
 class NotchedRun:
     """A notched input and the outputs for it."""
 
-    frequencies: Array  #: (n_f,) [Hz]
+    frequencies: Array  #: frequencies of the test, (n_f,) [Hz]
     level: Array  #: specified level, (n_f,) [units of the model, squared per Hz for a density]
-    notched: Array  #: level with notches, (n_f,)
+    notched: Array  #: level with notches, (n_f,), in the units of `level`
     sizes: Array  #: amplitudes or densities of the outputs, (n_f, n_out)
     notches: tuple[Notch, ...]
     rms: Array | None  #: rms of the outputs in a random test, (n_out,)

@@ -28,8 +28,8 @@ ROUNDS = 60
 POINTS_A_CYCLE = 20  #: points per cycle of the highest wavelet
 #: shapes of a history for a spectrum, by name
 SHAPES = {"wavelets": "wavelets, which end at rest", "damped-sines": "damped sines, compensated to end at rest"}
-DECAY = 0.05  #: zeta of damped sines, by default
-#: frequencies, relative to the first one, and zeta of the compensating damped sines
+DECAY = 0.05  #: damping ratio zeta of damped sines by default
+#: frequencies relative to the first one, and damping ratios zeta, of the compensating damped sines
 SLOW, SLOW_DECAY = (0.5, 0.25), 0.8
 ENDED = 1e3  #: factor by which the first damped sine has decayed at the end
 MOST_NUMBERS = 100_000_000  #: largest number of values of the shapes
@@ -79,11 +79,11 @@ def pulse(kind: str, amplitude: float, duration: float, *, edge: float = EDGE) -
 class Synthesis:
     """An acceleration synthesised for a target spectrum, and the deviation of its spectrum."""
 
-    time: Array  #: (n_t,) [s]
-    acceleration: Array  #: in the unit of the target, (n_t,)
+    time: Array  #: times of the pulse, (n_t,) [s]
+    acceleration: Array  #: acceleration at these times, (n_t,), in the unit of the target
     frequencies: Array  #: frequencies at which the spectra are compared, (n_f,) [Hz]
-    target: Array  #: (n_f,)
-    reached: Array  #: (n_f,)
+    target: Array  #: target spectrum, (n_f,)
+    reached: Array  #: spectrum of the pulse, (n_f,)
 
     @property
     def decibels(self) -> Array:

@@ -118,10 +118,10 @@ class Miles:
     """Miles' estimate for a mode: the rms acceleration sqrt(pi/2 f Q S(f)) of a single mass at its frequency."""
 
     mode: int  #: number of the mode, from 1
-    frequency: float  #: [Hz]
+    frequency: float  #: natural frequency of the mode [Hz]
     Q: float
     density: float  #: density of the input at the frequency [g²/Hz]
-    grms: float  #: [g]
+    grms: float  #: root mean square acceleration [g]
     share: float  #: fraction of the mass that is effective in the direction
 
 
@@ -136,8 +136,8 @@ class RandomRun:
     level: Array  #: densities of the acting inputs, (n_f, n_act) [units of the model² per Hz]
     inputs: tuple[str, ...]  #: names of the acting inputs
     input_rms: Array  #: exact rms of the acting inputs, (n_act,) [units of the model]
-    density: Array  #: (n_f, n_out) [units of the model² per Hz]
-    rms: Array  #: (n_out,)
+    density: Array  #: densities of the outputs, (n_f, n_out) [units of the model² per Hz]
+    rms: Array  #: root mean squares of the outputs, (n_out,)
     error: Array  #: bound of the relative integration error of rms, (n_out,)
     wide: Array  #: densities with uncertainty, to which notch limits apply, (n_f, n_out)
     uncertain: Array  #: rms with uncertainty, (n_out,)
@@ -145,7 +145,7 @@ class RandomRun:
     expected: Array | None  #: expected largest value in the duration, (n_out,)
     von_mises: Mapping[str, RandomVonMises]  #: von Mises stresses by place
     miles: tuple[Miles, ...]  #: estimates for the modes in the band; () if several inputs act
-    transfer: Array  #: complex, (n_f, n_rows, n_act)
+    transfer: Array  #: complex response of the rows per unit of input, (n_f, n_rows, n_act)
     field: Array | None = None  #: rms of the von Mises stress at all kept nodes, (n_nodes,)
 
 

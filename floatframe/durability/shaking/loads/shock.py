@@ -24,9 +24,9 @@ __all__ = ["SpectrumRequest", "TimeRun", "TimeTest", "time_run", "time_runs"]
 POINTS_A_CYCLE = 20  #: points per cycle of the highest vibrating mode
 AFTER = 10.0  #: cycles of the lowest mode that are computed after the end of an input
 MOST_SAMPLES = 2_000_000
-ON_GRID = 1e-6  #: of a step, by which a time may miss it
-COARSE_DIGIT = 0.25  #: of a step, above which the last digit of a time is too coarse to identify its step
-LOST = 0.01  #: of the largest value of a history; a note reports a larger change of it by new times
+ON_GRID = 1e-6  #: fraction of a step by which a time may deviate from the time grid
+COARSE_DIGIT = 0.25  #: fraction of a step above which the last digit of a time is too coarse to identify its step
+LOST = 0.01  #: change of a history by new times, relative to its largest value, above which there is a note
 
 
 @dataclass(frozen=True)
@@ -138,15 +138,15 @@ class TimeRun:
     kind: str
     direction: str
     outputs: tuple[Output, ...]
-    t: Array  #: (n_t,) [s]
+    t: Array  #: output times, (n_t,) [s]
     inputs: tuple[str, ...]
-    input_values: Array  #: (n_act, n_t) [units of the model]
-    values: Array  #: (n_out, n_t) [units of the model]
+    input_values: Array  #: histories of the inputs, (n_act, n_t) [units of the model]
+    values: Array  #: histories of the outputs, (n_out, n_t) [units of the model]
     uncertain: Array  #: largest |value| with uncertainty, (n_out,)
     #: velocities of the bases at the end of each input, (n_act,) [units of the model]; NaN for forces
     velocity_left: Array
     displacement_left: Array  #: displacements of the bases at the end of each input, (n_act,)
-    spectra_frequencies: Array  #: (n_f,) [Hz]
+    spectra_frequencies: Array  #: frequencies of the shock spectra, (n_f,) [Hz]
     spectra: Mapping[str, Mapping[float, Array]]  #: spectra by name of the input or acceleration, then by Q, (n_f,)
     spectra_kind: str = "acceleration"
     words: str = ""

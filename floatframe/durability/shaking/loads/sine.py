@@ -79,7 +79,7 @@ class SineRun:
     test: str
     direction: str  #: name of the input
     outputs: tuple[Output, ...]  #: outputs of the model, followed by von Mises stresses
-    frequencies: Array  #: (n_f,) [Hz]
+    frequencies: Array  #: frequencies of the test, (n_f,) [Hz]
     level: Array  #: amplitude of the input, (n_f,) [units of the model]
     sizes: Array  #: steady amplitudes, (n_f, n_out) [units of the model]
     transfer: Array  #: complex response of the model outputs per unit of input, (n_f, n_rows)
@@ -87,7 +87,7 @@ class SineRun:
     static: Array  #: quasi-static amplitudes: the response at the lowest frequency, scaled with the level, (n_f, n_out)
     swept_frequencies: Array = field(default_factory=lambda: np.zeros(0))  #: frequencies of the sweep, (n_t,) [Hz]
     swept: Array | None = None  #: envelopes during the sweep, (n_t, n_out)
-    rate: float | None = None  #: octaves a minute
+    rate: float | None = None  #: sweep rate in octaves per minute
 
     @property
     def peaks(self) -> Array:

@@ -34,8 +34,8 @@ APART = 1e-9  #: relative distance below which edges coincide
 class ResolvedBand:
     """Points in a band, with the weights of two rules."""
 
-    frequencies: Array  #: ascending, (n_f,) [Hz]
-    weights: Array  #: (n_f,) [Hz]
+    frequencies: Array  #: ascending frequencies, (n_f,) [Hz]
+    weights: Array  #: quadrature weights of the frequencies, (n_f,) [Hz]
     coarse: Array  #: weights of the rule with half the intervals, (n_f,) [Hz]
 
     def integral(self, values: Array) -> Array:

@@ -18,7 +18,7 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["VON_MISES", "RandomVonMises", "cycle_von_mises", "exceeded", "random_von_mises", "von_mises_density"]
 
-#: A, for components xx yy zz yz xz xy
+#: matrix A of the von Mises stress, for components xx yy zz yz xz xy
 VON_MISES = np.array(
     [
         [1, -0.5, -0.5, 0, 0, 0],
@@ -49,7 +49,7 @@ def von_mises_density(density: Array) -> Array:
 class RandomVonMises(NamedTuple):
     """Von Mises stress of a Gaussian stress."""
 
-    rms: float  #: exact
+    rms: float  #: exact root mean square
     quantile: float  #: value that is not exceeded 99.73 % of the time, like 3 sigma of a Gaussian
     factor: float  #: quantile divided by rms: 3 if one component dominates, otherwise less
 

@@ -47,8 +47,8 @@ class Held:
     """Motions of a structure on bases."""
 
     T: Array  #: static motions that follow the bases, (n_x, n_s)
-    V: Array  #: modes with the bases held, of unit mass, (n_x, n_m)
-    omega: Array  #: angular frequencies of the modes, ascending, (n_m,)
+    V: Array  #: modes with fixed bases and unit mass, (n_x, n_m)
+    omega: Array  #: ascending angular frequencies of the modes, (n_m,)
     V_0: Array  #: shapes without mass, of unit stiffness, (n_x, n_0)
 
 
@@ -201,10 +201,10 @@ class OnBases:
 
     body: ReducedBody
     bases: tuple[Base, ...]
-    M: Array  #: over x, axes of B, (n_x, n_x)
-    C: Array  #: zero if the damping is given by modes
+    M: Array  #: mass matrix for the unknowns x, axes of B, (n_x, n_x)
+    C: Array  #: damping matrix, zero if the damping is given by modes
     K: Array
-    F: Array  #: loads of the forces, (n_x, n_f)
+    F: Array  #: loads of unit forces, (n_x, n_f)
     forces: tuple[str, ...]
     held: Held
 

@@ -1,4 +1,4 @@
-"""Damping of the modes with the bases held: by ratio, table over frequency, band, single mode, or the body's own."""
+"""Damping of modes with fixed bases: by ratio, table over frequency, band, single mode, or from the body."""
 
 import itertools
 import math

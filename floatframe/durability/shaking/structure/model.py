@@ -35,9 +35,9 @@ class Base:
     """A rigid base: the parts that it holds, and its reference point for rotations and moments."""
 
     name: str
-    holds: tuple[str, ...]  #: interfaces of a body, or joints and springs of a system
+    holds: tuple[str, ...]  #: interfaces of a body, or joints and springs of a system, that the base moves
     point: Array  #: reference point in coordinates of the mesh, or of the ground, (3,) [m]
-    axes: Array = field(default_factory=lambda: np.eye(3))  #: columns: axes of its directions, (3, 3)
+    axes: Array = field(default_factory=lambda: np.eye(3))  #: axes of the base directions as columns, (3, 3)
 
     def __post_init__(self) -> None:
         for name in ("point", "axes"):
@@ -63,8 +63,8 @@ class ShakenModel:
     units: Units
     bases: tuple[Base, ...]
     inputs: tuple[str, ...]  #: "base:x" of a base, otherwise the name of a force
-    rates: IntArray  #: r of each input, (n_s,)
-    omega: Array  #: angular frequencies, ascending, (n_m,) [rad per unit of time]
+    rates: IntArray  #: order r of the derivative that is the input, for each input, (n_s,)
+    omega: Array  #: ascending angular frequencies, (n_m,) [rad per unit of time]
     C: Array  #: modal damping, (n_m, n_m) [1/unit of time]
     B: Array  #: (3, n_m, n_s)
     E: Array  #: (3, n_out, n_m)
@@ -89,7 +89,7 @@ class ShakenModel:
 
     @property
     def frequencies(self) -> Array:
-        """Frequencies with the bases held, (n_m,) [Hz]."""
+        """Natural frequencies with fixed bases, (n_m,) [Hz]."""
         return np.asarray(self.omega / (2 * np.pi) / self.units.time)
 
     @property
@@ -132,7 +132,7 @@ class ShakenModel:
 
 
 def follows_stiffness(output: Output) -> bool:
-    """Whether displacements act on an output through a stiffness: forces, stresses, accelerations made of forces."""
+    """Whether an output depends on displacements through a stiffness: forces, stresses, accelerations from forces."""
     return any(word in output.kind for word in ("force", "moment", "stress", "acceleration"))
 
 

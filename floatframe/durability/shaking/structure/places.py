@@ -204,5 +204,5 @@ def six_rows(body: ReducedBody, point: Array, Psi: Array) -> Array:
 
 
 def in_mesh_axes(body: ReducedBody, rows: Array) -> Array:
-    """Return six rows turned from axes of B to those of the mesh."""
+    """Return six rows rotated from axes of B to mesh axes."""
     return np.asarray(la.block_diag(body.frame.axes, body.frame.axes) @ rows)

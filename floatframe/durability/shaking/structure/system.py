@@ -103,7 +103,7 @@ def bases_of_system(
 
 
 def marker_a(system: System, connection: object, state: State) -> tuple[Array, float]:
-    """Return the place of marker A, (3,), and the sign from the force on it to that of the base on the structure."""
+    """Return the position of marker A, (3,), and the sign from its force to the base's force on the structure."""
     a, _ = joint_markers(system, connection, compiled_system(system).placed)  # type: ignore[arg-type]
     return marker_pose(a, state, n_q_of(system))[0], -1.0 if a.body < 0 else 1.0
 
