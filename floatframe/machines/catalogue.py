@@ -24,10 +24,10 @@ class Machine:
 
     title: str
     room: str  #: folder in floatframe/machines
-    shows: str  #: its content in one line
+    shows: str  #: content of the machine in one line
 
 
-#: every machine by the name with which `floatframe example` copies it
+#: machines by the name with which `floatframe example` copies them
 MACHINES: dict[str, Machine] = {
     "antenna": Machine(
         "a deployable antenna", "antenna", "slow opening on a rig and in space, latching shock in free flight"

@@ -24,19 +24,19 @@ __all__ = ["AntennaGeometry", "Mechanism", "mechanism"]
 class AntennaGeometry:
     """Lengths of one petal and its strut [m]."""
 
-    hinge_radius: float = 0.6  #: of the petal hinges from the mast
-    slider_radius: float = 0.15  #: of the feet of the struts
-    elbow: float = 1.2  #: from the hinge along the petal to the strut
-    strut: float = 1.75  #: length
+    hinge_radius: float = 0.6  #: distance of the petal hinges from the mast
+    slider_radius: float = 0.15  #: distance of the feet of the struts from the mast
+    elbow: float = 1.2  #: distance from the hinge along the petal to the strut
+    strut: float = 1.75  #: length of a strut
 
 
 @dataclass(frozen=True, eq=False)
 class Mechanism:
     """State of the mechanism at given angles of the petals, (n,) each."""
 
-    theta: Array  #: of the petals from the mast [rad]
+    theta: Array  #: angle of the petals from the mast [rad]
     slider: Array  #: height s of the slider [m]
-    rate: Array  #: ds/dtheta [m/rad]
+    rate: Array  #: derivative ds/dtheta of the slider height [m/rad]
     drive: Array  #: force F of the drive on the slider along +z [N]
     strut: Array  #: compression of one strut [N]
     strut_angle: Array  #: angle of a strut from the mast, at its foot, downward [rad]

@@ -53,9 +53,9 @@ def petal_mesh(
 class Pointing:
     """Direction from the middle of each hinge to the tip of its petal, in axes of the spacecraft, (n_t, n_petals)."""
 
-    t: Array  #: (n_t,) [s]
-    theta: Array  #: from the mast [rad]
-    lateral: Array  #: out of the plane of the petal and the mast [rad]
+    t: Array  #: output times, (n_t,) [s]
+    theta: Array  #: angle of the petal from the mast [rad]
+    lateral: Array  #: angle out of the plane of petal and mast [rad]
 
 
 def pointing(system: System, motion: Trajectory, *, hinge_radius: float = 0.6, petal_length: float = 4.0) -> Pointing:

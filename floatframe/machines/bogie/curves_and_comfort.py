@@ -82,7 +82,7 @@ def weighted_rms(t: Array, acceleration: Array, direction: str) -> float:
 
 
 LEAD = 50.0  #: track length behind the middle of the vehicle [m]
-LENGTH = 1e5  #: of the circle [m]
+LENGTH = 1e5  #: length of the circular track [m]
 
 
 def circle(radius: float, cant: float = 0.0) -> Track:

@@ -96,7 +96,7 @@ class Hunting(NamedTuple):
     """The lateral oscillation with the least damping."""
 
     damping: float  #: damping ratio; below 0 the oscillation grows
-    frequency: float  #: [Hz]
+    frequency: float  #: frequency of the oscillation [Hz]
 
 
 def hunting(system: System, radius: float | None = None) -> Hunting:
@@ -156,7 +156,7 @@ def with_lateral_kick(system: System, kick: float) -> System:
 class SpeedSweep(NamedTuple):
     """Hunting of a vehicle with decreasing speed."""
 
-    speed: Array  #: (n,) [m/s]
+    speed: Array  #: running speeds, (n,) [m/s]
     amplitude: Array  #: half the range of the lateral displacement of an axle near each of these speeds, (n,) [m]
     offset: Array  #: mean lateral displacement [m]
 

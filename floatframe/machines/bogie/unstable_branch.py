@@ -33,8 +33,8 @@ class Run(NamedTuple):
     """Half the range of the lateral displacement of an axle, in two windows of one second."""
 
     start: float  #: initial amplitude of the mode [m]
-    early: float  #: after the first second [m]
-    late: float  #: in the last second [m]; NaN if a wheel has climbed the rail
+    early: float  #: amplitude after the first second [m]
+    late: float  #: amplitude in the last second [m]; NaN if a wheel has climbed the rail
 
 
 class Bracket(NamedTuple):
@@ -51,7 +51,7 @@ class Hunted:
 
     motion: SteadyMotion
     axle: str
-    eigenvalue: complex  #: [1/s]
+    eigenvalue: complex  #: eigenvalue of the mode [1/s]
     shape: Array  #: motions of the bodies, scaled to 1 for the lateral motion of the axle, (n_u,) complex
 
     def state(self, amplitude: float) -> State:

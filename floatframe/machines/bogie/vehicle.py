@@ -31,9 +31,10 @@ class RailVehicle:
     on one side.
     """
 
-    body_mass: float = 32000.0  #: [kg]
-    body_inertia: tuple[float, float, float] = (56800.0, 1.97e6, 1.97e6)  #: [kg m²]
-    body_height: float = 1.8  #: of its centre of mass [m]
+    body_mass: float = 32000.0  #: mass of the car body [kg]
+    #: principal moments of inertia of the car body [kg m²]
+    body_inertia: tuple[float, float, float] = (56800.0, 1.97e6, 1.97e6)
+    body_height: float = 1.8  #: height of the car body's centre of mass [m]
     frame_mass: float = 2615.0
     frame_inertia: tuple[float, float, float] = (1722.0, 1476.0, 3067.0)
     frame_height: float = 0.6
@@ -42,17 +43,18 @@ class RailVehicle:
     pivot: float = 9.5  #: half the distance between the bogies [m]
     wheelbase: float = 1.28  #: half the wheelbase [m]
     primary_arm: float = 1.0  #: half the lateral distance between the primary springs [m]
-    #: of an axle box: longitudinal, lateral, vertical [N/m]
+    #: stiffness of an axle box suspension: longitudinal, lateral, vertical [N/m]
     primary: tuple[float, float, float] = (31.391e6, 3.884e6, 1.22e6)
-    primary_damping: float = 4000.0  #: vertical [N s/m]
+    primary_damping: float = 4000.0  #: vertical damping of an axle box suspension [N s/m]
     secondary_arm: float = 1.0
     secondary_height: float = 0.83
-    secondary: tuple[float, float, float] = (160e3, 160e3, 430e3)  #: of an air spring [N/m]
-    #: longitudinal (yaw dampers), lateral, vertical [N s/m]
+    #: stiffness of an air spring: longitudinal, lateral, vertical [N/m]
+    secondary: tuple[float, float, float] = (160e3, 160e3, 430e3)
+    #: damping of the secondary suspension: longitudinal (yaw dampers), lateral, vertical [N s/m]
     secondary_damping: tuple[float, float, float] = (0.0, 16e3, 20e3)
-    rod: float = 5e6  #: of the traction rod, longitudinal [N/m]
-    rod_damping: float = 25e3  #: of the traction rod [N s/m]
-    roll_bar: float = 940e3  #: of the anti-roll bar of a bogie [N m/rad]
+    rod: float = 5e6  #: longitudinal stiffness of the traction rod [N/m]
+    rod_damping: float = 25e3  #: longitudinal damping of the traction rod [N s/m]
+    roll_bar: float = 940e3  #: torsional stiffness of a bogie's anti-roll bar [N m/rad]
     guide: float = 1.0  #: factor on the longitudinal and lateral primary stiffness
 
     @property

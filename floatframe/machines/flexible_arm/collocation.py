@@ -50,10 +50,10 @@ class OptimalMove:
 
     names: tuple[str, ...]  #: names of the positions
     driven: tuple[str, ...]  #: coordinates that have a motor
-    t: Array  #: (n_t,) [s]
-    z: Array  #: positions, (n_t, n_z)
-    z_dot: Array  #: rates, (n_t, n_z)
-    torque: Array  #: of the motors, (n_t, n_u) [N m]
+    t: Array  #: times of the solution, (n_t,) [s]
+    z: Array  #: positions at these times, (n_t, n_z)
+    z_dot: Array  #: rates at these times, (n_t, n_z)
+    torque: Array  #: torques of the motors, (n_t, n_u) [N m]
     cost: float
     iterations: int
 

@@ -18,7 +18,7 @@ from floatframe.results.sensors import CoordinateSensor, PlaceSensor
 __all__ = ["BENDING", "LENGTH", "FlexibleLinks", "arm", "links"]
 
 FILES = Path(__file__).parent / "files"
-LENGTH = 0.5  #: of each link [m]
+LENGTH = 0.5  #: length of each link [m]
 BENDING = (0, 1)  #: the two lowest modes of a link, in the numbering of its job
 TIP = Marker("forearm", "tip")
 

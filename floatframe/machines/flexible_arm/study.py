@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 __all__ = ["BANDWIDTH", "DURATION", "LARGEST", "TARGET", "ArmMotion", "compared", "controlled", "moves", "plot_motions"]
 
 TARGET = {"shoulder": 1.2, "elbow": 0.9}  #: final angles of the hinges [rad]
-DURATION = 0.8  #: of the move [s]
-LARGEST = (8.0, 3.0)  #: torque of each motor [N m]
-BANDWIDTH = 10.0  #: of the feedback [rad/s]
-T_END = 2.0  #: of the motions [s]
+DURATION = 0.8  #: duration of the move [s]
+LARGEST = (8.0, 3.0)  #: largest torque of each motor [N m]
+BANDWIDTH = 10.0  #: bandwidth of the feedback control [rad/s]
+T_END = 2.0  #: end of the motions [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class ArmMotion:
     motion: Trajectory
     tip: Array  #: position of the tip, (n_t, 2) [m]
     error: Array  #: distance of the tip from its desired position, (n_t,) [m]
-    torque: Array  #: of the motors, (n_t, 2) [N m]
+    torque: Array  #: torques of the motors, (n_t, 2) [N m]
 
     @property
     def residual(self) -> float:

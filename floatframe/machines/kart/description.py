@@ -12,9 +12,9 @@ class Kart:
     wheelbase: float = 1.05
     front_half_track: float = 0.53
     rear_half_track: float = 0.55
-    front_height: float = 0.125  #: of the wheel centres above the ground
+    front_height: float = 0.125  #: height of the front wheel centres above the ground
     rear_height: float = 0.137
-    rail_height: float = 0.06  #: of the tubes
+    rail_height: float = 0.06  #: height of the frame tubes
     kingpin_y: float = 0.42
 
 

@@ -19,9 +19,9 @@ WHEELS = ("front_left", "front_right", "rear_left", "rear_right")
 class Turn:
     """Motion of a kart in the axes of its chassis."""
 
-    t: Array  #: (n_t,) [s]
+    t: Array  #: output times, (n_t,) [s]
     speed: Array  #: forward speed of the origin of the chassis, (n_t,) [m/s]
-    yaw_rate: Array  #: (n_t,) [rad/s]
+    yaw_rate: Array  #: yaw rate of the chassis, (n_t,) [rad/s]
     loads: Array  #: F_z of front left, front right, rear left, rear right, (n_t, 4) [N]
 
     @property

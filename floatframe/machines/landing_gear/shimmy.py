@@ -34,9 +34,9 @@ LEG_MASS, LEG_CENTRE, LINK_MASS = 90.0, (0.0, -0.9), 4.0
 class Retraction:
     """The mechanism at angles of the leg, each array (n,), or (n, 2) in its plane (y, z)."""
 
-    knee: Array  #: (n, 2) [m]
+    knee: Array  #: position of the knee, (n, 2) [m]
     jack: Array  #: distance between the ends of the jack [m]
-    #: of leg and links, divided by g, zero where all centres of mass are at the height of the hinge [kg m]
+    #: potential energy of leg and links divided by g, zero if all centres of mass are at the height of the hinge [kg m]
     potential: Array
 
 

@@ -27,15 +27,15 @@ __all__ = [
 class Motor:
     """Two-axis model of a three-phase machine of about 380 kW, referred to the stator."""
 
-    stator_resistance: float = 0.08  #: [ohm]
-    rotor_resistance: float = 0.07  #: [ohm]
-    stator_leakage: float = 1.2e-3  #: [H]
-    rotor_leakage: float = 1.2e-3  #: [H]
-    magnetizing: float = 22e-3  #: [H]
+    stator_resistance: float = 0.08  #: stator resistance per phase [ohm]
+    rotor_resistance: float = 0.07  #: rotor resistance per phase, referred to the stator [ohm]
+    stator_leakage: float = 1.2e-3  #: leakage inductance of the stator [H]
+    rotor_leakage: float = 1.2e-3  #: leakage inductance of the rotor, referred to the stator [H]
+    magnetizing: float = 22e-3  #: magnetizing inductance [H]
     pole_pairs: int = 2
-    rated_voltage: float = 1100.0  #: phase peak [V]
-    rated_frequency: float = 60.0  #: [Hz]
-    boost: float = 25.0  #: phase peak at standstill [V]
+    rated_voltage: float = 1100.0  #: peak phase voltage at the rated frequency [V]
+    rated_frequency: float = 60.0  #: rated supply frequency [Hz]
+    boost: float = 25.0  #: peak phase voltage at standstill [V]
 
 
 def supply_voltage(motor: Motor, f: float) -> float:

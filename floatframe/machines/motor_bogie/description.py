@@ -23,7 +23,7 @@ class MotorBogie:
     """The numbers of the bogie that its closed forms use; `six_steps.toml` has the same, and all others."""
 
     motor: Motor = field(default_factory=Motor)
-    harmonics: Sequence[Sequence[float]] = SIX_STEPS  #: of the supply voltage
+    harmonics: Sequence[Sequence[float]] = SIX_STEPS  #: harmonics of the supply voltage
     ratio: float = 5.0  #: gear ratio, rotations of the rotor per rotation of the axle
     speed: float = 0.0  #: constant initial speed [m/s]
 

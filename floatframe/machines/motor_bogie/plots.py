@@ -68,9 +68,9 @@ def at_rest(system: System, load: str = "leading_lower", column: str = "force x"
 class ModeOfBogie(NamedTuple):
     """An oscillation, and the location of its kinetic energy."""
 
-    frequency: float  #: [Hz]
-    damping: float  #: ratio
-    where: str  #: the two bodies with the largest shares
+    frequency: float  #: natural frequency of the mode [Hz]
+    damping: float  #: damping ratio of the mode
+    where: str  #: names of the two bodies with the largest shares
     flexible: float  #: share of the kinetic energy in the modes of the frame
 
 
@@ -99,9 +99,9 @@ def modes_of(linear: LinearSystem, lowest: float = 5.0, highest: float = 200.0) 
 class SupplyLines(NamedTuple):
     """Amplitudes at multiples of the supply frequency."""
 
-    frequency: Array  #: of the supply, (n,) [Hz]
-    torque: dict[int, Array]  #: in the air gap of the leading motor, by multiple, each (n,) [N m]
-    load: dict[int, Array]  #: in a mount, each (n,) [N]
+    frequency: Array  #: supply frequency, (n,) [Hz]
+    torque: dict[int, Array]  #: torque in the air gap of the leading motor for each multiple, (n,) [N m]
+    load: dict[int, Array]  #: force in a mount for each multiple, (n,) [N]
 
 
 def supply_phase(system: System, t: Array, drive: str = "leading_drive") -> tuple[Array, Array]:

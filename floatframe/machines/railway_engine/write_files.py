@@ -66,7 +66,7 @@ def envelope(rail: Callable[[Array], Array], s: Array, reach: float, radius: flo
 class WheelPaths:
     """Prescribed path of each wheelset."""
 
-    t: Array  #: (n_t,) [s]
+    t: Array  #: output times, (n_t,) [s]
     places: Array  #: x, y of the track [m], yaw [rad], rotation about the right rail [rad], (n_t, n_wheelsets, 4)
 
 
@@ -80,12 +80,12 @@ class Defect:
         If a value is not a number, or if length, speed or a radius is not above zero.
     """
 
-    length: float = 0.1  #: of the defect along the rail [m]
-    vertical: float = 0.010  #: height of its crest [m]; below zero it is a dip
-    lateral: float = 0.004  #: displacement of the rail inwards there [m]
-    speed: float = 5.0  #: [m/s]
+    length: float = 0.1  #: length of the defect along the rail [m]
+    vertical: float = 0.010  #: height of the crest of the defect [m]; negative for a dip
+    lateral: float = 0.004  #: inward displacement of the rail at the defect [m]
+    speed: float = 5.0  #: running speed [m/s]
     begin: float = 0.5  #: initial distance of the first wheelset from the middle of the defect [m]
-    radius: float = 0.625  #: of the wheels [m]
+    radius: float = 0.625  #: radius of the wheels [m]
     gauge: float = 1.5  #: distance between the middles of the rails [m]
     flange_angle: float = 1.2217  #: gamma, 70 degrees [rad]
     patch: float = 0.015  #: half length of the contact, over which kinks of the path are rounded [m]
@@ -142,7 +142,7 @@ class SCurve:
     Its curvature rises and falls as a sine without jumps; the largest curvature is nearly 2 pi shift / L².
     """
 
-    shift: float = 4.0  #: from the first track to the second [m]
+    shift: float = 4.0  #: lateral distance from the first to the second track [m]
     length: float = 50.0  #: L, along the first track [m]
     speed: float = 7.0  #: speed along the curve [m/s]
     begin: float = 3.0  #: initial distance of the first wheelset from the curve [m]

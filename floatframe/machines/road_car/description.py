@@ -20,23 +20,24 @@ Point = tuple[float, float, float]
 class Axle:
     """A double wishbone suspension, with points of the left side in axes of the car [m, kg, s]."""
 
-    centre: Point  #: of the wheel
-    lower_front: Point  #: hinge of the lower wishbone
+    centre: Point  #: centre of the wheel
+    lower_front: Point  #: front hinge of the lower wishbone
     lower_rear: Point
     lower_ball: Point
-    upper_front: Point  #: hinge of the upper wishbone
+    upper_front: Point  #: front hinge of the upper wishbone
     upper_rear: Point
     upper_ball: Point
-    rod_inner: Point  #: of the tie rod, or of the toe link at the rear axle
+    rod_inner: Point  #: inner end of the tie rod, or of the toe link at the rear axle
     rod_outer: Point
-    seat: Point  #: of spring and damper on the lower wishbone
-    jack: Point  #: of the hydraulic cylinder on the lower wishbone
-    tower: Point  #: of spring, damper and cylinder on the body
-    mounts: tuple[Point, Point]  #: of the subframe on the body
-    spring: float  #: [N/m]
+    seat: Point  #: seat of spring and damper on the lower wishbone
+    jack: Point  #: seat of the hydraulic cylinder on the lower wishbone
+    tower: Point  #: seat of spring, damper and cylinder on the body
+    mounts: tuple[Point, Point]  #: mounts of the subframe on the body
+    spring: float  #: stiffness of the spring [N/m]
     preload: float  #: compression force of the spring at design height [N]
-    damper: float  #: [N s/m]
-    bar: float  #: of the anti-roll bar, torque on the wishbones divided by the sum of their rotations [N m/rad]
+    damper: float  #: damping of the damper [N s/m]
+    #: stiffness of the anti-roll bar, torque on the wishbones divided by the sum of their rotations [N m/rad]
+    bar: float
 
     def point(self, name: str, side: int) -> Array:
         """Return a point on a side (1: left, -1: right), (3,)."""
