@@ -26,13 +26,13 @@ def make_motion() -> None:
 
 
 def make_relative() -> None:
-    """Move it also in joint coordinates; these kernels need those of the motion."""
+    """Compute the motion in joint coordinates too; these kernels need the kernels of the motion."""
     make_motion()
     integrate(block(), GeneralizedAlpha(), 1e-3, 1e-3, formulation="relative")
 
 
 def make_schemes() -> None:
-    """Move it by an energy-conserving scheme, whose loop is also that of the variational scheme."""
+    """Compute the motion by an energy-conserving scheme, whose time loop the variational scheme also uses."""
     integrate(block(), EnergyMomentum(), 1e-3, 1e-3)
 
 
