@@ -276,7 +276,7 @@ class Element:
         return ()
 
     def small_angles(self) -> Callable[[Array], Array] | None:
-        """Return a function of motion that measures how far angles exceed the range of small angles; by default None.
+        """Return a function of motion that measures how far the angles exceed the range of small angles.
 
         By default none: any size is allowed.
 

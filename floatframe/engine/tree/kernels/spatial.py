@@ -70,6 +70,6 @@ def wrench_of_column(H, c, R, p):
 
 @small
 def turned_power(xi, screw, F):
-    """Return (xi × J) · F; J is given as a screw, F as an array of six."""
+    """Return (xi × J) · F, with the screw J and the wrench F as arrays of six."""
     S = spatial_cross(xi, pair(screw))
     return dot(S[0], F) + dot(S[1], F[3:])
