@@ -124,5 +124,5 @@ def check_deck(job: Any) -> None:
     for name, material in job.materials.items():
         if "cells" in material.model_fields_set:
             raise ValueError(
-                f"materials.{name}.cells: with a deck the tables of solids, shells, sections name the cells"
+                f"materials.{name}.cells: remove it; with a deck, the tables of solids, shells and sections name cells"
             )

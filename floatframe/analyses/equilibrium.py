@@ -539,7 +539,10 @@ def turning(compiled: CompiledSystem, state: State, omega: Array, center: Array)
 
 
 def _tangent(model: Model, work: Work, omega: Array) -> tuple[Linearized, tuple[Array, ...]]:
-    """Return rows and wrenches, and each body's derivative of the residual along steady rotations."""
+    """Return the linearised system, and the tangent matrix of each body.
+
+    A change of the position changes velocities and accelerations as in a steady rotation.
+    """
     parts = linearized(model, work, 0.0, 0.0, 1.0)
     if not work.state.u.any():
         return parts, parts.H

@@ -114,7 +114,7 @@ def multilevel(
 def _modes_of(
     families: Families, wanted: ModeCount, tolerance: float, cutoff_factor: float | None, workers: Workers
 ) -> MultilevelResult:
-    """Compute the modes over all dofs. The tree becomes the factorisation of the families if they have none yet."""
+    """Compute the modes over all dofs; families without a factorisation take that of the tree of substructures."""
     body = families.body
     i = body.i
     K, M = principal_block(body.K, i), principal_block(body.M, i)

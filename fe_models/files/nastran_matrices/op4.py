@@ -39,7 +39,7 @@ def read_text(where: str, path: Path) -> Iterator[NastranMatrix]:
 
 
 class _Lines:
-    """Lines of a file in sequence, with the number of the last line for messages."""
+    """Lines of a file in sequence, with the number of the line read last for messages."""
 
     def __init__(self, where: str, lines: list[bytes]) -> None:
         self.file = where

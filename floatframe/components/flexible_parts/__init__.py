@@ -1,4 +1,4 @@
-"""Alternatives to a single floating frame for flexible parts, which consist of several bodies, joints and forces."""
+"""Flexible parts of several bodies, joints and forces: alternatives to a body in a single floating frame."""
 
 from floatframe.components.flexible_parts.exact_beams import exact_beams
 from floatframe.components.flexible_parts.finite_segments import finite_segments, floating_parts

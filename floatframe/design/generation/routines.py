@@ -361,7 +361,10 @@ def routine_of(tree: TreeTerms, what: str, name: str) -> Routine:
 
 
 def carried_inwards(tree: TreeTerms) -> TreeTerms:
-    """Return a tree with as few moments as its joints allow; moments that are symbols do not change."""
+    """Return a tree in which moments of mass that a joint does not move belong to the parent: the forces stay the same.
+
+    A tree with a moment that is a symbol is returned as it is.
+    """
     links = list(tree.links)
     moments = [value for link in links for value in (link.mass, *link.s, *link.P.ravel())]
     if any(value.kind != CONSTANT for value in moments):

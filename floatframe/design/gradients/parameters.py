@@ -370,7 +370,7 @@ def with_neighbours(
 
 
 def neighbour(system: System) -> Neighbour:
-    """Return a compiled system as a neighbour."""
+    """Compile a system, and return it as a `Neighbour`: the system itself, or one with a changed parameter."""
     compiled = compiled_system(system)
     return Neighbour(system, compiled, new_work(compiled.model))
 

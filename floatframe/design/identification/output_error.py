@@ -159,7 +159,7 @@ class OutputFit:
         if coloured:
             said.append(
                 f"residuals of {', '.join(coloured)} are not white: the model lacks something there, and the "
-                "deviations are too small"
+                "standard deviations of the parameters are too small"
             )
         c = np.abs(np.triu(self.correlations, 1))
         if c.max(initial=0.0) > 0.99:

@@ -125,7 +125,10 @@ class Criterion:
         }.get((self.name, self.tensor))
 
     def norm_root(self) -> Array:
-        """Return A with |S| <= c |A sigma|, (6, 6): exact for von Mises stress, Frobenius norm for other criteria."""
+        """Return A, (6, 6), which bounds the criterion S of the stress sigma: |S| <= c |A sigma|, c = `bound_factor`.
+
+        |A sigma| is the von Mises stress for that criterion, and the Frobenius norm of the stress for others.
+        """
         if self.name == "signed-von-mises" and self.tensor == "full":
             return von_mises_root()
         return np.diag(np.sqrt(FROBENIUS))

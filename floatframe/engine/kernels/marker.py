@@ -124,7 +124,7 @@ def bent_shapes(model, m, n, q, factor, psi):
 
 @loops
 def bent_rate(model, work, m, i, out):
-    """Write K_P q_dot [6, k], which is minus the rate of Psi(q), into out, (6 n_q,)."""
+    """Write the matrix K_P q_dot, (6, n_q), into `out`, row after row; it is minus the rate of Psi(q)."""
     n, u0 = model.bodies.n_q[i], model.bodies.u0[i]
     bent_by(model, m, n, work.state.u[u0 + 6 : u0 + 6 + n], out)
 

@@ -26,7 +26,7 @@ class End:
     size: int  #: number of rows of the connection
     u0: int  #: index of the first velocity of the body
     n: int  #: number of velocities of the body
-    x0: int  #: index of the first column of the end in the array of all columns
+    x0: int  #: index of the first column of the end, if the columns of all ends are counted one after another
     #: pairs (part of the motion, part of the wrench) for the force and moment at the end
     places: tuple[tuple[int, int], ...]
     sign: float

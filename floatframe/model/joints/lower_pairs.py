@@ -83,7 +83,7 @@ class RevoluteJoint:
         checked_motions(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
+        """Return the rows for the assembled axes of the markers, (3, 3), and d = r_B - r_A, (3,), in ground axes."""
         axis_b = axis_in_b(self.axis, self.axis_b, A_a, A_b)
         frame = turning_frame(self.axis, axis_b, A_a, A_b)
         held = (Row(DOT, self.axis, n, part=MOMENT) for n in normals_of(axis_b))
@@ -129,7 +129,7 @@ class PrismaticJoint:
         checked_motions(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
+        """Return the rows for the assembled axes of the markers, (3, 3), and d = r_B - r_A, (3,), in ground axes."""
         held = (Row(SLIDE, n) for n in normals_of(self.axis))
         return (
             *arm_rows(),
@@ -191,7 +191,7 @@ class ScrewJoint:
         checked_motions(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
+        """Return the rows for the assembled axes of the markers, (3, 3), and d = r_B - r_A, (3,), in ground axes."""
         axis_b = axis_in_b(self.axis, self.axis_b, A_a, A_b)
         x, z, y = turning_frame(self.axis, axis_b, A_a, A_b)
         slope = self.lead / (2 * np.pi)
@@ -257,7 +257,7 @@ class CylindricalJoint:
         checked_motions(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
+        """Return the rows for the assembled axes of the markers, (3, 3), and d = r_B - r_A, (3,), in ground axes."""
         axis_b = axis_in_b(self.axis, self.axis_b, A_a, A_b)
         frame = turning_frame(self.axis, axis_b, A_a, A_b)
         return (
@@ -341,7 +341,7 @@ class PlanarJoint:
         checked_motions(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
+        """Return the rows for the assembled axes of the markers, (3, 3), and d = r_B - r_A, (3,), in ground axes."""
         axis_b = axis_in_b(self.axis, self.axis_b, A_a, A_b)
         first, second = normals_of(self.axis)
         return (

@@ -66,7 +66,7 @@ class FixedJoint:
             object.__setattr__(self, "rotation", rotation_of(f"joint {self.name!r}: rotation", self.rotation))
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
+        """Return the rows for the assembled axes of the markers, (3, 3), and d = r_B - r_A, (3,), in ground axes."""
         R_AB = A_a.T @ A_b if self.rotation is None else self.rotation
         return (*point_rows(), *orientation_rows(R_AB))
 
@@ -106,7 +106,7 @@ class ConstantOrientation:
             object.__setattr__(self, "rotation", rotation_of(f"joint {self.name!r}: rotation", self.rotation))
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
+        """Return the rows for the assembled axes of the markers, (3, 3), and d = r_B - r_A, (3,), in ground axes."""
         R_AB = A_a.T @ A_b if self.rotation is None else self.rotation
         return (*(Row(GAUGE, axis, part=FORCE) for axis in np.eye(3)), *orientation_rows(R_AB))
 
@@ -153,7 +153,7 @@ class UniversalJoint:
         checked_motions(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
+        """Return the rows for the assembled axes of the markers, (3, 3), and d = r_B - r_A, (3,), in ground axes."""
         # angle zero is the assembled position: z of A lies along the axis of B
         z = A_a.T @ A_b @ self.axis_b
         z = z - (z @ self.axis) * self.axis
@@ -210,7 +210,7 @@ class ConstantVelocityJoint:
         checked_axes(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
+        """Return the rows for the assembled axes of the markers, (3, 3), and d = r_B - r_A, (3,), in ground axes."""
         axis_b = axis_in_b(self.axis, self.axis_b, A_a, A_b)
         along, across = A_a @ self.axis, A_b @ axis_b
         cosine = float(along @ across)

@@ -58,7 +58,7 @@ class PointOnLine:
         checked_motions(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
+        """Return the rows for the assembled axes of the markers, (3, 3), and d = r_B - r_A, (3,), in ground axes."""
         held = (Row(SLIDE, n) for n in normals_of(self.axis))
         return (*arm_rows(), *held, slide_row(self.axis, self.motions, "distance"))
 
@@ -102,7 +102,7 @@ class PointOnPlane:
         checked_motions(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
+        """Return the rows for the assembled axes of the markers, (3, 3), and d = r_B - r_A, (3,), in ground axes."""
         first, second = normals_of(self.axis)
         free = (slide_row(first, self.motions, "first"), slide_row(second, self.motions, "second"))
         return (*arm_rows(), Row(SLIDE, self.axis), *free)

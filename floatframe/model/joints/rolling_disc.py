@@ -71,7 +71,7 @@ class RollingDisc:
         checked_axes(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
+        """Return the rows for the assembled axes of the markers, (3, 3), and d = r_B - r_A, (3,), in ground axes."""
         if abs(float((A_a @ self.axis) @ (A_b @ self.axis_b))) > 1 - 1e-6:
             raise ModelError(
                 f"joint {self.name!r}: the disc lies flat on the plane as placed, so that no point of its rim is the "

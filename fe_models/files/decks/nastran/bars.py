@@ -123,7 +123,7 @@ def _uses(model: NastranModel) -> Counter[int]:
 
 
 def _with_own_shear(model: NastranModel, name: str, keys: dict[str, Any]) -> tuple[str, dict[str, Any]] | str:
-    """Return material and section of bars whose MAT1 has a G of its own; a text says why they cannot have it.
+    """Return material and section of bars, changed if their MAT1 gives a G of its own; a text tells why G is refused.
 
     G scales the torsion constant and the shear areas of a general section; other shapes get a material with
     nu = E/(2 G) - 1, since bars have no other use for nu.

@@ -118,7 +118,7 @@ def connection_derivatives(model, work, c, c_k):
 
 @small
 def joint_row_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
-    """Write row r of P and V, the derivatives of row k of a joint.
+    """Write derivatives of row k of a joint: by motions of its markers to row r of P_a and P_b, by its wrench to V.
 
     A velocity that is held has no position: for c_k = 0, where rows stand for velocities or accelerations, its P is
     that by the velocities. The change of a soft row's reaction with its direction is left out: of second order.

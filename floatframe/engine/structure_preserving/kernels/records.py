@@ -18,7 +18,8 @@ __all__ = [
 ]  # fmt: skip
 
 CONSERVING, VARIATIONAL = range(2)
-#: columns of `Discrete.block0`: arrays of `bodies.CentralBody` by name, and the filters of dissipation
+#: columns of `Discrete.block0`, one for each constant array: C1, K_t, C2, J_k, S_ab, S_ab_T, M, K and D of
+#: `bodies.CentralBody`, then F, X and E of `Filter`
 (
     C1, BENT, C2, INERTIA, PRODUCTS, TURNED_PRODUCTS, MASS, STIFFNESS, DAMPING, FILTER, STIFFNESS_FILTER, FREE_TURNING,
 ) = range(12)  # fmt: skip
