@@ -19,8 +19,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["plot_deformation", "plot_loads", "plot_overview", "plot_places"]
+__all__ = ["free_legends", "plot_deformation", "plot_loads", "plot_overview", "plot_places"]
 
+LEGEND_GAP = 0.03  #: between curves and a legend above them, as a share of the height of a panel
+MOST_LEGEND = 0.5  #: largest share of the height of a panel that is kept free for a legend
 MOST_CURVES = 8  #: largest number of curves in a plot; if there are more, those with the largest values are drawn
 
 
@@ -72,7 +74,23 @@ def plot_overview(
         panel(ax)
     for ax in axes[len(panels) :]:
         ax.remove()
+    free_legends(figure)
     return figure
+
+
+def free_legends(figure: "Figure") -> None:
+    """Make room above the curves of a finished figure for those legends that cover a curve, on linear axes."""
+    figure.draw_without_rendering()
+    for ax in figure.axes:
+        legend = ax.get_legend()
+        if legend is None or ax.get_yscale() != "linear":
+            continue
+        box = legend.get_window_extent()
+        if any(box.count_contains(line.get_transform().transform(line.get_xydata())) for line in ax.get_lines()):
+            share = min(box.height / ax.get_window_extent().height + LEGEND_GAP, MOST_LEGEND)
+            bottom, top = ax.get_ylim()
+            ax.set_ylim(bottom, bottom + (top - bottom) / (1 - share))
+            legend.set_loc("upper right")
 
 
 def sensor_panel(trajectory: Trajectory, measurement: Measurement, columns: tuple[str, ...], ax: "Axes") -> "Axes":

@@ -5,10 +5,12 @@ from types import SimpleNamespace
 import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from numpy.testing import assert_array_equal
 
 from floatframe import GeneralizedAlpha, integrate
 from floatframe.pictures import plots
+from floatframe.pictures.overview import free_legends
 from floatframe.results.trajectory import Trajectory
 from tests.floatframe.results.examples import SYSTEM
 
@@ -66,3 +68,27 @@ def test_drift_that_is_rounding_beside_the_largest_is_counted_and_not_drawn(moti
 def test_reaction_is_drawn_by_component(motion):
     ax = plots.plot_reaction(motion, "link")
     assert_array_equal(ax.get_lines()[0].get_ydata(), motion.reaction("link").force[:, 0])
+
+
+def test_no_legend_of_an_overview_covers_a_curve():
+    """Without the room above, the legend of a motion that fills its panel covers it."""
+    figure = Figure(layout="constrained")
+    ax = figure.add_subplot()
+    t = np.linspace(0.0, 1.0, 2000)
+    for k in range(5):
+        ax.plot(t, np.sin(200 * t + k), label=f"curve {k}")
+    ax.legend()
+    assert covered(figure) == [ax]
+    free_legends(figure)
+    assert covered(figure) == []
+
+
+def covered(figure):
+    """Return the axes whose legend covers a point of a curve."""
+    figure.draw_without_rendering()
+    return [
+        ax
+        for ax in figure.axes
+        for box in [ax.get_legend().get_window_extent()]
+        if any(box.count_contains(ax.transData.transform(line.get_xydata())) for line in ax.get_lines())
+    ]
