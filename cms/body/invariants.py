@@ -178,7 +178,7 @@ class Moments:
 
     @property
     def left_out(self) -> "Moments":
-        """Moments for a motion that neglects the missing terms, so that the inertia stays constant.
+        """Moments for a motion that neglects the missing terms, so that these do not change the inertia.
 
         Missing terms are zero, including the trace of a missing 5C. M* then only comes from `ReducedBody.M`.
         """

@@ -78,7 +78,7 @@ def reduction_of(job: Job, body: FEBody) -> ReductionSection:
 
 
 def with_additions(families: Families, reduction: ReductionSection, modes: ModeSet) -> ModeSet:
-    """Replace interface modes by characteristic modes, and add extra columns, as the job requests."""
+    """Reduce interfaces of kind "nodes" to characteristic modes, and add extra columns, as the job requests."""
     if reduction.reduces_interfaces:
         cutoff = None if reduction.interface_cutoff is None else reduction.interface_cutoff * families.body.units.time
         wanted = ModeCount(reduction.interface_modes, cutoff)

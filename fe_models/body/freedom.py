@@ -66,7 +66,7 @@ class RigidForces:
 
     @property
     def n_free(self) -> int:
-        """Number of independent motions without forces beyond rounding, including combinations."""
+        """Number of independent possible motions without forces beyond rounding, including combinations."""
         F = self.F[:, self.is_possible]
         values = np.linalg.svd(F, compute_uv=False)
         return int((values <= max(ROUNDING * self.stiffest, WEAKEST * values.max(initial=0.0))).sum())

@@ -125,7 +125,7 @@ def shapes_of(kind: Hashable) -> dict[str, tuple[ArrayShape, Any]]:
 
 
 def put_arrays(record: object, where: str, error: type[Exception]) -> None:
-    """Make the fields of a frozen record that declare a `ArrayShape` read-only arrays, or tuples; refuse other shapes.
+    """Make the fields of a frozen record that declare an `ArrayShape` read-only arrays, or tuples; refuse other shapes.
 
     A large array on disk is read in slices of rows. `Columns` that are no array of this process stay where they are.
 

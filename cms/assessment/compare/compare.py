@@ -228,7 +228,7 @@ def sharp_edges(nodes: Array, triangles: IntArray) -> IntArray:
 
 
 def thinned_surface(nodes: Array, triangles: IntArray, most: int = MOST_TRIANGLES) -> IntArray:
-    """Return about `most` triangles at most, whose corners are some of the given nodes, (n_tri, 3)."""
+    """Return at most about `most` triangles, whose corners are some of the given nodes, (n_tri, 3)."""
     if len(triangles) <= most:
         return triangles
     import pyvista as pv

@@ -44,7 +44,7 @@ class FullModel:
     """
 
     band: float  #: highest frequency of the comparison [1 / time unit]
-    omega2: Array  #: squared frequencies of the elastic free modes up to twice the band, (n_modes,) [1/s²]
+    omega2: Array  #: squared angular frequencies of the elastic free modes up to twice the band, (n_modes,) [1/s²]
     rigid: Array  #: M-orthonormal rigid-body modes, (n_dof, n_r)
     Phi: Array  #: M-orthonormal elastic free modes in the band, (n_dof, n_band)
     Psi_A: Array  #: attachment modes: static responses to interface loads, (n_dof, n_e)
@@ -54,7 +54,7 @@ class FullModel:
     moved: Array  #: displacement columns of the reference motion, (n_dof, k)
     amplitudes: Array  #: amplitudes of these columns over time, (k, n_t)
     t: Array  #: times of the reference motion, (n_t,) [time unit]
-    port_omega2: Array  #: squared frequencies of the modes in the interface response, (n,) [1/s²]
+    port_omega2: Array  #: squared angular frequencies of the modes in the interface response, (n,) [1/s²]
     port_is_massive: Array  #: 1 for each of these modes that has mass, else 0, (n,)
     port_modes: Array  #: motion of the ports in these modes, (6 n_ports, n)
     port_rigid: Array  #: motion of the ports in the rigid-body modes, (6 n_ports, n_r)

@@ -65,7 +65,7 @@ def fitted_camera(scene: Scene, size: tuple[int, int]) -> Camera:
 
 
 def fitting_distance(relative: Array, half: Array) -> float:
-    """Return the smallest distance at which points, (n, 3) in camera axes, fit; `half` has the two tangents."""
+    """Return the smallest distance at which points, (n, 3) in camera axes, fit between tangents ±half, (2,)."""
     distance = float(((np.abs(relative[:, :2]) / half).max(axis=1) - relative[:, 2]).max())
     return distance if distance > 0 else 1.0  # every distance is valid for a single point
 

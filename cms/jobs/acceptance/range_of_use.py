@@ -52,7 +52,7 @@ class LargestLoad:
     linear: float  #: largest load without geometric stiffness; infinite: no deformation
     stiffened: float | None  #: largest load with geometric stiffness; None: the file has none
     governed_by: str  #: limit that is reached first: "rotation", "change of stiffness" or "nothing"
-    deflection: float  #: largest displacement in B at the load `linear`, over the body length
+    deflection: float  #: largest displacement in B at the load `linear` [length unit of the body]; 0: no limit
 
 
 @dataclass(frozen=True)

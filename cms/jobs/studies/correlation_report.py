@@ -24,7 +24,7 @@ __all__ = ["correlation_document"]
 
 GOOD_MAC, POOR_MAC = 0.9, 0.7  #: customary limits of the MAC: above the first good, below the second poor
 GOOD_ERROR, POOR_ERROR = 0.02, 0.05
-GOOD_CROSS = 0.1  #: customary limit of the largest off-diagonal entry of a cross-orthogonality matrix
+GOOD_CROSS = 0.1  #: customary limit of the mass-weighted product of two measured shapes
 MOST_POINTS = 20
 
 

@@ -32,8 +32,8 @@ LARGEST_DENSE = 3000  #: number of dofs up to which dense matrices are affordabl
 SHIFT = 1e-6  #: shift for a free body over the median of K_kk / M_kk; near the first elastic omega²
 SHIFT_SMALL = 1e-4  #: the same for a small dense pencil
 ZERO = 1e-13  #: omega² over that median, below which it is rounding of K: a rigid-body mode
-TIGHTEST, LOOSEST = 1e-13, 0.1  #: range of tolerances between rounding and uselessness
-MISMATCH = 1e-3  #: relative residual of K x = omega² M x, above which the factorised matrix is not K - sigma M
+TIGHTEST, LOOSEST = 1e-13, 0.1  #: smallest tolerance that rounding allows, and largest meaningful tolerance
+MISMATCH = 1e-3  #: residual of K x = omega² M x over its terms, up to which the factor can be that of K - sigma M
 MOST_PROOFS = 3
 GAP = 1e-4  #: relative gap between two values of omega² that is sufficient for counting modes
 

@@ -143,7 +143,7 @@ def solved_here(ranks: Ranks, key: str, rows: Rows, b: Part) -> Array:
 
 GUARDS = 4  #: number of modes beyond the wanted ones, which show where the cutoff frequency is exceeded
 FIRST_GUESS = 30  #: assumed number of modes if only a cutoff frequency is given
-#: factor from the tolerance of the caller to that of SLEPc: that of theta, whose error is the square of the residual
+#: factor on the tolerance of the caller for SLEPc, which applies it to theta, whose error is the residual squared
 SHARPER = 1e-6
 
 

@@ -36,7 +36,8 @@ class BalancedSystem:
     """Result of balancing 1 q_ddot + D q_dot + diag(omega²) q = B u, y = Cᵀ q."""
 
     hankel: Array  #: Hankel singular values of u -> y, descending, (2 n,)
-    signs: Array  #: sign of each singular value, +1 or -1, (2 n,), up to which a system with C = B is balanced; else +1
+    #: +1 or -1 for each singular value, (2 n,): a system with C = B is balanced up to these signs; otherwise all are +1
+    signs: Array
     position_velocity: Array  #: position-velocity singular values, descending, (n,)
     T: Array  #: balanced directions as orthonormal columns over q, (n, n)
 

@@ -83,7 +83,7 @@ def coupled_field(body: FEBody, u_mesh: Array) -> CoupledField:
 
 
 def _nearest_rigid(body: FEBody, interface: Interface, u_mesh: Array) -> tuple[Array, float]:
-    """Return the rigid motion that fits the members best, (6, k), and the relative remainder."""
+    """Return the motion of the reference node that fits the members best, (6, k), and the relative remainder."""
     assert body.recovery is not None
     rows = np.flatnonzero(np.isin(body.recovery.dofs[:, 0], interface.nodes))
     scale = np.where(body.recovery.dofs[rows, 1] >= 3, body.length, 1.0)[:, None]

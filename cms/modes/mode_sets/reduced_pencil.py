@@ -158,8 +158,8 @@ def free_frequencies(pencil: ReducedPencil) -> Array:
 def fixed_frequencies(pencil: ReducedPencil) -> Array:
     """Return the finite frequencies with all boundary dofs fixed, ascending [Hz].
 
-    The dual equations enforce this by the forces f. Their nonpositive eigenvalues are dropped; the others bound
-    nothing.
+    The dual equations enforce this by the forces f. Their nonpositive eigenvalues are dropped; the others are
+    not bounds.
     """
     if not pencil.is_dual:
         Z = la.null_space(pencil.interface / np.abs(pencil.interface).max(axis=1, keepdims=True))

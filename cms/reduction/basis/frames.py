@@ -120,7 +120,7 @@ class FrameCondition:
     frame: BodyFrame
     rigid_part: Callable[[Array], Array]  #: maps columns (n_dof, k) to C (6, k); the frame removes Psi_R C
     Psi_R: Array  #: rigid-body modes about the centre of mass, (n_dof, 6); (n_dof, 0) for a held body
-    M_Psi_R: Array  #: M Psi_R, the shape of Psi_R
+    M_Psi_R: Array  #: M Psi_R, of the same shape as Psi_R
     W: Array  #: W Psi_R, (n_dof, 6); the frame condition is (W Psi_R)ᵀ u = 0
     center: Array  #: centre of mass, the reference point of Psi_R, in mesh axes, (3,) [m]
 

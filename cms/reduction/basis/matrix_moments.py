@@ -17,7 +17,7 @@ from fe_models.foundation.tall.columns import in_memory
 __all__ = ["gram_from_matrices"]
 
 MASSLESS = 1e-12  #: inertia of a rigid motion over the largest one, below which it is rounding (masses on a line)
-ISOTROPIC = 1e-9  #: largest relative difference between the rigid mass matrix and that of m, S, J for an exact result
+ISOTROPIC = 1e-9  #: relative difference between the rigid mass matrix and that of m, S, J, up to which they agree
 
 
 def gram_from_matrices(body: FEBody, Phi: Array, origin: Array | None = None) -> Array:

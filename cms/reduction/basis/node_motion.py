@@ -59,7 +59,7 @@ class ReferenceMotion(NamedTuple):
     rows: sp.csr_array  #: translation and rotation of the point over the dofs of the body, mesh axes, (6, n_dof)
     point: Array  #: position of the point, (3,) [m]
     has_rotation: bool = True  #: whether the motion includes a rotation; otherwise rows 3-5 are zero
-    is_mean: bool = False  #: whether the point moves as the mean of several members because no node lies there
+    is_mean: bool = False  #: whether the point moves as the mean of several members, because no single node moves it
 
 
 def reference_motion(body: FEBody, interface: Interface) -> ReferenceMotion:

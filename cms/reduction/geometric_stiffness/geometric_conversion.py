@@ -227,7 +227,7 @@ def changed_rigid(reduced: ReducedBody, turned_rigid: Array, p: Array, R: Array)
 
 
 def turned_work(loads: Loads, C1: Array, P: Array, Psi: Array) -> Array:
-    """Return the work of loads rotated about each axis on the shapes, (k, 3, n); moments contribute half of it.
+    """Return the work of loads rotated about each axis on the shapes, (k, 3, n); moments have a factor ½.
 
     Parameters
     ----------

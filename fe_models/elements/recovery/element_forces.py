@@ -150,7 +150,7 @@ class ElementGroup:
         return len(self.names)
 
     def members(self, at: str | int, *, is_only: bool) -> IntArray:
-        """Return the elements with this name or number; None if the group has none.
+        """Return the elements with this name or number; an empty array if the group has none.
 
         Parameters
         ----------

@@ -220,6 +220,6 @@ class Deck:
     supports: tuple[Support, ...] = ()
     loads: tuple[Load, ...] = ()
     rods: tuple[RodSection, ...] = ()
-    plane: int | None = None  #: axis normal to the plane in which the deck fixes all of its points; None: not planar
+    plane: int | None = None  #: axis normal to the plane to which the deck confines all points; None: not planar
     lumped: frozenset[str] = frozenset()  #: kinds of elements whose mass the program lumps: "lines", "shells", "rods"
     is_plain_mesh: bool = False  #: whether the deck contains only nodes, elements and sets, as written by a mesher

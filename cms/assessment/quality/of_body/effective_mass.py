@@ -26,7 +26,7 @@ class EffectiveMass:
     at: str  #: name of the fixed interface
     frequencies: Array  #: frequencies with the interface fixed, ascending, (n,) [Hz]
     mass: Array  #: effective mass and inertia about the interface by direction, (n, 6) [kg, kg m²], axes of B
-    total: Array  #: mass and inertia of the rigid body about the interface, (6,)
+    total: Array  #: mass and inertia of the rigid body about the interface by direction, (6,) [kg, kg m²], axes of B
 
     def __post_init__(self) -> None:
         for name in ("frequencies", "mass", "total"):

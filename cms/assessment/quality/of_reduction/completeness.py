@@ -16,7 +16,7 @@ __all__ = [
     "StaticCompleteness", "completeness_records", "energy_error", "load_case_responses", "static_completeness",
 ]  # fmt: skip
 
-NO_LOAD = 1e-10  #: unbalanced part of a load over the load, below which it is rounding
+NO_LOAD = 1e-10  #: load minus the inertia forces that balance it, over the load, below which it is rounding
 NO_ENERGY = 1e-24  #: strain energy of a response over the largest of its kind, below which it is zero
 ACCELERATIONS = ("ax", "ay", "az", "alpha x", "alpha y", "alpha z")
 

@@ -100,7 +100,7 @@ def basis_ports(reference: FullReference, basis: FreeBasis) -> PortModel:
 
 
 def compare_responses(full: FrequencyResponse, reduced: FrequencyResponse, length: float) -> Array:
-    """Return the relative error at each frequency, (n_f,), in the Frobenius norm; the length scales rotations."""
+    """Return the relative error at each frequency, (n_f,): Frobenius norm, rotations times, moments over the length."""
     out, into = (
         np.array([length if label.rsplit(" ", 1)[1].startswith("r") else 1.0 for label in labels])
         for labels in (full.outputs, full.inputs)

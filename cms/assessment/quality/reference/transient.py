@@ -29,7 +29,7 @@ from fe_models.foundation.records import ArrayShape, checked_fields
 __all__ = ["LoadHistory", "Snapshots", "interface_forces", "support_acceleration", "transient", "transient_in"]
 
 
-NO_LOAD = 1e-10  #: unbalanced part of a load over the load, below which it is rounding
+NO_LOAD = 1e-10  #: load minus the inertia forces that balance it, over the load, below which it is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,7 @@ def interface_forces(body: FEBody, histories: Mapping[str, Array], t: Array) -> 
 
 
 def support_acceleration(body: FEBody, acceleration: Array, t: Array, *, origin: Array | None = None) -> LoadHistory:
-    """Return the inertia load -M Psi_R a(t) in an accelerating frame, for the motion relative to this frame.
+    """Return the inertia load -M Psi_R a(t) in an accelerating frame, for the motion relative to it, to first order.
 
     Parameters
     ----------

@@ -14,7 +14,8 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["layers_of_block", "layups_in_axes"]
 
-PARALLEL = 1e-6  #: sine of the angle up to which axes 3 of orientations and normals of a flat shell count as parallel
+#: difference of components or cosines up to which axes of orientations and normals of a flat shell count as parallel
+PARALLEL = 1e-6
 #: cosine between a shell normal and the direction of a layup, above which y replaces x or the layup is refused
 STEEP = 0.9
 

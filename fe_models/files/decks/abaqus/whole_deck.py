@@ -158,7 +158,7 @@ def _take(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
 
 
 def _check_plane(draft: Draft) -> None:
-    """Raise an error for plane elements together with elements in space, or outside of one plane normal to z."""
+    """Add plane elements to the ledger if there are elements in space, or if they are not in one plane normal to z."""
     if not draft.sheets:
         return
     if len(draft.shells) > len(draft.sheets) or draft.solids or draft.lines or draft.rods:

@@ -40,7 +40,7 @@ KEYOPTS: dict[int, dict[int, dict[int, str]]] = {
     181: {1: {0: ""}, 3: {0: "", 2: ""}},
     281: {1: {0: ""}},
 }
-#: KEYOPTs for output, layers and acoustic layers, which change neither mass nor stiffness
+#: KEYOPTs for output, layers and wave-absorbing boundary layers, which change neither mass nor stiffness
 OUTPUT_KEYOPTS = (4, 5, 8, 9, 10, 15)
 DAMPING_LABELS = ("DMPR", "DMPS", "ALPD", "BETD")
 ISOTROPIC = ("EX", "PRXY", "NUXY", "DENS")

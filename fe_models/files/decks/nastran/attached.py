@@ -89,7 +89,7 @@ def _mass_matrix(model: NastranModel, card: Card) -> None:
 
 
 def _scalar_masses(model: NastranModel) -> None:
-    """Read CMASS1 and CMASS2 at one grid point: equal masses along all axes form a point mass.
+    """Read CMASS1 and CMASS2 at one grid point: equal masses along all axes form a point mass, others go to the ledger.
 
     Axes along which the deck holds the point do not count: no mass moves there.
     """

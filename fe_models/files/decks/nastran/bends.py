@@ -180,7 +180,7 @@ def _pipe(known: Card, R: float, nu: float) -> _Bend | str:
 
 
 def _flexibility(section: _Bend, E: float, G: float, R: float, angle: float) -> Array:
-    """Return the (6, 6) flexibility: motion of one end relative to the other per force at the middle of the arc.
+    """Return the (6, 6) flexibility: relative motion of the ends per force and moment, both at the middle of the arc.
 
     (1) A section at the angle phi has r and t, outward and along the arc. From forces F and moments M at the middle it
         has N = t · F, V = r · F, V2 = z · F, and T, M2, M1 = (t, r, z) · (M - s × F), s its place.

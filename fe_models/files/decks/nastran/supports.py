@@ -1,4 +1,4 @@
-"""Supports of a Nastran deck become interfaces; a deck that fixes all points in a plane is planar."""
+"""Supports of a Nastran deck become interfaces; a deck that confines all points to a plane is planar."""
 
 import numpy as np
 
@@ -46,7 +46,7 @@ def hold_points(model: NastranModel, *, find_plane: bool = True) -> None:
 
 
 def _find_plane(model: NastranModel) -> None:
-    """Find the plane in which a deck fixes all element points, and remove the supports that define it.
+    """Find the plane to which a deck confines all element points, and remove the supports that do so.
 
     A point is held in a plane if its translation along the normal and its rotations about the other two axes are held.
     The remaining supports hold the body, or hold the rotation in the plane, for which membranes have no stiffness.
@@ -87,7 +87,7 @@ def _across(model: NastranModel, node: int, normal: int) -> int:
 
 
 def _holds(model: NastranModel, node: int, normal: int) -> bool:
-    """Return whether a point is fixed in the plane normal to an axis of the basic system."""
+    """Return whether a point is confined to the plane normal to an axis of the basic system."""
     own = _across(model, node, normal)
     out = {own, *(3 + k for k in range(3) if k != own)}
     return abs(model.axes(node)[normal, own]) > 1 - ALONG and out <= model.held.get(node, set())
