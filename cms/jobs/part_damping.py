@@ -230,7 +230,7 @@ def dofs_of(interface: Interface) -> IntArray:
 
 
 def n_fixed_modes(body: FEBody, h: IntArray) -> int:
-    """Return the number of modes with mass if the dofs h are fixed, limited to `FIXED_MODES`."""
+    """Return the number of modes with mass if the dofs h are fixed; only an upper bound if many dofs have mass."""
     i = np.setdiff1d(np.arange(body.n_dof), h)
     n = len(i) - 2 * int((body.dofs[:, 1] == MULTIPLIER).sum())
     mass = body.M.diagonal()[i]

@@ -44,7 +44,7 @@ class LargestSpeed:
 
 @dataclass(frozen=True)
 class LargestLoad:
-    """Largest load at one interface along one axis of B."""
+    """Largest load at one interface along one axis of B for which the frame is accurate."""
 
     interface: str
     direction: str  #: direction in axes of B, from "force x" to "moment z"
@@ -132,7 +132,7 @@ def custom_band(reduced: ReducedBody) -> UsableBand:
 
 
 def largest_speed(reduced: ReducedBody) -> LargestSpeed | None:
-    """Return the largest angular speed of the frame; None if it is unknown."""
+    """Return the largest angular speed for which the frame is accurate; None if it is unknown."""
     if reduced.is_held or not reduced.n_q or reduced.moments.missing:
         return None
     found = []
@@ -153,7 +153,7 @@ def largest_speed(reduced: ReducedBody) -> LargestSpeed | None:
 
 
 def largest_loads(reduced: ReducedBody) -> tuple[LargestLoad, ...]:
-    """Return the largest loads at each interface."""
+    """Return the largest loads at each interface for which the frame is accurate."""
     stiffness = np.diag(reduced.K)
     if not reduced.n_q or not (stiffness > 0).all():
         return ()

@@ -34,7 +34,7 @@ COUNTED = 1e-11  #: eigenvalue of the scaled boundary block over the largest one
 
 @dataclass(frozen=True, eq=False)
 class BoundaryConditions:
-    """Admissible motion of the fixed dofs, u_h = Z z, with stiffness and mass of the neighbours attached to them."""
+    """Admissible motion of the dofs h, u_h = Z z, with stiffness and mass of the neighbours attached to them."""
 
     Z: Array  #: free directions, orthonormal columns, (n_h, n_z)
     K_load: Array | None = None  #: stiffness of the neighbours over the held dofs, (n_h, n_h) [N/m]

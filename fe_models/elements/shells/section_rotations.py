@@ -136,7 +136,7 @@ def own_axes(
 
 
 def rotations_of_sections(model: ShellModel, beams: BeamModel, nodes: IntArray, held: IntArray) -> SectionRotations:
-    """Return the independent section rotations; none at fixed nodes, or where a line leaves the shell.
+    """Return the independent section rotations; none at nodes in `held`, or where a line leaves the shell.
 
     Parameters
     ----------

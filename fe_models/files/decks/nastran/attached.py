@@ -20,7 +20,7 @@ from fe_models.meshes.cell_shapes import CELL_SHAPES
 
 __all__ = ["read_attached"]
 
-SAME = 1e-9  #: relative difference up to which entries of a mass matrix are equal
+SAME = 1e-9  #: difference of entries of a mass matrix over the largest one, up to which they are equal
 
 #: kind of cell and number of corner grids of each solid card
 _FACED = {"CTETRA": ("tetra", 4), "CPENTA": ("wedge", 6), "CHEXA": ("hexahedron", 8)}

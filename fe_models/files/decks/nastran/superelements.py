@@ -299,7 +299,7 @@ def _joined_mesh(parts: list[Deck], placed: list[Superelement], connected: dict[
 
 
 def _joined_loads(parts: list[Deck], main: NastranModel) -> tuple[Load, ...]:
-    """Return the loads of all parts: forces of the same set form one load; gravity must be equal in all parts."""
+    """Return the loads of all parts: forces of the same set form one load; gravity only if all parts have the same."""
     made: dict[str, Load] = {}
     for part in parts:
         for load in part.loads:
