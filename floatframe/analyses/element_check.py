@@ -25,7 +25,7 @@ from floatframe.results.element_motion import placed_law
 
 __all__ = ["ElementCheck", "check_element"]
 
-N_SAMPLES = 3  #: number of motions at which the law is evaluated; the first is the assembled state at rest
+N_SAMPLES = 3  #: number of motions at which the law is evaluated; the first is the state to be checked
 NEAR = 1e-3  #: distance of the other motions from the first, relative to the size of the system, or in rad
 MOVING = 0.1  #: velocities of the other motions, in system sizes per unit of time, or in rad per unit of time
 DERIVATIVE = 1e-5  #: smallest reported error of a derivative, relative to the largest derivative in the same row

@@ -15,7 +15,7 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["Stretch", "stretches_of_passed_contact"]
 
-PARTS = 5  #: number of points in a step at which gaps are evaluated
+PARTS = 5  #: number of equal parts of a step at whose ends gaps are evaluated
 WITHIN = 4  #: number of steps that resolve a missed contact
 TOLERANCE = 1e-9  #: depth, relative to the change of the gap in the step, below which the contact is ignored
 

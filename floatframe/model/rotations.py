@@ -191,7 +191,7 @@ def right_jacobian(theta: Array) -> Array:
 
 
 def spin_rate(theta: Array, rate: Array, second: Array) -> Array:
-    """Return the rate of angular velocity L(theta) rate of exp(theta), (..., 3), in the initial axes.
+    """Return the rate of the angular velocity omega = L(theta) rate of exp(theta), (..., 3), in the initial axes.
 
     It is L second + (theta · rate) (da theta × rate + db theta × (theta × rate)) + b rate × (theta × rate).
     """

@@ -30,7 +30,7 @@ N_PARTS = 10  #: largest number of halvings of a step after a jump, for states w
 #: ratios that require halving: change predicted by the state's rate to its change in the step, and to its size
 FOLLOWED, FELT = 2.0, 0.05
 STEEP = 1.5  #: growth of an expression at half the distance that indicates a pole
-SHORT = 1e-9  #: smallest time before a jump and smallest remainder of a step, as fractions of a step
+SHORT = 1e-9  #: gap left before a jump, and remainder that counts as zero, as fractions of a step
 
 
 def jump_times(system: System, t_start: float, h: float, n_steps: int) -> list[float]:

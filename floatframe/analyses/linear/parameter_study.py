@@ -29,7 +29,7 @@ SAME = 1e-2  #: relative difference of eigenvalues below which they count as equ
 CLOSE = 0.1  #: weight of the distance between eigenvalues, relative to the weight of the distance between shapes
 ALIKE = 0.25  #: difference of shape distances below which eigenvalues decide how modes continue
 CLEAR = 0.5  #: largest change of eigenvalues by which they decide, relative to the change for the other choice
-ROUNDING = float(np.sqrt(np.finfo(float).eps))  #: relative error of a double eigenvalue
+ROUNDING = float(np.sqrt(np.finfo(float).eps))  #: error of a double eigenvalue, relative to the largest eigenvalue
 MOST_HALVINGS = 3  #: largest number of times that a parameter step is halved if a mode is lost
 
 

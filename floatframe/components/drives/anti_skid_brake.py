@@ -64,7 +64,7 @@ class AntiSkidBrake(Element):
     build_rate: float  #: rate at which the valve builds up pressure [Pa/s]
     release_rate: float  #: rate at which the valve releases pressure [Pa/s]
     radius: float  #: rolling radius R of the wheel [m]
-    slip: float  #: slip threshold at which the valve releases
+    slip: float  #: slip threshold above which the valve releases
     slip_band: float  #: half width of the slip range around the threshold in which the valve opens and closes
     reference_deceleration: float  #: largest assumed deceleration of the vehicle [m/s²]
     drop_out: float  #: reference speed below which anti-skid is off [m/s]

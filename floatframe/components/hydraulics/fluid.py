@@ -41,7 +41,7 @@ class Fluid:
     density: float  #: density at ambient pressure [kg/m³]
     bulk_modulus: float  #: bulk modulus K of the liquid without air [Pa]
     ambient: float  #: absolute ambient pressure p_a [Pa]
-    viscosity: float | None = None  #: dynamic viscosity, required for pipes [Pa s]
+    viscosity: float | None = None  #: dynamic viscosity [Pa s]; None: no laminar friction in pipes
     air: float = 0.0  #: volume fraction of entrained air at ambient pressure
     air_exponent: float = 1.4  #: polytropic exponent n of the entrained air
     vapour_pressure: float = 0.0  #: absolute vapour pressure p_v [Pa]

@@ -1,4 +1,4 @@
-"""A flexible link whose mass, stiffness and damping differ from its finite element model by identified factors.
+"""A flexible link whose identified mass, stiffness and damping differ from its finite element model.
 
 With the density times mu and the moduli times kappa, shapes are the same; with M-orthonormal modes q goes over to
 sqrt(mu) q, so that
@@ -27,7 +27,7 @@ __all__ = ["scaled_link"]
 def scaled_link(
     body: FlexibleBody, *, mass: float = 1.0, stiffness: float = 1.0, damping: Sequence[float] | None = None
 ) -> FlexibleBody:
-    """Return a flexible body with mass, stiffness and damping of its model multiplied by factors.
+    """Return a flexible body with its mass and stiffness multiplied by factors, and with given damping ratios.
 
     Parameters
     ----------

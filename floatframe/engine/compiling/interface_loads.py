@@ -64,7 +64,10 @@ def interface_number(reduced: ReducedBody, psi: Array, position: Array) -> int:
 
 
 def amplitudes(load: Load, t: Array, R: Array) -> Array:
-    """Return force and moment of a point force over time in body axes, (n_t, 6); a follower rotates with its marker."""
+    """Return force and moment of a point force over time in body axes, (n_t, 6).
+
+    A follower force is constant in the axes of the undeformed marker.
+    """
     force = load.force
     factor = np.ones(len(t)) if force.amplitude is None else np.array([force.amplitude(x) for x in t])
     six = []

@@ -200,7 +200,7 @@ def beginning_of(
 
 
 def closing_velocities(z: StepFilter, after: State, w: Array, t: float, h: float, rows: NDArray[np.bool_]) -> Array:
-    """Return the velocity correction du of (3), (n_u,), for some rows, (n_w,), in a step of size h from t."""
+    """Return the velocity correction du of (3), (n_u,), for some rows, (n_w,), in a step of size h; z: with s = 1."""
     model = z.compiled.model
     work, unknowns = work_from(model, w), start_unknowns(model, w)
     if len(model.coordinates.row):  # angles of couplers and user forces are those nearest to the predicted ones

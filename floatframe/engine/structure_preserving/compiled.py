@@ -29,7 +29,7 @@ class Filter:
 
     F: Array  #: (1 + 2 Phi chi Phiᵀ M_e)⁻¹ Phi chi Phiᵀ, (n, n)
     X: Array  #: Phi chi Phiᵀ M_e, (n, n)
-    E: Array  #: rotation of a free body by its vibration, J⁻¹ B, (3, n)
+    E: Array  #: J⁻¹ B, (3, n): a free body without angular momentum rotates with -E q_dot
 
 
 def filter_of(body: CentralBody, h: float, rho_inf: float) -> Filter:

@@ -179,7 +179,7 @@ def scales_of(path: Path, head: Mapping[str, str], n_channels: int, kind: str) -
 
 
 def constant_tail(values: Array, per_frame: int) -> int:
-    """Return the number of last samples in the last frame that repeat in all channels; 0 if they are few."""
+    """Return how many samples at the end of the last frame equal the last one in all channels; 0 if they are few."""
     last = values[-per_frame:]
     changes = np.flatnonzero((last != last[-1]).any(axis=1))
     n = len(last) - (int(changes[-1]) + 1 if len(changes) else 0)

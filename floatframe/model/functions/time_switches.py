@@ -152,28 +152,28 @@ def applied(operation: Callable[..., Array], operands: Sequence[OfTime], t: Arra
 
 
 def is_true(value: OfTime, t: Array) -> NDArray[np.bool_]:
-    """Return the times at which a comparison is true."""
+    """Return whether a comparison is true at each time, (n_t,)."""
     return value(t) != 0.0
 
 
 def is_beyond(value: OfTime, level: float, t: Array) -> NDArray[np.bool_]:
-    """Return the times at which a function has reached a level."""
+    """Return whether a function has reached a level at each time, (n_t,)."""
     return value(t) >= level
 
 
 def is_positive(value: OfTime, t: Array) -> NDArray[np.bool_]:
-    """Return the times at which a denominator is positive; at a zero it has the sign from just before."""
+    """Return whether a denominator is positive at each time, (n_t,); at a zero it has the sign from just before."""
     v = value(t)
     return np.where(v == 0.0, value(np.nextafter(t, -np.inf)), v) > 0.0
 
 
 def is_behind(y: OfTime, x: OfTime, t: Array) -> NDArray[np.bool_]:
-    """Return the times at which a point is in the third quadrant, next to the branch cut of atan2."""
+    """Return whether a point is in the third quadrant at each time, (n_t,), next to the branch cut of atan2."""
     return (y(t) < 0.0) & (x(t) < 0.0)
 
 
 def is_below(value: OfTime, t: Array) -> NDArray[np.bool_]:
-    """Return the times at which a function is zero or negative."""
+    """Return whether a function is zero or negative at each time, (n_t,)."""
     return value(t) <= 0.0
 
 

@@ -86,7 +86,7 @@ def subtract_slopes(model, work, tree, i, K, shift, c_d, c_k):
 
 @inner
 def put_reactions(model, work, tree, joints):
-    """Write the wrenches of the tree joints into state.w in the order of their rows: F, M on A, N on B reversed."""
+    """Write the wrenches of the tree joints into state.w as in their rows: F and M act on A, -N acts on B."""
     for i in range(tree.parent.shape[0]):
         c = tree.joint[i]
         if c < 0:

@@ -75,6 +75,6 @@ class RowCoordinate:
         return turning if self.is_angle else slip
 
     def force(self, place: RelativePlace, w: Array) -> Array:
-        """Return the force or torque along the coordinate, (...,), from the wrench w, (..., size)."""
+        """Return the force or torque, (...,), positive if it increases the coordinate, from wrench w, (..., size)."""
         own = np.sum([factor * w[..., part : part + 3] for part, factor in self.parts], axis=0)
         return -dot(own, self.direction(place))

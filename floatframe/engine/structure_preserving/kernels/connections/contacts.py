@@ -33,7 +33,7 @@ POINT = math.sqrt(0.6)  # of Gauss, exact to degree five
 
 @inner
 def mean_force(k, n, x_0, x_1):
-    """Return the change of k x^(n+1)/(n+1) divided by the change of depth, for gaps at both ends of the step."""
+    """Return the change of k x^(n+1)/(n+1) divided by the change of depth, for depths x_0 and x_1."""
     middle, half = 0.5 * (x_0 + x_1), 0.5 * (x_1 - x_0)
     if abs(half) <= ALIKE * middle:
         ends = (middle - POINT * half) ** n + (middle + POINT * half) ** n
@@ -103,7 +103,7 @@ def contact_load(model, discrete, step, c):
 
 @inner
 def speed_of_approach(model, step, c):
-    """Return v_0 for the next step: unchanged in contact, otherwise the speed at which the gap closes."""
+    """Return v_0 for the next step: the approach speed in contact, otherwise the (negative) rate of the gap."""
     begin = contact_gap(model, step.x_0, step.A_0, c)
     end = contact_gap(model, step.end.markers.r, step.end.markers.A, c)
     if end >= 0.0:
