@@ -26,7 +26,7 @@ def plot_history(result: OptimizationResult) -> "Figure":
 
 
 def plot_objective(result: OptimizationResult, ax: "Axes") -> "Axes":
-    """Draw F of every evaluation and the smallest so far; hollow if limits are violated, a tick if it failed."""
+    """Draw F of every evaluation and the smallest so far; hollow if limits are violated, a cross below if it failed."""
     rows = result.history
     number = np.arange(1, len(rows) + 1)
     F = np.array([row.objective for row in rows])
