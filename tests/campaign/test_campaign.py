@@ -89,9 +89,10 @@ def test_a_tape_of_another_expression_has_another_value():
     assert value_of_tape(other, (3.0, 2.0, 4.0)) == 1.0
 
 
+@pytest.mark.parametrize("seeds", [(3, 4), pytest.param((5, 6), marks=pytest.mark.long)])
 @pytest.mark.parametrize("family", [name for name in FAMILIES if name not in ("kills", "motions")])
-def test_the_first_cases_of_every_family_pass(tmp_path, family):
-    for seed in (3, 4):
+def test_the_first_cases_of_every_family_pass(tmp_path, family, seeds):
+    for seed in seeds:
         (tmp_path / str(seed)).mkdir()
         verdict = case_of(family)(seed, tmp_path / str(seed))
         assert verdict.kind in (REFUSED, ACCEPTED), verdict.words

@@ -71,6 +71,13 @@ def test_memory_line_and_file_line_move_alike_bit_for_bit(reduced, tmp_path):
         assert_same(getattr(from_memory, field.name), getattr(from_file, field.name), field.name)
 
 
+@pytest.mark.long  # of a job and of its Python example, below
+def test_the_reduction_repeats_itself(body, reduced):
+    again = cms.reduce(body, cms.craig_bampton(body, n_modes=4), frame=cms.NodalFrame("big_end"))
+    assert_allclose(again.K, reduced.K, rtol=0, atol=1e-10 * reduced.K.max())
+    assert_allclose(again.Phi, reduced.Phi, rtol=0, atol=1e-10 * np.abs(reduced.Phi).max())
+
+
 def test_a_stiff_rod_swings_with_the_period_of_the_compound_pendulum(reduced):
     """Released horizontally: a quarter period is K(sin(pi/4)) / sqrt(m g s / J)."""
     moments = reduced.moments

@@ -182,12 +182,20 @@ def modes_in_parts(files, held=False):
     return f[elastic], zeta[elastic]
 
 
+RATIO = ("ratio = 0.03", [0.03] * 6)
+RATIOS = ("ratios = [0.03, 0.02, 0.04, 0.03]", [0.03, 0.02, 0.04, 0.03, 0.03, 0.03])
+RAMP = ("ramp = [[2000, 0.03]]\nabove = 0.2", [0.03] * 6)
+
+
 @pytest.mark.parametrize(
     ("table", "wanted", "frame"),
     [
-        ("ratio = 0.03", [0.03] * 6, "tisserand"),
-        ("ratios = [0.03, 0.02, 0.04, 0.03]", [0.03, 0.02, 0.04, 0.03, 0.03, 0.03], "nodal"),
-        ("ramp = [[2000, 0.03]]\nabove = 0.2", [0.03] * 6, "tisserand"),
+        (*RATIO, "tisserand"),
+        (*RATIOS, "nodal"),
+        (*RAMP, "tisserand"),
+        pytest.param(*RATIO, "nodal", marks=pytest.mark.long),
+        pytest.param(*RATIOS, "tisserand", marks=pytest.mark.long),
+        pytest.param(*RAMP, "nodal", marks=pytest.mark.long),
     ],
 )
 def test_modes_of_the_whole_keep_their_damping_ratios_in_parts(beam, caplog, table, wanted, frame):

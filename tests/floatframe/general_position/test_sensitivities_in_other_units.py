@@ -27,7 +27,7 @@ from tests.floatframe.other_units import SI, SIZES, in_units, other_units
 
 R = Rotation.from_rotvec([0.7, -0.4, 1.1]).as_matrix()
 PLACE = np.array([30.0, -20.0, 15.0])
-UNITS = ["mm-kg-ms", "in-slinch-s", *SIZES]
+UNITS = ["mm-kg-ms", "in-slinch-s", *SIZES, pytest.param("mm-t-s", marks=pytest.mark.long)]
 OUTPUTS = {"hinge.angle value": "rad", "slide.distance rate": "m/s", "load force size": "N", "load moment size": "N m",
            "energy kinetic": "J", "hand size": "m/s^2"}  # fmt: skip
 PARAMETERS = {"bodies.arm.mass": "kg", "forces.rub.damping": "N m s", "forces.spring.stiffness": "N/m",

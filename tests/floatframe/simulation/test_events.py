@@ -233,7 +233,7 @@ def test_blocks_of_steps_change_neither_the_motion_nor_its_events(method, monkey
     ]
     system = double_pendulum(*events, forces=[push])
     motions = []
-    for size in (1, 32, 400) if isinstance(method, GeneralizedAlpha) else (1, 32):
+    for size in (1, 32, 400):
         monkeypatch.setattr(event_steps, "BLOCK", size)
         motions.append(integrate(system, method, 1.0, 0.005, output_every=7))
     step_by_step, *in_blocks = motions

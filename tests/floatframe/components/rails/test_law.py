@@ -66,8 +66,8 @@ def height(law, load=LOAD, y=0.0, V=10.0):
 
 
 def test_wheels_of_different_pairs_find_the_tables_that_they_have_alone():
-    """Three wheels of two pairs; the place of a table is the fifth number of a wheel, behind a head of 21."""
-    pairs = [CONE, replace(CONE, radius=0.5), CONE]
+    """Four wheels of three pairs; the place of a table is the fifth number of a wheel, behind a head of 21."""
+    pairs = [CONE, replace(CONE, radius=0.5), CONE, replace(CONE, radius=0.4)]
     wheels = [Wheel(1, 0.75, pair) for pair in pairs]
     together = law_numbers(wheels, Track(), ContactLaws())
     ends = [21 + 6 * len(wheels) + Track().cells.size]

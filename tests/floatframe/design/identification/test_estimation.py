@@ -43,14 +43,15 @@ def noisy(truth, rng):
     return tau + NOISE * rng.normal(size=tau.shape), wrench + BASE_NOISE * rng.normal(size=wrench.shape)
 
 
-@pytest.mark.parametrize("source", ["torques", "both"])
-def test_bias_and_deviation_over_many_noises_are_those_predicted(robot, truth, source):
+@pytest.mark.parametrize(
+    ("source", "n"), [("torques", 60), ("both", 60), pytest.param("torques", 200, marks=pytest.mark.long)]
+)
+def test_bias_and_deviation_over_many_noises_are_those_predicted(robot, truth, source, n):
     """Means within 4 standard errors, scatter within what chi-squared allows."""
     form, samples, phi = robot
     base = base_parameters(form, source=source, by="samples")
     rng = np.random.default_rng(11)
     found, predicted = [], []
-    n = 60
     for _ in range(n):
         tau, wrench = noisy(truth, rng)
         made = estimate(form, Measured(samples, tau, wrench if source == "both" else None), base=base)

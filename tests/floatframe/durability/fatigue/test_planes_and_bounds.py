@@ -49,7 +49,13 @@ def largest(name, matrices, q, frame, *, n_planes=180, k=0.3):
     return float(found.largest[0])
 
 
-@pytest.mark.parametrize(("name", "seed"), [("normal", 0), ("shear", 1), ("findley", 2)])
+PLANES = ["normal", "shear", "findley"]
+
+
+@pytest.mark.parametrize(("name", "seed"), [
+    pytest.param(name, seed, marks=() if seed == k else pytest.mark.long)
+    for k, name in enumerate(PLANES) for seed in range(3)
+])  # fmt: skip
 def test_tension_and_torsion_out_of_phase(name, seed):
     """sigma cos wt and tau sin wt in the plane of the surface, by brute force over planes, any axes."""
     R = rotation(seed)  # columns: e1, e2, m

@@ -26,10 +26,11 @@ TREES = {
     "all charts, free base": (25, 3, KINDS[:-1], {"free_base": True}),
     "a chain of balls": (10, 4, ("spherical",), {"branching": 0.0}),
     "80 bodies": (80, 5, ("revolute", "prismatic", "universal", "planar"), {"branching": 0.6}),
+    "200 bodies": (200, 5, ("revolute", "prismatic", "universal", "planar"), {"branching": 0.6}),
 }
 
 
-@pytest.fixture(scope="module", params=TREES)
+@pytest.fixture(scope="module", params=[*list(TREES)[:-1], pytest.param("200 bodies", marks=pytest.mark.long)])
 def rigid(request):
     n, seed, kinds, options = TREES[request.param]
     return beside_pinocchio(n, seed, kinds, **options)
