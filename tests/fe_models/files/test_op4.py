@@ -51,6 +51,8 @@ def spoilt_record(words, at, fault):
     end = at + 1 + words[at] // 4
     if fault == "it is truncated":
         return words[: end - 1]
+    if fault == "the file ends within a record":
+        return words[: at + 3]  # within its head
     words = words.copy()
     second = at + 4 + 1 + words[at + 4]  # its second string: length + 1, row, numbers
     where, value = {
@@ -66,8 +68,8 @@ def spoilt_record(words, at, fault):
 
 @pytest.mark.parametrize(
     "fault",
-    ["it is truncated", "is not the one at its beginning", "not larger than the one before", "do not add up",
-     "outside the rows", "not in the order of the rows"],
+    ["it is truncated", "the file ends within a record", "is not the one at its beginning",
+     "not larger than the one before", "do not add up", "outside the rows", "not in the order of the rows"],
 )  # fmt: skip
 def test_a_fault_of_a_record_names_its_column_and_byte(tmp_path, fault):
     A = np.zeros((6, 5))

@@ -152,6 +152,13 @@ def test_mass_and_stiffness_are_never_left_out_unasked(tmp_path, old, new, words
         deck.ledger.require_whole([entry.name, "NOTHING"])
 
 
+def test_elements_of_one_type_without_a_section_are_counted_together(tmp_path):
+    more = "*ELEMENT, TYPE=S4R, ELSET=more\n91, 1, 2, 3, 4\n92, 1, 2, 6, 5\n"
+    text = DECK.replace("*NSET, NSET=foot", more + "*NSET, NSET=foot")
+    text = text.replace("*SHELL SECTION, ELSET=skin, MATERIAL=STEEL, OFFSET=0.5\n0.1\n", "")
+    assert ("S4R", "3") in [row[:2] for row in deck_of(tmp_path, text).ledger.rows()]
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [

@@ -169,6 +169,18 @@ def test_inputs_beyond_the_ranges_of_the_file_are_held_there_and_counted(tyres):
     assert leaning["clamped"] == 1
 
 
+def test_camber_is_the_angle_between_wheel_plane_and_normal_of_the_road(tyres):
+    """Camber thrust and moments without slip, of a wheel that leans by 0.25 rad towards -y."""
+    tyre, lean = tyres[61], 0.25
+    seen, _, _ = answer(
+        element(tyre).law(placed(HEIGHT)), motion(HEIGHT, v=(25.0, 0, 0), omega=(0, 80, 0), A=turn(0, lean)), [0.0, 0.0]
+    )
+    assert seen["clamped"] == 0
+    at = seen["Fz"], 0.0, 0.0, lean, 25.0, 16.7, tyre.radius, 4000.0
+    (_, Fy, Mx, _, Mz), _ = version_61(tyre.coefficients, 220e3, 220e3, *at, combined=True)
+    assert_allclose([seen[key] for key in ("Fy", "Mx", "Mz")], [Fy, Mx, Mz], rtol=1e-7)
+
+
 def test_below_the_lowest_load_forces_fall_in_proportion(tyres):
     law = element(tyres[61], relaxation_x=0.3, relaxation_y=0.5).law(placed(HEIGHT))
     R = tyres[61].radius * tyres[61].coefficients["QRE0"]

@@ -107,6 +107,15 @@ def test_an_obstacle_between_two_y_leaves_the_other_wheel_alone():
     assert_allclose(road.height(2.2, -0.7), 0.0, atol=1e-12)
 
 
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+def test_an_obstacle_between_two_y_ends_within_a_hundredth_of_its_width(size):
+    low, high = 0.3 * size, 0.7 * size
+    road = wheels.bump(2.0 * size, 0.05 * size, 0.4 * size, length=5.0 * size).enveloped(R * size, between=(low, high))
+    edge = 0.01 * (high - low)
+    for y, height in ((low, 0.05), (high, 0.05), (low - edge, 0.0), (high + edge, 0.0)):
+        assert_allclose(road.height(2.2 * size, y), height * size, rtol=0, atol=1e-12 * size)
+
+
 def test_a_cosine_bump_is_one():
     road = wheels.cosine_bump(1.0, 0.1, 2.0, length=5.0).road()
     x = np.linspace(1.0, 3.0, 65)

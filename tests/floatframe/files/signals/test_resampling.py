@@ -7,6 +7,8 @@ from scipy.interpolate import PchipInterpolator
 
 from floatframe import SignalError
 from floatframe.files.signals import Signal, filtered, integrated_twice, resampled, without_drift
+from floatframe.files.signals.analysis import even_signals
+from floatframe.files.signals.signals import Signals
 from floatframe.model.functions.tables import acceleration_table
 
 RATE = 2000.0
@@ -104,6 +106,15 @@ def test_uneven_times_are_made_even_at_their_mean_rate_or_the_new_one(rate, even
     exact = PchipInterpolator(uneven, signal.values)(np.arange(int(even) + 1) / even)
     assert_allclose(found.time, np.arange(int(rate) + 1) / rate, rtol=0, atol=1e-12)
     assert_allclose(found.values, exact[:: int(even / rate)], rtol=0, atol=1e-12)
+
+
+def test_signals_with_rows_of_events_are_made_even_at_their_usual_step():
+    """Two rows between the others, and one that is missing, in a channel that is a straight line."""
+    usual = 0.3 + 0.02 * np.arange(30)
+    time = np.sort(np.append(np.delete(usual, 17), [0.413, 0.5061]))
+    even = even_signals(Signals(time, np.column_stack([3.0 * time, -time]), ("a", "b"), ("m", "N")))
+    assert_allclose(even.time, usual, rtol=0, atol=1e-12)
+    assert_allclose(even.values, np.column_stack([3.0 * usual, -usual]), rtol=0, atol=1e-9)
 
 
 def test_the_report_of_uneven_times_is_that_of_even_ones():
