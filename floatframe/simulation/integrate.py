@@ -530,7 +530,7 @@ class Run:
         end, row = self.integrator.observe(self.acting, t, batch.end, self.work)
         if not self.sampling.sample(n_done, row, self.head):
             return batch
-        self.jumps[n_done - 1] = [t]  # for companions of the run
+        self.jumps.setdefault(n_done - 1, []).append(t)  # for companions of the run
         end, row = self.integrator.after_jump(self.acting, t, batch.end, self.work)
         rows = batch.rows
         if n_done % self.output_every == 0:

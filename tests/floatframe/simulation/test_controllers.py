@@ -29,7 +29,7 @@ from floatframe.files.cosimulation.held_inputs import with_held_inputs
 from floatframe.integrators import Ida, RelativeOde
 from floatframe.model.bodies.coordinates import JointCoordinate
 from floatframe.model.forces import JointForce, UserForce
-from floatframe.model.functions.time_functions import constant
+from floatframe.model.functions.time_functions import constant, piecewise
 from floatframe.results.sensors import PlaceSensor
 
 AXIS = np.array([0.48, -0.6, 0.64])  #: of the hinge, a unit vector
@@ -171,6 +171,16 @@ def test_companions_of_a_run_cross_the_jumps_of_outputs(period):
     """Torques that turn round every two or three steps: the run is exact, and its companions find no error."""
     swap = pid(period=period, inputs="pin.angle", state=None, function=lambda t, x: 8.0 * (-1.0) ** round(t / period))
     assert integrate(rotor(swap), GeneralizedAlpha(), 2.0, 0.01, watch="tell").validity == ()
+
+
+@pytest.mark.parametrize("at", [0.03, 0.035, 0.04])
+def test_companions_cross_a_jump_of_another_force_in_a_step_before_a_sample(at):
+    """The run is exact, so that a companion finds an error only where it misses one of the two jumps."""
+    swap = pid(period=0.02, inputs="pin.angle", state=None, function=lambda t, x: 8.0 * (-1.0) ** round(t / 0.02))
+    kick = JointForce("kick", "pin", "angle", motor=piecewise([0.0, at], [constant(0.0), constant(50.0)]))
+    system = rotor(swap)
+    motion = integrate(replace(system, forces=[*system.forces, kick]), GeneralizedAlpha(), 0.4, 0.01, watch="tell")
+    assert motion.validity == ()
 
 
 def test_a_coarse_run_under_a_controller_is_still_watched():
