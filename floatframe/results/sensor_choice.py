@@ -8,11 +8,10 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError, ResultsError
-from floatframe.model.forces import JointForce
 from floatframe.model.system import System
 from floatframe.results.sensors import coordinate_sensors, measured, measurement_of, sensor_of, sensors_of
 from floatframe.results.sensors.loads import CoordinateSensor, ReactionSensor
-from floatframe.results.sensors.measurement import Measurement, Sensor, unit_words, vector_columns
+from floatframe.results.sensors.measurement import Measurement, Sensor, amplitude_unit, unit_words, vector_columns
 from floatframe.results.trajectory import Trajectory
 
 __all__ = ["chosen_measurements", "controller_samples"]
@@ -97,16 +96,9 @@ def controller_samples(system: System, trajectory: Trajectory, name: str) -> Mea
     states = np.array(found["states"], dtype=float).reshape(len(found["t"]), -1)
     columns = {key: np.array(values, dtype=float) for key, values in found["outputs"].items()}
     columns |= {f"state {k + 1}": states[:, k] for k in range(states.shape[1])}
-    units = {key: output_unit(system, key) if key in found["outputs"] else "1" for key in columns}
+    unit_of = {getattr(force, "name", ""): amplitude_unit(system.units, force) for force in system.forces}
+    units = {key: unit_of[key] if key in found["outputs"] else "1" for key in columns}
     return Measurement(name, np.array(found["t"], dtype=float), columns, units)
-
-
-def output_unit(system: System, name: str) -> str:
-    """Return the unit of an output: that of the motor of a joint force, "1" for a factor."""
-    force = next((each for each in system.forces if getattr(each, "name", "") == name), None)
-    if not isinstance(force, JointForce):
-        return "1"
-    return unit_words(system.units, "moment" if force.coordinate.startswith("angle") else "force")
 
 
 def held_between(samples: Measurement, t: Array) -> Measurement:

@@ -23,7 +23,7 @@ from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.kernels.memory import Rows
 from floatframe.errors import ModelError
 from floatframe.model.controller import Controller
-from floatframe.model.forces import BodyLoad, JointForce, PointForce
+from floatframe.model.forces import WITH_AMPLITUDE, BodyLoad, JointForce, PointForce
 from floatframe.model.functions.time_functions import N_COEFFICIENTS, TimeFunction
 from floatframe.model.system import System
 from floatframe.results.head import Head
@@ -204,19 +204,15 @@ def steps_of(controller: Controller, h: float) -> int:
 
 def with_outputs(system: System, functions: Mapping[str, TimeFunction]) -> System:
     """Return the system whose named forces have these functions of time as motors and factors."""
-    found, choices = [], []
-    for force in system.forces:
-        if isinstance(force, JointForce | PointForce | BodyLoad):
-            choices.append(force.name)
-            if force.name in functions:
-                key = "motor" if isinstance(force, JointForce) else "amplitude"
-                force = replace(force, **{key: functions[force.name]})  # type: ignore[arg-type]
-        found.append(force)
-    for name in functions:
+    forces = list(system.forces)
+    choices = {force.name: k for k, force in enumerate(forces) if isinstance(force, BodyLoad | JointForce | PointForce)}
+    for name, function in functions.items():
         if name not in choices:
-            hint = nearest(name, choices) if choices else "; the system has no such force"
+            hint = nearest(name, list(choices)) if choices else "; the system has no such force"
             raise ModelError(f"controllers: outputs: no joint force, point force or body load {quoted(name)}{hint}")
-    return replace(system, forces=found)
+        force = forces[choices[name]]
+        forces[choices[name]] = replace(force, **{WITH_AMPLITUDE[type(force)]: function})  # type: ignore[arg-type]
+    return replace(system, forces=forces)
 
 
 def value_of(system: System, motion: Trajectory, controller: Controller, name: str) -> float:

@@ -20,17 +20,15 @@ from floatframe.engine.initial_conditions.newton_equations import linearized, se
 from floatframe.engine.kernels.work import new_work
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import body_name
-from floatframe.model.forces import BodyLoad, JointForce, PointForce
+from floatframe.model.forces import WITH_AMPLITUDE, BodyLoad, JointForce, PointForce
 from floatframe.model.functions.time_functions import TimeFunction, constant
 from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_matrix
 from floatframe.model.system import System
+from floatframe.results.sensors.measurement import amplitude_unit
 from floatframe.results.small_motions.small_motions import InputForce, SmallMotions
 from floatframe.results.trajectory import Trajectory
 
 __all__ = ["ForceInput", "force_column", "force_input_unit", "forces_of_amplitude", "forces_with_amplitude"]
-
-#: name of the function of time in each type of force
-WITH_AMPLITUDE = {PointForce: "amplitude", BodyLoad: "amplitude", JointForce: "motor"}
 
 
 @frozen_copies
@@ -77,12 +75,7 @@ def force_of(system: System, channel: ForceInput) -> Any:
 
 def force_input_unit(system: System, channel: ForceInput) -> str:
     """Return the unit of the input."""
-    force = force_of(system, channel)
-    if not isinstance(force, JointForce):
-        return "1"
-    units = system.units
-    is_angle = force.coordinate.startswith("angle")
-    return f"{units.force_symbol} {units.length_symbol}" if is_angle else units.force_symbol
+    return amplitude_unit(system.units, force_of(system, channel))
 
 
 def force_column(small: SmallMotions, channel: ForceInput) -> tuple[Array, Array]:

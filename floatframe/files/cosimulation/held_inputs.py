@@ -16,7 +16,7 @@ from floatframe.model.forces import BodyLoad, JointForce, PointForce
 from floatframe.model.functions.time_functions import TimeFunction, constant
 from floatframe.model.system import System
 from floatframe.results.sensors.channels import Channel, CoordinateChannel
-from floatframe.results.sensors.measurement import unit_words
+from floatframe.results.sensors.measurement import amplitude_unit, unit_words
 from floatframe.simulation.held_functions import force_numbers
 
 __all__ = ["HeldInput", "function_numbers", "input_choices", "with_held_inputs"]
@@ -72,8 +72,7 @@ def found_inputs(system: System) -> Iterator[HeldInput]:
             yield HeldInput(f"forces.{force.name}.amplitude", "1", f"factor of {force.name}", begin, is_own=own)
         elif isinstance(force, JointForce):
             begin, own = value_at_start(force.motor, 0.0), is_constant(force.motor)
-            what = "moment" if is_angle(system, force.joint, force.coordinate) else "force"
-            unit = unit_words(system.units, what)
+            what, unit = "moment" if force.is_angular else "force", amplitude_unit(system.units, force)
             yield HeldInput(f"forces.{force.name}.motor", unit, f"motor {what} of {force.name}", begin, is_own=own)
     for joint in system.joints:
         for coordinate, motion in getattr(joint, "motions", {}).items():

@@ -8,6 +8,7 @@ from floatframe.model.forces.user_force import UserForce
 
 __all__ = [
     "FORCES",
+    "WITH_AMPLITUDE",
     "BodyLoad",
     "Bushing",
     "Force",
@@ -30,3 +31,6 @@ FORCES = {
     "spring-damper": SpringDamper,
     "user-force": UserForce,
 }
+
+#: name of the function of time in each type of force
+WITH_AMPLITUDE = {PointForce: "amplitude", BodyLoad: "amplitude", JointForce: "motor"}

@@ -12,12 +12,13 @@ from fe_models.foundation.records import FrozenMapping, frozen_copies
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ResultsError
+from floatframe.model.forces import Force, JointForce
 from floatframe.model.system import System
 from floatframe.results.small_motions.rows import LinearColumns
 from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Trajectory
 
-__all__ = ["Measurement", "Sensor", "unit_words", "vector_columns"]
+__all__ = ["Measurement", "Sensor", "amplitude_unit", "unit_words", "vector_columns"]
 
 
 @presented
@@ -122,3 +123,10 @@ def unit_words(units: Units, what: str) -> str:
         "stress": units.stress_symbol,
         "modal": f"{units.mass_symbol}^(1/2) {m}",
     }[what]
+
+
+def amplitude_unit(units: Units, force: Force) -> str:
+    """Return the unit of the motor of a joint force; "1" for the amplitude of a load, which is a factor."""
+    if not isinstance(force, JointForce):
+        return "1"
+    return unit_words(units, "moment" if force.is_angular else "force")
