@@ -79,8 +79,9 @@ class Measurement:
         return f"{self.sensor} {column}".strip()
 
     def channel(self, column: str) -> str:
-        """Return the name of a column among those of all sensors, "sensor column"; "sensor.column" stays as it is."""
-        return self.sensor if self.sensor.endswith(f".{column}") else f"{self.sensor} {column}"
+        """Return the name of a column among those of all sensors: "sensor column"; a chosen column keeps its name."""
+        is_chosen = self.sensor.endswith((f".{column}", f" {column}")) and len(self.columns) == 1
+        return self.sensor if is_chosen else f"{self.sensor} {column}"
 
 
 class Sensor(Protocol):

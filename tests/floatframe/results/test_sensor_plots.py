@@ -89,6 +89,11 @@ def test_a_motion_plots_into_given_axes_what_has_one_unit(motion):
         motion.plot("pin force", ax=Figure().add_subplot())
 
 
+def test_a_chosen_column_keeps_the_name_by_which_it_was_chosen(motion):
+    table = motion.to_table("bob at z", "bob at.x", "bob at")
+    assert list(table.columns) == ["t", "bob at z", "bob at.x", "bob at x", "bob at y", "bob at size"]
+
+
 def test_more_than_a_dozen_columns_are_drawn_in_groups():
     t = np.linspace(0.0, 1.0, 5)
     many = {f"q{k}": np.sin((k + 1) * t) for k in range(29)} | {"still": np.zeros(5)}
