@@ -13,6 +13,7 @@ from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.snapshot import Snapshot
 from floatframe.design.gradients.differences import CENTRAL_FIRST, Stencil
+from floatframe.engine.compiling.placing import placed_bodies
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import ModelError
@@ -31,6 +32,7 @@ __all__ = ["Family", "Neighbour", "Parameter", "Source", "family_of", "size_besi
 #
 #     bodies.NAME.mass, .inertia.0.0, .position.1, .velocity.0, .omega_B.2, .q.0, .reduced.K.0.0, .reduced.D.1.1
 #     bodies.NAME.turn.2                    a rotation of the body at the start about its axis [rad], zero as placed
+#     bodies.NAME.position.1                of a body without a position: that in which its joints place it
 #     joints.NAME.marker_b.position.0       joints.NAME.motions.angle.pieces.0.6
 #     forces.NAME.stiffness                 forces.NAME.parameters.kp         couplers.NAME.terms.0.1       gravity.1
 #
@@ -127,9 +129,12 @@ def visit_system(system: System, left: str, path: str, value: Any, found: list[A
     parts = getattr(system, head)
     names = [getattr(part, "name", "") for part in parts]
     name = longest(rest, [each for each in names if each], path)
-    k = names.index(name)
-    child, old = visit(parts[k], rest[len(name) + 1 :], path, value, found)
-    if child is parts[k]:
+    k, rest = names.index(name), rest[len(name) + 1 :]
+    part = parts[k]
+    if head == "bodies" and part.position is None and rest.partition(".")[0] in ("position", TURN):
+        part = placed_bodies(system)[k]
+    child, old = visit(part, rest, path, value, found)
+    if child is part:
         return system, old
     return replace(system, **{head: (*parts[:k], child, *parts[k + 1 :])}), old  # type: ignore[arg-type]
 

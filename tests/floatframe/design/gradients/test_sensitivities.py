@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 import floatframe as ff
 from floatframe.components.mechanisms import pendulum, slider_crank
 from floatframe.design.gradients.parameters import value_at, with_value
+from floatframe.engine.compiling.placing import placed_bodies
 from floatframe.model.functions.time_functions import constant, harmonic, piecewise
 from tests.floatframe.model.elements.element_states_examples import lifted
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffened_body, stiffness
@@ -383,6 +384,25 @@ def test_a_steady_rotation_of_a_flexible_body_and_differences_of_its_solutions()
     f = [value(p + j * step) for j in (-2, -1, 1, 2)]
     expected = (f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * step)
     assert_allclose(found.gradient[0, 0], expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("path", ["bodies.block.position.1", "bodies.block.turn.2", "joints.rail.marker_a.position.0"])
+def test_a_body_without_a_position_varies_about_where_its_joints_place_it(path):
+    """The joint turns the block, so that a block with the identity would begin in another configuration."""
+    post, own = ff.Marker(ff.GROUND, position=(0.7, -0.4, 0.9)), ff.Marker("block", position=(0.1, 0.2, 0.0))
+    rail = ff.CylindricalJoint("rail", post, own, axis=(0.48, -0.6, 0.64), axis_b=(0, 0, 1))
+    spring = ff.SpringDamper("spring", ff.Marker(ff.GROUND, position=(1, 2, 3)), ff.Marker("block"), 30.0)
+    place = ff.PlaceSensor("place", ff.Marker("block", position=(0.3, 0.0, 0.1)))
+    block = ff.RigidBody("block", 2.0, np.diag([0.1, 0.2, 0.25]), center_of_mass=(0.1, 0, 0))
+    free = ff.System([block], [rail], [ff.Gravity((0, 0, -9.81)), spring], sensors=[place])
+    given = replace(free, bodies=placed_bodies(free))
+    found, expected = (ff.sensitivities(each, ["place x"], [path], t_end=0.1, h=1e-3) for each in (free, given))
+    assert_allclose(value_at(free, path), value_at(given, path), rtol=0, atol=1e-15)
+    if path.startswith("bodies"):
+        assert_allclose(found.gradient, expected.gradient, rtol=1e-6, atol=0)
+    by_runs = differences_of_runs(free, path, ["place x"], 1e-3, t_end=0.1, h=1e-3)
+    assert abs(by_runs[0]) > 0.05
+    assert_allclose(found.gradient[0], by_runs, rtol=1e-5, atol=0)
 
 
 def test_what_a_turn_changes_has_no_derivative():
