@@ -80,7 +80,7 @@ def boundary_facets(mesh: Mesh) -> Mapping[str, IntArray]:
 
 
 def facets_of(mesh: Mesh) -> Facets:
-    """Return the facets of a solid mesh; they are cached as long as the mesh exists."""
+    """Return the facets of a solid mesh; the arrays are cached as long as the mesh exists, and read-only."""
     if mesh in _known:
         return _known[mesh]
     every = all_facets(mesh)
@@ -110,9 +110,9 @@ def facets_of(mesh: Mesh) -> Facets:
                 cells.append(np.repeat(owners, len(flat)))
     _known[mesh] = Facets(
         MappingProxyType(facets),
-        np.concatenate(triangles),
-        np.concatenate(cells),
-        np.concatenate(pairs),
+        frozen(np.concatenate(triangles), np.int64),
+        frozen(np.concatenate(cells), np.int64),
+        frozen(np.concatenate(pairs), np.int64),
         n_overlapping,
         n_mismatched,
     )

@@ -8,6 +8,7 @@ from fe_models.meshes.boundary import (
     boundary_facets,
     boundary_triangles,
     facet_weights,
+    facets_of,
     first_of_equal_rows,
 )
 from fe_models.meshes.cell_shapes import CELL_SHAPES, cell_jacobians, quadrature, shape_values
@@ -74,6 +75,12 @@ def test_boundary_of_a_box_is_outward_and_has_its_area(kind):
     area, centroid = area_centroid(mesh.nodes, facets)
     assert_allclose(area, BOX_AREA, rtol=ROUNDOFF, atol=0)
     assert_allclose(centroid, [1, 0.5, 0.75], rtol=ROUNDOFF, atol=0)
+
+
+def test_cached_facets_are_read_only():
+    found = facets_of(faced_box("tetra"))
+    for array in (*found.boundary.values(), found.triangles, found.cells, found.pairs):
+        assert not array.flags.writeable
 
 
 @pytest.mark.parametrize("kind", SOLID_TYPES)
