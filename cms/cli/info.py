@@ -28,8 +28,16 @@ def info_record(file: Path, units: str | None = None, mass_at: str | None = None
     return json.dumps({**body_record(body), **more, "digest": digest(file)}, indent=2)
 
 
-def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
-    """Print mass properties, modes and interfaces of a body, and its provenance if `everything`."""
+def print_body(body: "ReducedBody", *, everything: bool = False, has_warned: bool = False) -> None:
+    """Print mass properties, modes and interfaces of a body.
+
+    Parameters
+    ----------
+    everything
+        Whether to print its provenance too.
+    has_warned
+        Whether the command has warned of implausible units of this body before; the table then leaves them out.
+    """
     from cms.assessment.quality.body_record import body_record, body_size
     from cms.body.reduced_body import unit_findings
 
@@ -43,7 +51,7 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
     rows = [
         ("name", record["name"]),
         ("units", f"{body.units.name} (force {body.units.force_symbol}, stress {body.units.stress_symbol})"),
-        *[("warning", text) for _, text in unit_findings(body)],
+        *[("warning", text) for _, text in ([] if has_warned else unit_findings(body))],
         ("frame B", frame["kind"] + (f" at {frame['at']}" if frame["at"] else "")),
         *([("held", "to the ground, as declared: no floating frame can take it")] if record["is_held"] else []),
         ("origin of B", f"{vector_words(frame['origin'], size)} {length} (mesh coordinates)"),

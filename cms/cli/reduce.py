@@ -5,7 +5,7 @@ import signal
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -21,6 +21,7 @@ from fe_models.foundation.ranks.ranks import RankError, require_agreement, start
 if TYPE_CHECKING:
     from cms.body.reduced_body import ReducedBody
     from cms.jobs.job import Job
+    from fe_models.checks.report import Report
     from fe_models.foundation.stages import Stages
 
 __all__ = ["Fleet", "on_ranks", "one_job_of_ranks", "reduce_and_write", "reduce_and_write_fleet", "reduce_command"]
@@ -31,16 +32,18 @@ def reduce_and_write(job: "Job", path: Path, solver: str | None = None, memory: 
     from cms.body.modal_file.file import write
     from cms.pipeline import reduce_job
 
-    reports: list[Any] = []
+    reports: list[Report] = []
+    omit: tuple[str, ...] = ()
     try:
         with stages() as clock:
             reduced = reduce_job(job, clock, solver=solver, memory=memory, on_report=reports.append)
+            omit = ("units",)  # logged while the body was made
             with clock("write"):
                 write(reduced, path)
     finally:  # the mesh numbers help to understand why a mesh is rejected
         for report in reports:
-            print_table(report.title, ("", ""), report.rows())
-    print_body(reduced)
+            print_table(report.title, ("", ""), report.rows(omit=omit))
+    print_body(reduced, has_warned=True)
     print_times(clock)
     say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
     return reduced

@@ -1,7 +1,7 @@
 """Base class of all mesh reports: findings, and whether the mesh is usable."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import dataclass
 
 from fe_models.errors import MeshError
@@ -63,9 +63,10 @@ class Report(ABC):
     def numbers(self) -> list[tuple[str, str]]:
         """Return label and value of each number, as text."""
 
-    def rows(self) -> list[tuple[str, str]]:
-        """Return label and text of each number and each finding, for a table."""
-        return self.numbers() + [("error" if f.is_error else "warning", f.text) for f in self.findings]
+    def rows(self, *, omit: Container[str] = ()) -> list[tuple[str, str]]:
+        """Return label and text of each number and each finding, for a table, without findings of the kinds `omit`."""
+        findings = [finding for finding in self.findings if finding.kind not in omit]
+        return self.numbers() + [("error" if f.is_error else "warning", f.text) for f in findings]
 
     def lines(self) -> list[str]:
         """Return the rows as lines of text."""

@@ -10,6 +10,7 @@ from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.freedom import RigidForces, rigid_forces
 from fe_models.body.load_cases import LoadCase
 from fe_models.body.rigid_motion import rigid_motion_of_dofs
+from fe_models.checks.report import Finding, Report
 from fe_models.errors import MatrixError
 from fe_models.files.matrices.foreign_matrices import ROLES, SCALAR, ForeignMatrices
 from fe_models.files.matrices.given import body_from_matrices
@@ -268,18 +269,20 @@ def where_of(read: ForeignMatrices) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class MatrixReport:
+class MatrixReport(Report):
     """Numbers and notes of imported matrices, shown before the checks."""
 
     read: ForeignMatrices
+    source: str = ""
+    findings: tuple[Finding, ...] = ()
 
     @property
     def title(self) -> str:
         """Title of the table."""
         return "Matrices"
 
-    def rows(self) -> list[tuple[str, str]]:
-        """Return (description, value) of each row of a table."""
+    def numbers(self) -> list[tuple[str, str]]:
+        """Return label and value of each number and note, as text."""
         read = self.read
         rows = [("files", ", ".join(path.rpartition("/")[2] for path in read.files))]
         rows += [("program", read.program)] if read.program else []

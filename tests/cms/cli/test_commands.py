@@ -109,6 +109,17 @@ def test_file_line_and_memory_line_agree_bit_for_bit(folder):
     assert again.moments.S_kl.tobytes() == body.moments.S_kl.tobytes()
 
 
+def test_reduce_warns_of_a_body_too_large_once_and_info_again(folder, caplog):
+    """The bar is 100 mm long; its numbers read as metres make a body of 101 m of steel."""
+    text = JOB.replace("mm-t-s", "m-kg-s").replace("210000", "2.1e11").replace("7.85e-9", "7850.0")
+    (folder / "bar.toml").write_text(text)
+    result = run("reduce", folder / "bar.toml")
+    assert result.exit_code == 0, result.output
+    assert caplog.text.count("the body is 101 m large") == 1  # a note on standard error
+    assert "large" not in result.stdout
+    assert run("info", folder / "bar.h5").stdout.count("the body is 101 m large") == 1
+
+
 def test_cutoff_is_in_hertz_in_every_unit_system(folder):
     """The bar in mm-kg-ms has frequencies in kHz; the cut-off keeps the same modes."""
     job = JOB.replace("n_modes = 3", "cutoff = 150000.0")
