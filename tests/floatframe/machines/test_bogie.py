@@ -58,6 +58,11 @@ def test_more_conicity_hunts_faster_and_independent_wheels_not_at_all():
     assert hunting(on_cones(0.3, 110.0, is_independent=True)).damping > 0.05
 
 
+@pytest.mark.long  # at 85 m/s, with more conicity, the search for the critical speed below begins damped
+def test_a_slow_vehicle_on_wheels_of_little_conicity_is_well_damped():
+    assert hunting(on_cones(0.05, 50.0)).damping > 0.1
+
+
 def test_the_critical_speed_lies_where_damping_ends():
     speed = critical_speed(lambda V: on_cones(0.1, V), 85.0, 93.0, tolerance=4.0)
     assert_allclose(speed, 88.4, rtol=0, atol=2.5)  # finely bisected: 88.4, see docs/bogie.md
