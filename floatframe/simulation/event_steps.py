@@ -34,8 +34,8 @@ from floatframe.results.head import Head
 from floatframe.results.results_file import MemorySource
 from floatframe.results.sensors import sensor_of
 from floatframe.results.trajectory import Trajectory
-from floatframe.results.writer import arrays_of
 from floatframe.simulation.events import Event, events_of, off_at_start, require_events, switched
+from floatframe.simulation.motion_head import joint_rows
 from floatframe.simulation.passage import MOST_NEIGHBOURS, direct_values, expected_passage, passage
 from floatframe.simulation.stop_events import (
     INWARD,
@@ -187,8 +187,7 @@ class EventWatch:
                 columns.append(np.concatenate([direct(row) for row in rows]))
                 continue
             if motion is None:
-                arrays = arrays_of([self.in_files(row) for row in rows])
-                arrays["drift"] = arrays["drift"][:, : len(self.head.joints)]
+                arrays = joint_rows(self.full, [self.in_files(row) for row in rows])
                 head = replace(self.head, summary={"events": self.happened})
                 motion = Trajectory(head, MemorySource(arrays), is_complete=False)
             found = sensor_of(self.full, event.watch).measure(self.full, motion).columns

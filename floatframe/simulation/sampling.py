@@ -30,9 +30,9 @@ from floatframe.results.head import Head
 from floatframe.results.results_file import MemorySource
 from floatframe.results.sensors import coordinate_sensors, measurement_of
 from floatframe.results.trajectory import Trajectory
-from floatframe.results.writer import arrays_of
 from floatframe.simulation.events import has_events
 from floatframe.simulation.held_functions import force_numbers
+from floatframe.simulation.motion_head import joint_rows
 
 __all__ = ["Sampling"]
 
@@ -125,8 +125,7 @@ class Sampling:
         ModelError
             If a function fails or returns something impossible, or an input is not one value.
         """
-        arrays = arrays_of([rows_of_file(compiled_system(self.system), row)])
-        arrays["drift"] = arrays["drift"][:, : len(head.joints)]
+        arrays = joint_rows(self.system, [rows_of_file(compiled_system(self.system), row)])
         motion = Trajectory(head, MemorySource(arrays), is_complete=False)
         jumps = False
         for each in self.sampled:

@@ -20,12 +20,11 @@ from floatframe.model.system import System
 from floatframe.results.results_file import MemorySource
 from floatframe.results.sensors import Measurement, sensor_of, sensors_of
 from floatframe.results.trajectory import Trajectory
-from floatframe.results.writer import arrays_of
 from floatframe.simulation.events import events_of
 from floatframe.simulation.held_functions import write_function
 from floatframe.simulation.integrate import number_of_steps
 from floatframe.simulation.jumps import jumps_of_steps, over_jumps
-from floatframe.simulation.motion_head import head_of
+from floatframe.simulation.motion_head import head_of, joint_rows
 from floatframe.simulation.restart import memory_of_record, restart_record
 from floatframe.simulation.switch_events import switch_events
 from floatframe.simulation.validity_watch import ValidityWatch
@@ -287,8 +286,7 @@ class Unit:
             raise ModelError(f"unit {self.system.name!r}: outputs before its beginning")
         self.settle()
         assert self.row is not None
-        arrays = arrays_of([rows_of_file(compiled_system(self.system), self.row)])
-        arrays["drift"] = arrays["drift"][:, : len(self.head.joints)]
+        arrays = joint_rows(self.system, [rows_of_file(compiled_system(self.system), self.row)])
         motion = Trajectory(self.head, MemorySource(arrays), is_complete=False)
         return [sensor.measure(self.system, motion) for sensor in self.sensors]
 
