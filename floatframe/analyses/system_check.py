@@ -190,9 +190,12 @@ def by_joints_record(system: System) -> QualityRecord:
     bodies, parts = {body.name: body for body in placed_bodies(system)}, []
     for name, n_held in held_directions(system).items():
         at = ", ".join(f"{x:.5g}" for x in bodies[name].drawn_position)
-        free = {3: "", 0: ", as drawn: no joint asks for a position"}.get(
-            n_held, f", as drawn in the {3 - n_held} directions that its joints leave free"
-        )
+        free = {
+            0: ", as drawn: no joint asks for a position",
+            1: ", as drawn in the two directions that its joints leave free",
+            2: ", as drawn in the direction that its joints leave free",
+            3: "",
+        }[n_held]
         parts.append(f"{name!r} begins at [{at}] {system.units.length_symbol}{free}")
     return record("no position", "Bodies without a position", "info", "; ".join(parts))
 

@@ -244,7 +244,7 @@ def test_the_check_says_where_bodies_stand_and_what_no_joint_asks_for():
               PrismaticJoint("rail", post, Marker("block", position=(0, 0, 0)), axis=axis)]  # fmt: skip
     found = {record.name: record for record in check_system(System(bodies, joints))}["no position"]
     assert found.reason == (
-        "'arm' begins at [0.5, 0.25, -1] m; 'block' begins at [0.5, 0.25, 0] m, as drawn in the 1 directions that its "
+        "'arm' begins at [0.5, 0.25, -1] m; 'block' begins at [0.5, 0.25, 0] m, as drawn in the direction that its "
         "joints leave free; 'free' begins at [0, 0, 0] m, as drawn: no joint asks for a position"
     )
 
