@@ -130,7 +130,12 @@ def sensors_of(system: System) -> tuple[Sensor, ...]:
 
 
 def coordinate_sensors(system: System) -> tuple[Sensor, ...]:
-    """Return a sensor "joint.coordinate" for every coordinate of every joint."""
+    """Return a sensor "joint.coordinate" for every coordinate of every joint; made once for a system."""
+    return system.derived(make_coordinate_sensors)
+
+
+def make_coordinate_sensors(system: System) -> tuple[Sensor, ...]:
+    """Return a new sensor for every coordinate of every joint."""
     return tuple(
         CoordinateSensor(f"{joint.name}.{coordinate}", joint.name, coordinate)
         for joint in system.joints
