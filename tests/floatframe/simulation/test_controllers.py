@@ -9,9 +9,12 @@ from numba import njit
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.signal import StateSpace
 
+import cms
+import fe_models as fm
 from floatframe import (
     Controller,
     Event,
+    FlexibleBody,
     GeneralizedAlpha,
     Gravity,
     Marker,
@@ -31,6 +34,7 @@ from floatframe.model.bodies.coordinates import JointCoordinate
 from floatframe.model.forces import JointForce, UserForce
 from floatframe.model.functions.time_functions import constant, piecewise
 from floatframe.results.sensors import PlaceSensor
+from tests.floatframe.simulation.examples import steps_on_record
 
 AXIS = np.array([0.48, -0.6, 0.64])  #: of the hinge, a unit vector
 PLACE = (0.3, 0.1, -0.2)
@@ -112,7 +116,7 @@ def test_the_motion_does_not_depend_on_batches_and_outputs(motion):
     assert_array_equal(other.controller("pid").motor, motion.controller("pid").motor)
 
 
-def test_an_interrupted_run_is_resumed_bit_for_bit(tmp_path):
+def test_an_interrupted_run_is_resumed_bit_for_bit(tmp_path, monkeypatch):
     """Steps and samples of a restart record coincide at 0.8 s; the run is interrupted after it."""
     path, h = tmp_path / "rotor.h5", 1e-3
     whole = integrate(rotor(pid()), GeneralizedAlpha(), 1.5, h)
@@ -121,8 +125,10 @@ def test_an_interrupted_run_is_resumed_bit_for_bit(tmp_path):
         if progress.n_steps >= 900:
             raise KeyboardInterrupt
 
+    monkeypatch.setattr("floatframe.simulation.integrate.SEGMENT_SECONDS", 0.0)
     with pytest.raises(KeyboardInterrupt):
         integrate(rotor(pid()), GeneralizedAlpha(), 1.5, h, output=path, batch_steps=100, progress=interrupt)
+    assert steps_on_record(path) == 800
     resumed = resume(rotor(pid()), path)
     assert_array_equal(resumed.joint("pin").angle, whole.joint("pin").angle)
     for key, values in whole.controller("pid").columns.items():
@@ -164,6 +170,36 @@ def test_two_controllers_of_different_periods_act_on_their_own_forces():
     assert_allclose(samples.push, (tip.x - tip.z)[::30][:10], rtol=0, atol=1e-12)
     assert samples.units == {"push": "1"}
     assert len(motion.controller("pid").t) == 30
+
+
+def test_a_controller_whose_output_stays_changes_nothing_beside_one_whose_output_jumps(motion):
+    still = Controller("still", period=PERIOD, inputs="pin.angle", outputs="push", function=lambda t, x: 0.0)
+    system = rotor(pid(), still)
+    push = PointForce("push", Marker("hub", position=(0.1, 0.2, 0)), force=(3.0, 1.0, -2.0))
+    other = integrate(replace(system, forces=[*system.forces, push]), GeneralizedAlpha(), 1.0, 1e-3)
+    assert_allclose(other.joint("pin").angle, motion.joint("pin").angle, rtol=0, atol=1e-12)
+    assert_allclose(other.controller("pid").motor, motion.controller("pid").motor, rtol=0, atol=1e-10)
+
+
+def test_two_outputs_of_a_controller_follow_places_of_a_flexible_body():
+    """The engine moves the arm in mean axes, and sensors see it in the axes of its foot."""
+    line = fm.straight_line((0, 0, 0), (0.6, 0.3, -0.2), 3)
+    ends = [fm.line_interface(line, name, fm.NodeSet(name)) for name in ("start", "end")]
+    section = fm.BeamProperty(fm.Rectangle(0.02, 0.03), fm.Material("soft", E=2e9, nu=0.3, rho=7850.0))
+    full = cms.couple(fm.beam_body(line, section, name="arm", units="m-kg-s", interfaces=ends))
+    arm = FlexibleBody("hub", cms.reduce(full, cms.craig_bampton(full, 2), frame=cms.NodalFrame("start")))
+    pin = RevoluteJoint("pin", Marker("ground"), Marker("hub", "start"), axis=AXIS)
+    forces = [JointForce("motor", "pin", "angle", motor=constant(0.0)),
+              PointForce("push", Marker("hub", "end"), force=(15.0, 5.0, -10.0))]  # fmt: skip
+    both = pid(inputs=["tip.z", "pin.angle"], outputs=["push", "motor"], state=None,
+               function=lambda t, x: (1.0 + x[0], 0.5 - x[1]))  # fmt: skip
+    tip = PlaceSensor("tip", Marker("hub", "end"))
+    motion = integrate(System([arm], [pin], forces, sensors=[tip], controllers=[both]), GeneralizedAlpha(), 0.1, 1e-3)
+    samples, place, joint = motion.controller("pid"), motion.sensor("tip").z, motion.joint("pin")
+    assert np.ptp(place) > 1e-2
+    assert_allclose(samples.push, 1.0 + place[::10][:10], rtol=0, atol=1e-12)
+    assert_allclose(samples.motor, 0.5 - joint.angle[::10][:10], rtol=0, atol=1e-12)
+    assert_allclose(joint.angle_force[5::10], samples.motor, rtol=0, atol=1e-10)
 
 
 @pytest.mark.parametrize("period", [0.02, 0.03])
