@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array, tilde
+from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.markers import MarkerData, find_marker
 from floatframe.errors import ModelError
 from floatframe.model.bodies.flexible_body import FlexibleBody
@@ -39,6 +39,7 @@ __all__ = ["held_directions", "placed_bodies", "placed_state"]
 
 AT_JOINT = 1e-9  #: gap of a joint, relative to the size of the system, up to which a body keeps its position
 PARALLEL = 1e-9  #: sine of an angle up to which axes count as parallel
+OPPOSITE = 1e-8  #: size of the sum of two unit vectors up to which they count as opposite: the root of its rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,15 +212,16 @@ def asked_rotation(bodies: list[Body], link: Link) -> Array | None:
 
 
 def rotation_between(here: Array, there: Array) -> Array | None:
-    """Return the smallest rotation, (3, 3), from one unit vector to another; None if they are parallel."""
-    normal, cosine = np.cross(here, there), float(here @ there)
-    if np.linalg.norm(normal) <= PARALLEL:
-        if cosine > 0:
-            return None
-        across = normals_of(here)[0]  # half a turn about any normal
-        return np.asarray(2 * np.outer(across, across) - np.eye(3))
-    N = tilde(normal)
-    return np.asarray(np.eye(3) + N + N @ N / (1 + cosine))
+    """Return the smallest rotation, (3, 3), from one unit vector to another; None if they are parallel.
+
+    It is the reflection of `here` followed by that of the direction in the middle, accurate up to half a turn.
+    """
+    if np.linalg.norm(there - here) <= PARALLEL:
+        return None
+    middle = here + there
+    size = np.linalg.norm(middle)
+    middle = middle / size if size > OPPOSITE else normals_of(here)[1]  # half a turn about any normal
+    return np.asarray((np.eye(3) - 2 * np.outer(middle, middle)) @ (np.eye(3) - 2 * np.outer(here, here)))
 
 
 def placed_state(system: System) -> State:

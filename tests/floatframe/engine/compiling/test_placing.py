@@ -155,6 +155,17 @@ def test_opposite_axes_turn_the_body_by_half_a_turn():
     assert_allclose(rotations(System([rigid("arm")], [joint]))["arm"] @ -axis, axis, rtol=0, atol=1e-14)
 
 
+@pytest.mark.parametrize("off", [1e-3, 1e-6, 1e-7, 2e-8, 5e-9, 1e-12])
+def test_nearly_opposite_axes_turn_the_body_by_a_rotation(off):
+    """As of axes that are given with a few digits; the middle of both is known to the rounding over its size."""
+    axis, normal = np.array([0.48, -0.6, 0.64]), np.array([-0.6, -0.48, 0.0]) / np.hypot(0.6, 0.48)
+    axis_b = (-axis + off * normal) / np.linalg.norm(-axis + off * normal)
+    joint = RevoluteJoint("pin", Marker(GROUND, position=POST), Marker("arm"), axis=axis, axis_b=axis_b)
+    (body,) = placed_bodies(System([rigid("arm")], [joint]))
+    R = Rotation.from_quat(np.roll(body.orientation, -1)).as_matrix()
+    assert_allclose(R @ axis_b, axis, rtol=0, atol=3e-8 if off < 1e-3 else 1e-12)
+
+
 @pytest.mark.parametrize("is_b", [True, False])
 def test_a_fixed_rotation_turns_the_body(is_b):
     R_AB, triad = Rotation.from_rotvec([2.1, 0.4, -1.0]).as_matrix(), Rotation.from_rotvec([0.2, 1.4, 0.3]).as_matrix()
