@@ -10,7 +10,7 @@ import fe_models as fm
 from cms.assessment.quality.of_body.descriptions import check_units
 from cms.body.reduced_body import unit_findings
 from fe_models.body.unit_check import BodyNumbers, hull_volume, implausible_numbers
-from fe_models.foundation.units import unit_system
+from fe_models.foundation.units import UNIT_SYSTEMS, unit_system
 from tests.bodies import bar, box_mesh
 
 SI = unit_system("m-kg-s")
@@ -83,6 +83,31 @@ def test_the_frequency_of_a_warning_is_in_hertz_in_all_units():
     numbers = BodyNumbers(size=9e4, frequency=1e-4)
     ((_, text),) = implausible_numbers(unit_system("mm-kg-ms"), numbers)
     assert "9e+04 mm = 90 m large and vibrates from 0.1 Hz on" in text
+
+
+def in_units(name, *, size=2.0, hull=0.5, mass=3000.0, frequency=300.0, meshed_speed=5000.0):
+    """Return the unit system and the numbers in it of a body given in SI."""
+    units = unit_system(name)
+    return units, BodyNumbers(
+        size=size / units.length, hull=hull / units.length**3, mass=mass / units.mass,
+        frequency=frequency * units.time, meshed_speed=meshed_speed * units.time / units.length,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("name", UNIT_SYSTEMS)
+def test_speeds_and_densities_are_judged_alike_in_all_units(name):
+    assert implausible_numbers(*in_units(name)) == []
+    ((_, fast),) = implausible_numbers(*in_units(name, meshed_speed=4e5))
+    assert "from node to node waves would run at about 4e+05 m/s" in fast
+    ((_, heavy),) = implausible_numbers(*in_units(name, hull=0.0, mass=1e6))
+    assert "in a cube around all nodes of" in heavy
+    assert "1.25e+05 kg/m³" in heavy
+
+
+def test_nodes_in_mm_beside_matrices_in_si_are_named_by_all_their_numbers():
+    """A light frame of 0.2 kg/m³: its hull must become smaller by the cube of 1000."""
+    units, numbers = in_units("m-kg-s", size=2e3, hull=0.5e9, meshed_speed=5e6, mass=0.1)
+    assert "the nodes seem to be in mm" in implausible_numbers(units, numbers)[0][1]
 
 
 @pytest.mark.parametrize("kind", ["solid", "beam", "shell"])
