@@ -7,6 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
 
+from fe_models.foundation.units import unit_system
 from floatframe import (
     GeneralizedAlpha,
     Gravity,
@@ -73,6 +74,15 @@ def test_a_motion_plots_sensors_joints_and_bodies_with_units(motion):
     panels = [(ax.get_title(), ax.get_ylabel()) for ax in turning.plot("pin").axes]
     own = [("pin.angle", label) for label in ("value [rad]", "rate [rad/s]", "force [N m]")]
     assert panels == [*own, ("pin reaction", "pin reaction [N]"), ("pin reaction", "pin reaction [N m]")]
+
+
+def test_axes_have_the_units_of_the_system():
+    motion = integrate(replace(SWING, units=unit_system("mm-kg-ms")), GeneralizedAlpha(), 0.05, 1e-3)
+    assert labels(motion.plot("bob at"))[0][:2] == ("time [ms]", "bob at [mm]")
+    assert labels(motion.plot("pin force"))[0][:2] == ("time [ms]", "pin force [kN]")
+    ax = Figure().add_subplot()
+    motion.plot("bob at.z", ax=ax)
+    assert ax.get_xlabel() == "time [ms]"
 
 
 def test_a_motion_plots_into_given_axes_what_has_one_unit(motion):
