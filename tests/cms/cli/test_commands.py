@@ -298,11 +298,19 @@ def test_frame_refuses_what_it_cannot_do(modal_file, tmp_path):
         (("--to", "buckens", "--axes", "1,0,0;0,1,0"), "expected three axes"),
         (("--to", "buckens", "--axes", "1,0,0;0,1,0;0,0,-1"), "three orthonormal right-handed axes"),
         (("--to", "buckens", "--damping", "-1"), "ratio = -1.0; expected 0 to 1"),
+        (("--to", "buckens", "--damping", "0.3"), "--heavy of a command"),
         (("--to", "buckens", "--units", "m-kg"), "did you mean 'm-kg-s'?"),
         (("--to", "buckens", "-o", path), "this is an input; choose another name"),
     ]:
         assert_refused(run("frame", path, *options), words)
         assert contents(tmp_path) == before
+
+
+def test_frame_takes_a_damping_ratio_above_a_fifth_if_it_is_confirmed(modal_file, tmp_path):
+    result = run("frame", modal_file, "--to", "buckens", "--damping", "0.3", "--heavy", "-o", tmp_path / "b.h5")
+    assert result.exit_code == 0, result.output
+    body = read(tmp_path / "b.h5")
+    assert_allclose(np.diag(body.D), 2 * 0.3 * np.sqrt(np.diag(body.K)), rtol=1e-12)
 
 
 def test_info_json_is_the_record(modal_file):

@@ -173,12 +173,22 @@ def test_matrices_without_rows_or_places_ask_for_them(tmp_path):
         (["--interface", "hub=a"], "expected node numbers with commas between"),
         (["--nodal-masses", "none.csv"], "there is no such file"),
         (["--frame", "mean"], "unknown frame"),
+        (["--damping", "0.3"], "--heavy of a command"),
     ],
 )
 def test_options_that_are_wrong_are_told(outboard, words, told):
     result = CliRunner().invoke(app, ["import", str(outboard), "--units", "mm-kg-s", *words])
     assert result.exit_code != 0
     assert told in " ".join(result.output.split())
+
+
+def test_a_damping_ratio_above_a_fifth_is_taken_if_it_is_confirmed(outboard, tmp_path):
+    words = ["import", str(outboard), "--units", "mm-kg-s", "-o", str(tmp_path / "body.h5")]
+    result = CliRunner().invoke(app, [*words, "--damping", "0.3", "--heavy"])
+    assert result.exit_code == 0, result.output
+    body, bare = cms.read(tmp_path / "body.h5"), cms.import_body(outboard, units="mm-kg-s")
+    omega = np.sqrt(np.diag(body.K) * np.diag(body.M))
+    assert_allclose(np.diag(body.D - bare.D), 2 * 0.3 * omega, rtol=1e-9, atol=0)
 
 
 def test_a_table_of_nodal_masses_completes_a_superelement(outboard, tmp_path):
