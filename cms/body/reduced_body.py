@@ -304,7 +304,7 @@ def unit_findings(body: ReducedBody) -> list[tuple[bool, str]]:
     nodes, free = np.asarray(body.nodes), np.asarray(body.free_frequencies)
     numbers = BodyNumbers(
         size=float(np.linalg.norm(np.ptp(nodes, axis=0))) if len(nodes) else 0.0,
-        hull=hull_volume(nodes) if len(nodes) else 0.0,
+        hull=hull_volume(nodes),
         mass=body.moments.m,
         frequency=float(free[0]) if len(free) else None,
     )

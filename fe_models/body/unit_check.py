@@ -153,18 +153,19 @@ def _findings(units: Units, numbers: BodyNumbers) -> list[tuple[bool, str]]:
 def warn_of_materials(name: str, units: Units | str, materials: Iterable[_Elastic]) -> None:
     """Log a warning for each density, modulus and wave speed that no solid has in the units of the body."""
     units = unit_system(units) if isinstance(units, str) else units
-    for _, text in implausible_numbers(
-        units, BodyNumbers(materials=tuple({id(each): each for each in materials}.values()))
-    ):
+    each_once = tuple({id(material): material for material in materials}.values())
+    for _, text in implausible_numbers(units, BodyNumbers(materials=each_once)):
         log.warning("body %r: %s", name, text)
 
 
 def hull_volume(points: Array) -> float:
-    """Return the volume of the convex hull of points; 0 if they lie in a plane or on a line."""
+    """Return the volume of the convex hull of points; 0 if they are fewer than four, or lie in a plane or on a line."""
     from scipy.spatial import ConvexHull
 
+    if len(points) < 4:
+        return 0.0
     centered = np.asarray(points) - np.mean(points, axis=0)
-    extents = np.linalg.svd(centered, compute_uv=False) if len(centered) > 3 else np.zeros(3)
-    if len(extents) < 3 or extents[2] <= FLAT * extents[0]:
+    extents = np.linalg.svd(centered, compute_uv=False)
+    if extents[2] <= FLAT * extents[0]:
         return 0.0
     return float(ConvexHull(centered).volume)

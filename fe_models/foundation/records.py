@@ -173,7 +173,7 @@ def put_arrays(record: object, where: str, error: type[Exception]) -> None:
         if shape.is_triad:
             defect = np.abs(array.T @ array - np.eye(3)).max()
             if not defect <= ORTHONORMAL:
-                raise error(f"{what}: expected orthonormal axes as columns, they are {defect:.1e} from it")
+                raise error(f"{what}: expected orthonormal axes as columns, got |AᵀA - I| = {defect:.1e}")
             if np.linalg.det(array) < 0:
                 raise error(f"{what}: expected right-handed axes as columns")
         object.__setattr__(record, name, array)
@@ -305,16 +305,16 @@ def hints_of(subject: Hashable) -> dict[str, Any]:
     return get_type_hints(subject, include_extras=True)
 
 
-#: inputs by the function or data class, with classes of which every object is taken as it is
-TAKEN: defaultdict[Hashable, set[tuple[str, type]]] = defaultdict(set)
+#: for each function or data class: (input, type) of the values that were accepted unchanged, as all of the type are
+ACCEPTED: defaultdict[Hashable, set[tuple[str, type]]] = defaultdict(set)
 
 
 def conformed_inputs(where: str, subject: Hashable, given: Mapping[str, Any], error: type[Exception]) -> Any:
     """Return those inputs of a function or data class that change; raise the error for the first of another kind."""
     changed = {}
-    hints, taken = hints_of(subject), TAKEN[subject]
+    hints, accepted = hints_of(subject), ACCEPTED[subject]
     for name, value in given.items():
-        if name not in hints or (name, type(value)) in taken:
+        if name not in hints or (name, type(value)) in accepted:
             continue
         try:
             found = conformed(hints[name], value)
@@ -326,7 +326,7 @@ def conformed_inputs(where: str, subject: Hashable, given: Mapping[str, Any], er
         if found is not value:
             changed[name] = found
         elif not looks_inside and "Literal[" not in str(hints[name]):
-            taken.add((name, type(value)))
+            accepted.add((name, type(value)))
     return changed
 
 
