@@ -216,7 +216,7 @@ def integrate(
         run.words_of_start = lambda: words_of_begun_drives(begun, t_start, state, step)
         memory, rows = run.begin(memory, 0)
         if sampling is not None and sampling.sample(0, rows, head):
-            memory, rows = run.begin(integrator.start(begun, t_start, state), 0)
+            memory, rows = integrator.after_jump(run.acting, t_start, memory, run.work)
         require_sensors(system, head, rows)
         run.writer = None if place is None else ResultsWriter(place, head)
         run.steps.begin(memory.state)

@@ -87,6 +87,16 @@ def test_the_loop_of_a_sampled_controller_is_the_exact_discrete_one(motion):
     assert motion.validity == ()
 
 
+def test_the_start_under_a_controller_is_told_once(caplog):
+    """The first call, which changes the forces, does not close the joints again."""
+    system = rotor(pid())
+    away = replace(system, bodies=[replace(system.bodies[0], position=np.add(PLACE, 0.1))])
+    motion = integrate(away, GeneralizedAlpha(), 0.02, 1e-3)
+    assert [record.message[:24] for record in caplog.records] == ["body 'hub' was placed 0."]
+    exact = discrete_loop(2)
+    assert_allclose(motion.joint("pin").angle[[0, 10]], exact[:, 0], rtol=0, atol=1e-12)
+
+
 def test_outputs_and_states_are_stored_at_the_sampling_instants(motion):
     samples = motion.controller("pid")
     assert_allclose(samples.t, PERIOD * np.arange(100), rtol=0, atol=1e-12)
