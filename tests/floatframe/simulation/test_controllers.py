@@ -31,7 +31,7 @@ from floatframe import (
 from floatframe.files.cosimulation.held_inputs import with_held_inputs
 from floatframe.integrators import Ida, RelativeOde
 from floatframe.model.bodies.coordinates import JointCoordinate
-from floatframe.model.forces import JointForce, UserForce
+from floatframe.model.forces import WITH_AMPLITUDE, BodyLoad, JointForce, UserForce
 from floatframe.model.functions.time_functions import constant, piecewise
 from floatframe.results.sensors import PlaceSensor
 from tests.floatframe.simulation.examples import steps_on_record
@@ -191,25 +191,55 @@ def test_a_controller_whose_output_stays_changes_nothing_beside_one_whose_output
     assert_allclose(other.controller("pid").motor, motion.controller("pid").motor, rtol=0, atol=1e-10)
 
 
-def test_two_outputs_of_a_controller_follow_places_of_a_flexible_body():
-    """The engine moves the arm in mean axes, and sensors see it in the axes of its foot."""
+def flexible_rotor(**parts):
+    """A soft arm on the hinge under two body loads; its file has the axes of its foot, the engine takes mean axes."""
     line = fm.straight_line((0, 0, 0), (0.6, 0.3, -0.2), 3)
     ends = [fm.line_interface(line, name, fm.NodeSet(name)) for name in ("start", "end")]
     section = fm.BeamProperty(fm.Rectangle(0.02, 0.03), fm.Material("soft", E=2e9, nu=0.3, rho=7850.0))
     full = cms.couple(fm.beam_body(line, section, name="arm", units="m-kg-s", interfaces=ends))
+    full = full.with_load_cases(
+        fm.gravity_load(full, "down", (0.0, 0.0, -9.81)), fm.gravity_load(full, "side", (2.0, 5.0, 0.0))
+    )
     arm = FlexibleBody("hub", cms.reduce(full, cms.craig_bampton(full, 2), frame=cms.NodalFrame("start")))
     pin = RevoluteJoint("pin", Marker("ground"), Marker("hub", "start"), axis=AXIS)
-    forces = [JointForce("motor", "pin", "angle", motor=constant(0.0)),
-              PointForce("push", Marker("hub", "end"), force=(15.0, 5.0, -10.0))]  # fmt: skip
+    forces = [
+        JointForce("spin", "pin", "angle", motor=constant(0.2)),
+        JointForce("motor", "pin", "angle", motor=constant(0.0)),
+        PointForce("wind", Marker("hub", "end"), force=(1.0, -4.0, 2.0)),
+        PointForce("push", Marker("hub", "end"), force=(15.0, 5.0, -10.0)),
+        BodyLoad("first", "hub", "down", amplitude=0.1),
+        BodyLoad("second", "hub", "side", amplitude=0.1),
+    ]
+    return System([arm], [pin], forces, **parts)
+
+
+def test_outputs_are_the_factors_of_forces_and_loads_with_their_names():
+    """Outputs that never change move the arm as constants do."""
+    values = {"push": 0.7, "second": 0.8, "motor": -0.6}
+    plain = flexible_rotor()
+    forces = [
+        replace(force, **{WITH_AMPLITUDE[type(force)]: constant(values[force.name])}) if force.name in values else force
+        for force in plain.forces
+    ]
+    given = pid(outputs=list(values), state=None, function=lambda t, x: list(values.values()))
+    expected, found = (
+        integrate(system, GeneralizedAlpha(), 0.05, 1e-3)
+        for system in (replace(plain, forces=forces), flexible_rotor(controllers=[given]))
+    )
+    assert_allclose(found.joint("pin").angle, expected.joint("pin").angle, rtol=0, atol=1e-12)
+    assert np.abs(expected.joint("pin").angle).max() > 1e-3
+
+
+def test_two_outputs_of_a_controller_follow_places_of_a_flexible_body():
     both = pid(inputs=["tip.z", "pin.angle"], outputs=["push", "motor"], state=None,
                function=lambda t, x: (1.0 + x[0], 0.5 - x[1]))  # fmt: skip
     tip = PlaceSensor("tip", Marker("hub", "end"))
-    motion = integrate(System([arm], [pin], forces, sensors=[tip], controllers=[both]), GeneralizedAlpha(), 0.1, 1e-3)
+    motion = integrate(flexible_rotor(sensors=[tip], controllers=[both]), GeneralizedAlpha(), 0.1, 1e-3)
     samples, place, joint = motion.controller("pid"), motion.sensor("tip").z, motion.joint("pin")
     assert np.ptp(place) > 1e-2
     assert_allclose(samples.push, 1.0 + place[::10][:10], rtol=0, atol=1e-12)
     assert_allclose(samples.motor, 0.5 - joint.angle[::10][:10], rtol=0, atol=1e-12)
-    assert_allclose(joint.angle_force[5::10], samples.motor, rtol=0, atol=1e-10)
+    assert_allclose(joint.angle_force[5::10], 0.2 + samples.motor, rtol=0, atol=1e-10)
 
 
 @pytest.mark.parametrize("period", [0.02, 0.03])
