@@ -19,9 +19,9 @@ app = commands(
     "cms",
     "Component mode synthesis: a meshed part becomes a small, exact, portable flexible body.",
     hints={
-        "study": "floatframe compare {} for models of a body in a mechanism, or cms compare JOB for mode sets",
-        "validate": "cms check {}",
-        "convert": "cms export {}",
+        "study": "floatframe compare FILE for models of a body in a mechanism, or cms compare JOB for mode sets",
+        "validate": "cms check FILE",
+        "convert": "cms export FILE",
     },
 )
 

@@ -7,6 +7,7 @@ import errno
 import functools
 import logging
 import os
+import re
 import sys
 import traceback
 import warnings
@@ -112,14 +113,17 @@ def register(app: typer.Typer, groups: Mapping[str, Mapping[str, Callable[..., N
 def commands(name: str, help: str, *, hints: Mapping[str, str] | None = None) -> typer.Typer:
     """Return an application with the options --version and --debug.
 
-    hints: what to use in place of commands that this program does not have, by name; {} stands for the arguments.
+    hints: what to use in place of commands that this program does not have, by name; FILE or NAME stands for the
+    arguments.
     """
     known = hints or {}
 
     class Hinting(TyperGroup):
         def resolve_command(self, ctx: Any, args: list[str]) -> Any:
             if args[0] in known:
-                ctx.fail(f"No such command {args[0]!r}. Use {known[args[0]].format(' '.join(args[1:]) or 'FILE')}.")
+                given = " ".join(args[1:])
+                hint = re.sub("FILE|NAME", lambda word: given or word[0], known[args[0]])
+                ctx.fail(f"No such command {args[0]!r}. Use {hint}.")
             return super().resolve_command(ctx, args)
 
     app = Commands(

@@ -10,6 +10,7 @@ import floatframe.cli.analyses as analyses
 import floatframe.cli.driven as driven
 import floatframe.cli.durability as durability
 import floatframe.cli.exchange as exchange
+import floatframe.cli.export as export
 import floatframe.cli.fits as fits
 import floatframe.cli.linear as linear
 import floatframe.cli.prepare as prepare
@@ -28,7 +29,7 @@ from cms.cli.console import (
     say,
     stages,
 )
-from cms.cli.outputs import PICTURES, TABLES, output_file, write_outputs
+from cms.cli.outputs import PICTURES, output_file, write_outputs
 from cms.cli.schema import schema_command_of
 from cms.cli.show import show_command
 
@@ -37,7 +38,6 @@ if TYPE_CHECKING:
 
     from cms.body.reduced_body import ReducedBody
     from fe_models.foundation.stages import Stages
-    from floatframe.model.system import System
     from floatframe.results.trajectory import Trajectory
     from floatframe.simulation.integrate import Progress
 
@@ -47,12 +47,15 @@ app = commands(
     "floatframe",
     "Flexible multibody dynamics: bodies from modal files, joints and forces become motion.",
     hints={
-        "eig": "floatframe modes {}",
-        "study": "floatframe compare {}",
-        "machine": "floatframe example {}",
-        "bode": "floatframe response {}",
-        "simulate": "floatframe run {}",
-        "reduce": "cms reduce {}",
+        "eig": "floatframe modes FILE",
+        "study": "floatframe compare FILE",
+        "machine": "floatframe example NAME",
+        "bode": "floatframe response FILE",
+        "simulate": "floatframe run FILE",
+        "reduce": "cms reduce FILE",
+        "urdf": "floatframe export FILE --to urdf",
+        "fmu": "floatframe export FILE --to fmu",
+        "generate": "floatframe export FILE --to c (or python, casadi, matlab, fmu-c)",
     },
 )
 
@@ -202,7 +205,7 @@ def print_run(trajectory: "Trajectory") -> None:
     """Print a summary of a motion, its cost and its accuracy."""
     from floatframe.results.export import run_record
 
-    record = run_record(trajectory, known_system(trajectory))
+    record = run_record(trajectory, spectra.known_system(trajectory))
     units = trajectory.units
     second, length = units.time_symbol, units.length_symbol
     energy = f"{units.force_symbol} {length}"
@@ -278,19 +281,6 @@ def print_run(trajectory: "Trajectory") -> None:
         print_table("Places of sensors on flexible bodies", ("", "place"), places)
 
 
-def known_system(trajectory: "Trajectory") -> "System | None":
-    """Return the system of a motion from the file its results name; None, with a note, if that cannot be read."""
-    from cms.errors import CmsError
-    from floatframe.errors import FloatframeError
-    from floatframe.files.system_file.recorded_system import recorded_system
-
-    try:
-        return recorded_system(trajectory)
-    except (FloatframeError, CmsError) as error:
-        typer.echo(f"note: sensors are left out: {error}", err=True)
-        return None
-
-
 def peak_words(column: dict[str, Any]) -> str:
     """Return the time of the largest magnitude of a measured quantity, with the node or instance where it was."""
     numbers = [f"{name} {value}" for name, value in column["peak"].items() if name != "t"]
@@ -355,7 +345,7 @@ def info_command(
 
         from floatframe.results.export import run_record
 
-        record = run_record(trajectory, known_system(trajectory))
+        record = run_record(trajectory, spectra.known_system(trajectory))
         typer.echo(json_module.dumps(record, indent=2, ensure_ascii=True))
         return
     print_run(trajectory)
@@ -408,7 +398,7 @@ def plot_command(
     except CmsError as error:  # the motion can be plotted without its bodies
         typer.echo(f"note: elastic displacement is left out: {error}", err=True)
         bodies = {}
-    system = known_system(trajectory)
+    system = spectra.known_system(trajectory)
     if sensors:
         if system is None:
             raise ResultsError("--sensor: the system file of the run is gone, or the run was made in Python")
@@ -457,7 +447,7 @@ def animate_command(
         output, file.with_suffix(".gif"), ResultsError, overwrite_of=(file, *trajectory.files), needs_file=True
     )
     bodies: dict[str, ReducedBody | RigidBody] = {**bodies_of(trajectory)}
-    system = known_system(trajectory)
+    system = spectra.known_system(trajectory)
     if system is not None:  # boxes with the inertia of rigid bodies, instead of cubes
         bodies |= {body.name: body for body in system.bodies if isinstance(body, RigidBody)}
     with stages(remaining=True) as clock, clock("film") as advance:
@@ -466,63 +456,6 @@ def animate_command(
             system=system, on_frame=lambda done, all_: advance(done / all_),
         )  # fmt: skip
     say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
-
-
-@guarded
-def export_command(
-    file: ResultsFile,
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", help="A table (.csv, ...), a .pvd series, or RPC III (.rsp, .drv, .tim)."),
-    ] = None,
-    sensors: Annotated[
-        list[str],
-        typer.Option("--sensor", "-s", help="Only this sensor, sensor.column or joint.coordinate; * and ? are wild."),
-    ] = [],  # noqa: B006
-    every: Annotated[int, typer.Option(min=1, help="Use every n-th output time only (.pvd).")] = 1,
-) -> None:
-    """Write a motion as a table, for ParaView, or for a test rig.
-
-    The ending of -o decides: .csv, .json, .mat, .npz and .parquet hold all sensors, .pvd deformed surfaces with
-    stress, .rsp, .drv or .tim signals.
-
-    Without -o, a table is written next to the results: swing.h5 gives swing.csv.
-
-    Example: floatframe export swing.h5 -o swing.csv
-
-    Example: floatframe export swing.h5 -o swing.pvd --every 10
-
-    Example: floatframe export swing.h5 --sensor "wheel*" -o drive.rsp
-    """
-    from floatframe.errors import ResultsError
-    from floatframe.files.signals.rpc_file import write_rpc
-    from floatframe.pictures.animation import bodies_of
-    from floatframe.results.export import export_vtk, motion_table, sensor_table
-    from floatframe.results.sensor_choice import chosen_measurements
-    from floatframe.results.trajectory import read_trajectory
-
-    trajectory = read_trajectory(file)
-    signals, read = (".rsp", ".drv", ".tim", ".rpc"), (file, *trajectory.files)
-    path = output_file(output, file.with_suffix(".csv"), (*TABLES, ".pvd", *signals), ResultsError, overwrite_of=read)
-    bodies = bodies_of(trajectory)
-    if path.suffix.lower() in TABLES:
-        system = known_system(trajectory)
-        if sensors and system is None:
-            raise ResultsError("--sensor: the system file of the run is gone, or the run was made in Python")
-        if system is None or not sensors:
-            table = motion_table(trajectory, bodies, system)
-        else:
-            table = sensor_table(trajectory, chosen_measurements(system, trajectory, sensors))
-        write_outputs([path], table=lambda: table)
-    elif path.suffix.lower() in signals:
-        write_rpc(spectra.sensor_signals(trajectory, sensors), path)
-        say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
-    else:
-        with stages(remaining=True) as clock, clock("surfaces") as advance:
-            written = export_vtk(
-                trajectory, bodies, path, every=every, on_frame=lambda done, all_: advance(done / all_)
-            )
-        say(f"wrote {path} and {len(written) - 1} surfaces in {path.with_suffix('')}")
 
 
 register(
@@ -561,10 +494,7 @@ register(
         },
         "Exchange": {
             "import": exchange.import_command,
-            "export": export_command,
-            "urdf": exchange.urdf_command,
-            "fmu": exchange.fmu_command,
-            "generate": exchange.generate_command,
+            "export": export.export_command,
         },
         "Set up": {
             "prepare": prepare.prepare_command,

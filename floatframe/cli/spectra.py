@@ -11,6 +11,7 @@ from cms.cli.outputs import PICTURES, TABLES, output_file, write_outputs
 if TYPE_CHECKING:
     from floatframe.files.signals.analysis import SpectrumRequest
     from floatframe.files.signals.signals import Signal, Signals
+    from floatframe.model.system import System
     from floatframe.results.trajectory import Trajectory
 
 __all__ = ["plot_as", "sensor_signals", "spectrum_command"]
@@ -112,6 +113,19 @@ def sensor_signals(trajectory: "Trajectory", names: list[str], rate: float | Non
     for note in signals.notes:
         typer.echo(f"note: {note}", err=True)
     return signals
+
+
+def known_system(trajectory: "Trajectory") -> "System | None":
+    """Return the system of a motion from the file its results name; None, with a note, if that cannot be read."""
+    from cms.errors import CmsError
+    from floatframe.errors import FloatframeError
+    from floatframe.files.system_file.recorded_system import recorded_system
+
+    try:
+        return recorded_system(trajectory)
+    except (FloatframeError, CmsError) as error:
+        typer.echo(f"note: sensors are left out: {error}", err=True)
+        return None
 
 
 def plot_as(

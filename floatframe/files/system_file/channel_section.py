@@ -202,7 +202,7 @@ class EventSection(Table):
 
 
 class FmuSection(Table):
-    """[fmu]: the inputs, outputs and parameters of the FMU that `floatframe fmu` writes."""
+    """[fmu]: the inputs, outputs and parameters of the FMU that `floatframe export --to fmu` writes."""
 
     inputs: list[Name] | None = Field(
         None, description="names of inputs, such as forces.NAME.amplitude, joints.NAME.angle, or a table [inputs.NAME]"

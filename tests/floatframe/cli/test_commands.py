@@ -282,6 +282,9 @@ def test_help_names_the_commands_and_loads_nothing_heavy():
         (app, "eig", "floatframe modes swing.toml."),
         (app, "study", "floatframe compare swing.toml."),
         (app, "reduce", "cms reduce swing.toml."),
+        (app, "urdf", "floatframe export swing.toml --to urdf."),
+        (app, "fmu", "floatframe export swing.toml --to fmu."),
+        (app, "generate", "floatframe export swing.toml --to c (or python, casadi, matlab, fmu-c)."),
         (cms_app, "study", "floatframe compare swing.toml for models of a body in a mechanism"),
     ],
 )
@@ -289,6 +292,23 @@ def test_a_command_under_another_name_is_answered_with_its_name_here(program, na
     result = CliRunner().invoke(program, [name, "swing.toml"])
     assert result.exit_code == 2
     assert f"No such command '{name}'. Use {now}" in " ".join(result.output.replace("│", " ").split())
+
+
+@pytest.mark.parametrize(("name", "meant"), [("machine", "example NAME"), ("urdf", "export FILE --to urdf")])
+def test_a_command_under_another_name_says_what_it_takes(name, meant):
+    shown = " ".join(CliRunner().invoke(app, [name]).output.replace("│", " ").split())
+    assert f"Use floatframe {meant}." in shown
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_of_a_shell_offers_the_targets_of_export(shell):
+    typed = {"COMP_WORDS": "floatframe export arm.toml --to fm", "COMP_CWORD": "4",
+             "_TYPER_COMPLETE_ARGS": "floatframe export arm.toml --to fm",
+             "_TYPER_COMPLETE_FISH_ACTION": "get-args"}  # fmt: skip
+    environment = ENVIRONMENT | typed | {"_FLOATFRAME_COMPLETE": f"complete_{shell}"}
+    result = subprocess.run(PROGRAM, env=environment, capture_output=True, text=True)
+    assert "fmu-c" in result.stdout, result.stderr
+    assert "urdf" not in result.stdout
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

@@ -1,4 +1,4 @@
-"""The command generate: the files that the function makes, and messages."""
+"""The targets c, python, casadi and matlab of `floatframe export`: the files that the function makes, and messages."""
 
 import json
 
@@ -21,12 +21,14 @@ def pendulum(tmp_path):
 
 
 def called(*words):
-    return CliRunner().invoke(app, ["generate", *map(str, words)])
+    return CliRunner().invoke(app, ["export", *map(str, words)])
 
 
 def test_the_command_writes_what_the_function_returns(pendulum, tmp_path):
     folder = tmp_path / "code"
-    made = called(pendulum, "--what", "inverse", "--what", "mass", "--name", "stick", "-o", folder, "--json")
+    made = called(
+        pendulum, "--to", "c", "--what", "inverse", "--what", "mass", "--name", "stick", "-o", folder, "--json"
+    )
     assert made.exit_code == 0, made.output
     record = json.loads(made.stdout)
     assert sorted(path.name for path in folder.iterdir()) == [
@@ -44,7 +46,7 @@ def test_the_command_writes_what_the_function_returns(pendulum, tmp_path):
 def test_all_routines_of_all_languages_are_written(language, pendulum, tmp_path):
     folder = tmp_path / "code"
     wanted = [word for what in ROUTINES for word in ("--what", what)]
-    made = called(pendulum, *wanted, "--language", language, "--name", "stick", "-o", folder, "--json")
+    made = called(pendulum, *wanted, "--to", language, "--name", "stick", "-o", folder, "--json")
     assert made.exit_code == 0, made.output
     record = json.loads(made.stdout)
     assert set(record["functions"]) == {f"stick_{what}" for what in ROUTINES}
@@ -63,11 +65,11 @@ def test_help_names_all_routines_and_languages():
 
 def test_what_cannot_be_is_told_and_nothing_is_written(pendulum, tmp_path):
     folder = tmp_path / "code"
-    made = called(pendulum, "--language", "ada", "-o", folder)
+    made = called(pendulum, "--to", "casady", "-o", folder)
     assert made.exit_code != 0
-    assert "language: expected one of c, python, casadi, matlab, got 'ada'" in " ".join(made.output.split())
+    assert "--to casady: unknown target; did you mean 'casadi'?" in made.stderr
     assert not folder.exists()
     (tmp_path / "file").write_text("")
-    made = called(pendulum, "-o", tmp_path / "file")
+    made = called(pendulum, "--to", "c", "-o", tmp_path / "file")
     assert made.exit_code != 0
     assert "cannot be written" in made.output

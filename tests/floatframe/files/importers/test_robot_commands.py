@@ -49,11 +49,11 @@ def test_the_written_folder_is_the_same_system_and_runs(gripper, tmp_path):
 
 def test_a_system_file_becomes_a_description_with_the_same_dynamics(gripper, tmp_path):
     run("import", gripper, "-o", tmp_path / "out", "--keep-fixed")
-    result = run("urdf", tmp_path / "out" / "gripper.toml", "-o", tmp_path / "back" / "g.urdf")
+    result = run("export", tmp_path / "out" / "gripper.toml", "-o", tmp_path / "back" / "g.urdf")
     assert result.exit_code == 2
     assert "URDF requires limits of a prismatic joint; effort, velocity not given" in result.stderr
     assert not (tmp_path / "back").exists()
-    result = run("urdf", tmp_path / "out" / "gripper.toml", "-o", tmp_path / "back" / "g.urdf", "--effort", 9,
+    result = run("export", tmp_path / "out" / "gripper.toml", "-o", tmp_path / "back" / "g.urdf", "--effort", 9,
                  "--velocity", 2)  # fmt: skip
     assert result.exit_code == 0, result.output
     assert "note: left out: gravity" in result.stderr
