@@ -190,8 +190,8 @@ def require_free(model: RelativeModel) -> None:
     """Raise `ModelError` if a coordinate is prescribed, because forward dynamics does not support that."""
     if model.driven:
         raise ModelError(
-            f"generate: coordinate {quoted(model.driven[0])} is prescribed by a function of time, which forward does "
-            'not know; leave out the motion of its joint, or take what = "residual"'
+            f"generate: coordinate {quoted(model.driven[0])} is prescribed by a function of time, which what = "
+            '"forward" does not support; remove the motion of its joint, or take what = "residual"'
         )
 
 

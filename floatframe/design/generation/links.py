@@ -2,7 +2,7 @@
 
 The node frame is the outer frame of the joint; for a flexible body (`modes.py`), it is this frame while undeformed.
 
-Rounding errors (cos 90° and products with it) are zero here: entries of rotation matrices within 4 ulp of an integer,
+Rounding errors (cos 90° and products with it) are set to zero: entries of rotation matrices within 4 ulp of an integer,
 and lengths and moments below 4 ulp of the largest of their kind.
 """
 
@@ -182,7 +182,7 @@ def tree_terms(expansion: Expansion, parameters: Sequence[str] = ()) -> TreeTerm
 
 
 def body_frame(graph: Graph, expansion: Expansion, i: int, length: float) -> Frame:
-    """Return the frame of the file of body i, because the engine may use mean axes."""
+    """Return the frame of body i in its file; the engine may use mean axes instead."""
     name, node, mean = expansion.system.bodies[i].name, expansion.node_of[i], expansion.compiled.mean_axes[i]
     if mean is not None:
         frame = moving_frame(graph, expansion, i, name, mean.frame, length)
@@ -223,7 +223,7 @@ def frame_in_body(expansion: Expansion, i: int, length: float) -> tuple[Array, A
 def link_of(
     graph: Graph, expansion: Expansion, k: int, symbols: dict[str, Scalar], values: dict[str, float], length: float
 ) -> Link:
-    """Return node k as terms; symbols, values: of parameters by name, length: the largest of the tree."""
+    """Return node k as terms; symbols and values are those of parameters by name, length is the largest of the tree."""
     nodes, body = expansion.nodes, int(expansion.nodes.body[k])
     mass, s, P = graph.zero, terms(graph, np.zeros(3)), terms(graph, np.zeros((3, 3)))
     if body >= 0:
@@ -272,7 +272,7 @@ def elastic_parts(graph: Graph, expansion: Expansion, k: int, length: float) -> 
         F, origin = frame_in_body(expansion, i, length)
         A, r = F.T @ A, F.T @ (r - origin)
         parts["above"] = marker(i, int(nodes.above[k]))
-        r = r if parts["above"] is None else np.zeros(3)  # the marker has the place
+        r = r if parts["above"] is None else np.zeros(3)  # the marker contains the position
     return parts | {"A": terms(graph, whole(A)), "r": terms(graph, without_rounding(r, length))}
 
 

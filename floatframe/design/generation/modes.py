@@ -9,10 +9,10 @@ c = c_0 + phi q in the body frame, the moments of a mode in the node frame are (
     S'_kl = Fᵀ (S_kl - K_t,kl oᵀ) F          int phi_k phi_lᵀ, with the contribution of geometric stiffness
     K_r'  = Fᵀ (K_r - o × K_t)
 
-Rounding errors are zero here. An entry is a rounding error if it is below 1e-14 of its bound by Schwarz's inequality:
+Rounding errors are set to zero. An entry is a rounding error if it is below 1e-14 of its bound by Schwarz's inequality:
 (m M_kk)^(1/2) for C1_k, (tr P M_kk)^(1/2) for X_k, (M_kk M_ll)^(1/2) for S_kl and 4C_kl; or of the largest entry of its
-kind if that is larger (geometric stiffness, shapes of markers). M, K and D are treated alike, with their diagonals.
-Each such number changes forces by less than 1e-14 of the largest term of their kind.
+kind if that is larger (geometric stiffness, shapes of markers). M, K and D are treated likewise, with bounds from their
+diagonals. Each such number changes forces by less than 1e-14 of the largest term of their kind.
 """
 
 from dataclasses import dataclass
@@ -74,7 +74,7 @@ class ElasticMarker:
 
 
 def without_noise(x: Array, bound: Array) -> Array:
-    """Return numbers with entries replaced by zero that are rounding errors of a bound or of the largest entry."""
+    """Return numbers; entries that are rounding errors of a bound or of the largest entry are replaced by zero."""
     bound = np.broadcast_to(bound, x.shape)
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(bound > 0, np.abs(x) / bound, np.where(x == 0, 0.0, 1.0))
@@ -115,7 +115,7 @@ def modes_of(graph: Graph, expansion: Expansion, i: int, frame: tuple[Array, Arr
     X = F.T @ (X - C1_k[:, :, None] * origin) @ F
     S_kl = F.T @ (S_kl - Kt_kl[..., None] * origin) @ F
     Kr_kl = (Kr_kl - np.cross(origin, Kt_kl)) @ F
-    size = np.sqrt(np.maximum(np.diag(M), 0.0))  # of modes
+    size = np.sqrt(np.maximum(np.diag(M), 0.0))  # M_kk^(1/2)
     pair = size[:, None] * size
     moved = J + mass * ((origin @ origin) * np.eye(3) - np.outer(origin, origin))
     spread = np.sqrt(0.5 * max(float(np.trace(J)), float(np.trace(moved))))  # radius of gyration about either frame
@@ -143,9 +143,9 @@ def modes_of(graph: Graph, expansion: Expansion, i: int, frame: tuple[Array, Arr
 def elastic_marker(
     graph: Graph, expansion: Expansion, i: int, shape: MarkerShape, frame: tuple[Array, Array], length: float
 ) -> ElasticMarker:
-    """Return a marker of the flexible body i in the frame of its node, axes and origin of that in the body.
+    """Return a marker of the flexible body i in its node frame.
 
-    length: the largest of the tree.
+    frame: axes and origin of the node frame in the body; length: the largest length of the tree.
     """
     F, origin = frame
     n = expansion.xq_of[i].stop - expansion.xq_of[i].start

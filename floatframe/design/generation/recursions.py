@@ -1,12 +1,12 @@
 """The recursions of the engine evaluated with terms; every sum and product is simplified when it is created.
 
 Positions, motions and forces come from the kernels of engine/tree/recursion, which are called with terms (`Traced`).
-Only what flexible bodies and their markers do is written here anew (elastic.py), because it needs fewer products
-without tables and without branches.
+Only flexible bodies and their markers have equations of their own (elastic.py), which need fewer products because they
+contain no tables and no branches.
 
-A node of the engine turns by A E, where A mostly only exchanges axes. Terms go through A and E in two nodes, of which
-the first is fixed and carries nothing, and through a marker that moves with modes in a node before them; they go
-through A E in one node if A contains more than one angle.
+A node of the engine rotates by A E, where A usually only exchanges axes. Here A and E are two nodes; the first is fixed
+and has no mass. A marker that moves with modes is a further node before them. A and E stay in one node if A contains
+more than one angle.
 """
 
 from collections.abc import Callable, Mapping
@@ -26,7 +26,7 @@ from floatframe.engine.tree.recursion.nodes import FIXED, ROTATION, SCREW, NodeW
 
 __all__ = ["Recursion", "forward_dynamics", "inverse_dynamics", "mass_matrix", "shifted_moments", "turned_moment"]
 
-DENSE = 6  #: largest number of products of two matrices that are applied one after the other
+DENSE = 6  #: largest number of products with A for which A and E are two nodes
 
 
 class Traced:
@@ -89,7 +89,7 @@ def divided(tree: TreeTerms, is_divided: bool) -> tuple[list[Link], list[int]]:
 class Recursion:
     """The nodes of a tree at its positions, with their motions and forces.
 
-    is_divided: whether vectors always go through A and E one after the other, because few of them do.
+    is_divided: whether A and E are always two nodes, which pays if few vectors are transformed.
     """
 
     def __init__(self, tree: TreeTerms, *, is_divided: bool = False) -> None:
@@ -245,7 +245,8 @@ def mass_matrix(recursion: Recursion) -> Terms:
         subtree
     (2) the wrench of each rate, f = m a + alpha × s, t = s × a + (tr P) alpha - P alpha, where the kernel moves the
         node by the rate alone
-    (3) the forces of that wrench along the rates of the node and all above, by the kernel that passes it on
+    (3) the forces of that wrench along the rates of the node and of all nodes between it and the ground, by the kernel
+        that passes a wrench on to the parent
     """
     links, n = recursion.links, len(recursion.tree.v)
     bodies = [Composite(recursion, k) for k in range(len(links))]
@@ -287,7 +288,7 @@ class Composite:
             self.f, self.t = recursion.moments[k].first, recursion.moments[k].B
 
     def modal_block(self, own: MarkerPlace | None) -> tuple[Terms, list[tuple[Terms, Terms]]]:
-        """Return the modal mass matrix for a joint that is fixed at its marker, and the wrench of each mode."""
+        """Return the modal mass matrix if the marker of the joint is fixed, and the wrench of each mode."""
         if own is None:
             return self.H, list(zip(self.f, self.t, strict=True))
         shift, turn = own.columns()

@@ -233,7 +233,7 @@ def placed_nodes(recursion: Recursion) -> list[Motion]:
     nodes, work, _, marker_work = recursion.motion(tree.v, recursion.zeros(len(tree.v)), zero)
     markers, started = marker_work.markers, recursion.at_rest(recursion.zeros(len(tree.v)), tree.v, zero)[1]
     ground = zero, terms(tree.graph, np.eye(3)), zero, zero
-    placed: list[tuple[Motion, Terms]] = []  # with the arm from the point that moves so to the origin of the node
+    placed: list[tuple[Motion, Terms]] = []  # motion of a point, arm to the origin of the node
     for k, link in enumerate(recursion.links):
         (r, R, v, omega), arm = placed[link.parent] if link.parent >= 0 else (ground, zero)
         arm, m = arm + R @ work.p[k], nodes.above[k]
@@ -340,8 +340,8 @@ def routine_of(tree: TreeTerms, what: str, name: str) -> Routine:
 
 
 # transfer of masses towards the root of a tree: other moments of the bodies, the same forces along all rates ----------
-# If a part of the mass of a node moves in the same way with the inner frame of its joint as with the outer frame, it
-# can be assigned to the parent. Of the mass, first and second moment m, s, P = ∫ c cᵀ dm of a node, these parts are
+# A part of the mass of a node can be assigned to the parent if it moves with the inner frame of the joint in the same
+# way as with the outer frame. These parts of the mass m, first moment s and second moment P = ∫ c cᵀ dm are
 #
 #         hinge        the mass on its axis: m, s_z, P_zz
 #         screw        only P_zz, a direction along the axis without position
@@ -363,7 +363,7 @@ def routine_of(tree: TreeTerms, what: str, name: str) -> Routine:
 def carried_inwards(tree: TreeTerms) -> TreeTerms:
     """Return a tree in which moments of mass that a joint does not move belong to the parent: the forces stay the same.
 
-    A tree with a moment that is a symbol is returned as it is.
+    A tree with a moment that is a symbol is returned unchanged.
     """
     links = list(tree.links)
     moments = [value for link in links for value in (link.mass, *link.s, *link.P.ravel())]

@@ -1,7 +1,7 @@
 """Finite differences of fourth order: offsets and weights.
 
-f'(p) = Σ weights f(p + offsets step)/step + O(step⁴): central where both sides exist, else from one side, as for a
-damping of zero.
+f'(p) = Σ weights f(p + offsets step)/step + O(step⁴): central if f exists on both sides, otherwise one-sided, as
+for a damping of zero.
 """
 
 from dataclasses import dataclass

@@ -7,8 +7,9 @@ and the unknowns (xi, c_k w), c_k = beta h², is
     (2) x_1 = x_0 (+) xi:  dx_1 = A dx_0 + T dxi,  A = exp(-xi_theta), T its right Jacobian, on rotations
     (3) a_1, u_1, u_dot_1 linear in xi and S_0
 
-Direct: (1) differentiated, solved for the columns dxi of all parameters, carried on by (2), (3). Adjoint: the transpose
-of all of it backwards, one right side an output. Both solve with the same matrices, so that they agree to rounding.
+Direct method: the derivative of (1) is solved for the columns dxi of all parameters, and (2) and (3) give the next
+state. Adjoint method: the transposed equations are solved backwards in time, with one right-hand side per output. Both
+use the same matrices, so that their results agree to rounding errors.
 """
 
 from dataclasses import dataclass
@@ -89,7 +90,7 @@ def start_columns(
 ) -> tuple[Array, Array]:
     """Return derivatives by p of the start state S, (4 n_u, n_p), and of (x, u, u_dot, w), (3 n_u + n_w, n_p).
 
-    The latter of what results begin with; both by differences of the whole consistent start.
+    The second is the state with which the results begin. Both are finite differences of the complete consistent start.
     """
     x_0 = vector_of(group, own.compiled, motion.points[0].state)
     S, shown = [], []
@@ -108,7 +109,7 @@ def start_columns(
 
 
 def begun_beside(each: Neighbour, t: float, state: State | None) -> Memory:
-    """Return the start of `GeneralizedAlpha` for a neighbouring system, without checks done for the system itself."""
+    """Return the start of `GeneralizedAlpha` for a neighbouring system, without the checks that the system passed."""
     compiled, work = each.compiled, each.work
     given = compiled.placed if state is None else checked(compiled, state)
     work.state.time[...] = t

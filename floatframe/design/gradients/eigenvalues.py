@@ -6,8 +6,8 @@ Small motions exp(lambda t) of the whole system, wrenches included, obey P(lambd
         [lambda G_v + G_x            V ]
 
 psi, phi the left and right null vectors, P_lambda the derivative by lambda and P' the derivative of the matrices by p
-along (x(p), w(p), p), by differences of fourth order. Of an eigenvalue repeated m times psi and phi have m columns, and
-the derivatives of its m branches are the eigenvalues of - (psiᴴ P_lambda phi)⁻¹ psiᴴ P' phi.
+along (x(p), w(p), p), by differences of fourth order. For an eigenvalue of multiplicity m, psi and phi have m columns,
+and the derivatives of its m branches are the eigenvalues of - (psiᴴ P_lambda phi)⁻¹ psiᴴ P' phi.
 """
 
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ __all__ = [
 
 # equilibria at rest differentiated: the equations of balance, whose solution they are, once more ----------------------
 # [K  -Jᵀ] [dx]     [dr/dp]
-# [G   V ] [dw] = - [dg/dp]        direct: one right side a parameter; adjoint: the transposed, one an output
+# [G   V ] [dw] = - [dg/dp]        one right-hand side per parameter (direct), or the transpose per output (adjoint)
 
 
 SINGULAR_EQUILIBRIUM = 1e-12  #: smallest singular value of the scaled matrix, below which the equilibrium is not unique
@@ -87,7 +87,7 @@ def equilibrium_matrix(at: PointTangents, compiled: CompiledSystem, name: str) -
     Raises
     ------
     ModelError
-        If something moves at no cost, so that the equilibrium is one of many.
+        If a motion meets no resistance, so that the equilibrium is not unique.
     """
     balance = balance_of(at.K, at.J, at.G_x, at.V, typical_displacements(compiled))
     values = la.svdvals(balance.scaled)
@@ -110,7 +110,7 @@ def equilibrium_adjoint(balance: Balance, slopes: Array, by_p: Array) -> Array:
 
 
 # steady rotations -----------------------------------------------------------------------------------------------------
-# Steady rotations (relative equilibria) differentiated: all bodies turn about one axis, and their shape follows p.
+# Derivatives of steady rotations (relative equilibria): all bodies rotate about one axis, in a shape that depends on p.
 #
 # With the velocities u = U(x) and accelerations u_dot = A(x) of a rotation omega about a point c, body by body
 #
@@ -118,9 +118,9 @@ def equilibrium_adjoint(balance: Balance, slopes: Array, by_p: Array) -> Array:
 #
 #     (K + C dU/dx + M dA/dx) dx - Jᵀ dw = - dr/dp,    (G_x + G_v dU/dx) dx + V dw = - dg/dp          (2)
 #
-# Turned about its axis a steady rotation is another one: the matrix has this null vector,
-# and what is asked for must not depend on it (a distance, a coordinate of a joint, a force in axes that turn). (2) is
-# solved with the least change; anything else that moves at no cost is refused.
+# A steady rotation stays one when it is rotated about its axis. The matrix has this null vector, and outputs must not
+# depend on it (a distance, a joint coordinate, a force in rotating axes do not). (2) is solved with the smallest norm;
+# any other motion without resistance is refused.
 
 
 #: smallest singular value, relative to the largest one of the scaled matrix, of a motion with resistance
@@ -164,7 +164,7 @@ def steady_rotation_of(family: Family, own: Neighbour, omega: Array, center: Arr
     Raises
     ------
     ModelError
-        If something else than the turn about the axis costs nothing.
+        If a motion other than the rotation about the axis meets no resistance.
     ConvergenceError
         If there is no such motion.
     """
@@ -191,7 +191,7 @@ def steady_rotation_of(family: Family, own: Neighbour, omega: Array, center: Arr
 
 
 def without_turn(balance: Balance, turned: Array, name: str) -> tuple[Array, Array]:
-    """Return the pseudo-inverse of a matrix that excludes a rotation about the axis, and the change of (x, w) by it."""
+    """Return the pseudo-inverse without the rotation about the axis, and the change of (x, w) by this rotation."""
     rows, columns = balance.of_rows, balance.of_columns
     left, sizes, right = la.svd(balance.scaled)
     n_free = int((sizes <= SINGULAR * sizes[0]).sum())
@@ -204,8 +204,8 @@ def without_turn(balance: Balance, turned: Array, name: str) -> tuple[Array, Arr
     factor = float(turned @ own) / float(own @ own) if own.any() else 0.0
     if n_free > 1 or np.abs(factor * own - turned).max() > MEETS * np.abs(turned).max():
         raise ModelError(
-            f"sensitivities: system {name!r}: its steady rotation is not unique (a motion besides rotation about its "
-            "axis moves at no cost), and has no derivative; hold it by a spring or a joint"
+            f"sensitivities: system {name!r}: its steady rotation is not unique (a motion other than rotation about "
+            "its axis meets no resistance) and has no derivative; hold it by a spring or a joint"
         )
     return inverse, factor * turn
 
@@ -260,7 +260,7 @@ def branch_of(eigenvalues: Array, k: int) -> Branch:
     Raises
     ------
     ModelError
-        For a motion that costs nothing: its two eigenvalues of zero have one vector, and no derivative.
+        For a motion without resistance: its double zero eigenvalue has only one eigenvector and no derivative.
     """
     value = complex(eigenvalues[k])
     if value == 0:
@@ -287,7 +287,7 @@ def eigenvalue_derivatives(
     Raises
     ------
     ModelError
-        If the eigenvalue is defective (as many modes run into one), and has no derivative.
+        If the eigenvalue is defective (modes coincide) and has no derivative.
     """
     psi, phi = null_vectors(at, branch.value, displacements, branch.n_times)
     slope = psi.conj().T @ pencil_slope(at, branch.value) @ phi

@@ -62,7 +62,7 @@ def wanted_of(outputs: Sequence[str] | Mapping[str, str | tuple[str, Take]]) -> 
     for name, given in named.items():
         of, take = (given, "last") if isinstance(given, str) else given
         if not callable(take) and take not in TAKES:
-            raise ModelError(f"sensitivities: output {name!r}: no way to take {quoted(take)}{nearest(take, TAKES)}")
+            raise ModelError(f"sensitivities: output {name!r}: no reduction {quoted(take)}{nearest(take, TAKES)}")
         found.append(OutputRequest(name, of, take))
     return tuple(found)
 

@@ -32,11 +32,11 @@ __all__ = ["Family", "Neighbour", "Parameter", "Source", "family_of", "size_besi
 #
 #     bodies.NAME.mass, .inertia.0.0, .position.1, .velocity.0, .omega_B.2, .q.0, .reduced.K.0.0, .reduced.D.1.1
 #     bodies.NAME.turn.2                    a rotation of the body at the start about its axis [rad], zero as placed
-#     bodies.NAME.position.1                of a body without a position: that in which its joints place it
+#     bodies.NAME.position.1                for a body without a position: the one that its joints determine
 #     joints.NAME.marker_b.position.0       joints.NAME.motions.angle.pieces.0.6
 #     forces.NAME.stiffness                 forces.NAME.parameters.kp         couplers.NAME.terms.0.1       gravity.1
 #
-# Of a symmetric matrix both entries of a pair change together. Parts that stand "as placed" follow what they stand on.
+# In a symmetric matrix both entries of a pair change together. Parts that are "as placed" move with their neighbours.
 
 
 LISTS = ("bodies", "joints", "forces", "couplers")
@@ -50,7 +50,7 @@ def value_at(system: System, path: str) -> float:
     Raises
     ------
     ModelError
-        With the nearest name, if there is none, or it is no number that could vary.
+        If the path does not exist (the message suggests the nearest name), or is not a number that can vary.
     """
     return float(visit(system, path, path, None)[1])
 
@@ -271,8 +271,8 @@ def family_of(
     Raises
     ------
     ModelError, SystemFileError
-        If a path leads nowhere or to no number, a parameter changes what the system is made of (its topology), or
-        no system exists near by.
+        If a path does not lead to a number, a parameter changes the topology of the system, or no system exists for
+        neighbouring values.
     """
     make, system, paths, values = described(source, parameters)
     unknown = [name for name in steps or {} if name not in paths]
@@ -331,7 +331,7 @@ def numbers_of_file(path_of_file: str, paths: Mapping[str, str]) -> dict[str, fl
         if (table := path.partition(".")[0]) in OUTSIDE:
             raise SystemFileError(
                 f"{path_of_file}: the key path {path!r}: the table [{table}] describes the run or the display, "
-                "and is no part of it; derivatives are by numbers of bodies, joints, forces, sensors, signals"
+                "not the system; expected a number of a body, joint, force, sensor or signal"
             )
     content = read_parametric(Path(path_of_file), SystemFileError)
     found = {}
@@ -400,5 +400,5 @@ def require_same_topology(compiled: CompiledSystem, other: CompiledSystem, path:
         if turn > SAME_ROW:
             raise ModelError(
                 f"parameter {path!r}: directions of a joint jump with it (the axis lies midway between axes of its "
-                "marker, from which normals are chosen); give the marker a triad turned a little, or vary the triad"
+                "marker, from which normals are chosen); rotate the triad of the marker a little, or vary the triad"
             )

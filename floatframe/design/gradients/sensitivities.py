@@ -154,9 +154,9 @@ def sensitivities(
     system
         A system; or the path of a system file; or a function that takes a dict of names and values and returns one.
     outputs
-        Columns of sensors or joint coordinates, such as "tip x" or "hinge.angle value": the last value is meant. Or a
-        dict from names to these, or to pairs such as ("tip x", "rms"), with what is taken over time, as in studies,
-        or a function of the values (n_t,) that returns a number and its derivatives by them, (n_t,).
+        Columns of sensors or joint coordinates, such as "tip x" or "hinge.angle value", of which the last value is
+        taken. Or a dict from names to such columns, or to pairs of a column and its reduction over time: a name, as in
+        studies ("rms"), or a function from the values, (n_t,), to a number and its derivatives, (n_t,).
         For "modes": "frequency 1", "damping 2", "real 1", "imaginary 3".
     parameters
         Key paths, "bodies.rod.mass" (docs/sensitivities.md), or a dict from names to them. Of a file: its keys, as in
@@ -167,17 +167,16 @@ def sensitivities(
     method
         "direct", whose cost grows with the parameters, or "adjoint", whose cost grows with the outputs.
     t_end, h, integrator, t_start, state
-        Of a motion, as for `integrate`; of a file by default as its table [run] says.
+        Of a motion, as for `integrate`; the defaults for a file are in its table [run].
     steps
-        Steps of the differences by which residuals change with a parameter, by its name, where a thousandth of its
-        size does not fit.
+        Steps of finite differences by name of the parameter, if the default, a thousandth of its size, does not suit.
     omega, center
         Of "rotation": angular velocity and a point of the axis, ground axes, (3,) [rad/s, m].
 
     Raises
     ------
     ModelError, SystemFileError
-        If a parameter or output is not there, a parameter changes the topology, or the motion has events, jumps of
+        If a parameter or output does not exist, a parameter changes the topology, or the motion has events, jumps of
         forces, forces with states, or steps that are not those of generalized-alpha with fixed step.
     ConvergenceError
         If there is no motion or equilibrium.
@@ -265,13 +264,13 @@ def require_no_memory(system: System) -> None:
             what = "states" if each.law.states else "multipliers"
             raise ModelError(
                 f"sensitivities: element {each.element.name!r} has {what}, which are not differentiated; "
-                "those of elements without are; else vary its parameter by floatframe sweep"
+                "take an element without them, or vary its parameter by floatframe sweep"
             )
     compiled = compiled_system(system)
     if len(gaps := compiled.model.gaps.connection):
         raise ModelError(
-            f"sensitivities: contact {compiled.connection_names[gaps[0]]!r} divides steps where it closes, which is "
-            "not differentiated; vary its parameter by floatframe sweep"
+            f"sensitivities: contact {compiled.connection_names[gaps[0]]!r} divides the step in which it closes, "
+            "which is not differentiated; vary its parameter by floatframe sweep"
         )
     if len(rows := compiled.model.states.row):
         owner = int(np.searchsorted(compiled.model.connections.w0, rows[0], side="right")) - 1
@@ -286,8 +285,8 @@ def require_smooth_run(family: Family, t_start: float, h: float, n_steps: int) -
     acting = [event for event in events_of(system) if getattr(event, "is_active", True)]
     if acting:
         raise ModelError(
-            f"sensitivities: event {acting[0].name!r}: motions over events are not differentiated; take the "
-            "events out, or end the run before them"
+            f"sensitivities: event {acting[0].name!r}: motions over events are not differentiated; remove "
+            "the events, or end the run before them"
         )
     stops = [coupler.name for coupler in system.couplers if coupler.limits is not None]
     if stops:
@@ -376,7 +375,7 @@ def seen_otherwise(family: Family, columns: tuple[Column, ...], points: Sequence
 def along(own: Neighbour, group: Configurations, columns: tuple[Column, ...], point: Point, changes: Array) -> Array:
     """Return the derivatives of measurements, (n_out, n_p), along changes of the point by parameters.
 
-    changes: d(x, u, u_dot, w)/dp, (3 n_u + n_w, n_p); each is followed so far that the point moves by `SLOPE_STEP`.
+    changes: d(x, u, u_dot, w)/dp, (3 n_u + n_w, n_p); the step along each moves the point by `SLOPE_STEP`.
     """
     size = np.abs(changes / scales_at(own, group, point)[:, None]).max(axis=0, initial=0.0)
     steps = SLOPE_STEP / np.where(size > 0, size, 1.0)
@@ -408,8 +407,8 @@ def slopes_at(own: Neighbour, group: Configurations, columns: tuple[Column, ...]
 def scales_at(own: Neighbour, group: Configurations, point: Point) -> Array:
     """Return typical magnitudes of (x, u, u_dot, w) at a point, (3 n_u + n_w,); a thousandth is a small change.
 
-    (1) x: the length of the system, a radian, the size of modes. (2) u, u_dot: x times a rate, and its square, that the
-    fastest motion has. (3) w: wrenches that do as much work on x as the largest one; states as they are.
+    (1) x: the length of the system, a radian, and `modal_size`. (2) u, u_dot: x times the rate of the fastest motion,
+    and times its square. (3) w: wrenches that do as much work on x as the largest one; states: their own values.
     """
     x = np.ones(group.n_v)
     for _, j, n_q in group.parts():
@@ -461,8 +460,8 @@ def of_rotation(
     for each, value, slope in zip(wanted, values[0], turned, strict=True):
         if steady.turn.any() and abs(slope) > DEPENDS * max(abs(float(value)), np.abs(values[0]).max(initial=0.0)):
             raise ModelError(
-                f"output {each.name!r}: {each.of!r} changes as the system rotates ({slope:.3g} per radian), so that it "
-                "has no one value; take a coordinate of a joint, a distance, a size, or axes that turn"
+                f"output {each.name!r}: {each.of!r} changes as the system rotates ({slope:.3g} per radian), so that "
+                "its value is not unique; take a joint coordinate, a distance, a magnitude, or rotating axes"
             )
     gradient = seen_otherwise(family, columns, [steady.point])[0]
     if method == "direct":

@@ -1,12 +1,12 @@
 """Barycentric parameters of a tree: bodies augmented by the masses of their subtrees.
 
-The joints of a chain carry a mass as if it sat in the joint; with mass m' of a subtree and d from the origin of a body
-to the joint that carries c [1]_,
+The mass of a subtree acts on the body that carries it like a point mass in the joint. With the mass m' of a subtree and
+d_c from the origin of a body to the joint of its child c [1]_,
 
     m' = m + Σ_c m'_c,      S' = S + Σ_c m'_c d_c,      K = J + Σ_c m'_c (d_c² 1 - d_c d_cᵀ).
 
-In trees of rotations the inverse dynamics knows the bodies by S' and K alone, both about the joint that carries the
-body; a translation or a free body keeps its mass to itself.
+In a tree of rotations, the inverse dynamics depends on the bodies only through S' and K, both about the joint that
+carries the body. A body on a translation and a free body do not pass their mass on.
 
 References
 ----------

@@ -1,8 +1,8 @@
 """Base parameters: the smallest set of parameter combinations that determines torques or reactions.
 
 All directions N of the parameters that change nothing, (p, k), are found either by rules (`silent_directions`,
-`silent_at_base`) or by the rank of a sampled linear form. Of the parameters k are then left out, chosen such that the
-rest is well determined, and what they did is added to those that stay:
+`silent_at_base`) or by the rank of a sampled linear form. Then k parameters are left out, chosen such that the rest is
+well determined, and their effect is added to the remaining parameters:
 
     phi = (phi_1, phi_2),   N = (N_1, N_2):     beta = phi_1 - N_1 N_2⁻¹ phi_2,      Y phi = Y_1 beta.
 """
@@ -51,26 +51,30 @@ __all__ = [
 
 
 # parameters of a tree without effect on torques, by rules over its joints: base parameters in closed form -------------
-# Three kinds of changes of the parameters leave all torques as they are. With everything in ground axes at the placed
-# configuration (a: direction of a rotation through p, d: direction of a translation):
+# Three kinds of changes of the parameters do not change any torque. All vectors are in ground axes at the placed
+# configuration (a: direction of a rotation through p):
 #
 # (1) Transfers: parts of the inertia of body i that can be moved to its parent, because the joint between them does not
-#     move them. A rotation transfers masses along its axis (a mass at p, and two changes of it along a), a
-#     translation every inertia tensor without mass. A joint of several coordinates transfers the parts that each of
-#     them transfers. Parts that are transferred to the ground have no effect.
-# (2) Parameters without effect on their own body, because its possible motions do not depend on them.
-#     No rotation on the way to the ground: S and J; m too, if there is no translation either.
-#     All rotations parallel to e: J but for e·J e, and S·e; a translation along e then lets also the rest of S through;
-#     about a line that stays (all rotations on it, translations along it): m on it unless there is a translation, and
-#     the rest of S if gravity is along e or there is none.
-#     Rotations in several directions through one point that stays: a mass there; S about it if there is no gravity.
-# (3) Inertia of a drive that is also one of its body: about the first rotation, and rotations that stay square to all
-#     before them, the rotor's J and e·J e of the body; along a translation along which nothing before it moves or
-#     weighs, and which nothing turns away, the rotor's and the mass.
+#     move them. A rotation transfers masses on its axis (a mass at p, and its first and second derivative along a). A
+#     translation transfers every inertia tensor without mass; if it is along e and all rotations before it are parallel
+#     to e, also first moments normal to e. A joint of several coordinates transfers the parts that each of them
+#     transfers. Parts that are transferred to the ground have no effect.
+# (2) Parameters that have no effect in any possible motion of their own body, which the joints between the body and the
+#     ground determine:
+#     If none of these joints rotates, S and J have no effect; if none translates either, m has none.
+#     If all rotations are parallel to e, S·e and J except e·J e have no effect. If in addition all rotation axes lie on
+#     one line and all translations are along it, a mass on the line has no effect unless there is a translation, and
+#     the rest of S has none if gravity is along e or zero.
+#     If there are several directions of rotation, all axes meet in one point and nothing translates, a mass at the
+#     point has no effect; nor has S about it if there is no gravity.
+# (3) Inertia of a drive that acts like inertia of its body. For the first rotation, and for rotations that stay normal
+#     to all rotations before them: the inertia of the rotor and e·J e of the body. For a translation, if earlier
+#     translations and gravity are normal to it and earlier rotations are parallel to it: the inertia of the drive and
+#     the mass.
 #
-# That these are all is not proven here but for the kinds of joints named; `base_parameters` finds the same by the rank
-# of sampled regressors, and tests hold them against each other over trees of all kinds. The rules for chains of single
-# rotations and translations are those of Gautier & Khalil (1990) [1]_, said without a convention of frames.
+# Completeness of the rules is proven only for the kinds of joints named. `base_parameters` finds the same directions by
+# the rank of sampled regressors, and tests compare both over trees of all kinds. The rules for chains of single
+# rotations and translations are those of Gautier & Khalil (1990) [1]_, stated without a convention of frames.
 #
 # References
 # ----------
@@ -198,8 +202,8 @@ def common(spaces: list[Array]) -> Array:
 def passing(own: list[Move], before: list[Move], dipoles: Callable[[list[Move], Array], Array]) -> Array:
     """(1) Return the parameters that can be transferred from a body to its parent, as rows of 10.
 
-    dipoles: the first moments without mass, (k, 10), that a translation lets through, by the moves before it and its
-    direction.
+    dipoles: function from the moves before a translation and its direction to the first moments without mass, (k, 10),
+    that the translation transfers.
     """
     if not own:
         return np.eye(10)
@@ -309,20 +313,20 @@ def drive_twins(move: Move, earlier: list[Move], gravity: Array) -> list[tuple[A
 
 
 # which parameters of a tree do nothing to the ground reaction: base parameters of reactions ---------------------------
-# The reaction of the ground is the rate of the momentum of all bodies less their weight. Parameters do nothing to it
-# where they bring no linear and no angular momentum in any motion, and no weight or moment of weight where they are
-# placed: without momentum their first moment stays. In the terms of the rules for torques above:
+# The reaction of the ground is the rate of the momentum of all bodies minus their weight. Parameters have no effect on
+# it if they contribute no linear and no angular momentum in any motion, and no weight and no moment of weight in the
+# placed configuration (without momentum, their first moment is constant). In the terms of the rules for torques above:
 #
 # (1) Transfers: masses along the axis of a rotation, inertia tensors without mass through a translation, and a first
-#     moment along the translation if all rotations before it, if any, have its direction. What passes to the ground has
-#     no momentum.
-# (2) Where all rotations on the way of a body to the ground are parallel to e: inertia tensors square to e (J e = 0).
-# (3) Drives act between two bodies: nothing of theirs reaches the ground.
-# (4) Of what (1) and (2) leave without momentum, only what has no weight and no moment of weight does nothing: of n
-#     directions those that solve six equations, force and moment of gravity on them at the placed configuration.
+#     moment along the translation if all rotations before it, if any, have its direction. Parts that are transferred to
+#     the ground have no momentum.
+# (2) If all rotations between a body and the ground are parallel to e: inertia tensors normal to e (J e = 0).
+# (3) Drives act between two bodies, so that their parameters have no effect on the ground.
+# (4) Directions of (1) and (2) have no momentum; only those without weight and moment of weight have no effect. They
+#     solve six equations: force and moment of gravity in the placed configuration are zero.
 #
-# Each does nothing by the balance of momentum; that they are all is not proven. `base_parameters` finds the same by the
-# rank of sampled regressors, and tests hold them against each other over trees of all kinds.
+# The balance of momentum proves each rule, but not that the rules are complete. `base_parameters` finds the same
+# directions by the rank of sampled regressors, and tests compare both over trees of all kinds.
 
 
 def silent_at_base(form: LinearForm) -> Array:
@@ -450,13 +454,13 @@ def base_parameters(form: LinearForm, *, source: str = "torques", by: str = "rul
         What is measured: "torques" of all coordinates, "reactions" of the ground, or "both".
     by
         "rules" over the joints, or "samples": the rank of the form over random motions.
-    seed
-        Of these.
+        seed
+            Seed of the random motions.
 
     Raises
     ------
     ModelError
-        If a name is not known, or there is no rule.
+        If a name is unknown, or there is no rule.
     """
     if source not in SOURCES:
         raise ModelError(f"base_parameters: source: expected one of {', '.join(SOURCES)}, got {source!r}")
@@ -473,7 +477,7 @@ def silent_by_rules(form: LinearForm, source: str) -> Array:
     """Return the directions of the parameters, (p, k), that have no effect on the measurements, by rules."""
     if form.independent is not None:
         raise ModelError(
-            f"system {form.system.name!r}: rules of base parameters are those of trees, and its joints close loops; "
+            f"system {form.system.name!r}: rules of base parameters hold for trees, but its joints close loops; "
             "find the base parameters by samples"
         )
     if source == "torques":
@@ -520,7 +524,7 @@ def sampled_silence(form: LinearForm, samples: TreeSamples, source: str) -> Arra
     return Vt[s <= RANK * s[0]].T * typical_parameters(form)[:, None]
 
 
-# typical magnitudes: bodies of mass 1 and of the size of the system, that fall by half of it in the typical time
+# typical magnitudes: bodies of mass 1 and of the size of the system, which fall by half this size in the typical time
 
 
 def typical_time(form: LinearForm) -> float:

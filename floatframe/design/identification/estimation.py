@@ -1,11 +1,12 @@
 """Base parameters from measured torques and reactions, with their standard deviations.
 
 (1) W beta = y + e: rows of the linear form for each channel and instant, columns of the base parameters.
-(2) Ordinary least squares gives residuals, and from each channel's sigma_k its noise.
-(3) Rows are divided by the sigma_k of their channel and solved again, until the sigma_k stand (weighted).
-(4) Rows whose residual is far above the noise lose weight, w = min(1, c sigma_k / |e|), until all stands (robust [1]_).
-(5) Deviations are those of white noise: C = (Wᵀ S⁻¹ W)⁻¹, whose diagonal are the variances of beta. Rows that follow
-    each other faster than the noise changes say less than they count: `whiteness` tells.
+(2) Ordinary least squares gives the residuals e, and their standard deviation sigma_k is the noise of channel k.
+(3) Rows are divided by the sigma_k of their channel and solved again, until the sigma_k converge (weighted).
+(4) Rows whose residual is far above the noise lose weight, w = min(1, c sigma_k / |e|), until all values converge
+    (robust [1]_).
+(5) Deviations assume white noise: the variances of beta are the diagonal of C = (Wᵀ S⁻¹ W)⁻¹. Rows that follow each
+    other faster than the noise changes contain less information than this assumes: see `whiteness`.
 
 References
 ----------
@@ -167,8 +168,8 @@ class Estimate:
         ]
         if unfit:
             said.append(
-                f"the model misses {', '.join(unfit)} of what was measured: look at friction, units (degrees said "
-                "to be rad), signs, the zero of angles (as the system is placed), gravity, exchanged columns, noise"
+                f"the model misses {', '.join(unfit)} of the measured values: check friction, units (degrees given "
+                "as rad), signs, the zero of angles (as the system is placed), gravity, exchanged columns, noise"
             )
         negative = [
             name
@@ -183,8 +184,8 @@ class Estimate:
         coloured = [name for name, r in zip(self.channels, self.whiteness, strict=True) if r > WHITE / np.sqrt(n)]
         if coloured:
             said.append(
-                f"residuals of {', '.join(coloured)} are not white: the model lacks something there, or rows follow "
-                "faster than the noise changes, and the deviations are too small; take fewer rows"
+                f"residuals of {', '.join(coloured)} are not white: the model lacks an effect, or rows follow each "
+                "other faster than the noise changes; the deviations are too small; take fewer rows"
             )
         return tuple(said)
 
@@ -220,14 +221,14 @@ def estimate(
     measured
         A motion, with torques, reactions, or both.
     method
-        Of `METHODS`.
+        One of `METHODS`.
     base
-        Combinations to estimate; by default those of the rank of the form over random motions.
+        Combinations to estimate; default: those found by the rank of the form over random motions.
 
     Raises
     ------
     ModelError
-        If there are fewer rows than parameters, or the motion leaves combinations undetermined; by name.
+        If there are fewer rows than parameters, or the motion does not determine some combinations, which are named.
     """
     if method not in METHODS:
         raise ModelError(f"estimate: method: expected one of {', '.join(METHODS)}, got {method!r}")
@@ -240,12 +241,12 @@ def estimate(
     n, n_channels, n_base = W.shape
     if n * n_channels <= n_base:
         raise ModelError(
-            f"estimate: {n} instants of {n_channels} channels cannot tell {n_base} parameters; measure longer"
+            f"estimate: {n} instants of {n_channels} channels cannot determine {n_base} parameters; measure longer"
         )
     if not y.any():
         raise ModelError("estimate: all measured torques and reactions are zero")
     require_excited(base, every)
-    alike = typical_forces(form, measured.source)  # forces and torques in one measure, until their noise is known
+    alike = typical_forces(form, measured.source)  # weights of forces and torques until their noise is known
     sigma, weights = alike, np.ones((n, n_channels))
     beta = solved(W, y, sigma, weights)
     for _ in range(1 if method == "ordinary" else ROUNDS):
@@ -272,7 +273,7 @@ def estimate(
 def noise(e: Array, weights: Array, spent: float) -> Array:
     """Return the noise of channels from their residuals, corrected for the number of fitted parameters."""
     n = len(e)
-    if weights.min() < 1.0:  # the median ignores outliers
+    if weights.min() < 1.0:  # robust: the median ignores outliers
         return np.median(np.abs(e), axis=0) / 0.6744897501960817 + np.finfo(float).tiny
     return np.sqrt((e**2).sum(axis=0) / max(n - spent, 1.0)) + np.finfo(float).tiny
 

@@ -1,12 +1,13 @@
 """Exciting motions: finite Fourier series within limits, with a well conditioned linear form.
 
-Of coordinate k, over one period T = 2 pi / w, with N harmonics [1]_
+Coordinate k, over one period T = 2 pi / w, with N harmonics, is [1]_
 
     x_k = c_k + Σ_l (a_kl sin(l w t) - b_kl cos(l w t)) / (l w),
 
 so that rates and accelerations are series too, the motion repeats (averages lower the noise) and its band is known.
-The coefficients minimise the logarithm of the condition number of the rows of the base parameters, rows and columns in
-their typical sizes, within limits of position, rate, acceleration and torque at the instants of one period.
+The coefficients minimise the logarithm of the condition number of the rows of the base parameters, with rows and
+columns divided by typical magnitudes, within limits of position, rate, acceleration and torque at the instants of one
+period.
 
 References
 ----------
@@ -120,22 +121,22 @@ def exciting_motion(
     Parameters
     ----------
     base
-        What is to be told.
+        The base parameters to determine.
     limits
-        Of every coordinate, by its name.
+        Limits of every coordinate, by its name.
     period
-        Of the motion [s].
+        Period of the motion [s].
     n_harmonics
-        N.
+        Number of harmonics N.
     n_instants
-        At which rows are taken and limits kept; between them positions may leave them by what the last harmonic does.
+        Number of instants of the rows, at which the limits hold; between them the last harmonic may exceed the limits.
     n_starts, max_iterations, seed
-        Random beginnings, the best of which is improved by SLSQP.
+        Number and seed of random starts, the best of which is improved by SLSQP, and its largest number of iterations.
 
     Raises
     ------
     ModelError
-        If a coordinate has no limits or impossible ones, or no motion keeps them.
+        If a coordinate has no limits or impossible ones, or no motion satisfies them.
     """
     form = base.form
     names = tuple(column.name for column in form.columns)
@@ -154,7 +155,7 @@ def exciting_motion(
     known: dict[bytes, tuple[float, float]] = {}  # the objective and its constraint evaluate the same motions
 
     def judged(x: Array) -> tuple[float, float]:
-        """Log of the condition number, and what the torques leave of their limits, the least share."""
+        """Return the logarithm of the condition number, and the smallest margin of a torque as a share of its limit."""
         key = x.tobytes()
         if key not in known:
             C = x.reshape(n_c, width)
@@ -198,7 +199,7 @@ def exciting_motion(
             x = scaled_into(x, bounds, blocks, 0.7)
     if not starts:
         raise ModelError(
-            "exciting_motion: no random motion keeps the limits of torque, however small; allow larger ones"
+            "exciting_motion: no random motion satisfies the torque limits, however small; allow larger torques"
         )
     start = min(starts, key=lambda x: judged(x)[0])
     constraints: list = [inside]
@@ -220,7 +221,7 @@ def checked(name: str, limits: Mapping[str, MotionLimits], names: tuple[str, ...
         if given not in names:
             raise ModelError(f"exciting_motion: limits: no coordinate {quoted(given)}{nearest(given, list(names))}")
     if name not in limits:
-        raise ModelError(f"exciting_motion: limits: expected those of every coordinate, none for {quoted(name)}")
+        raise ModelError(f"exciting_motion: limits: expected limits of every coordinate, got none for {quoted(name)}")
     each = limits[name]
     if not each.low < each.high or min(each.rate, each.acceleration, each.torque) <= 0:
         raise ModelError(

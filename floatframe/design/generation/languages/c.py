@@ -7,11 +7,11 @@ from floatframe.design.generation.routines import Routine
 
 __all__ = ["c_files"]
 
-#: Sine and cosine of one angle: the angle is reduced by k quarter turns, with pi/2 as a sum of two numbers, the first
-#: with 33 bits, so that k times it is exact. Polynomials in r², |r| <= pi/4, through Chebyshev points follow, with
-#: 1.4e-17 error.
+#: Sine and cosine of one angle. The angle is reduced by k quarter turns to r, |r| <= pi/4. Here pi/2 is the sum of two
+#: numbers, the first with 33 bits, so that its product with k is exact. The polynomials in r² interpolate at Chebyshev
+#: points with an error of 1.4e-17.
 SINE_COSINE = """\
-/* sine and cosine of x, to 2e-16; far from zero those of the library */
+/* sine and cosine of x, to 2e-16; by the library if |x| is large */
 static inline void {name}(double x, double *sine, double *cosine)
 {{
     if (fabs(x) < 65536.0) {{

@@ -81,7 +81,7 @@ def lines_of(routine: Routine, *, symbol: Callable[[str], str]) -> Lines:
         return f"{text(a, level)} {SIGNS[kind]} {text(b, level + 1)}", level
 
     for term in order:
-        if term.index in turned:  # written by its negative, b - a
+        if term.index in turned:  # its only use is its negative, written as b - a
             continue
         out, level = expression(term)
         is_free = term.kind in (CONSTANT, SYMBOL) or (term.kind == NEG and len(out) < 8)

@@ -10,7 +10,7 @@ __all__ = ["docstring", "python_files"]
 STACKED = '''
 
 def stacked(values, shape, many):
-    """Return results as an array of a shape, and of that of many motions behind it."""
+    """Return results as an array of the given shape, followed by the axes of many motions."""
     if not many:
         return np.array(values, dtype=float).reshape(shape)
     out = np.empty((len(values), *many))

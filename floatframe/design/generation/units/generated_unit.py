@@ -94,12 +94,12 @@ def compiled_library(sources: Mapping[str, bytes]) -> tuple[str, bytes]:
 
 
 VERSIONS = (2, 3)
-WORDS = "Multibody system {}: equations of motion as generated C, without needs where it runs."
+WORDS = "Multibody system {}: equations of motion as generated C, without runtime dependencies."
 STEP = "step"  #: name of the parameter of the unit
 #: text of the documentation page
 PAGE = """<p>The sources are in the folder sources.</p>
-<p>Time is in seconds. In co-simulation forces are held over a communication step, which is taken by the classical
-Runge-Kutta method in equal steps of at most the parameter {}. States can be kept, restored and serialised.</p>"""
+<p>Time is in seconds. In co-simulation, forces are constant over a communication step. The classical Runge-Kutta
+method divides it into equal steps of at most the parameter {}. States can be saved, restored and serialised.</p>"""
 STABLE = 2.6  #: largest product of the step and the fastest frequency
 
 
@@ -158,7 +158,7 @@ def generate_fmu(
         if named:
             raise ModelError(
                 f"generate_fmu: expected bodies, joints, gravity and linear joint forces, got {kind} "
-                f"{quoted(named[0].name)}, of which the unit would know nothing; leave it out"
+                f"{quoted(named[0].name)}, which the unit cannot represent; remove it"
             )
     routine = routine_of(tree, "forward", identifier(f"{system.name}_forward"))
     require_stable(model, tree, step / system.units.time)

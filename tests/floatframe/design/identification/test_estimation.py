@@ -172,4 +172,4 @@ def test_friction_that_the_model_lacks_is_told_by_residuals_that_correlate(robot
     misses, words = lacking.warnings
     assert misses.startswith("the model misses ")
     assert "joint1/angle" in words
-    assert "are not white: the model lacks something there" in words
+    assert "are not white: the model lacks an effect" in words

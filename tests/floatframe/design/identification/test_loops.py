@@ -137,7 +137,7 @@ def test_what_does_not_move_a_loop_is_refused_by_name(form):
     )
     with pytest.raises(ModelError, match="'gear': couplers and elements are no joints"):
         linear_form(replace(robot, couplers=[gear]), independent=ANGLES)
-    with pytest.raises(ModelError, match="rules of base parameters are those of trees"):
+    with pytest.raises(ModelError, match="rules of base parameters hold for trees"):
         base_parameters(form)
 
 

@@ -305,7 +305,7 @@ def test_prescribed_coordinates_are_refused(robot, tmp_path):
 
 def test_events_are_refused(robot, tmp_path):
     event = ff.Event("end", "joint1.angle", 1.0, stop=True)
-    with pytest.raises(ModelError, match=r"got event 'end', of which the unit would know nothing; leave it out"):
+    with pytest.raises(ModelError, match=r"got event 'end', which the unit cannot represent; remove it"):
         ff.generate_fmu(replace(robot.system, events=[event]), tmp_path / "robot.fmu")
     assert not list(tmp_path.iterdir())
 
