@@ -1,6 +1,6 @@
 """Integrators, one file each. The time loop is `floatframe.simulation.integrate`.
 
-An integrator is a frozen object with the functions `start` and `step`; what it carries between steps is a `Memory`.
+An integrator is a frozen object with the functions `start` and `step`. Its state between steps is a `Memory`.
 """
 
 from collections.abc import Callable
@@ -61,7 +61,7 @@ def made_integrator(chosen: Integrator | type[Integrator] | str) -> Integrator:
     Raises
     ------
     ModelError
-        If the name is unknown, or the class is none of an integrator.
+        If the name is unknown, or the class is not an integrator.
     """
     if isinstance(chosen, str):
         if chosen not in INTEGRATORS:

@@ -46,7 +46,7 @@ class DiscreteScheme(Integrator):
     def start(self, system: System, t: float, state: State | None = None, before: Memory | None = None) -> Memory:
         """Return the memory at the start, for a consistent state near the given one.
 
-        `a` holds the multipliers: of joints zero, of equations of elements those that fulfil them there.
+        `a` holds the multipliers: zero for joints; for equations of elements, the values that fulfil them at the start.
         """
         memory = super().start(system, t, state, before)
         held = discrete_system(system, type(self).__name__).held
@@ -86,7 +86,7 @@ class DiscreteScheme(Integrator):
             tolerance=self.tolerance, max_iterations=self.max_iterations, length=ds.length, h_min=least,
         )  # fmt: skip
         if outcome.status == NO_ACCELERATION:  # the memory is beyond the last good step: repeat the good steps
-            # explained first, because the repeated steps overwrite what it needs
+            # find the reason first: the repeated steps overwrite the arrays from which it is found
             failure = explained(compiled, work, outcome, self.max_iterations, LEAST_STEP * h)
             work.past.n[...] = 0
             again = self.advance(system, memory, work, t0=t0, h=h, first=first, n_steps=outcome.n_steps, every=every)

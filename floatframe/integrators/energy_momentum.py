@@ -18,8 +18,8 @@ __all__ = ["EnergyDecaying", "EnergyMomentum"]
 class EnergyMomentum(DiscreteScheme):
     """Second-order scheme that conserves energy and momenta to the tolerance of Newton's method [1]_ [2]_ [3]_.
 
-    In coordinates of the centre of mass (`structure_preserving.kernels.bodies`), with ' at the end of a step and
-    mean(...) for mean values over it:
+    In coordinates of the centre of mass (`structure_preserving.kernels.bodies`); a prime marks values at the end of a
+    step, mean(...) is the mean of both ends:
 
     (1) c' - c = h mean(v),  R' = R cay(h mean(omega)),  q' - q = h mean(q_dot)
     (2) m (v' - v) = h F
@@ -27,13 +27,14 @@ class EnergyMomentum(DiscreteScheme):
     (4) Y' - Y = h (1/2 wᵀ M,k(mean q) w' - K mean(q) - D mean(q_dot) + Q)
     (5) g(t') = 0
 
-    F, tau, Q act at the mean lever with the discrete derivatives of kernels/markers.py, so that their work is that of
+    F, tau, Q act at the mean lever with the discrete derivatives of kernels/markers.py, so that they do the work of
     the true displacements. T' - T is mean(v)·(2) + mean(omega)·(3) + mean(q_dot)·(4), because M is of degree two in q:
-    energy changes by the work of forces alone, closed joints do none. Torques of internal forces cancel, since levers
-    are those to the mean of the true positions. Derivation in docs/integrators.md.
+    energy changes by the work of forces alone, and closed joints do no work. Torques of internal forces cancel, because
+    their levers end at the mean of the true positions. docs/integrators.md has the derivation.
 
-    Velocities fulfil joints in the mean over a step, at its ends to second order; accelerations and reactions in the
-    results are those of the equations of motion at the output times, for velocities that fulfil the joints.
+    The mean velocities of a step fulfil the joints exactly, the velocities at its ends to second order. Accelerations
+    and reactions in the results follow from the equations of motion at the output times, for velocities that fulfil
+    the joints.
 
     Parameters
     ----------
@@ -67,24 +68,24 @@ class EnergyMomentum(DiscreteScheme):
 class EnergyDecaying(DiscreteScheme):
     """The scheme of `EnergyMomentum` with dissipation in unresolved modes: energy never increases.
 
-    In place of (1) and (4), with E = J⁻¹ B and M_e = M - Bᵀ E at q = 0, the modes Phi of (K, M_e), their frequencies
-    omega, and Z = Y - Eᵀ Pi, the momentum of vibrations, which is zero in all rigid motions whatever the frame,
+    Let E = J⁻¹ B and M_e = M - Bᵀ E at q = 0, Phi the modes of (K, M_e), omega their frequencies, and Z = Y - Eᵀ Pi the
+    momentum of vibrations, which is zero in every rigid motion, in any body frame. (1) and (4) are replaced by
 
         R' = R cay(h (mean(omega) - E y)),   q' - q = h (mean(q_dot) + y),   y = F (Z* - Z),
         K mean(q) becomes K (mean(q) + X (q' - q)),   X = Phi chi Phiᵀ M_e,   F = Phi chi/(1 + 2 chi) Phiᵀ,
         chi = chi_inf x²/(1 + x²),   x = omega h,   chi_inf = (1 - rho)/(1 + rho)/2
 
     Z* is Z' for the velocities that y = 0 would give, so that y = Phi chi Phiᵀ (Z' - Z) where deformations are small.
-    Energy falls in a step by (q' - q)ᵀ K X (q' - q) + yᵀ (Z' - Z), whatever h, since chi is at most 1/2; momenta stay
-    exact. A mode alone has the spectral radius of the method with theta = 1/2 + chi, rho_inf where h is long; for short
-    h dissipation is of third order, the scheme of second. The idea of dissipating stress and velocity together is that
-    of Armero & Romero (2001) [1]_; the filter by frequency, which makes it of second order, is possible because K is
-    constant here.
+    In a step, energy falls by (q' - q)ᵀ K X (q' - q) + yᵀ (Z' - Z) for any h, because chi is at most 1/2; momenta stay
+    exact. A single mode has the spectral radius of the method with theta = 1/2 + chi, which is rho_inf for long h. For
+    short h the dissipation is of third order and the scheme of second. Armero & Romero (2001) [1]_ proposed to
+    dissipate stress and velocity together. The filter by frequency, which makes the scheme of second order, is possible
+    because K is constant here.
 
     Parameters
     ----------
     rho_inf
-        Spectral radius of modes far above 1/h, 0 <= rho_inf <= 1; 1: `EnergyMomentum`.
+        Spectral radius of modes with frequencies far above 1/h, 0 <= rho_inf <= 1; 1 gives `EnergyMomentum`.
     tolerance
         Largest last correction over the increments of the step.
     max_iterations

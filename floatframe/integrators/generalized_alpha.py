@@ -60,25 +60,25 @@ class GeneralizedAlpha(Integrator):
         u_new = u + h ((1 - gamma) a + gamma a_new)
     (3) (1 - alpha_m) a_new + alpha_m a = (1 - alpha_f) u_dot_new + alpha_f u_dot
 
-    Unknowns of Newton's method are x and beta h² w, the equations of motion are multiplied by beta h², so that the
-    matrix stays well-conditioned as h falls. The start uses a = u_dot(t + (alpha_m - alpha_f) h) without what h does
-    not follow, and shifts the velocities by O(h²) such that the first step closes the joints without a kick
-    (`start.step_filter`); without both, reactions begin with an error of first order. Where forces jump, a changes by
-    what u_dot does, filtered likewise.
+    The unknowns of Newton's method are x and beta h² w, and the equations of motion are multiplied by beta h², so that
+    the matrix stays well-conditioned as h falls. The start uses a = u_dot(t + (alpha_m - alpha_f) h) without the
+    components that steps of size h do not resolve, and changes the velocities by O(h²) so that the first step closes
+    the joints without a kick (`initial_conditions.step_filter`). Otherwise reactions would begin with an error of first
+    order. Where forces jump, a changes by the jump of u_dot, filtered likewise.
 
-    Energy: in linear systems no mode gains any, and modes that h does not resolve lose all but rho_inf of their
-    amplitude in a step; in nonlinear ones its error is of second order.
+    In linear systems no mode gains energy, and in each step the amplitude of a mode that h does not resolve falls to
+    rho_inf times its value. In nonlinear systems the error of the energy is of second order.
 
     With `error_tolerance` the step follows the motion. The position x of (2) and the exact one differ by [3]_
 
         e = (gamma/2 - beta - 1/12) h² (a_new - a) + O(h⁴),
 
     because a = u_dot + (1/2 - gamma) h u_ddot to first order, so that x has h³ u_ddot ((1/2 - gamma)/2 + beta) in the
-    place of h³ u_ddot / 6. A step whose e is above the tolerance, or in which Newton's method fails, is tried again,
-    shorter. e is that of the worst body: root mean square over its own mass, divided by the size of all that hangs
-    together with it by joints and forces (the ground left out), so that no heavy or far body hides the error of
-    another. The `h` of `integrate` is then the distance of output times and the longest step; output times are met
-    exactly, by equal steps from one to the next.
+    place of h³ u_ddot / 6. A step is repeated with a smaller size if e is above the tolerance or Newton's method fails.
+    e is taken for each body, as the root mean square over its mass divided by the size of all bodies connected with it
+    by joints and forces (without the ground), and the largest decides: so no heavy or distant body hides the error of
+    another. The `h` of `integrate` is then the interval of output times and the longest step. Equal steps from one
+    output time to the next meet these times exactly.
 
     Parameters
     ----------
@@ -92,8 +92,8 @@ class GeneralizedAlpha(Integrator):
     error_tolerance
         Largest local error of a body in a step relative to the size of the connected bodies; None: fixed step.
     h_min
-        Smallest size of a divided step, after failure or at a contact [s]; None: a millionth of h, without division of
-        fixed steps in systems without contacts and dry friction.
+        Smallest size to which a step may be divided, after failure or at a contact [s]. None: a millionth of h; fixed
+        steps are then divided only in systems with contacts or dry friction.
     parameters
         alpha_m, alpha_f, beta, gamma instead of those from rho_inf (see `newmark`, `hht`).
     stabilized
@@ -105,7 +105,7 @@ class GeneralizedAlpha(Integrator):
     .. [1] Arnold & Bruels (2007), Multibody System Dynamics 18, 185-202.
     .. [2] Bruels & Cardona (2010), Journal of Computational and Nonlinear Dynamics 5, 031002.
     .. [3] The estimate of Zienkiewicz & Xie (1991), Earthquake Engineering & Structural Dynamics 20, 871-887, which
-       Negrut et al. memory to the index-3 equations of HHT, for all parameters; derived above.
+       Negrut et al. carried over to the index-3 equations of HHT; derived above for all parameters.
     """
 
     rho_inf: float = 0.8
@@ -148,7 +148,7 @@ class GeneralizedAlpha(Integrator):
     def after_jump(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
         """Return the memory after forces have jumped at t, and the results there.
 
-        The state stays; u_dot and a change by what the filter of `start.step_filter` with s = 1 lets of the jump.
+        The state stays. u_dot and a change by the jump after the filter of `initial_conditions.step_filter` with s = 1.
         """
         if memory.h == 0.0:
             return started_anew(self, system, t, memory, work)
@@ -161,7 +161,7 @@ class GeneralizedAlpha(Integrator):
     ) -> tuple[Memory, Array]:
         """Return the memory with u_dot and w after forces have jumped at t; the change of u_dot is filtered.
 
-        may: as of `spin_at`.
+        may: see `spin_at`.
         """
         work = work_from(compiled.model, memory.w)
         work.state.time[...] = t
@@ -177,7 +177,7 @@ class GeneralizedAlpha(Integrator):
     ) -> tuple[Memory, Rows, int, Failure | None]:
         """Advance by n_steps of size h, beginning with step `first` counted from t0; see `integrator.Integrator`.
 
-        `work` holds the factors of the last Newton matrix, which serve until they are too old.
+        `work` holds the factors of the last Newton matrix, which are used until they are too old.
         """
         from floatframe.engine.kernels.entry import absolute_kernels
 
@@ -202,7 +202,7 @@ class GeneralizedAlpha(Integrator):
         }
 
     def least_step(self, h: float, compiled: CompiledSystem) -> float:
-        """Return the smallest size of a divided step of size h; 0 if steps may not be divided."""
+        """Return the smallest size to which a step of size h may be divided; 0 if steps may not be divided."""
         if self.h_min is not None:
             return min(self.h_min, h)
         is_fixed = self.error_tolerance is None and not has_divided_steps(compiled.model)
@@ -254,7 +254,8 @@ class GeneralizedAlpha(Integrator):
     def prepared(self, system: System, memory: Memory, h: float, t: float) -> Memory:
         """Return the memory with algorithmic accelerations for steps of size h that begin at t.
 
-        At the start, and where longer steps follow: as `start.step_filter` says. Shorter steps: a nearer to u_dot.
+        At the start, and where longer steps follow, a is found as in `initial_conditions.step_filter`. Where shorter
+        steps follow, the difference a - u_dot is scaled by the ratio of the step sizes.
         """
         compiled = compiled_system(system)
         is_divided = self.least_step(h, compiled) > 0.0
@@ -302,7 +303,7 @@ class GeneralizedAlpha(Integrator):
             return Failure(words, excess)
         if status == SINGULAR_CONNECTION:
             words = (
-                f"the equations of {compiled.connection_words(index)} depend on others here (a singular position); "
+                f"the equations of {compiled.connection_words(index)} depend on other equations (a singular position); "
                 "choose a smaller h, or check for a drive out of reach or an error in the system"
             )
             return Failure(f"{words}; {fast_turn}" if fast_turn else words, excess)
@@ -340,10 +341,10 @@ def newmark(beta: float = 0.25, gamma: float = 0.5, **options: float) -> General
     Parameters
     ----------
     beta, gamma
-        Of positions and velocities: x = h u + h² ((1/2 - beta) a + beta a_new). beta >= gamma/2 >= 1/4 is stable for
-        every h in linear systems.
+        Parameters of positions, x = h u + h² ((1/2 - beta) a + beta a_new), and of velocities. In linear systems the
+        method is stable for every h if beta >= gamma/2 >= 1/4.
     options
-        As of `GeneralizedAlpha`.
+        Other parameters of `GeneralizedAlpha`.
 
     References
     ----------
@@ -357,12 +358,12 @@ def newmark(beta: float = 0.25, gamma: float = 0.5, **options: float) -> General
 def trapezoidal(**options: float) -> GeneralizedAlpha:
     """Return the trapezoidal rule `newmark(1/4, 1/2)`, which has no numerical damping.
 
-    In linear systems without joints it keeps the energy; reactions of joints oscillate by O(h) for good.
+    In linear systems without joints it conserves energy. Reactions of joints oscillate permanently by O(h).
 
     Parameters
     ----------
     options
-        As of `GeneralizedAlpha`.
+        Other parameters of `GeneralizedAlpha`.
     """
     return newmark(0.25, 0.5, **options)
 
@@ -373,9 +374,9 @@ def hht(alpha: float = -0.1, **options: float) -> GeneralizedAlpha:
     Parameters
     ----------
     alpha
-        Numerical damping, -1/3 (most) to 0 (none: the trapezoidal rule).
+        Numerical damping, from -1/3 (largest) to 0 (none: the trapezoidal rule).
     options
-        As of `GeneralizedAlpha`.
+        Other parameters of `GeneralizedAlpha`.
 
     References
     ----------
@@ -420,7 +421,7 @@ def words_of_fast_turn(compiled: CompiledSystem, u: Array, h: float) -> str:
 
 
 def rows_closed_by_positions(model: Model, stabilized: bool) -> NDArray[np.bool_]:
-    """Return which rows constrain positions but not velocities, (n_w,); if stabilised, only those of elements."""
+    """Return which rows constrain positions but not velocities, (n_w,); if stabilised, only rows of elements do."""
     is_stabilized = np.repeat(np.isin(model.connections.law, (JOINT, COUPLER)), model.connections.size)
     return is_held_position(model.rows.kind) & ~(is_stabilized & stabilized)
 

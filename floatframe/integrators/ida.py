@@ -45,11 +45,12 @@ MOST_STEPS = 100_000  #: largest number of solver steps between two outputs
 class Ida(Integrator):
     """Backward differentiation of orders one to five with variable steps: SUNDIALS IDA [1]_, through scikit-sundae.
 
-    Joints enter by their second derivatives: accelerations and reactions follow from the state by one linear system
-    (index one), y' = (v, p * omega / 2, q_dot, u_dot(t, y)). At the end of each batch of steps, and in every output,
-    the state is put back on the joints with the least motion, positions first, then velocities. It is for checks of
-    the other methods: slow, and its energy falls or rises with the tolerances. Work and dissipation in the results
-    are summed by the trapezoidal rule over the outputs, and `stops` of elements looked at there.
+    Joints enter by their second derivatives: one linear system gives accelerations and reactions of a state (index
+    one), y' = (v, p * omega / 2, q_dot, u_dot(t, y)). At the end of each batch of steps, and in every output, the state
+    is projected on the constraints of the joints with the least motion, positions first, then velocities. The method is
+    for checks of the others: it is slow, and its energy drifts by an amount that depends on the tolerances. Work and
+    dissipation in the results are summed by the trapezoidal rule over the outputs. `stops` of elements are checked at
+    the outputs only.
 
     Needs the extra `ida`: pip install "floatframe[ida]".
 
@@ -79,12 +80,12 @@ class Ida(Integrator):
         compiled = compiled_system(system)
         for c, name in enumerate(compiled.connection_names):
             if compiled.model.connections.law[c] in (COUPLER, USER_FORCE):
-                raise ModelError(f"Ida: {name!r} has a memory of its own, which this scheme does not know; use another")
+                raise ModelError(f"Ida: {name!r} has a memory, which this scheme cannot integrate; use another scheme")
         for each in compiled.laws:
             if each.law.states or each.law.multipliers:
                 raise ModelError(
-                    f"Ida: element {each.element.name!r} has states or multipliers of its own, which this scheme does "
-                    "not know; use GeneralizedAlpha"
+                    f"Ida: element {each.element.name!r} has states or multipliers of its own, which this scheme "
+                    "cannot integrate; use GeneralizedAlpha"
                 )
         require_no_remembered_contacts(compiled, "Ida")
         return super().start(system, t, state, before).changed(a=np.zeros(0))
@@ -107,10 +108,10 @@ class Ida(Integrator):
         reached, message = solution(made, times, flattened(memory.state))
         made.rotations.begin(float(times[0]), memory.angle, memory.angle_rate)
         for t, (at, y) in zip(times[1:], reached, strict=False):
-            if not np.isfinite(y).all() or abs(at - t) > 1e-9 * (times[1] - times[0]):  # it may end before its failure
+            if not np.isfinite(y).all() or abs(at - t) > 1e-9 * (times[1] - times[0]):  # a failed solver ends early
                 break
             own.state.time[...] = t
-            own.counted.no_number[...] = 0  # of a trial beyond
+            own.counted.no_number[...] = 0  # the solver may have evaluated a NaN beyond this time
             state = with_compatible_velocities(compiled, own, assembled(compiled, own, state_of(compiled, y)))
             yield (float(t), state, *made.accelerations(t, state))
         else:
@@ -121,14 +122,14 @@ class Ida(Integrator):
     def solved(self, made: "Motion", t: Array, y_0: Array) -> tuple[list[tuple[float, Array]], str]:
         """Return the times and y that the solver reached, except the first, and its message."""
         solver = self.solver(made)
-        # with two times, every step is returned
+        # the solver returns all its steps if it gets only two times, therefore a third one is added
         asked = t if len(t) > 2 else np.array([t[0], 0.5 * (t[0] + t[1]), t[1]])
         solution = solver.solve(asked, y_0, made.rates(float(t[0]), y_0))
         reached = zip(np.atleast_1d(solution.t), np.atleast_2d(solution.y), strict=True)
         return list(reached)[len(asked) - len(t) + 1 :], solution.message
 
     def solved_past_contacts(self, made: "Motion", t: Array, y_0: Array) -> tuple[list[tuple[float, Array]], str]:
-        """Return the same for a system with contacts, step by step, so that no short contact is missed."""
+        """Return the same as `solved` for a system with contacts, step by step, so that no short contact is missed."""
         compiled, work = made.compiled, new_work(made.compiled.model)
 
         def gaps(at: float, y: Array) -> Array:
@@ -146,7 +147,7 @@ class Ida(Integrator):
                 if not result.success:
                     return reached, result.message
                 end = float(result.t)
-                if end <= begin:  # after outputs within a step, its end is returned once more
+                if end <= begin:  # after outputs within a step, the solver returns the end of the step once more
                     continue
                 both = np.array([y, result.y]), np.array([rates, result.yp])
                 found = stretches_of_passed_contact(gaps, begin, end, *both)

@@ -38,7 +38,7 @@ __all__ = [
     "with_angles",
 ]
 
-LEAST_STEP = 1e-6  #: smallest part of the largest step, for divided steps without a given minimum
+LEAST_STEP = 1e-6  #: smallest size of a divided step relative to the largest, if the user gives no minimum
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Integrator(Protocol):
     def start(self, system: System, t: float, state: State | None = None, before: Memory | None = None) -> Memory:
         """Return the memory at the start: the consistent state and its accelerations.
 
-        Counted angles, angles of couplers and states of user forces go on from those of a memory `before`.
+        Counted angles, angles of couplers and states of user forces continue from those of a memory `before`.
         """
         known, angle = (None, None) if before is None else (before.w, before.angle)
         made = consistent_motion(system, state, t=t, known=known, angle=angle)
@@ -89,8 +89,8 @@ class Integrator(Protocol):
         Returns
         -------
         tuple
-            The memory after the last good step; the rows of results; how many steps were good; why the next was not,
-            or None.
+            The memory after the last good step; the rows of results; the number of good steps; the reason why the next
+            step failed, or None.
         """
         raise NotImplementedError
 
@@ -147,8 +147,8 @@ def with_angles(
 ) -> Memory:
     """Return the memory at the start of a motion with its counted angles.
 
-    They go on from those of a memory before, else from the motions that prescribe them, from the state that a motion
-    begins with, or between -pi and pi.
+    They continue from those of a memory `before`. Without one they begin with the values of the motions that prescribe
+    them, else of the given initial state, else between -pi and pi.
     """
     compiled = compiled_system(system)
     if before is None:
@@ -175,7 +175,7 @@ def turned_on(system: System, memory: Memory, h: float) -> Memory:
 def coasted(
     method: Integrator, system: System, t: float, size: float, memory: Memory, work: Work
 ) -> tuple[Memory, Rows]:
-    """Return memory and results extrapolated from rates to a time so close to t that a step would be only rounding."""
+    """Return memory and results at t + size, extrapolated from the rates, where a step would only be roundoff."""
     compiled = compiled_system(system)
     state = displaced(compiled.model, memory.state, size * memory.state.u)
     w, rows = memory.w.copy(), compiled.model.states.row
@@ -186,7 +186,7 @@ def coasted(
 
 
 class FollowedRotations:
-    """Counted rotations of bushings for a method with its own steps; they are written into the iterate."""
+    """Counted rotations of bushings for a method that chooses its own steps; they are written into the iterate."""
 
     def __init__(self, model: Model, work: Work, t: float, memory: Memory) -> None:
         """Begin to count from the state of a motion at time t."""
@@ -195,14 +195,14 @@ class FollowedRotations:
         self.begin(t, memory.angle, memory.angle_rate)
 
     def begin(self, t: float, angle: Array, rate: Array) -> None:
-        """Set the rotations at time t, from which they are counted further."""
+        """Set the rotations at time t, from which the count continues."""
         self.t, self.angle, self.rate = t, angle.copy(), rate.copy()
         self.state.angle[: len(angle)] = angle
 
     def has_changed(self, t: float) -> bool:
         """Update the rotations in the iterate for time t.
 
-        Return whether they differ by full turns from those used before.
+        Return whether they differ by full turns from the rotations used before.
         """
         changed = False
         for k in self.first:
@@ -240,9 +240,9 @@ def observed_outputs(
     Parameters
     ----------
     outputs
-        Time, state, u_dot and w at output times h apart, as a solver with steps of its own finds them.
+        Time, state, u_dot and w at output times h apart, found by a solver with steps of its own.
     name
-        Of the solver, for messages.
+        Name of the solver, for messages.
     """
     rows, n_good = [new_rows(compiled_system(system).model, 0)], 0
     try:
@@ -278,18 +278,18 @@ def joined_rows(parts: Sequence[Rows]) -> Rows:
 def failure_of_element(
     compiled: CompiledSystem, work: Work, outcome: Outcome, least: float, smaller: str
 ) -> Failure | None:
-    """Return the reason for a failed step that an element or contact gives, for any method; None if there is none.
+    """Return the reason for a failed step if an element or contact caused the failure, for any method; otherwise None.
 
-    least: the smallest step; smaller: what may be given to have shorter ones.
+    least: the smallest step; smaller: name of the option that allows shorter steps.
     """
     from floatframe.engine.kernels.generalized_alpha import STOPPED, UNRESOLVED
 
-    if outcome.status == STOPPED:  # the step converged, whatever an iterate of it gave
+    if outcome.status == STOPPED:  # the step converged, so a NaN in one of its iterates does not matter
         return Failure(compiled.stop_words[outcome.singular], outcome.excess)
     if no_number := int(work.counted.no_number):
         words = (
             f"{compiled.connection_words(no_number - 1)} is not finite (NaN or infinity) for a finite motion; check "
-            "its law, or choose a smaller h if it is only known near the motion"
+            "its law, or choose a smaller h if the law is defined only near the motion"
         )
         return Failure(words, outcome.excess)
     if outcome.status != UNRESOLVED:

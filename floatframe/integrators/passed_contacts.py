@@ -1,9 +1,9 @@
 """Contacts that a solver with its own steps misses: open at both ends of a step, but closed between them.
 
-An error estimate knows only what the solver has evaluated. The cubic through the ends of a step and their rates shows
-the rest: where a gap is closed within the step alone, the solver goes anew to just before it, then in steps that end
-within the contact. There its force enters the error estimate. (The dense output of a step may have evaluated the force
-that the step itself has not seen.)
+An error estimate contains only forces that the solver has evaluated. Gaps are therefore evaluated along the cubic
+through the ends of a step and their rates. If a gap closes only within the step, the solver repeats it: first to just
+before the contact, then in steps short enough to end within the contact, where its force enters the error estimate.
+(The dense output of a step may have evaluated the force that the step itself has missed.)
 """
 
 from collections.abc import Callable
@@ -35,7 +35,7 @@ def stretches_of_passed_contact(
     Parameters
     ----------
     gaps
-        Gaps of a time and y.
+        Function of time and y that returns all gaps.
     y, rates
         Solution and its rates at both ends, (2, n) each.
     """
@@ -46,7 +46,7 @@ def stretches_of_passed_contact(
     t = np.linspace(t_0, t_1, PARTS + 1)
     values = np.array([gaps(at, way(at)) for at in t])
     found = []
-    is_near = values.min(axis=0) <= np.ptp(values, axis=0)  # others change too little to close between the values
+    is_near = values.min(axis=0) <= np.ptp(values, axis=0)  # other gaps change too little to close between the values
     for g in np.flatnonzero((values[0] >= 0.0) & (values[-1] >= 0.0) & is_near):
 
         def gap(at: float, g: int = int(g)) -> float:

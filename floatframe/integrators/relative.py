@@ -42,14 +42,14 @@ class RelativeGeneralizedAlpha(Integrator):
 
     (1) predict: a_new = a for every unknown s = (z, q)
     (2) Newton on  rho(s, s_dot, s_ddot, w) = 0, g = 0  over the increment x of the step, where rho is the residual
-        projected along the coordinates, g what loops, couplers and force elements say, and
+        projected along the coordinates, g the equations of loops, couplers and force elements, and
         x = h s_dot + h² ((1/2 - beta) a + beta a_new),  Q exp(x) for rotations
         s_dot_new = s_dot + h ((1 - gamma) a + gamma a_new)
     (3) (1 - alpha_m) a_new + alpha_m a = (1 - alpha_f) s_ddot_new + alpha_f s_ddot
 
-    Trees have no constraints: joints stay closed to rounding, positions, velocities and accelerations alike. Loops are
-    closed by the constraints of their cut joints, of index 3, and begin as those of `GeneralizedAlpha` do. The error
-    that steers the step is that of the unknowns, measured by how it moves the bodies, as there.
+    Trees have no constraints: positions, velocities and accelerations fulfil the joints to roundoff. Loops are closed
+    by the index-3 constraints of their cut joints, which begin like those of `GeneralizedAlpha`. The step is controlled
+    by the error of the unknowns, measured by the motion of the bodies that it causes, as in `GeneralizedAlpha`.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class RelativeGeneralizedAlpha(Integrator):
     error_tolerance
         Largest local error of a body in a step, as in `GeneralizedAlpha`.
     h_min
-        Smallest size of a divided step after failure [s]; None as in `GeneralizedAlpha`.
+        Smallest size to which a step may be divided after failure [s]; None as in `GeneralizedAlpha`.
     parameters
         alpha_m, alpha_f, beta, gamma instead of those from rho_inf.
     stabilized
@@ -105,7 +105,7 @@ class RelativeGeneralizedAlpha(Integrator):
         model, tree = compiled_system(system).model, tree_of(system).tree
         after, joints = memory.copied(), new_joint_work(model, tree)
         rows = joint_kernels.observe(model, work, tree, joints, NO_TANGENT, memory=after, t=t)
-        return memory.changed(power=after.power), rows  # reactions written there are those of the row alone
+        return memory.changed(power=after.power), rows  # the reactions in `after` serve this row of results alone
 
     def advance(
         self, system: System, memory: Memory, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
@@ -131,7 +131,8 @@ class RelativeGeneralizedAlpha(Integrator):
     def prepared(self, system: System, memory: Memory, h: float, t: float) -> Memory:
         """Return the memory with algorithmic accelerations of the unknowns for steps of size h that begin at t.
 
-        At the start, and where longer steps follow: as `start.step_filter` says, in the coordinates of the joints.
+        At the start, and where longer steps follow, they are found as in `initial_conditions.step_filter`, in the
+        coordinates of the joints.
         """
         compiled, method = compiled_system(system), self.absolute
         is_divided = method.least_step(h, compiled) > 0.0
@@ -182,7 +183,7 @@ def in_formulation(integrator: Integrator, formulation: str | None) -> Integrato
     Raises
     ------
     ModelError
-        If there is no such formulation, or the method is absolute alone.
+        If there is no such formulation, or the method works only in absolute coordinates.
     """
     if formulation is None:
         return integrator
@@ -207,7 +208,7 @@ class Kept:
     after: Memory | None = None
 
 
-#: by the identity of an array of the working arrays; an entry is removed when that array is freed
+#: data by the id of an array of the working arrays; an entry is removed when that array is freed
 KEPT: dict[int, Kept] = {}
 
 
@@ -250,8 +251,8 @@ def joint_accelerations(
 ) -> tuple[Array, Array]:
     """Return the initial s_ddot and its rate at the positions of the unknowns in the memory, (n_u,).
 
-    spin: bodies that spin by themselves, whose rates are those of s_ddot without the turn of their axes, in axes that
-    do not spin.
+    spin: bodies whose spin is integrated separately. Their rates are those of s_ddot without the rotation of their
+    axes, in axes that do not spin.
     """
     state, u_dot, s = memory.state, begun.u_dot, NEAR_BY * h
     jerk = begun.rates if spin is None else begun.rates - spin.further
@@ -289,7 +290,8 @@ def shifted(
 ) -> Memory:
     """Return the memory with velocities changed by O(h²), so that the first step closes some of the kept rows.
 
-    G ds = -g(after)/h with the matrix of a step, M + gamma h D + beta h² K, as (3) of `start.step_filter`.
+    Solves G ds = -g(after)/h with the matrix of a step, M + gamma h D + beta h² K, as in (3) of
+    `initial_conditions.step_filter`.
     """
     from floatframe.engine.tree.kernels.entry import motion_of_bodies, moved, newton_matrix, projected
 

@@ -56,16 +56,17 @@ SETTLED = 1e-12  #: tolerance for the last change of reactions and other implici
 class RelativeOde(Integrator):
     """SciPy's `solve_ivp` on the ordinary differential equation of the independent coordinates (docs/relative.md §7).
 
-    (1) coordinates that close the loops are chosen by pivoted LU, and anew where the choice wears out
-    (2) at each evaluation loops are closed exactly, in positions by Newton's method and in rates
+    (1) pivoted LU chooses the dependent coordinates, which close the loops, and chooses again when they become
+        unsuitable
+    (2) each evaluation closes the loops exactly: positions by Newton's method, rates by a linear system
     (3) accelerations and reactions follow from the recursive equations
 
-    so that constraints hold to rounding at any tolerance. Steps and orders are the solver's; `h` of `integrate` is the
-    distance of outputs. Rotations are counted from the beginning of a batch of steps, anew after two radians. Work and
-    dissipation are summed by the trapezoidal rule over the outputs, `stops` of elements looked at there. States of
-    elements and user forces are unknowns of the solver beside coordinates and rates; multipliers of elements, and
-    friction by the force in its joint, are found with the reactions by Newton's method. Elements that feel
-    accelerations are for `RelativeGeneralizedAlpha`.
+    Constraints therefore hold to roundoff at any tolerance. The solver chooses steps and orders; `h` of `integrate` is
+    the interval of outputs. Rotations are measured from the beginning of a batch of steps; the reference is renewed
+    after two radians. Work and dissipation are summed by the trapezoidal rule over the outputs, and `stops` of elements
+    are checked at the outputs only. States of elements and user forces are unknowns of the solver, like coordinates and
+    rates. Multipliers of elements, and friction that depends on the force in its joint, are found with the reactions by
+    Newton's method. Elements whose law depends on accelerations need `RelativeGeneralizedAlpha`.
 
     Parameters
     ----------
@@ -94,8 +95,8 @@ class RelativeOde(Integrator):
         for each in compiled.laws:
             if each.law.accelerations:
                 raise ModelError(
-                    f"RelativeOde: element {each.element.name!r} feels accelerations, which this scheme does not know; "
-                    "use GeneralizedAlpha"
+                    f"RelativeOde: element {each.element.name!r} depends on accelerations, which this scheme does not "
+                    "support; use GeneralizedAlpha"
                 )
         require_no_remembered_contacts(compiled, "RelativeOde")
         return super().start(system, t, state, before).changed(a=np.zeros(0))
@@ -111,7 +112,7 @@ class RelativeOde(Integrator):
         )
         memory = memory.changed(n_iterations=memory.n_iterations + motion.n_evaluations)
         if failure is not None and n_steps > 1 and not has_stopped and compiled_system(system).stop_words:
-            begun = first + n_good  # its stop may precede the failure: output by output up to the stop
+            begun = first + n_good  # an element may stop the run before the failure: go on output by output to find it
             memory, more_rows, more, failure = one_by_one(
                 self, system, memory, work, t0=t0, h=h, first=begun, n_steps=n_steps - n_good, every=every
             )
@@ -180,7 +181,7 @@ class Motion:
         tree, joints, state = self.tree, self.joints, self.work.state
         state.time[...] = t
         state.w[:] = 0.0
-        state.w[self.own] = self.z  # angles are those nearest to it
+        state.w[self.own] = self.z  # counted angles take the values nearest to z
         self.work.states.base[:] = self.z[: self.n_states]
         joints.x[tree.column[~self.is_mode]] = x[~self.is_mode]
         joints.rate[tree.column[~self.is_mode]] = rates[~self.is_mode]
@@ -242,7 +243,7 @@ class Motion:
         return np.concatenate([x_dot[self.of_places.independent], accelerations[self.of_rates.independent], z_dot])
 
     def accelerations(self, t: float, x: Array, rates: Array) -> Array:
-        """(3): return accelerations of all unknowns; the motion of bodies and the wrenches are written."""
+        """(3): return accelerations of all unknowns; write the motion of bodies and the wrenches."""
         from floatframe.engine.tree.kernels.entry import accelerations
 
         self.n_evaluations += 1
@@ -252,7 +253,7 @@ class Motion:
             self.work.state.w[self.own] = self.z
         for _ in range(1 if self.is_linear else MOST):
             if not accelerations(self.model, self.work, self.tree, self.joints, self.tangent):
-                # raises an error with the name of a mode without mass
+                # if a mode has no mass, this raises an error with its name
                 central_bodies(self.model, self.compiled.body_names, "RelativeOde")
                 raise ModelError(
                     f"the equations of motion are singular at t = {t:.9g}: a mode or a coordinate without mass, or "
@@ -263,14 +264,14 @@ class Motion:
             change = np.abs(self.tangent.mu).max(initial=0.0)
             if change <= SETTLED * np.abs(self.work.state.w[self.rows]).max(initial=0.0):
                 break
-            if not self.is_linear:  # the joints are at the positions of x
+            if not self.is_linear:  # evaluate again at the positions of x, with the new wrenches
                 w = self.work.state.w.copy()
                 self.put(t, x, rates)
                 self.work.state.w[self.rows] = w[self.rows]
         else:
             if not self.is_linear:
                 raise ModelError(
-                    f"reactions, friction and multipliers of elements did not settle at t = {t:.9g}: their equations "
+                    f"reactions, friction and multipliers of elements did not converge at t = {t:.9g}: their equations "
                     "have no solution near by, or several; use GeneralizedAlpha"
                 )
         if self.rotations.has_changed(t):
@@ -315,7 +316,10 @@ class Motion:
                 self.begin(state, t)
 
     def before_contact(self, solution: Any, work: Work) -> tuple[float, Array, list[Stretch]]:
-        """Return time, y and the next parts of the motion at a step that misses a contact; if none does, at the end."""
+        """Return time and y at the start of the first step that misses a contact, and the next parts of the motion.
+
+        If no step misses a contact, return time and y at the end, and no parts.
+        """
 
         def gaps(t: float, y: Array) -> Array:
             state, _, w = self.state_at(t, y)
@@ -356,7 +360,7 @@ class Motion:
         projected(self.model, self.work, self.tree, self.joints)
         state = self.work.state
         p = euler_parameters(state.R)
-        p *= np.where((p * self.p).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]  # of the two signs, the nearer one
+        p *= np.where((p * self.p).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]  # the sign that makes p continuous
         self.p = p
         return State(state.r, p, state.q, state.u), state.u_dot.copy(), state.w.copy()
 
@@ -377,9 +381,9 @@ def groups_of(parts: SystemTree) -> list[Array]:
 
 
 # independent coordinates of closed loops: partitioning by pivoted LU, exact solution of the constraints ---------------
-# With C the derivative of what is held by the coordinates, scaled by their sizes, LU with pivoting over the columns of
-# C finds the coordinates that are solved for (the dependent ones, as many as there are constraints); the others are
-# free. The partition serves as long as the solution is well conditioned, and is made anew where it is not, see
+# C is the derivative of the constraints by the coordinates, with columns scaled by typical sizes of the coordinates. LU
+# with pivoting over the columns of C finds the dependent coordinates, as many as there are constraints; the others are
+# independent. The partition is kept while the solution is well conditioned, and is then computed again, see
 # docs/relative.md §7.
 
 
@@ -421,11 +425,11 @@ def partition_of(C: Array, names: tuple[str, ...], sizes: Array) -> Partition:
     Parameters
     ----------
     C
-        Derivative of what is held by the coordinates.
+        Derivative of the constraints by the coordinates.
     names
-        Of the constraints, for messages.
+        Names of the constraints, for messages.
     sizes
-        Of the coordinates, by which their columns are compared, (n,).
+        Typical sizes of the coordinates, which scale the columns of C, (n,).
 
     Raises
     ------
@@ -434,21 +438,21 @@ def partition_of(C: Array, names: tuple[str, ...], sizes: Array) -> Partition:
     """
     n_c, n = C.shape
     if n_c > n:
-        raise ModelError(f"{n_c} constraints of {n} coordinates: {', '.join(dict.fromkeys(names))} hold too much")
+        raise ModelError(f"{', '.join(dict.fromkeys(names))}: {n_c} constraints, but only {n} coordinates to constrain")
     left = (C * sizes).copy()
     size = np.abs(left).max(axis=1, initial=0.0, keepdims=True)
     if n_c and not size.all():
         raise ModelError(f"joint {names[int(np.argmin(size))]!r} holds what cannot move")
     left = left / size if n_c else left
     dependent: list[int] = []
-    for k in range(n_c):  # rows one by one, with the largest of all remaining numbers as pivot
+    for k in range(n_c):  # eliminate row by row, with the largest of all remaining entries as pivot
         rest = np.abs(left[k:])
         row, column = divmod(int(np.argmax(rest)), n)
         if rest[row, column] <= RANK:
             named = ", ".join(repr(name) for name in dict.fromkeys(names))
             raise ModelError(
                 f"{n_c - k} of {n_c} constraints of {named} repeat others here: a singular position, or constraints "
-                "that are redundant; begin in another position, or replace a joint by one that holds less"
+                "that are redundant; begin in another position, or replace a joint by one with fewer constraints"
             )
         left[[k, k + row]] = left[[k + row, k]]
         dependent.append(column)

@@ -13,6 +13,6 @@ def require_no_remembered_contacts(compiled: CompiledSystem, scheme: str) -> Non
     for c, name in enumerate(compiled.connection_names):
         if model.connections.law[c] == CONTACT and model.contacts.dissipation[model.connections.item[c]] > 0:
             raise ModelError(
-                f"{scheme}: contact {name!r} depends on the speed with which it began, which this scheme does not "
-                "remember; use GeneralizedAlpha, or restitution = 1"
+                f"{scheme}: the force of contact {name!r} depends on its initial speed, which this scheme does not "
+                "store; use GeneralizedAlpha, or restitution = 1"
             )

@@ -21,9 +21,9 @@ __all__ = ["Variational"]
 class Variational(DiscreteScheme):
     """Symplectic scheme of order two: exact momenta, bounded energy error, joints closed in positions and velocities.
 
-    Coordinates of the centre of mass c, R_GB, q (`structure_preserving.kernels.bodies`). Between two configurations
-    with R' = R cay(theta), by the midpoint rule in q and the trapezoidal rule in the potential V of gravity and
-    springs,
+    The coordinates are the centre of mass c, R_GB and q (`structure_preserving.kernels.bodies`). Between two
+    configurations with R' = R cay(theta), the discrete Lagrangian takes q by the midpoint rule and the potential V of
+    gravity and springs by the trapezoidal rule:
 
         L_d = h (m |d/h|²/2 + T(theta/h, dq/h; mean q) - mean(q)ᵀ K mean(q)/2) - h (V + V')/2
         d = c' - c,  dq = q' - q,  Pi = J omega + B q_dot and Y = Bᵀ omega + M q_dot at theta/h, dq/h, mean q
@@ -32,10 +32,11 @@ class Variational(DiscreteScheme):
         Y_0 + h/2 Q = Y - h/2 (1/2 wᵀ M,k w - K mean(q) - D dq/h),   g(t') = 0
     (2) the same at the end, Pi_0' = (1 - tilde(theta)/2 + theta thetaᵀ/4) Pi + h/2 R'ᵀ tau', ... with G u' = -g_t
 
-    Momenta with index 0 are those of the results, velocities follow from them. The joints act like forces at both ends,
-    with one multiplier that closes positions and one that closes velocities (RATTLE). Discrete Euler-Poincare
-    equations and the Cayley map: [1]_; constraints: [2]_; dampers enter by the discrete Lagrange-d'Alembert principle.
-    The modal stiffness stands in the implicit midpoint, so that stiff modes do not bound h; stiff spring-dampers do.
+    The results contain the momenta with index 0 and the velocities that follow from them. The joints act like forces at
+    both ends, with one multiplier that closes positions and one that closes velocities (RATTLE). [1]_ derives the
+    discrete Euler-Poincare equations with the Cayley map, [2]_ the constraints. Dampers enter by the discrete
+    Lagrange-d'Alembert principle. The implicit midpoint rule integrates the modal stiffness, so that stiff modes do not
+    limit h; stiff spring-dampers do.
 
     Friction by the normal force of a joint is refused.
 
@@ -64,7 +65,7 @@ class Variational(DiscreteScheme):
             if getattr(force, "friction_coefficient", 0.0) > 0:
                 raise ModelError(
                     f"Variational: force {getattr(force, 'name', '')!r} has friction by the normal force, which this "
-                    "scheme does not know; use energy-momentum or generalized-alpha"
+                    "scheme does not support; use energy-momentum or generalized-alpha"
                 )
         return super().start(system, t, state, before)
 

@@ -1,21 +1,21 @@
 """Energy balance of a run from its result rows: the energy that the time steps have added or removed.
 
-The balance is total energy - work of forces + dissipated energy, less its value at the start.
+The balance is total energy - work of forces + dissipated energy, minus its value at the start.
 
-- Gain: the steps must not add energy. A run reports a gain of `GAIN_LIMIT`. It stops where the energy of the motion,
+- Gain: the steps must not add energy. A run reports a gain of `GAIN_LIMIT`. It stops when the energy of the motion,
   without the sum of the work of dampers, has grown by `STOP_LIMIT`.
-- Loss: numerical damping removes energy, mostly that of vibrations which the steps do not resolve. Companions in other
-  steps damp the same vibrations, so that they cannot see what these would do to the motion. A run reports a loss of
-  `LOSS_LIMIT`.
+- Loss: numerical damping removes energy, mostly of vibrations that the steps do not resolve. A companion with other
+  steps damps the same vibrations, so it cannot show their effect on the motion. A run reports a loss of `LOSS_LIMIT`.
 
-Not counted in favour of a gain or a loss:
+These errors of the balance are subtracted from a gain or a loss:
 
-- the change of the power in a step, to which the trapezoidal sums of work are accurate;
+- the change of the power in a step, which bounds the error of the trapezoidal sums of work;
 - for gains, the work of dampers where it changes fast from step to step: the velocity in a damper that the steps do not
   resolve changes its sign from step to step, and the trapezoidal sum is then far above the energy that the scheme
-  takes out;
-- rounding: positions have an error of `ROUNDING` times their distance from the origin. Rounding of forces in stiff
-  springs moves bodies by up to `REST` times the length of the system. Velocities have these errors over the step.
+  removes;
+- roundoff: positions have an error of `ROUNDING` times their distance from the origin. Roundoff of forces in stiff
+  springs moves bodies by at most `REST` times the length of the system. Velocities have these errors divided by the
+  step size.
 """
 
 from collections.abc import Mapping
@@ -45,7 +45,7 @@ ADVICE = {
     "damping": "take a step that resolves the fast vibrations, less numerical damping (rho_inf nearer to 1), or start "
     "without these vibrations",
 }  #: remedy for each kind of note
-#: displacement in a step, over the length of the system, caused by rounding in springs of 1000 rad per step
+#: displacement in a step, divided by the length of the system, due to roundoff in springs of 1000 rad per step
 REST = 1e-12
 ROUNDING = 8 * np.finfo(float).eps  #: relative rounding error of a number
 
@@ -75,8 +75,8 @@ class EnergyWatch:
     ) -> tuple[ValidityNote, ...]:
         """Take result rows and return new notes; is_switched: other forces act in these rows.
 
-        The first steps, in which little moves yet, are judged at the end of a run alone (is_last). Rows are judged
-        together: a look at a few costs as much as one at many.
+        The first steps, with little motion, are assessed only at the end of a run (is_last). Rows are collected,
+        because it costs as much to assess a few as many.
         """
         notes = self.flush(system) if is_switched else ()
         if len(rows.t):
@@ -177,7 +177,7 @@ class EnergyWatch:
         numbers = np.array(record["energy_sums"], dtype=float)
         sums = (float(x) for x in numbers[:6])
         self.gain, self.unsure, self.unresolved, self.taken, self.scale, self.noise = sums
-        self.n_seen = FIRST_VERDICT  # a restart comes later
+        self.n_seen = FIRST_VERDICT  # the run was resumed after its first steps
         self.last, change, self.potential = numbers[6:9], numbers[9:11], numbers[11:]
         self.change = None if np.isnan(change).any() else change
         self.notes = {note.kind: note for note in notes if note.kind in ADVICE}

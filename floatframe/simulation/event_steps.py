@@ -1,8 +1,8 @@
 """Time steps in which events are located.
 
-The compiled loop takes a block of steps and keeps the memory after each. Then the watched values are computed for the
-whole block at once. If a value passes its level within a step, trial steps of other sizes from the memory before that
-step locate the event. No step of the run is repeated. Events that only record leave the motion unchanged, bit for bit.
+The compiled loop takes a block of steps and stores the memory after each. Then the watched values of the whole block
+are computed at once. If a value passes its level within a step, trial steps of other sizes, from the memory before that
+step, locate the event. No step of the run is repeated. Events that only record leave the motion unchanged, bit for bit.
 """
 
 import json
@@ -55,12 +55,12 @@ __all__ = ["EventWatch"]
 BLOCK = 400  #: largest number of steps in a block; blocks end at multiples of it
 #: change of a watched value in a step, relative to its level and largest value, below which it is constant
 STANDS = 1e-9
-#: fraction of a step that is extrapolated after an event, because such a short step would consist of rounding
+#: fraction of a step below which the rest after an event is extrapolated, because so short a step is only roundoff
 SHORT = 1e-7
 MOST_NUMBERS = 2**23  #: largest count of numbers in the results of a block
 SHUT = 1e-6  #: largest gap, relative to `gap_sizes`, that a coupler or an element closes when it is engaged
 MOST_MADE = 8  #: largest number of switched systems that are cached
-MOST_IN_A_STEP = 100  #: largest number of events in one step; above it, events switch each other on and off without end
+MOST_IN_A_STEP = 100  #: largest number of events in one step; more of them switch each other on and off endlessly
 
 
 class Ended(NamedTuple):
@@ -224,7 +224,7 @@ class EventWatch:
     def happens(self, event: Event, before: float, after: float) -> bool:
         """Whether an event happens between two watched values.
 
-        An event that would switch nothing does not happen if only rounding passes its level: a latched value stays.
+        If an event would switch nothing, it does not happen by a change of roundoff size, as of a latched value.
         """
         if not event.happens(before, after):
             return False
@@ -266,15 +266,16 @@ class EventWatch:
     ) -> tuple[Memory, Rows, Work, int, Failure | None]:  # fmt: skip
         """Take a block of up to n_steps steps of size h, beginning with step `first` counted from t0.
 
-        Return the memory, the results after every `every`-th step (and at a stop), working arrays, the number of steps
-        that are done, and why the next one failed, if it did.
+        Return the memory, the results after every `every`-th step (and at a stop), working arrays, the number of
+        completed steps, and the reason if the next step failed.
 
-        (1) One call takes the steps of the block and keeps the memory after each. The watched values are computed.
-        (2) If an event happens in a step, trial steps from the memory before it locate the event (`settled`).
-        (3) If the event does not change the motion, the steps of the block stay as they are.
-        (4) If it does, the block ends with that step.
+        (1) One call takes the steps of the block and stores the memory after each. The watched values are computed.
+        (2) If an event happens in a step, trial steps from the memory before this step locate the event (`settled`).
+        (3) If the event does not change the motion, the steps of the block are accepted.
+        (4) If the event changes the motion, the block ends with that step.
 
-        If the method keeps no memories, the steps before the event are repeated, and its step is taken by itself.
+        If the method stores no memories, the steps before the event are repeated, and the step with the event is taken
+        in a call of its own.
         """
         keeps_past = not isinstance(integrator, Ida | RelativeOde)
         is_single = first == self.due or isinstance(integrator, Ida)  # each call of Ida restarts
@@ -361,9 +362,9 @@ class EventWatch:
     ) -> tuple[Memory, Rows, Work, Failure | None] | None:  # fmt: skip
         """Handle the events in a step of size h from t; return None if they do not change the motion.
 
-        Otherwise return memory, results and working arrays at the end of the step or at the stop, and why the step
-        failed, if it did. begin: memory before the step. ended: end of the step. neighbours: the number of steps before
-        this one for which there are values, and the values at steps around it, (n_times, n_events).
+        Otherwise return memory, results and working arrays at the end of the step or at the stop, and the reason if the
+        step failed. begin: memory before the step. ended: end of the step. neighbours: the watched values at the steps
+        around this one, (n_times, n_events), after the number of these steps that come before it.
         """
         size, reached_end = h, None
         for _ in range(MOST_IN_A_STEP):
@@ -391,7 +392,7 @@ class EventWatch:
             t = t + acting.part * size if event.at is None else event.at
             row = acting.row._replace(t=np.array([t]))
             reached = self.values_after(row)
-            for i in (acting.j, *(place.j for place in noted)):  # past their levels, despite rounding
+            for i in (acting.j, *(place.j for place in noted)):  # these have passed their levels, despite roundoff
                 level = events[i].level_passed
                 if (reached[i] - level) * (self.values[i] - level) > 0.0:
                     reached[i] = level
@@ -438,9 +439,9 @@ class EventWatch:
     ) -> tuple[Memory, Rows, Work]:
         """Return memory, results and working arrays for the motion after an event at t.
 
-        system: as switched before t. state: of the engine, with other velocities; None: that of the memory. The method
-        restarts if velocities or constraints have changed; it continues if only forces have. The energy that springs
-        bring or remove counts as work given, and the energy that an impact removes as work taken.
+        system: as switched before t. state: state of the engine with changed velocities; None: the state of the memory.
+        The method restarts if velocities or constraints have changed, and continues if only forces have changed. Energy
+        that switched springs add or remove counts as supplied work, energy that an impact removes as dissipated work.
         """
         is_struck = state is not None
         before, work_done, work = row.diagnostics[-1], memory.work, self.new_work()
@@ -471,7 +472,7 @@ class EventWatch:
             if abs(caught - wanted) > SHUT * sum_size(compiled, name):
                 raise ModelError(
                     f"event {event.name!r} at t = {t:g}: coupler {name!r} is to hold {wanted:.6g}, but finds "
-                    f"{caught:.6g}; leave its constant out, so that it holds what it catches, or let the event watch it"
+                    f"{caught:.6g}; omit its constant, so that it holds this value, or let the event watch this sum"
                 )
         holding = [
             placed
@@ -502,7 +503,7 @@ class EventWatch:
             self.switch(self.off)
             return None
         limits = next(each.limits for each in self.full.couplers if each.name == event.coupler)
-        assert limits is not None  # it has events
+        assert limits is not None  # only couplers with limits have stop events
         _, factors, core = sum_rows(compiled_system(self.full), event.coupler)
         self.resting[event.coupler] = event.side
         self.switch(self.off)
@@ -528,7 +529,7 @@ class EventWatch:
     def take_inside(self) -> None:
         """Move values at limits without contact just inside, so that the next passage is an event.
 
-        Values of switching functions move to the side of their current sign likewise.
+        Likewise, values of switching functions move to the side of their current sign.
         """
         for j, event in enumerate(self.events):
             if isinstance(event, StopEvent) and event.side in INWARD and event.coupler not in self.resting:
@@ -558,7 +559,7 @@ class EventWatch:
     ) -> "Place":  # fmt: skip
         """Locate event j in a step of size `size` from t; return the location just after the event.
 
-        Each trial is one step from the start of the given step to the trial place.
+        Each trial is one step from the start of the given step to the trial time.
         """
         event, work = self.events[j], self.trial_work()
         tried: dict[float, Place] = {}
@@ -625,5 +626,5 @@ def require_shut(event: Event, placed: PlacedLaw, gap: Array, t: float, sizes: A
         if holds == POSITION and abs(gap[row]) > SHUT * sizes[row]:
             raise ModelError(
                 f"event {event.name!r} at t = {t:g}: element {placed.element.name!r} is to hold the position of its "
-                f"multiplier {name!r}, but finds it open by {gap[row]:.6g}; let the event watch what it holds"
+                f"multiplier {name!r}, but finds it open by {gap[row]:.6g}; let the event watch this position"
             )

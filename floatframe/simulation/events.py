@@ -38,8 +38,7 @@ __all__ = [
 
 DIRECTIONS = {"rising": 1, "falling": -1, "both": 0}
 
-#: force functions of zero that replace a force but keep its place in the system; a force without functions would be
-#: rejected
+#: zero values that switch a force off but keep it in the system; a force without any functions would be rejected
 SILENT: dict[type, dict[str, Any]] = {
     PointForce: {"force": np.zeros(3), "torque": np.zeros(3)},
     SpringDamper: {"stiffness": 0.0, "damping": 0.0, "preload": 0.0, "characteristic": constant(0.0)},
@@ -67,9 +66,9 @@ SILENT: dict[type, dict[str, Any]] = {
 class Event:
     """Actions that are taken when a measured value passes a level, or at a given time.
 
-    The time where a value passes its level is found to `tolerance` by steps of other sizes. A force or an element is
-    off at the start if the first event that names it switches it on; a coupler (a latch, a clutch) if it is not
-    `engaged`. An event that only records does not change the motion, bit for bit.
+    Trial steps of other sizes find the time of passage to `tolerance`. A force or an element is off at the start if the
+    first event that names it switches it on. A coupler (a latch, a clutch) is off at the start if it is not `engaged`.
+    An event that only records does not change the motion, bit for bit.
 
     Parameters
     ----------
@@ -82,19 +81,19 @@ class Event:
     direction
         "rising", "falling" or "both".
     column
-        Column of the sensor, such as "x" or "rate"; "": its first.
+        Column of the sensor, such as "x" or "rate"; "": its first column.
     stop
-        End the run there.
+        End the run at the event.
     switch_on
-        Names of forces, couplers and elements.
+        Names of forces, couplers and elements to switch on.
     switch_off
-        Names of forces, couplers and elements.
+        Names of forces, couplers and elements to switch off.
     tolerance
         Tolerance of the time, relative to the step.
     at
         Instead of `watch`: the time of the event, after the start of the run [s].
     record
-        Keep the results at this time, in addition to those of the output times.
+        Store the results at the event, in addition to those of the output times.
     """
 
     name: str
@@ -188,7 +187,7 @@ def require_switched(where: str, coupler: CoordinateCoupler, *, is_first_on: boo
         )
     if is_first_on and coupler.engaged:
         raise ModelError(
-            f"{where}: coupler {coupler.name!r} is switched on, but it is engaged at the start; say engaged = false"
+            f"{where}: coupler {coupler.name!r} is switched on, but it is engaged at the start; set engaged = false"
         )
 
 
@@ -216,9 +215,9 @@ def require_times_of_events(system: System, t_start: float) -> None:
 
 
 def switched(system: System, off: frozenset[str], held: Mapping[str, float]) -> System:
-    """Return the system with these forces zero, couplers released, elements off, and unchanged columns of results.
+    """Return the system with these forces zero, couplers released and elements off; the columns of results stay.
 
-    held: what couplers that have been switched on hold, by name.
+    held: constants of the couplers that events have switched on, by name.
     """
     if not off and not held:
         return system

@@ -1,4 +1,4 @@
-"""Units of other programs in a system: which FMU, its inputs and outputs, and the coupling of steps."""
+"""Units of other programs in a system: the FMU file, its inputs and outputs, and the coupling of steps."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -25,11 +25,11 @@ class ForeignUnit:
     file
         Path of the FMU.
     inputs
-        Its inputs, by sensors of the system, "tip.x".
+        Sensors of the system, such as "tip.x", for the inputs of the unit.
     outputs
-        Its outputs, by inputs of the system on which they act.
+        Inputs of the system on which the outputs of the unit act.
     parameters
-        Its parameters by values.
+        Values of parameters of the unit.
     """
 
     name: str
@@ -50,9 +50,9 @@ class ForeignUnit:
 class Coupling:
     """How a system and its foreign units take their steps together.
 
-    explicit: all take a macro-step with the inputs of its beginning, held; the error is of first order in the step.
-    iterated: all take it again, from kept states, with the means of the inputs at its beginning and its end, until
-    these no longer change; the error is of second order, and the coupling may be stiffer.
+    explicit: all take a macro-step with constant inputs, those at its beginning. The error is of first order in the
+    step. iterated: all repeat the macro-step from its initial states, with the means of the inputs at its beginning and
+    end, until these converge. The error is of second order, and the coupling may be stiffer.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ __all__ = ["force_numbers", "write_function"]
 
 
 def force_numbers(system: System, compiled: CompiledSystem, names: set[str]) -> list[int]:
-    """Return the numbers of the functions that are factors or motor forces of the named forces."""
+    """Return the indices of the functions that are factors or motor forces of the named forces."""
     model, found = compiled.model, []
     for kind, factors in ((PointForce, model.loads.factor), (BodyLoad, model.body_loads.factor)):
         forces = [force for force in system.forces if isinstance(force, kind)]

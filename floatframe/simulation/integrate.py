@@ -1,12 +1,12 @@
 """Computation of a motion: start, then steps in compiled batches, which are checked and written.
 
-    (1) start       bodies made consistent; memory of the integrator and results at the start    `Integrator.start`
+    (1) start       make bodies consistent; memory of the integrator and results at the start    `Integrator.start`
     (2) step        a batch of steps in one compiled call, cut where laws jump and events happen  `next_steps`
-    (3) observe     what steps, energy, laws and ranges of validity say about the motion          `Run.observe`
-    (4) write       results, records to go on from, and progress                   `Run.keep`, `Run.close_segment`
+    (3) observe     checks of step size, energy, laws and ranges of validity                      `Run.observe`
+    (4) write       results, restart records, and progress                         `Run.keep`, `Run.close_segment`
 
-`resume` begins with the record of an interrupted run in place of (1). The memory between steps is the `Memory` of the
-integrator; results of output times are `Rows`.
+`resume` begins with the record of an interrupted run in place of (1). The integrator keeps its state between steps in a
+`Memory`; results of output times are `Rows`.
 """
 
 import logging
@@ -124,46 +124,46 @@ def integrate(
     Parameters
     ----------
     system
-        The system; its bodies as placed are made consistent first.
+        The system. The given positions and velocities of its bodies are made consistent first.
     integrator
-        The method, such as `GeneralizedAlpha(rho_inf=0.8)`; a class or a name of a system file, such as "hht": with
-        its defaults.
+        The method, such as `GeneralizedAlpha(rho_inf=0.8)`. A class, or a name of a system file such as "hht", stands
+        for the method with its defaults.
     t_end
         End time [s].
     h
-        Step size [s], or distance of outputs and largest step where the integrator controls its step; made smaller by
-        less than one step in the whole run where it does not divide it.
+        Step size [s]. If the integrator controls its step, h is the interval of outputs and the largest step. If h does
+        not divide the time of the run, it is reduced until one more step fits.
     t_start
         Time at the beginning [s].
     state
-        State to begin from, instead of the bodies as placed.
+        State to begin from, instead of the positions and velocities of the bodies in the system.
     output
         Results file; None keeps the motion in memory.
     output_every
-        Write the results of every so many steps; the start is always written.
+        Number of steps from one written result to the next; the start is always written.
     batch_steps
         Steps per call of the compiled loop; the motion does not depend on it, bit for bit.
     progress
-        Called after every batch. What it raises ends the run; closed results stay.
+        Called after every batch. An exception that it raises ends the run; closed segments of the results stay.
     formulation
-        "absolute", or "relative": in the coordinates of joints (docs/relative.md), with results of the same form; None:
-        that of the integrator.
+        "absolute", or "relative" for the coordinates of joints (docs/relative.md), with results of the same form; None:
+        the formulation of the integrator.
     watch
-        Where the steps put the motion off by 3 %, or add 5 % of its energy, the motion says so (`validity`) and the log
-        too. "stop": a run ends where half of its energy comes from its steps; "tell": it goes on; "off":
-        neither is looked for.
+        If the steps cause an error of 3 % in the motion, or add 5 % to its energy, `validity` of the motion and the log
+        report it. "stop": the run also ends when half of its energy comes from its steps. "tell": it continues. "off":
+        no checks.
 
     Returns
     -------
     Motion
-        The motion; with `output` it is read from the file when asked for.
+        The motion; with `output` its arrays are read from the file when they are used.
 
     Raises
     ------
     ModelError
         If an argument or the system is impossible.
     ConvergenceError
-        If a step fails, or half of the energy comes from the steps; it carries the trajectory so far.
+        If a step fails, or half of the energy comes from the steps; its attribute `trajectory` is the motion so far.
     ResultsError
         If the results cannot be written.
     """
@@ -206,7 +206,7 @@ def integrate(
     events = EventWatch(system, head) if has_events(system) else None
     require_times_of_events(system, t_start)
     begun = system if events is None else events.system
-    with ExitStack() as held:  # location of the results, fixed from before the computation until its end
+    with ExitStack() as held:  # reserves the location of the results during the computation
         place = None if output is None else held.enter_context(ResultsPlace(output, inputs=system.files))
         memory = integrator.start(begun, t_start, state)  # (1)
         run = Run(
@@ -233,7 +233,7 @@ def require_no_units(system: System) -> None:
     if system.fmus:
         names = ", ".join(unit.name for unit in system.fmus)
         raise ModelError(
-            f"system {system.name!r}: units of other programs act beside it (fmus: {names}): use floatframe run, or "
+            f"system {system.name!r} is coupled to units of other programs (fmus: {names}): use floatframe run, or "
             "floatframe.co_simulate in place of integrate; such a run cannot be resumed"
         )
 
@@ -243,8 +243,8 @@ def number_of_steps(t_start: float, t_end: float, h: float) -> int:
     wanted = (t_end - t_start) / h
     if not wanted <= MOST_STEPS:
         raise ModelError(
-            f"integrate: from t = {t_start:g} to {t_end:g} with h = {h:g} these are {wanted:.1e} steps, expected up to "
-            f"{MOST_STEPS:.0e}; take t_end nearer, or a greater h"
+            f"integrate: the run from t = {t_start:g} to {t_end:g} with h = {h:g} has {wanted:.1e} steps, expected at "
+            f"most {MOST_STEPS:.0e}; choose an earlier t_end or a larger h"
         )
     return max(1, ceil(wanted * (1 - 1e-12) - 1e-9))
 
@@ -269,7 +269,7 @@ def resume(
     system
         The system that was run.
     output
-        The results file the run was to write; its segments are beside it.
+        The results file that the run was to write; its segments are in the same folder.
     progress
         As in `integrate`.
 
@@ -286,15 +286,15 @@ def resume(
         run = dict(head.run)
         kind = CLASSES.get(str(run.get("integrator")))
         if kind is None or any(name not in run for name in (*TIMES, *(part.name for part in fields(kind)))):
-            raise ResultsError(f"{output}: the interrupted run is of another version of this program; run it anew")
+            raise ResultsError(f"{output}: another version of this program made the interrupted run; run it anew")
         integrator = kind(**{part.name: run[part.name] for part in fields(kind)})
         n_total = round((run["t_end"] - run["t_start"]) / run["h"])
         sampling = Sampling.of(system, run["t_start"], run["h"], n_total)
         system = system if sampling is None else sampling.system
         if run.get("digest") != system_digest(system, integrator):
             raise ResultsError(
-                f"{output}: the interrupted run was of another system than {system.name!r}, or that or this program "
-                "has changed since; resume it with the files and the version it was begun with, or run it anew"
+                f"{output}: the interrupted run was of another system than {system.name!r}, or the system or this "
+                "program has changed since; resume it with the files and version with which it began, or run it anew"
             )
         if record is None:
             raise ResultsError(f"{output}: the interrupted run has no restart record; run it anew")
@@ -441,7 +441,7 @@ class Run:
             self.writer.close_segment(record)
 
     def begin(self, memory: Memory, n_done: int) -> tuple[Memory, Rows]:
-        """Evaluate the motion at the start or continuation of the run; store the iterate and the first results."""
+        """Evaluate the motion where the run starts or is resumed; store the iterate and the first results."""
         self.work = new_work(compiled_system(self.acting).model) if self.events is None else self.events.new_work()
         memory, rows = self.integrator.observe(self.acting, self.t_start + n_done * self.h, memory, self.work)
         if self.events is not None:
@@ -459,9 +459,9 @@ class Run:
         """Take the remaining steps in batches that end where a run can be resumed; return the motion."""
         self.jumps = self.steps.jumps = jumps_of_steps(self.system, self.t_start, self.h, self.n_total)
         laws = LawWatch(self.system, self.t_start, self.h, self.jumps, n_done)
-        n_told = n_done  # steps at the last progress
+        n_told = n_done  # steps at the last progress report
         failure: Failure | None = None
-        safe = self.record_where_due(memory, n_done)  # while a block runs, its events are ahead of its memory
+        safe = self.record_where_due(memory, n_done)  # made now: during a block, events are later than the memory
         try:
             while n_done < self.n_total:
                 raise_if_interrupted()
@@ -502,7 +502,7 @@ class Run:
     def step(self, memory: Memory, first: int, n_left: int, batch_steps: int) -> "Batch":
         """Take at most `n_left` steps, up to the next check, the end of the run, or new factors.
 
-        The watch divides batches of `batch_steps`, and leaves their ends.
+        The watch divides batches of `batch_steps` further, but does not move their ends.
         """
         n_steps = min(n_left, self.steps.room(first, batch_steps), self.n_total - first)
         n_steps = min(n_steps, RESTART_STEPS - first % RESTART_STEPS)

@@ -1,9 +1,9 @@
 """Steps at force jumps: one step ends at the jump and the next step begins there, so that no impulse is lost.
 
-A method of steps takes a force from both ends of a step; a jump between them, or at one of them, would count for too
-much or too little of the step (an error of the impulse of order h). So the step is cut just before the jump, and the
-motion goes on from the state at it with the accelerations of the force after it. Where a state of an element (the
-current of a motor) follows the jump in less than the step, the step begins with short parts that grow.
+A time integration method evaluates a force at both ends of a step. If the force jumps within the step or at one of its
+ends, the impulse has an error of order h. Therefore the step ends just before the jump, and the motion continues from
+the state there with the accelerations due to the force after the jump. If a state of an element (the current of a
+motor) responds to the jump in less than a step, the step begins with short parts that grow.
 """
 
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ __all__ = ["jump_times", "jumps_by_step", "jumps_of_steps", "next_steps"]
 PER_STEP = 4  #: number of points in a step between which expressions of t are compared
 MOST_PLACES = 1_000_000  #: largest number of points of comparison in a run
 N_PARTS = 10  #: largest number of halvings of a step after a jump, for states with fast response
-#: ratios that require halving: change predicted by the state's rate to its change in the step, and to its size
+#: a step is halved if the change predicted by the state's rate exceeds these multiples of its change and of its size
 FOLLOWED, FELT = 2.0, 0.05
 STEEP = 1.5  #: growth of an expression at half the distance that indicates a pole
 SHORT = 1e-9  #: gap left before a jump, and remainder that counts as zero, as fractions of a step
@@ -37,7 +37,7 @@ def jump_times(system: System, t_start: float, h: float, n_steps: int) -> list[f
     """Return the ascending times after the start of a run, up to its end, at which a force or law jumps.
 
     (1) jumps of the values of functions of time
-    (2) switches of expressions, found between places in the steps
+    (2) switches of expressions, found between points in the steps
     (3) knots that user forces and laws declare
     """
     times = {
@@ -97,10 +97,11 @@ def next_steps(
     jumps: dict[int, list[float]],
     events: EventWatch | None = None,
 ) -> tuple[Memory, Rows, Work, int, Failure | None]:
-    """Take steps of size h, beginning with step `first` counted from t0: the step with the next jumps or those before.
+    """Take steps of size h, beginning with step `first` counted from t0: the steps before the next jumps, or this step.
 
-    Return the memory after them, the results after every `every`-th (and at a stop), how many steps are done, at most
-    n_steps, and why the next one failed, if it did. jumps: times by step. system: as events have switched it.
+    Return the memory after them, the results after every `every`-th step (and at a stop), working arrays, the number of
+    completed steps, at most n_steps, and the reason if the next step failed. jumps: times by step. system: as events
+    have switched it.
     """
     n_smooth = min((k - first for k in jumps if k >= first), default=n_steps)
     if n_smooth == 0:
@@ -133,7 +134,7 @@ def over_jumps(
     """Take a step of size h from t, divided at jumps; return memory and results at its end, or at a stop."""
     where, end, begin = t, t + h, memory
     rows: Rows | None = None
-    is_after = False  # a jump
+    is_after = False  # whether the next part of the step follows a jump
     for number, until in enumerate([*jumps, end]):
         is_last = number == len(jumps)
         size = until - where - (0.0 if is_last else SHORT * h)
@@ -165,9 +166,10 @@ def over_jumps(
 
 
 def n_settling_parts(integrator: Integrator, system: System, memory: Memory, work: Work, t: float, size: float) -> int:
-    """Return the number of times that a step after a jump is halved at its beginning.
+    """Return how many times a step after a jump is halved at its beginning.
 
-    A step is tried: a state whose rate at its beginning would lead much further than the step does settles in less.
+    A trial step is taken: if the initial rate of a state predicts a much larger change than the step has, the state
+    settles within the step.
     """
     rows = compiled_system(system).model.states.row
     if not len(rows) or not has_fixed_steps(integrator):

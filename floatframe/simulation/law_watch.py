@@ -1,9 +1,9 @@
 """Check for undeclared time dependence of user functions, by their values at the ends and middles of steps.
 
-Functions of time in fields, expressions and `knots` say where a law jumps, and steps end there. What else a function of
-a user does with the time is not known. After some steps it is asked at their ends and middles with the motion as it is
-then: where the middle is far from the mean of the ends, it jumps or varies faster than the steps, which is told once.
-A pulse that lies between these places is not seen.
+Functions of time in fields, expressions and `knots` declare where a law jumps, and steps end there. Any other time
+dependence of a user's function is unknown. After some steps the function is therefore evaluated at their ends and
+middles, all with the motion at the last end. If a middle value is far from the mean of the end values, the function
+jumps or varies faster than the steps, which is reported once. A pulse between these points is missed.
 """
 
 import ctypes
@@ -83,8 +83,8 @@ class LawWatch:
                 law.is_told = True
                 words.append(
                     f"{law.where}: its function jumps with time, or varies fast, inside the step of {self.h:.6g} from "
-                    f"t = {self.t_start + steps[0] * self.h:.9g}, which takes it for a ramp: give the times of jumps "
-                    "as knots, or take a shorter step"
+                    f"t = {self.t_start + steps[0] * self.h:.9g}, but a step treats it as a ramp: give the times of "
+                    "jumps as knots, or take a shorter step"
                 )
         return words
 

@@ -35,8 +35,8 @@ Values = Callable[[Rows], Array]
 def direct_values(system: System, event: Event) -> Values | None:
     """Return the function from result rows to the watched values of an event, (n_times,); None if it needs a sensor.
 
-    The value is a time, or an angle of a joint between rigid bodies, which every run counts. It agrees with that of the
-    sensor to rounding.
+    The value is a time, or an angle of a joint between rigid bodies, which every run counts. It agrees with the value
+    of the sensor to roundoff.
     """
     if event.at is not None:
         return lambda rows: rows.t
@@ -64,8 +64,8 @@ def counted_angle_of(system: System, sensor: CoordinateSensor) -> Values | None:
 def expected_passage(places: Sequence[float], values: Sequence[float]) -> tuple[float, float]:
     """Return the zero in (0, 1) of the polynomial through values at given points, and its slope there.
 
-    Both 0 and 1 are among the places, with values of different signs; Newton's divided differences, Newton's method in
-    a bracket.
+    Both 0 and 1 are among the points, with values of different signs. The polynomial is found by Newton's divided
+    differences, its zero by Newton's method in a bracket.
     """
     n, c = len(places), list(values)
     for j in range(1, n):
@@ -98,25 +98,25 @@ def passage(
 ) -> float:
     """Return the first multiple of the tolerance, at most 1, at which a function is no longer negative.
 
-    (1) x is where the zero is expected, a multiple of the tolerance; f = beyond(x) bounds the bracket,
-        f(low) < 0 <= f(high)
-    (2) high is the place if low is the multiple before it, or if f(high) is too small for the one before to be beyond,
-        by a slope that two evaluations in a row agree on
-    (3) the multiple after x - f/slope, within the bracket, is the next x; the slope is that of the last two places.
-        Where the bracket has not shrunk to half in three evaluations, its middle is taken
-    So the place does not depend on the guess, which saves evaluations alone, but for (2) where the slope changes within
-    a few tolerances.
+    (1) Evaluate f = beyond(x) at the multiple x of the tolerance at which the zero is expected. x becomes low or high,
+        so that f(low) < 0 <= f(high)
+    (2) Return high if low is the multiple just before it. Return it also if f(high) is so small that f is negative one
+        multiple earlier, by a slope on which two successive evaluations agree
+    (3) The next x is the multiple after x - f/slope, within the bracket, with the slope between the last two points. If
+        three evaluations have not halved the bracket, take its middle
+    So the result does not depend on the guess, which only saves evaluations. The exception is (2), if the slope changes
+    within a few tolerances.
 
     Parameters
     ----------
     beyond
-        The function; called at places between 0 and 1, among them the one that is returned unless that is 1.
+        The function. It is called at points between 0 and 1, and always at the returned point unless that is 1.
     before, after
-        Its values at 0, below zero, and at 1, zero or above.
+        Its values at 0, which is negative, and at 1, which is not negative.
     tolerance
-        How far behind the zero the place may lie.
+        Largest distance of the returned point from the zero.
     guess
-        Where the zero is expected, and the slope there.
+        Expected zero, and the slope there.
     """
     if after <= 0.0:
         return 1.0

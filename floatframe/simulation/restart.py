@@ -1,7 +1,7 @@
 """Restart records: the memory of an integrator, stored with the results to resume an interrupted run.
 
-A record belongs to a step whose number is a multiple of `RESTART_STEPS`. There every run makes its Newton factors
-anew, so that a resumed run takes the same steps as one that was never interrupted, bit for bit.
+A record belongs to a step whose number is a multiple of `RESTART_STEPS`. At such steps every run computes its Newton
+factors again, so that a resumed run takes the same steps as an uninterrupted one, bit for bit.
 """
 
 import hashlib
@@ -39,7 +39,7 @@ def memory_of_record(record: Mapping[str, Array], system: System) -> tuple[Memor
     for name, array in {**expected._asdict(), "n_done": np.array(0)}.items():
         if name not in record or (record[name].shape != array.shape and name != "a"):
             raise ResultsError("restart: the record is of a system with other bodies; resume the system that was run")
-    if record["a"].ndim != 1:  # accelerations, or multipliers in the conserving schemes
+    if record["a"].ndim != 1:  # "a" holds accelerations, or multipliers in the conserving schemes
         raise ResultsError("restart: the record lacks the memory of the method; run the system again")
     values: dict[str, Any] = {name: record[name] for name in Memory._fields}
     return expected.changed(**values), int(record["n_done"])

@@ -1,12 +1,13 @@
-"""Controllers of a run: measured, called and written between two steps, at every sampling instant.
+"""Controllers of a run: called between two steps, at every sampling instant.
 
-The outputs are functions of time with a piece for each sampling instant. All pieces from an instant on get its outputs,
-so that companions of the run, which repeat earlier steps, find the outputs that acted there.
+The outputs are functions of time with a piece for each sampling instant. A call writes its outputs into the pieces of
+its instant and of all later ones, so that companions of the run, which repeat earlier steps, find the outputs that
+acted in these steps.
 
-    (1) begin       the forces of the outputs get such functions; a call at the start of the run
-    (2) step        batches end at sampling instants
-    (3) sample      the inputs are measured, the function is called once, its outputs are written; where they jump, the
-                    motion goes on from the same state with the accelerations of the new forces
+    (1) begin       give such functions to the forces of the outputs, and call the controllers at the start of the run
+    (2) step        end batches at sampling instants
+    (3) sample      measure the inputs, call the function once, write its outputs; where they jump, continue the motion
+                    from the same state with the accelerations of the new forces
 """
 
 import time
@@ -37,8 +38,8 @@ from floatframe.simulation.motion_head import joint_rows
 __all__ = ["Sampling"]
 
 JUMP = 1e-9  #: relative change of an output below which it is constant, as in `TimeFunction.jumps`
-WHOLE = 1e-6  #: difference of a period from a whole number of steps, in steps, that counts as rounding
-MOST_NUMBERS = 2**26  #: most numbers of the functions of all outputs
+WHOLE = 1e-6  #: difference of a period from a whole number of steps, in steps, that counts as roundoff
+MOST_NUMBERS = 2**26  #: largest count of numbers in the functions of a controller's outputs
 
 
 @dataclass
@@ -50,12 +51,12 @@ class Sampled:
     numbers: tuple[int, ...]  #: functions of time in the compiled system, one for each output
     state: Array | None  #: memory after the last call
     t: list[float] = field(default_factory=list)  #: sampling instants so far
-    outputs: list[Array] = field(default_factory=list)  #: at these instants
+    outputs: list[Array] = field(default_factory=list)  #: outputs at these instants
     states: list[Array] = field(default_factory=list)  #: memory after the calls at these instants
-    seconds: float = 0.0  #: that the calls took
+    seconds: float = 0.0  #: computing time of the calls
 
     def cost_words(self) -> str:
-        """Describe what the calls of the function cost."""
+        """Describe the number and computing time of the calls of the function."""
         n = len(self.t)
         each = 1e6 * self.seconds / max(n, 1)
         return f"controller {self.controller.name!r}: its Python function was called {n} times, {each:.3g} µs each"
@@ -65,7 +66,7 @@ class Sampled:
 class Sampling:
     """The controllers of a run."""
 
-    system: System  #: with the functions of time of the outputs
+    system: System  #: the system with the functions of time of the outputs
     t_start: float
     h: float
     sampled: tuple[Sampled, ...]
@@ -103,7 +104,7 @@ class Sampling:
         return cls(held, t_start, h, tuple(made))
 
     def room(self, n_done: int) -> int:
-        """Return how many steps lead to the next sampling instant."""
+        """Return the number of steps to the next sampling instant."""
         return min(each.every - n_done % each.every for each in self.sampled)
 
     def is_due(self, n_done: int) -> bool:
@@ -142,7 +143,7 @@ class Sampling:
         return jumps
 
     def take(self, each: Sampled, k: int, t: float, outputs: Array) -> None:
-        """Store sample k of a controller, and write its outputs into the functions of time from there on."""
+        """Store sample k of a controller, and write its outputs into the functions of time from t on."""
         each.t.append(t)
         each.outputs.append(outputs)
         each.states.append(np.zeros(0) if each.state is None else each.state)
@@ -181,7 +182,7 @@ class Sampling:
 
 
 def require_no_events(system: System) -> None:
-    """Raise `ModelError` if a system with controllers has events, which switch it between the sampling instants."""
+    """Raise `ModelError` if a system with controllers has events, which would act between the sampling instants."""
     if has_events(system):
         raise ModelError(
             f"system {system.name!r}: expected no events, stops of couplers or switches of expressions beside "

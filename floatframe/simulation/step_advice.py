@@ -86,7 +86,7 @@ def frequency_words(
 ) -> tuple[str, ...]:
     """Return a message about supplies, loads and prescribed motions with frequencies that the steps do not resolve.
 
-    A method that controls its steps is told of those alone of which it may see nothing: two steps in a period.
+    For a method that controls its steps, it names only frequencies with less than two steps per period.
     """
     words = []
     most = FOLLOWED if has_steps_of_one_size else SEEN
@@ -102,7 +102,7 @@ def frequency_words(
 def highest_frequencies(system: System, t: Array) -> Iterator[tuple[str, float]]:
     """Yield the highest frequencies of functions of time at times t, (n_t,) [1/s], with their paths in the system.
 
-    Sines in functions of time, in expressions of time alone, and what elements say by `frequencies`.
+    The sources are sines in functions of time, expressions of time alone, and the method `frequencies` of elements.
     """
     for each in functions_of_time(system):
         function = each.function
@@ -121,8 +121,8 @@ def highest_frequencies(system: System, t: Array) -> Iterator[tuple[str, float]]
 def knot_words(system: System, t_start: float, h: float, n_steps: int) -> tuple[str, ...]:
     """Return messages about table points between which the steps of a run are too long.
 
-    (1) Several knots in one step: what lies between them is not seen. Where a force jumps a step ends.
-    (2) A jump of a driven acceleration inside a step: the step takes it for a ramp. Jumps at the ends of steps are met.
+    (1) Several knots lie in one step, which misses the values between them. (Steps end at jumps of forces.)
+    (2) A driven acceleration jumps inside a step, which treats the jump as a ramp. Jumps at ends of steps are exact.
     """
     words = []
     cuts = np.array(jump_times(system, t_start, h, n_steps))
@@ -130,13 +130,13 @@ def knot_words(system: System, t_start: float, h: float, n_steps: int) -> tuple[
         inside = (function.begins > t_start) & (function.begins < t_start + n_steps * h * (1 - 1e-12))
         knots = function.begins[inside]
         steps = np.ceil((knots - t_start) / h - ON_A_STEP)
-        parts = steps + np.searchsorted(cuts, knots - ON_A_STEP * h)  # range of the steps, which jumps divide
+        parts = steps + np.searchsorted(cuts, knots - ON_A_STEP * h)  # number of the step or part; jumps divide steps
         passed = len(knots) - len(np.unique(parts))
         if passed:
             shortest = float(np.diff(knots).min())
             words.append(
-                f"{where}: steps of {h:.6g} pass over {passed} of the {len(knots)} knots of its table, which are down "
-                f"to {shortest:.6g} apart: what lies between is not seen; take a shorter step, or resample the signal"
+                f"{where}: steps of {h:.6g} pass over {passed} of the {len(knots)} knots of its table, whose smallest "
+                f"interval is {shortest:.6g}, and miss these values; take a shorter step, or resample the signal"
             )
         if is_motion:
             times, sizes = function.jumps(2)
@@ -146,7 +146,7 @@ def knot_words(system: System, t_start: float, h: float, n_steps: int) -> tuple[
                 k = int(np.flatnonzero(within)[0])
                 words.append(
                     f"{where}: its acceleration jumps inside {int(within.sum())} steps, first by {sizes[k]:.6g} at "
-                    f"t = {times[k]:.9g}: forces err in these steps; let a step end there (another h, or an event with "
-                    "at), or take a smoother table"
+                    f"t = {times[k]:.9g}: forces are wrong in these steps; let a step end there (by another h, or an "
+                    "event with at), or take a smoother table"
                 )
     return tuple(words)

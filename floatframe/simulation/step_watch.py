@@ -3,39 +3,41 @@
 It works for second-order methods, with fixed steps and with an error tolerance:
 
 (1) A companion is the same motion with steps twice as long (or an error tolerance eight times as large). It costs half
-    a step for each step of the run. The run and the companion differ by three times the error of the run. This includes
-    how the motion magnifies or damps earlier errors.
-(2) If that error or that of (6) exceeds `SCREEN` of the limit, long steps fail or a flexible body turns by `FAR_TURN`
-    in a step, a companion with half steps starts from the same memory and replaces the first one. It differs from the
-    run by 3/4 of the error. Only its estimate is reported. From the start of a run it has little numerical damping
-    (`LIGHT`): a run may damp vibrations that its steps do not resolve, and equal damping would hide what they do to the
-    motion.
-    The estimate holds for errors of second order. The companion with double steps goes on beside one with half steps.
-    Where the difference from the run falls to more than a quarter from double to half steps of the same damping
-    (vibrations of much energy that no step resolves), the estimate follows this ratio, up to `MOST_RATIO`. Where double
-    steps fail, the ratio is taken as `UNKNOWN_RATIO`. If the error exceeds `SCREEN` of the limit, but not the limit,
-    and the ratio is outside `ORDINARY`, quarter steps from the same memory decide, with half steps beside them: half
-    steps may agree with the run by chance.
+    a step for each step of the run. The run and the companion differ by three times the error of the run, including the
+    amplification or damping of earlier errors by the motion.
+(2) A companion with half steps starts from the same memory and replaces the first one if the error of (1) or (6)
+    exceeds `SCREEN` of the limit, if the long steps fail, or if a flexible body turns by `FAR_TURN` in a step. It
+    differs from the run by 3/4 of the error. Only its estimate is reported. If it begins with the run, it has little
+    numerical damping (`LIGHT`): the run may damp vibrations that its steps do not resolve, and a companion with equal
+    damping would not show their effect on the motion.
+    The estimate is valid for errors of second order. The companion with double steps therefore continues beside the one
+    with half steps. If, at the same damping, the difference from the run falls by less than a factor of four from
+    double to half steps (vibrations of much energy that no step resolves), the estimate uses the observed ratio, at
+    most `MOST_RATIO`. If double steps fail, it uses `UNKNOWN_RATIO`. If the error is between `SCREEN` of the limit and
+    the limit, and the ratio is outside `ORDINARY`, half steps may agree with the run by chance. Then quarter steps from
+    the same memory decide, with half steps beside them.
 (3) The companion covers `COMPANION_STEPS` steps. It crosses jumps of forces and has its own events. In a run of more
-    than `LONG_RUN` steps it starts after the first steps, from their memory. There it ends as soon as the error,
-    extrapolated in proportion to the end of the run, is far below the limit.
+    than `LONG_RUN` steps it starts after the first steps, from their memory, and ends as soon as the error,
+    extrapolated in proportion to the time up to the end of the run, is far below the limit.
 (4) After that, windows of `WINDOW` steps are repeated with half steps. The distance between windows grows. The errors
     of all steps are summed; steps between two windows get the mean error of both.
 (5) Position errors are relative to the longest displacement of any body from its start. Rotation errors are relative to
-    the largest rotation; where that and its error together are below `SMALL_TURN`, to the displacement over the length
-    of the system. Windows also count the errors of speeds, relative to twice the largest speed (a vibration moves by
-    two amplitudes). Errors a of place and b of speed combine to sqrt(a² + b²), since they turn into one another.
-(6) The first step is compared alone, with two half steps of the same damping, where accelerations change much in it.
-    A stiff spring with a damper settles before the comparisons of (1), while this step may be wrong by the whole sag.
-    While companions run, so are steps in which a force jumps, and the ones after them, in runs without events.
+    the largest rotation; if the sum of this rotation and its error is below `SMALL_TURN`, they are relative to the
+    displacement divided by the length of the system. Windows also count the errors of speeds, relative to twice the
+    largest speed (a vibration moves by two amplitudes). An error a of position and an error b of speed combine to
+    sqrt(a² + b²), because a vibration turns one into the other.
+(6) If accelerations change much in the first step, this step alone is compared with two half steps of the same damping:
+    a stiff spring with a damper settles before the comparisons of (1), although the first step may be wrong by the
+    whole sag. While companions run, steps in which a force jumps, and the steps after them, are compared likewise, in
+    runs without events.
 
-(7) A run that continues another one in time (`State.watched`) is a piece of one motion, and its errors are relative to
-    the motion since that began. If a companion reached the end of the other run, the error of the last state is passed
-    on, and companions begin with it: they lie from the run as far as if they had run since the beginning, and with the
-    shortest steps that have been needed since. Other errors of earlier pieces are added.
+(7) A run that continues another one in time (`State.watched`) is a piece of one motion. Its errors are relative to the
+    motion since the start of the first run. If a companion reached the end of the previous run, the error of the last
+    state is passed on, and the companions of this run begin with it, as if they had run since the beginning, with the
+    shortest steps that were needed before. Other errors of earlier pieces are added.
 
-A companion restarts where a run can be resumed; its error up to there is added. These sums, and that over windows, do
-not know how the motion changes earlier errors: it may forget them (damping) or magnify them (chaos).
+A companion restarts where a run can be resumed, and its error up to there is added. These sums, and the sum over
+windows, do not include the effect of the motion on earlier errors: it may damp them or magnify them (chaos).
 """
 
 from collections.abc import Mapping
@@ -74,7 +76,7 @@ LONG_RUN = 1000  #: number of steps of a run above which companions may cover fe
 LEAST_COMPANION_STEPS = 64  #: smallest number of steps that companions cover in long runs
 SMALL_SHARE = 0.05  #: fraction of the error limit below which an extrapolated error lets a companion end early
 FIRST_CHECK = 4  #: number of steps before the first comparison, and smallest number between two comparisons
-CHECK_INTERVAL = 8  #: divisor of the number of covered steps that gives the steps between comparisons in short runs
+CHECK_INTERVAL = 8  #: in short runs, the number of covered steps divided by the steps between two comparisons
 MOST_BETWEEN_CHECKS = 128  #: largest number of steps between two comparisons in long runs
 WINDOW = 4  #: number of steps in a window, which must be even
 WINDOW_GROWTH = 4  #: factor by which the distance between windows grows
@@ -135,9 +137,9 @@ class Companion:
     ) -> "Companion":  # fmt: skip
         """Return a companion that starts from the run's memory after `start` steps.
 
-        h: fixed step size of the run; the step then grows to that of the companion without a new start. 0: not fixed.
-        events: those of the run after `start` steps, if it has any; the companion gets a copy with working arrays.
-        is_light: with the numerical damping of `LIGHT` where that is less.
+        h: fixed step size of the run, from which the step changes to that of the companion without a new start; 0: not
+        fixed. events: events of the run after `start` steps, if it has any; the companion gets a copy with working
+        arrays. is_light: whether to use the numerical damping of `LIGHT` if it is less than that of the run.
         """
         none = np.zeros((len(memory.r), 2, 3))
         method, begin, share = integrator_of(integrator, ratio), memory, ERROR_SHARE[ratio]
@@ -155,7 +157,7 @@ class Companion:
         )
 
     def begin_apart(self, system: System, t: float, error: Array) -> None:
-        """Shift the start by the error of the run at t, as if this companion had found it; see `error_of`."""
+        """Shift the start by the error of the run at t, as if this companion had run until then; see `error_of`."""
         apart = moved(self.begin, -error / self.share)
         acting = system if self.events is None else self.events.system
         self.memory, _ = started_anew(self.integrator, acting, t, apart, self.work)
@@ -335,8 +337,8 @@ class StepWatch:
     ) -> ValidityNote | None:  # fmt: skip
         """Take the memories before and after n_steps steps of the run; return a note if it is new.
 
-        events: those of the run before these steps; needed if a companion starts with them. is_cut: whether a force
-        jumps or an event switches something within these steps.
+        events: events of the run before these steps, needed if a companion starts with these steps. is_cut: whether a
+        force jumps or an event switches something within these steps.
         """
         last = first + n_steps
         if self.has_companion:
@@ -367,7 +369,7 @@ class StepWatch:
     def may_err_at_once(self, system: System, begin: Memory, end: Memory, h: float) -> bool:
         """Whether the first step alone may have a relevant error, judged by its change of accelerations.
 
-        Where they change by c, places are in doubt by up to h² c/2. What a step does not resolve changes them fully.
+        If they change by c, positions may be wrong by h² c/2. Motions that a step does not resolve change them fully.
         """
         u0 = compiled_system(system).model.bodies.u0[:-1, None] + np.arange(6)
         change = lengths((end.u_dot - begin.u_dot)[u0].reshape(-1, 2, 3)).max(axis=0)
@@ -397,7 +399,7 @@ class StepWatch:
         if self.is_comparable(last):
             self.update_size(begin.state, end.state, h * (last - first))
             self.turn = np.maximum(self.turn, turns_in_a_step(system, end.state, h))
-            if not self.follow(system, other, end, last, t0, h):  # what it has found so far counts
+            if not self.follow(system, other, end, last, t0, h):  # the error found so far still counts
                 self.close_companion(h)
                 self.companions_done, self.next_window = True, last
                 return self.new_note(system, t0 + last * h, h) if self.is_judged(last) else None
@@ -435,14 +437,14 @@ class StepWatch:
             is_fit = not (is_far and self.coarse.ratio == DOUBLES)
             if not (is_fit and self.coarse.follow(system, end, last, t0, h, self.jumps)):
                 self.coarse, self.coarse_fails = None, True
-        found = np.maximum(other.peak, self.first_error)  # double steps may not see what half steps found in one step
+        found = np.maximum(other.peak, self.first_error)  # half steps may have found an error that double steps miss
         is_small = is_good and self.relative_errors(system, found).max() < SCREEN * self.limit
         if other.ratio == DOUBLES and not is_small:
             doubles_fail, other = not is_good, self.refined(system, t0, other)
             if doubles_fail:
                 self.coarse, self.coarse_fails = None, True
             is_good = other.follow(system, end, last, t0, h, self.jumps)
-        if not is_good and other.is_light:  # less damping may be what fails
+        if not is_good and other.is_light:  # the steps may fail because of the smaller damping
             damped = self.with_steps(other.ratio, system, t0, other, is_light=False)
             is_good = damped.follow(system, end, last, t0, h, self.jumps)
             self.companion = damped if is_good else other
@@ -472,7 +474,8 @@ class StepWatch:
     ) -> Companion:
         """Return a companion with the given step size ratio that starts where another companion started.
 
-        is_light: with little numerical damping at the start of a run; a memory of the run has that of its method.
+        is_light: whether to use little numerical damping, if the companion begins with the run. (Later memories of the
+        run contain the damping of its method.)
         """
         return self.moved_companion(system, t0, Companion.begun(
             self.integrator, other.begin, self.work_arrays(system), other.start, ratio, events=other.events_at_begin,
@@ -484,7 +487,7 @@ class StepWatch:
         if self.error is not None and other.start == 0:
             try:
                 other.begin_apart(system, t0, self.error)
-            except FloatframeError:  # no such state
+            except FloatframeError:  # there is no consistent state with this error
                 self.add_error_at_begin()
         return other
 
@@ -492,7 +495,7 @@ class StepWatch:
         """Remove the companion and add its error to the sum; return the error, or None if there is none."""
         other, self.companion = self.companion, None
         coarse, self.coarse = self.coarse, None
-        if other is None or other.at == other.start:  # what the first step alone has found counts nevertheless
+        if other is None or other.at == other.start:  # only the error of the first step is known, and it counts
             first = np.zeros_like(self.total)
             first[:, :, 0] = self.first_error
             self.total, self.first_error = self.total + first, 0.0
@@ -578,7 +581,7 @@ class StepWatch:
         if found is not None:
             total = total.copy()
             total[:, :, 0] += found
-        largest_turn = size[1, 0] + total[:, 1, 0].max()  # that the exact motion may have
+        largest_turn = size[1, 0] + total[:, 1, 0].max()  # largest rotation that the exact motion may have
         if largest_turn < SMALL_TURN * min(size[0, 0] / compiled.length, 1.0):
             size[1] = np.maximum(size[1], size[0] / compiled.length)
         moves = size[:, 0] > least
@@ -646,7 +649,7 @@ class StepWatch:
 
 
 def integrator_of(integrator: Integrator, ratio: float) -> Integrator:
-    """Return the method for another step size; ratio: new step size over the original one."""
+    """Return the method for another step size; ratio: new step size divided by the original one."""
     tolerance = getattr(integrator, "error_tolerance", None)
     if tolerance is None:
         return integrator
@@ -654,9 +657,9 @@ def integrator_of(integrator: Integrator, ratio: float) -> Integrator:
 
 
 def lighter(integrator: Integrator, ratio: float) -> tuple[Integrator, float]:
-    """Return the method with less numerical damping if its own exceeds that of `LIGHT`, and its error factor.
+    """Return the method with the numerical damping of `LIGHT` if its own is larger, and its error factor.
 
-    The phase error of generalized-alpha in a period is c(rho_inf) (omega h)², c as below.
+    The phase error of generalized-alpha in a period is c(rho_inf) (omega h)², with c as in the code.
     """
     if not isinstance(integrator, GeneralizedAlpha | RelativeGeneralizedAlpha):
         return integrator, ERROR_SHARE[ratio]
@@ -677,8 +680,8 @@ def ratio_of_differences(other: Companion, coarse: Companion) -> Array:
 def by_observed_order(other: Companion, coarse: Companion | None, coarse_fails: bool) -> Array:
     """Return the factor by which errors exceed the second-order estimate of a companion, (n_b, 2).
 
-    Changes of a run to shorter and shorter steps that fall by a ratio x go on by x/(1 - x) times the last.
-    Where double steps fail, the order is unknown, and the first is assumed.
+    If the changes due to shorter and shorter steps form a geometric series of ratio x, the changes after the last one
+    add up to x/(1 - x) times the last. If double steps fail, the order is unknown and taken as first.
     """
     none = np.ones(other.peak.shape)
     if other.ratio == DOUBLES or (other.ratio == HALVES and other.is_light):

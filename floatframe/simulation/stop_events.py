@@ -83,7 +83,7 @@ def sum_size(compiled: CompiledSystem, name: str) -> float:
 def stop_values(compiled: CompiledSystem, event: StopEvent, resting: Mapping[str, str], rows: Sequence[Rows]) -> Array:
     """Return the watched value of a stop event for result rows, (n_times,).
 
-    A limit on which the sum rests is not reached again; one on which it does not rest cannot let go.
+    A limit at which the sum rests cannot be reached again, and a limit at which it does not rest cannot release it.
     """
     side, w = resting.get(event.coupler), np.concatenate([row.w for row in rows])
     if event.side == "release":
@@ -119,7 +119,7 @@ def require_off_stops(system: System, w: Array) -> None:
             if INWARD[event.side] * (value - event.level) < -BEYOND * size:
                 raise ModelError(
                     f"coupler {event.coupler!r}: the equilibrium would be at {value:.6g}, beyond its {event.side} "
-                    f"limit {event.level:.6g}, where it rests on the stop: for statics give the coupler "
+                    f"limit {event.level:.6g}, so the coupler rests on the stop: for statics, give it "
                     f"constant = {event.level:g} in place of its limits"
                 )
 

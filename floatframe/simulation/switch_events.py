@@ -1,8 +1,8 @@
 """Switching functions: a law jumps at their zeros; their signs are constant within a step.
 
-A step that ends beyond the zero with the sign of its beginning finds a smooth motion, so that the time of the zero is
-found by steps of other sizes, as that of an event. There the sign changes, and the motion goes on with the
-accelerations after the jump.
+A step keeps the sign of its beginning even if it ends beyond the zero, so that its motion is smooth. Trial steps of
+other sizes therefore find the time of the zero, as that of any event. There the sign changes, and the motion continues
+with the accelerations after the jump.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -75,7 +75,7 @@ def column_at(column: Array, t: Array) -> Array:
 
 
 def unknowns_of_force(compiled: CompiledSystem, u: int, i: int) -> IntArray:
-    """Return the numbers of the unknowns that user force u uses, which is element i: values, rates, states."""
+    """Return the indices of the unknowns (values, rates, states) of user force u, which is element i."""
     users, elements = compiled.model.users, compiled.model.elements
     rows = compiled.model.coordinates.row[elements.coordinate0[i] : elements.coordinate0[i + 1]]
     states = int(elements.core[i]) + int(users.n_forces[u]) + 3 * np.arange(int(users.n_states[u]))
@@ -105,7 +105,7 @@ def sign_of(value: float) -> int:
 
 
 def beyond_zero(value: float, sign: int) -> float:
-    """Return a value with the given sign; a value with the other sign becomes the first number on this side."""
+    """Return a value with the given sign; a value with the other sign becomes the nearest number with this sign."""
     return value if sign * value > 0.0 else float(np.nextafter(0.0, sign))
 
 

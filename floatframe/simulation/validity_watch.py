@@ -2,13 +2,13 @@
 
 The stiffness of a body under its loads is K + Σ lambda_j K_j, with the amplitudes lambda of the unit loads (theory.md
 §7): acceleration of the frame origin minus gravity, angular acceleration, products of the angular velocity, wrenches on
-the interfaces, all in body axes. In units of K its change is A = Σ lambda_j K^(-1/2) K_j K^(-1/2): the loads are
--min(eig A) of those that buckle the body, and a linear frame is wrong in stiffness by max |eig A|.
+the interfaces, all in body axes. The relative change of the stiffness is A = Σ lambda_j K^(-1/2) K_j K^(-1/2). The
+loads are -min(eig A) times the buckling loads of the body, and a linear frame has a stiffness error of max |eig A|.
 
-Where the body has no matrices, those of the interface loads are estimated from the rotations of the interfaces.
+If the body has no such matrices, those of the interface loads are estimated from the rotations of the interfaces.
 
-The eigenvalues are found once per batch of rows, where Σ |lambda_j| |K_j| is largest, and only if that bound is above
-the limit and what was seen before.
+The eigenvalues are computed once per batch of rows, where Σ |lambda_j| |K_j| is largest, and only if that bound exceeds
+the limit and the largest value so far.
 """
 
 from collections.abc import Callable, Iterator
@@ -144,7 +144,7 @@ class ValidityWatch:
     def measures(self, part: Watched, rows: Rows, told: Rows) -> list[tuple[str, Array]]:
         """Return the checked quantities for engine rows, in the body frames of the files, (n_t,).
 
-        A rotation is that against the frame in which the engine moves the body, a load that of the frame of its file.
+        Rotations are relative to the frame in which the engine moves the body, loads refer to the frame of the file.
         """
         model = compiled_system(self.system).model
         i, u0 = part.index, int(model.bodies.u0[part.index])
@@ -200,7 +200,8 @@ class ValidityWatch:
 def in_mean_axes(part: Watched, q: Array) -> float:
     """Return the largest interface rotation relative to mean axes for q, (n_t, n_q) [rad]; -1: unknown.
 
-    Not known where the body has mean axes already, has many modes (the way there takes long), or cannot go there.
+    It is unknown if the body already has mean axes, if it has many modes (the conversion takes long), or if it cannot
+    be converted.
     """
     reduced = part.body.reduced
     if part.body.is_stiffened or reduced.frame.kind == "tisserand" or reduced.n_q > MOST_CONVERTED:
@@ -225,8 +226,9 @@ def is_elastic(body: FlexibleBody) -> bool:
 def held_frequencies(compiled: CompiledSystem, bodies: list[int]) -> list[float]:
     """Return the lowest positive angular frequency of each body with one joint fixed, over all joints [rad/s].
 
-    What a joint holds stands still then, so that a body that is clamped by one of its joints has the frequency of a
-    cantilever whatever the frame of its file; a body without joints has that of the free body. None above zero: inf.
+    The directions that the joint constrains are fixed, so that a body clamped by one of its joints has the frequency of
+    a cantilever, independent of the frame of its file. A body without joints has the frequency of the free body. The
+    frequency is infinite if none is positive.
     """
     model, work = compiled.model, new_work(compiled.model)
     set_iterate(work, compiled.placed)
@@ -250,9 +252,9 @@ def held_frequencies(compiled: CompiledSystem, bodies: list[int]) -> list[float]
 def lowest_frequency(M: Array, K: Array, G: Array) -> float:
     """Return the lowest positive angular frequency of motions with G x = 0; rigid motions come first in x.
 
-    The pencil (M, K + s M) has no singular side: its eigenvalues are 1/(omega² + s), the largest of them those of the
-    rigid-body motions that G leaves free. All motions are scaled to a mass of 1, or those of modes without mass to the
-    stiffness of the stiffest mode.
+    K + s M is regular, so that the eigenvalues of (M, K + s M) are 1/(omega² + s); the largest belong to the rigid-body
+    motions that G leaves free. Motions are scaled to a mass of 1, and modes without mass to the stiffness of the
+    stiffest mode.
     """
     mass, stiffness = np.diag(M), np.diag(K)
     highest = np.max(stiffness[mass > 0] / mass[mass > 0]) or stiffness.max() or 1.0
@@ -311,7 +313,8 @@ def estimated_interface_loads(reduced: ReducedBody) -> Array:
     """Return estimated matrices for unit interface wrenches, (n_interfaces, 6, n, n), for a body without them.
 
     A force N along the line e of length l from the centre of mass to an interface does the work -N l/2 times the mean
-    square of the slopes between them. Half the square of the slope at the interface is that of a half sine.
+    square of the slopes between them. This mean square is taken as half the square of the slope at the interface, as
+    for a half sine.
     """
     n, center = reduced.n_q, reduced.moments.center_of_mass
     K = np.zeros((len(reduced.interfaces), 6, n, n))
@@ -326,12 +329,12 @@ def estimated_interface_loads(reduced: ReducedBody) -> Array:
 
 
 # whether the rotations of bushings and of public elements stay where small angles are meant ---------------------------
-# A bushing with stiffness, damping or preload about its axes takes the components of the rotation vector theta of its
-# marker B against A. Cardan angles, which its coefficients may have been measured in, differ from them by about half
-# the products of two components: next to nothing about one axis, however far it turns, and ever more about two. Next to
-# a full turn a small tilt has a large component.
+# A bushing with stiffness, damping or preload about its axes uses the components of the rotation vector theta of its
+# marker B relative to A. Its coefficients may have been measured in Cardan angles, which differ from these components
+# by about half the products of two of them: hardly for rotations about one axis, however large, and more and more for
+# rotations about two. Near a full turn even a small tilt gives a large component.
 #
-# Public elements say themselves how far their angles are beyond small ones (`Element.small_angles`).
+# Public elements themselves state by how much their angles exceed small ones (`Element.small_angles`).
 
 
 ANGLES_LIMIT = 0.05  #: allowed relative difference between rotation vector and Cardan angles
@@ -360,7 +363,7 @@ def angle_measures(system: System) -> Iterator[tuple[str, str, Measure]]:
 def apart_from_cardan(a: MarkerData, b: MarkerData, k: int, rows: Rows) -> Array:
     """Return the relative difference between rotation vector and Cardan angles of b relative to a, (n_t,).
 
-    k: where its components begin in the counted angles, -1 where they are not.
+    k: index of its first component among the counted angles; -1 if the components are not counted.
     """
     if k >= 0:
         theta = rows.angle[:, k : k + 3]
