@@ -71,37 +71,37 @@ def compare(
     counts
         Numbers of vibration modes.
     band
-        Highest frequency [Hz]; None: that of elastic free mode n_reference.
+        Highest frequency [Hz]; None: the frequency of elastic free mode n_reference.
     n_reference
         Number of elastic free modes in the band, where no band is given.
     damping
         Ratio of every mode in response and motion.
     pulse_at
-        Interface the force pulse of the motion acts on; the first by default.
+        Interface on which the force pulse acts; by default the first.
     motion
         Reference motion for the deformation error; the response to the pulse by default.
     cache
-        File that keeps the solution of the full model for the next comparison; None: nothing is kept.
+        File that stores the solution of the full model for the next comparison; None: the solution is not stored.
     stage
-        Called with the name of each stage, gives a context manager around it.
+        Function that is called with the name of each stage and returns a context manager for this stage.
     workers
-        Where sets and numbers of modes are judged (docs/cluster.md), with a factorisation in every worker; None: here,
-        with the one that solved the full model.
+        Workers that assess sets and numbers of modes (docs/cluster.md); each makes its own factorisation. None: this
+        process assesses them, with the factorisation that solved the full model.
     source
-        Makes the body; sent to the workers, which need it and a cache.
+        Function that makes the body; workers need it and `cache`.
 
     Raises
     ------
     CompareError
-        If a set is unknown, no count is given, or the band holds no mode. A set that cannot be made does not raise: its
-        result says why.
+        If a set is unknown, no count is given, or the band holds no mode. A set that cannot be computed does not raise
+        an error: its result gives the reason.
     BodyError
         If the body is a mechanism or not free.
     WorkerError
-        If no workers can be had.
+        If no workers are available.
     """
     if workers is not None and (source is None or cache is None):
-        raise CompareError("workers: they need source, a function that makes the body, and a cache")
+        raise CompareError("workers: expected source, a function that makes the body, and cache")
     options = {name: dict(sets[name]) if isinstance(sets, Mapping) else {} for name in sets}
     check_request(options, counts)
     question = Question(default_pulse(body, pulse_at), damping, band, n_reference, motion)
@@ -271,13 +271,13 @@ class SetJudge:
     Parameters
     ----------
     source
-        Makes the coupled body; can be sent to another process.
+        Function that makes the coupled body; it can be sent to another process.
     cache
         Full path of the file with the solution of the full model.
     digest
-        Of that solution.
+        Digest of this solution.
     question
-        Key of the question that it answers.
+        Key of the request for this solution.
     damping
         Ratio of every mode in response and motion.
     """
@@ -301,7 +301,7 @@ class SetJudge:
         source, cache, digest, question, damping = self.given
         body = source()
         if reference_digest(body, question) != digest:
-            raise WorkerError("a worker makes another body of the same job; let all workers share the files of the job")
+            raise WorkerError("a worker made a different body from this job; let all workers read the same files")
         full = read_full_model(Path(cache), digest)
         if full is None:
             raise WorkerError(f"{cache}: it has changed since this comparison began; start it again")

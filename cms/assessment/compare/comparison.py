@@ -63,7 +63,7 @@ class FullResults:
     response_error: float  #: estimated relative error of the response of the full model
     damping: float  #: damping ratio of every mode in response and motion
     t: Array  #: times of the reference motion, (n_t,) [s]
-    force: Array | None  #: force of the pulse over its peak, (n_t,); None for a given motion
+    force: Array | None  #: force of the pulse divided by its peak, (n_t,); None for a given motion
     motion_words: str
     mass: Array  #: mass of the body along x, y, z, then inertia about these axes through the centre of mass, (6,)
     held_mass: Array  #: part of this mass that moves while the interfaces are fixed, (6,)
@@ -77,7 +77,7 @@ class Drawing:
 
     nodes: Array  #: node positions, (n, 3) [length unit]
     triangles: IntArray  #: corner nodes of the triangles, (n_tri, 3)
-    lines: IntArray  #: sharp edges of the surface, or the elements of a body without one, (n_lines, 2)
+    lines: IntArray  #: sharp edges of the surface, or elements of a body without surface, (n_lines, 2)
     shapes: Array  #: free modes in the band, scaled to a largest displacement of 1, (n_modes, n, 3)
     n_triangles_full: int  #: number of triangles of the surface before it was thinned for the screen
 

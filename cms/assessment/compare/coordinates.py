@@ -1,8 +1,8 @@
 """Coordinates in a small basis, in which many subsets of one mode set are assessed without the mesh.
 
-All that a comparison looks at (rigid-body and free modes, static responses, the columns of a mode set) is written in
-one basis Q, orthonormal in W = K + omega_1² M. Then K, M and every displacement are small dense arrays, the W-norm is
-the Euclidean norm, and differences of displacements are accurate to roundoff, which differences of energies are not.
+All displacements that a comparison uses (rigid-body and free modes, static responses, columns of a mode set) are
+expressed in one basis Q, orthonormal in W = K + omega_1² M. Then K, M and every displacement are small dense arrays,
+and the W-norm is the Euclidean norm. Displacements are subtracted, not energies: this is accurate to roundoff.
 """
 
 from dataclasses import dataclass
@@ -44,15 +44,15 @@ class ReferenceBasis:
         Parameters
         ----------
         families
-            Of a coupled body.
+            Mode families of a coupled body.
         ports
-            The reference points of its interfaces.
+            Reference points of its interfaces.
         columns
-            Displacements the sets are judged by, (n_dof, n_reference).
+            Reference displacements, by which sets are assessed, (n_dof, n_reference).
         n_rigid
-            How many of them, the first, are the M-orthonormal rigid-body modes.
+            Number of M-orthonormal rigid-body modes, which are the first columns.
         omega2
-            omega_1² of W [1/s²].
+            Factor omega_1² in W [1/s²].
         """
         body = families.body
         self.body, self.families, self.ports = body, families, ports
@@ -67,8 +67,8 @@ class ReferenceBasis:
     def coordinates(self, columns: Array) -> Coordinates:
         """Return the coordinates of a mode set's columns relative to the reference, (n_dof, n_columns).
 
-        (1) unit columns in the W-norm; what lies in the span of the reference taken off, twice
-        (2) W-orthonormal basis Q_V of what is left
+        (1) scale columns to unit W-norm, and subtract their part in the span of the reference, twice
+        (2) find a W-orthonormal basis Q_V of the remainders
         (3) coordinates (Q_refᵀ W V, Q_Vᵀ W V)
         """
         Q, V = self._Q, self._products(columns)

@@ -28,7 +28,7 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["Reference", "drawn_entry", "judge_subset"]
 
-#: interface motion of a combination of unit shapes over the largest one, below which interfaces count as fixed
+#: ratio of a combination's interface motion to the largest such motion, below which interfaces count as fixed
 HELD = 1e-9
 
 
@@ -163,7 +163,7 @@ def mass_part(reference: Reference, c: Coordinates, basis: FreeBasis, directions
     names = ("along x", "along y", "along z", "about x", "about y", "about z")
     worst = int(remainder[:3].argmax())
     reason = (
-        f"with all interfaces held the modes carry {100 * share[worst]:.1f} % of what moves {names[worst]}; "
+        f"with all interfaces fixed the modes carry {100 * share[worst]:.1f} % of the mass that moves {names[worst]}; "
         + ", ".join(f"{name} {100 * s:.0f} %" for name, s in zip(names, share, strict=True))
     )
     data = {"carried": carried, "share": share, "remainder": remainder}

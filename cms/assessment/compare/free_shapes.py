@@ -33,7 +33,7 @@ class Subset:
 def independent_subset(T: Array) -> tuple[Array, IntArray, float]:
     """Return an orthonormal basis of columns T, the redundant columns, and the condition number of the others.
 
-    The tolerance is that of the finishing step (docs/theory.md §3).
+    The tolerance is the one of the finishing step (docs/theory.md §3).
     """
     length = np.linalg.norm(T, axis=0)
     unit = T / np.where(length > 0, length, 1.0)
@@ -48,7 +48,7 @@ def judged_subset(c: Coordinates, T: Array, labels: tuple[str, ...], rigid: Arra
     """Solve the free-free problem of the span of columns T and the rigid-body modes.
 
     (1) independent columns U of T
-    (2) directions of U that hold no rigid-body motion, their rigid-body part off: U <- (1 - N Nᵀ M) U d
+    (2) directions d of U outside the rigid-body motions, without their rigid-body part: U <- (1 - N Nᵀ M) U d
     (3) K z = omega² M z over U, by the solver of the finishing step
 
     Parameters
@@ -56,7 +56,7 @@ def judged_subset(c: Coordinates, T: Array, labels: tuple[str, ...], rigid: Arra
     T
         Columns of the subset, (n_Q, k).
     labels
-        Of those columns, (k,).
+        Labels of these columns, (k,).
     rigid
         M-orthonormal rigid-body modes N, (n_Q, n_r).
     omega2_1
@@ -68,7 +68,8 @@ def judged_subset(c: Coordinates, T: Array, labels: tuple[str, ...], rigid: Arra
         If nothing elastic is left.
     """
     U, redundant, condition = independent_subset(T)  # (1)
-    motions = rigid / np.sqrt(omega2_1)  # for unit columns: the norm of the coordinates is that of K + omega_1² M
+    # scaled to unit length: the norm of coordinates is the (K + omega_1² M)-norm of the shapes, which is omega_1 for N
+    motions = rigid / np.sqrt(omega2_1)
     in_span = U.T @ motions
     rest = motions - U @ in_span
     U = U @ elastic_directions(in_span, rest.T @ rest)  # (2)

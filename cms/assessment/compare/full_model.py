@@ -30,7 +30,7 @@ __all__ = ["FullModel", "read_full_model", "reference_digest", "solve_full_model
 log = logging.getLogger(__name__)
 
 VERSION = "2"  #: version of the computation; results from files of another version are computed again
-MODES_BEYOND = 2.0  #: frequency over the band up to which free modes are included dynamically
+MODES_BEYOND = 2.0  #: highest frequency of dynamically included free modes, divided by the band
 #: number of free modes first requested per mode in the band; this mostly suffices for twice its frequency
 FIRST_SEARCH = 3
 MASS_TOLERANCE = 1e-10  #: relative residual of the solutions with M_II
@@ -112,19 +112,19 @@ def solve_full_model(
     Parameters
     ----------
     families
-        Of the body; its factorisation serves here too.
+        Mode families of the body; their factorisation is used here too.
     pulse
-        The force of the reference motion.
+        Force that causes the reference motion.
     n_modes
-        Elastic free modes the band holds, where no band is given.
+        Number of elastic free modes in the band, if no band is given.
     band
-        Highest frequency [cycles per time unit of the body]; None: that of mode n_modes.
+        Highest frequency [cycles per time unit of the body]; None: the frequency of mode n_modes.
     damping
         Ratio of every mode in the motion.
     motion
         A reference motion instead of the response to the pulse.
     n_expected
-        Free modes that will be asked for later: found at once here, they cost less than in two searches.
+        Number of free modes that will be needed later; one search here costs less than two.
 
     Raises
     ------

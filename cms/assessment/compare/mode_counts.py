@@ -19,7 +19,7 @@ def mode_counts(text: str) -> tuple[int, ...]:
     Parameters
     ----------
     text
-        Parts with commas between; each a number, a:b (both ends included) or a:b:step.
+        Parts separated by commas; each is a number, a:b (both ends included) or a:b:step.
 
     Raises
     ------

@@ -69,10 +69,10 @@ def select_modes(
 ) -> Selection:
     """Find the fewest modes with which a set meets an error over a band.
 
-    (1) the full model once: free modes of the band, and its response at the interfaces where that is the measure
-    (2) sets that grow by columns: the set with many modes once; all smaller ones are judged as its subspaces in small
-        coordinates, from none up, until one meets the error; if none does, with twice as many
-    (3) other sets: 0, 1, 2, 4, … modes until one meets the error, then bisection for the fewest
+    (1) solve the full model once: free modes of the band, and its response at the interfaces if the measure is "frf"
+    (2) if smaller sets are columns of larger ones: compute the set once with many modes, and assess its subspaces with
+        0, 1, 2, … modes in small coordinates until one meets the error; if none does, repeat with twice as many modes
+    (3) for other sets: try 0, 1, 2, 4, … modes until one meets the error, then find the fewest by bisection
 
     Parameters
     ----------
@@ -89,17 +89,17 @@ def select_modes(
         "frf": root mean square, over the logarithm of frequency, of the relative error of the receptance of all
         interfaces, 1 % modal damping (`cms.assessment.quality.of_reduction.frf`).
     options
-        Of the set, beside the number of modes.
+        Options of the set other than the number of modes.
     added
-        What is done to the set before it is judged, such as `with_load_cases`.
+        Function that is applied to the set before the assessment, such as `with_load_cases`.
     most
-        Number of modes at which the search gives up.
+        Largest number of modes; the search fails beyond it.
 
     Raises
     ------
     ModeSetError
-        If numbers or names are wrong, the band holds no mode, or no number of modes meets the error: the text has the
-        best that was found.
+        If numbers or names are wrong, the band holds no mode, or no number of modes meets the error. In the last case
+        the message contains the best result.
     """
     _check(set, error, band, measure)
     options = dict(options or {})

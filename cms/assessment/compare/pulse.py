@@ -1,4 +1,4 @@
-"""The reference motion of a comparison unless another is given: a short force pulse at an interface."""
+"""Default reference motion of a comparison: the response to a short force pulse at an interface."""
 
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ FEWEST_STEPS = 200
 class Pulse:
     """A force along (1, 1, 1) / sqrt(3) in mesh axes on an interface, sin²(pi t / T) for 0 < t < T = 2 / band.
 
-    The main lobe of its spectrum ends at the band, so that it drives what the comparison looks at and little else.
+    The main lobe of its spectrum ends at the band, so it mainly excites the modes that are compared.
     """
 
     at: str  #: name of the interface on which the force acts
@@ -32,7 +32,7 @@ class Pulse:
         Parameters
         ----------
         band, first
-            Highest frequency of the comparison, and that of the first elastic mode [cycles per time unit of the body].
+            Highest frequency of the comparison, frequency of the first elastic mode [cycles per time unit of the body].
         """
         duration = self.duration(band)
         t_end = duration + PERIODS / first
@@ -67,6 +67,6 @@ def default_pulse(body: FEBody, interface: str | None = None) -> Pulse:
     """
     if not body.interfaces:
         raise CompareError(
-            f"body {body.name!r} has no interface, at whose responses a comparison looks; name at least one"
+            f"body {body.name!r} has no interface; a comparison assesses responses at interfaces: name at least one"
         )
     return Pulse((body.interfaces[0] if interface is None else body.interface(interface)).name)

@@ -71,9 +71,9 @@ def solution(families: Families, question: Question, *, n_expected: int = 0, cac
     Parameters
     ----------
     n_expected
-        Free modes that mode sets will ask for.
+        Number of free modes that the mode sets will need.
     cache
-        File of the solution; None: none is read or written.
+        File of the solution; None: no file is read or written.
     """
     body = families.body
     digest = reference_digest(body, question.key)

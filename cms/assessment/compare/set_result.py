@@ -43,12 +43,12 @@ def set_result(
     basis: ReferenceBasis,
     reference: Reference,
 ) -> SetResult:
-    """Return the result of one set; if it cannot be made, its sentence gives the reason."""
+    """Return the result of one set; if the set cannot be computed, its sentence gives the reason."""
     return joined_parts(name, [set_part(name, options, counts, families, basis, reference)])
 
 
 def joined_parts(name: str, parts: Sequence[SetPart]) -> SetResult:
-    """Return the result of one set, joined from its parts, which together contain all numbers of modes."""
+    """Join the parts of one set, which together contain all numbers of modes, into its result."""
     words = first_sentence(MODE_SETS[name].__doc__)
     refused = {n_modes: why for part in parts for n_modes, why in part.refused.items()}
     found = [pair for part in parts for pair in zip(part.points, part.columns, strict=True)]

@@ -18,18 +18,18 @@ def column_subset(modes: ModeSet, at_b: Array, n_modes: int) -> tuple[Array, tup
     Parameters
     ----------
     modes
-        The largest set.
+        Largest set.
     at_b
-        Its rows at the boundary dofs, (n_b, n_columns).
+        Rows of this set at the boundary dofs, (n_b, n_columns).
     n_modes
         Number of vibration columns.
 
     Returns
     -------
     C
-        (n_columns, k).
+        Coefficients of the subset in the columns of the largest set, (n_columns, k).
     labels
-        One per column, (k,).
+        Label of each column of the subset, (k,).
     """
     kept = _retained_columns(modes, n_modes)
     return np.eye(len(modes.labels))[:, kept], tuple(modes.labels[k] for k in kept)
@@ -39,7 +39,7 @@ def residual_subset(modes: ModeSet, at_b: Array, n_modes: int) -> tuple[Array, t
     """Use fewer free modes, and add the static contribution of the removed modes to the residual attachment modes.
 
     residual_n = Psi_U - Phi_n Lambda_n⁻¹ Phi_n,Bᵀ = residual_N + sum over n < k <= N of phi_k omega_k⁻² phi_k,Bᵀ, for
-    M-orthonormal phi_k; parameters and returns as `column_subset`.
+    M-orthonormal phi_k. Parameters and returned values are those of `column_subset`.
     """
     kept = _retained_columns(modes, n_modes)
     C = np.eye(len(modes.labels))

@@ -77,7 +77,7 @@ def shown_point(points: Sequence[Point]) -> int | None:
 
 
 def set_sentence(points: Sequence[Point]) -> str:
-    """State the sufficient number of modes and the limits that fewer modes exceed, or those the largest set exceeds."""
+    """State how many modes suffice, and which limits fewer modes exceed; else the limits that the largest exceeds."""
     shown = shown_point(points)
     if shown is None:
         return "it has no columns to judge"
@@ -106,7 +106,7 @@ def miss(record: QualityRecord) -> str:
 def ranking(sets: Sequence[SetResult]) -> tuple[str, ...]:
     """Return the sets that are good enough: fewest coordinates first, then most accurate, then fewest modes.
 
-    Sets that are equal in all of it, such as those of one span, stand as they were given.
+    Sets that are equal in all three, such as sets with the same span, keep the given order.
     """
     good = [(result.name, result.detail) for result in sets if result.verdict == "pass" and result.detail is not None]
     good.sort(key=lambda found: (found[1].n_q, accuracy(found[1]), found[1].n_modes))

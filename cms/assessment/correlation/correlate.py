@@ -36,7 +36,7 @@ __all__ = [
 
 
 LEAST_MAC = 0.5
-WINDOW = 0.5  #: frequency difference over the measured frequency, within which a computed mode may be the partner
+WINDOW = 0.5  #: largest frequency difference between partners, divided by the measured frequency
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def comac(A: Array, B: Array) -> Array:
 
 
 def scale_factors(measured: Array, computed: Array) -> Array:
-    """Return the least-squares factor from each measured shape to its computed one, (n_rows, n) each -> (n,)."""
+    """Return the least-squares factors, (n,), that scale measured shapes to computed ones, both (n_rows, n)."""
     return np.asarray(np.einsum("rk,rk->k", measured, computed) / np.einsum("rk,rk->k", measured, measured))
 
 
@@ -124,7 +124,7 @@ def mass_at_rows(shapes: Array) -> Array:
     """
     if shapes.shape[0] < shapes.shape[1] or np.linalg.cond(shapes) > 1e6:
         raise CorrelationError(
-            f"{shapes.shape[0]} measured rows do not tell {shapes.shape[1]} modes of the model apart; no orthogonality"
+            f"{shapes.shape[0]} measured rows cannot distinguish {shapes.shape[1]} modes of the model; no orthogonality"
         )
     inverse = np.linalg.pinv(shapes)
     return np.asarray(inverse.T @ inverse)

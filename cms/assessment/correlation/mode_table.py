@@ -30,7 +30,7 @@ def read_mode_table(path: Path, length: float, *, given: float | None = None) ->
     length
         Length unit of the model [m].
     given
-        Length unit of x, y, z [m]; None: that of the model.
+        Length unit of x, y, z [m]; None: the length unit of the model.
 
     Raises
     ------

@@ -44,7 +44,7 @@ def modes_of_body(body: FEBody, cutoff: float, *, held: Sequence[str] = ()) -> M
     Parameters
     ----------
     held
-        Interfaces that are held in the test; empty: the body is free.
+        Interfaces that are fixed in the test; empty: the body is free.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def modes_of_body(body: FEBody, cutoff: float, *, held: Sequence[str] = ()) -> M
             modes = families.free_modes(ModeCount(cutoff=cutoff * body.units.time))
             columns, frequencies = np.asarray(modes.Phi), modes.frequencies
     if not len(frequencies):
-        raise CorrelationError(f"body {body.name!r}: no elastic mode up to {cutoff:g} Hz; units of the test and model?")
+        raise CorrelationError(f"body {body.name!r}: no elastic mode up to {cutoff:g} Hz; check the units of both")
     return ModelModes(
         body.name, np.asarray(frequencies) / body.units.time, body.translations(columns), np.asarray(body.nodes),
         body.numbering, columns, not held,

@@ -13,7 +13,7 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["Placement", "PointPairs", "pair_points"]
 
-TOLERANCE = 0.02  #: largest distance between a node and its point, over the size of the model
+TOLERANCE = 0.02  #: largest distance between a node and its point, divided by the size of the model
 
 
 @dataclass(frozen=True)
@@ -83,8 +83,8 @@ def pair_points(measured: MeasuredModes, model: ModelModes, placement: Placement
         raise CorrelationError(
             f"{len(far)} of {len(points)} measured points have no node within {placement.tolerance:g} of the size "
             f"{model.size:.4g} of the model; the farthest is point {points[worst]}, {away[worst]:.4g} away from node "
-            f"{model.numbering.node_name(int(found[worst]))}. Unit of length, origin and axes of the test? Else give "
-            "its node by hand, or a greater tolerance"
+            f"{model.numbering.node_name(int(found[worst]))}. Check length unit, origin and axes of the test; or "
+            "give its node by hand, or a larger tolerance"
         )
     same, counts = np.unique(found, return_counts=True)
     if (counts > 1).any():
@@ -102,7 +102,7 @@ def node_of(model: ModelModes, node: int | str, where: str) -> int:
     """Return the index of the node with a given number; the number is the index if the model has no numbers."""
     if not model.numbering.nodes.size:
         if not isinstance(node, int) or not 0 <= node < len(model.nodes):
-            raise CorrelationError(f"{where}: the model knows no numbers of nodes; expected an index, got {node!r}")
+            raise CorrelationError(f"{where}: the nodes of the model have no numbers; expected an index, got {node!r}")
         return node
     return int(model.numbering.rows_of_node(where, node)[0])
 

@@ -54,10 +54,10 @@ def read_universal(path: Path, length: float, *, given: float | None = None) -> 
     numbers = found[0]["numbers"]
     for k, mode in enumerate(found):
         if not np.array_equal(mode["numbers"], numbers):
-            raise CorrelationError(f"{path}: mode {k + 1} is of other points than the first; give one list of points")
+            raise CorrelationError(f"{path}: mode {k + 1} has other points than mode 1; all need the same")
     missing = [int(number) for number in numbers if int(number) not in places]
     if missing:
-        raise CorrelationError(f"{path}: {len(missing)} points have a shape and no place, such as {missing[:5]}")
+        raise CorrelationError(f"{path}: {len(missing)} points have a shape but no position, such as {missing[:5]}")
     shapes = np.stack([mode["shape"].reshape(-1) for mode in found], axis=1)
     is_complex = np.iscomplexobj(shapes) and np.abs(shapes.imag).max() > 0
     n = len(numbers)

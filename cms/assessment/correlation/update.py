@@ -34,7 +34,7 @@ STEP = 1e-3  #: step of theta for finite differences of the matrices
 SMALLEST_STEP = 1e-5  #: size of a theta step below which the update has converged
 MOST_ITERATIONS = 20
 HALVINGS = 8
-MODES_BEYOND = 1.3  #: highest computed frequency over the highest measured frequency
+MODES_BEYOND = 1.3  #: highest computed frequency divided by the highest measured one
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Parameter:
     name: str
     path: str  #: key path in the job, such as "materials.steel.young"
     start: float  #: initial value, not 0
-    spread: float = 0.1  #: expected standard deviation over the initial value
+    spread: float = 0.1  #: expected standard deviation divided by the initial value
     least: float = -0.9  #: lower bound of theta = p / start - 1
     most: float = 9.0
 
@@ -55,7 +55,7 @@ class Update:
 
     parameters: tuple[Parameter, ...]
     values: Array  #: updated value of each parameter, in its unit, (n,)
-    spread: Array  #: standard deviation of each parameter over its initial value, (n,)
+    spread: Array  #: standard deviation of each parameter divided by its initial value, (n,)
     correlation: Array  #: correlation matrix of the parameters, (n, n)
     jacobian: Array  #: relative change of frequency per relative change of parameter at the solution, (n_pairs, n)
     frequency_spread: float  #: relative standard deviation of the measured frequencies

@@ -15,7 +15,7 @@ class Limit:
     action: str  #: remedy if the value does not pass
 
 
-REDUCE_AGAIN = "reduce the body again; the file does not say one thing"
+REDUCE_AGAIN = "reduce the body again; the file contradicts itself"
 LIMITS: dict[str, Limit] = {
     # A reduced body on its own: consistency of its data ----------------------------------------------------------
     "symmetry": Limit("symmetry of M, K, D and moments", 1e-9, 1e-6, REDUCE_AGAIN),
@@ -29,7 +29,7 @@ LIMITS: dict[str, Limit] = {
     ),
     "modal-mass": Limit(
         "modal mass from the mass moments (M*)", 1e-8, 1e-4,
-        "the mass moments and the modes are of different bodies or units; reduce again",
+        "mass moments and modes belong to different bodies or have different units; reduce again",
     ),
     "frame-condition": Limit(
         "modes satisfy the body frame", 1e-8, 1e-4,
@@ -40,23 +40,23 @@ LIMITS: dict[str, Limit] = {
         "a mass moment has a wrong sign, order or unit; reduce again",
     ),
     "inertia-tensor": Limit(
-        "inertia tensor that masses can have", 1e-9, 1e-6,
+        "inertia tensor satisfies the triangle inequality", 1e-9, 1e-6,
         "check density, units and the origin of the inertia; no distribution of mass has this tensor",
     ),
     "gram": Limit(
-        "moments are those of one mass", 1e-9, 1e-6,
+        "moments are integrals over one mass distribution", 1e-9, 1e-6,
         "the moments contradict each other: a sign, an order or a unit is wrong; reduce again",
     ),
     "moments-shapes": Limit(
-        "direction of the moments by masses at the kept nodes, (1 - cosine) / 2", 0.9, 0.95,
+        "direction of the moments against masses at the kept nodes, (1 - cosine) / 2", 0.9, 0.95,
         "a moment has the wrong sign, or belongs to another mode; reduce again",
     ),
     "turned-loads": Limit(
-        "geometric stiffness over a rotation by the loads that turn", 1e-6, 1e-4,
+        "geometric stiffness for a rotation against rotated loads", 1e-6, 1e-4,
         "moments or geometric stiffness have a wrong sign, order or unit; reduce again",
     ),
     "second-order": Limit(
-        "geometric stiffness of interfaces by quadratic modes", 1e-6, 1e-4,
+        "geometric stiffness of interfaces against quadratic modes", 1e-6, 1e-4,
         "geometric stiffness or quadratic modes have a wrong sign, order or unit; reduce again",
     ),
     "rigid-interfaces": Limit(
@@ -73,24 +73,24 @@ LIMITS: dict[str, Limit] = {
     ),
     "energy-shares": Limit("energy shares of the sources sum to one", 1e-9, 1e-3, REDUCE_AGAIN),
     "labels": Limit(
-        "labels and shares are those of the columns on record", 1e-9, 1e-3,
-        "modes are called otherwise than their columns say; reduce again",
+        "labels and shares agree with the stored columns", 1e-9, 1e-3,
+        "labels of modes do not agree with their columns; reduce again",
     ),
     "recovery-motions": Limit(
         "recovery rows of motions follow a rigid motion", 1e-6, 1e-4,
-        "the rows are of another place, frame or unit than they say; make the table again",
+        "the rows belong to another position, frame or unit than their labels say; make the table again",
     ),
     "recovery-forces": Limit(
         "recovery rows of stress and forces in a rigid motion", 1e-6, 1e-3,
-        "the rows are of another body or in axes of other nodes; make the table again",
+        "the rows belong to another body or are in axes of other nodes; make the table again",
     ),
     "recovery-shapes": Limit(
-        "recovery rows of kept nodes and interfaces by the modes of the file", 1e-6, 1e-4,
-        "rows or what they belong to are of another body, order or unit; make the table again",
+        "recovery rows of kept nodes and interfaces against the modes of the file", 1e-6, 1e-4,
+        "rows and modes belong to different bodies, or differ in order or unit; make the table again",
     ),
     "driven-mass": Limit("mass that does not vibrate when one interface is driven", None, None, ""),
     "buckling": Limit(
-        "unit loads over the loads that buckle the body", 1.0, None,
+        "unit loads divided by the loads that buckle the body", 1.0, None,
         "a unit load buckles the body: look for a wrong unit of modulus or density, or a part that is almost loose",
     ),
     "dropped-columns": Limit(
@@ -98,7 +98,7 @@ LIMITS: dict[str, Limit] = {
         "",
     ),
     "mesh-order": Limit(
-        "lowest frequencies too high by cells of first order", 0.02, None,
+        "lowest frequencies too high because of first-order cells", 0.02, None,
         "mesh with cells of second order, give bricks incompatible modes, or mesh finer",
     ),
     "inertia-terms": Limit(
@@ -111,7 +111,7 @@ LIMITS: dict[str, Limit] = {
         "do nodes, masses and stiffness have the units that the file names? If they are meant, nothing is wrong",
     ),
     "step-size": Limit(
-        "highest over lowest frequency", 1e4, None,
+        "highest frequency divided by lowest frequency", 1e4, None,
         "drop the stiffest modes, or take an implicit integrator with numerical damping (rho_inf below 1)",
     ),
     "damping": Limit(
@@ -119,17 +119,17 @@ LIMITS: dict[str, Limit] = {
         "",
     ),
     "damping-told": Limit(
-        "damping is at least that which the provenance names", 1e-9, 1e-6,
+        "damping is at least the damping that the provenance names", 1e-9, 1e-6,
         "the damping was lost or changed after the reduction; reduce again",
     ),
     "scope": Limit("what the file alone cannot show", None, None, ""),
     # A mode set against its full model -----------------------------------------------------------------------------
     "same-body": Limit(
         "the reduced body is that of this model and mode set", 1e-6, 1e-6,
-        "check with the job the file was made from, or reduce again",
+        "check with the job from which the file was made, or reduce again",
     ),
     "grounding": Limit(
-        "stiffness is blind to rigid-body motion (K Psi_R = 0)", 1e-11, 1e-6,
+        "stiffness does not resist rigid-body motion (K Psi_R = 0)", 1e-11, 1e-6,
         "release the body from the ground, or give the nodes with all their digits",
     ),
     "mass-properties": Limit(
@@ -139,7 +139,7 @@ LIMITS: dict[str, Limit] = {
     # all fields of the file in its own modes, `cms.assessment.quality.of_reduction.contents`
     "points": Limit(
         "nodes, numbers, sets and surface of the model", 1e-9, 1e-6,
-        "the file's nodes are not those of the model: another mesh, an origin or axes; check with its own job",
+        "the file's nodes are not those of the model: mesh, origin or axes differ; check with its own job",
     ),
     "frame": Limit(
         "modes satisfy the frame that the file names", 1e-6, 1e-4,
@@ -155,7 +155,7 @@ LIMITS: dict[str, Limit] = {
     ),
     "damping-matrix": Limit(
         "damping of the model and the job", 1e-6, 1e-4,
-        "the file is damped otherwise than the job says; reduce again, or check with the job it was made from",
+        "damping of file and job differ; reduce again, or check with the job from which the file was made",
     ),
     "load-cases": Limit(
         "load cases of the model", 1e-6, 1e-4,
@@ -175,7 +175,7 @@ LIMITS: dict[str, Limit] = {
     ),
     "kept-rotations": Limit(
         "rotations of kept nodes", 1e-6, 1e-4,
-        "markers at these nodes would turn wrongly; reduce again",
+        "markers at these nodes would rotate wrongly; reduce again",
     ),
     "recovery-rows": Limit(
         "recovery tables of the job", 1e-5, 1e-3,
@@ -199,11 +199,11 @@ LIMITS: dict[str, Limit] = {
     ),
     "mac": Limit(
         "modes in the band that the set does not recover (1 - MAC, mass-weighted)", 0.02, 0.2,
-        "keep more modes, or hold the frequency band lower",
+        "keep more modes, or lower the frequency band",
     ),
     "mac-nodal": Limit(
         "modes in the band that the set does not recover (1 - MAC, nodal)", 0.02, 0.2,
-        "keep more modes, or hold the frequency band lower",
+        "keep more modes, or lower the frequency band",
     ),
     "static-interface": Limit(
         "static response to loads on the interfaces, error in energy norm", 1e-6, 0.1,
@@ -219,14 +219,14 @@ LIMITS: dict[str, Limit] = {
     ),
     "frequency-response": Limit(
         "frequency response at the interfaces, relative error over the band", 0.05, 0.3,
-        "keep more modes, or hold the band lower",
+        "keep more modes, or lower the band",
     ),
     "residual-bound": Limit(
         "guaranteed distance of the frequencies in the band to true ones", 0.1, None,
-        "keep more modes; the true error is at most this and mostly near its square",
+        "keep more modes; the true error is at most this value and usually close to its square",
     ),
     "effective-mass": Limit(
-        "effective mass of vibration with the interfaces held that the modes leave out", 0.1, None,
+        "effective mass with fixed interfaces that is missing in the modes", 0.1, None,
         "add fixed-interface modes or inertia-relief modes, or accept it if the missing direction is not driven",
     ),
     "conditioning": Limit(
@@ -235,24 +235,24 @@ LIMITS: dict[str, Limit] = {
     ),
     "interface-stiffening": Limit(
         "change of frequencies between rigid and distributing interfaces", 0.05, None,
-        "the truth lies between RBE2 and RBE3: choose by the stiffness of the real joint, or spread the interface",
+        "the real stiffness lies between RBE2 and RBE3: choose by the stiffness of the joint, or enlarge the interface",
     ),
     # A received body against a full model of the same part --------------------------------------------------------
     "model-mass": Limit(
         "mass, centre and inertia: full model against the body", 1e-3, 1e-2,
-        "look for masses that one of both has and the other not: what the deck lists as left out, units, densities",
+        "look for masses that only one of them has (cards of the deck that are left out), and for units and densities",
     ),
     "band-asked": Limit(
         "highest frequency of interest over that which the body is good for", 1.000001, 1.000001,
         "reduce with more modes, or ask for a lower band",
     ),
     "mesh-error": Limit(
-        "lowest frequencies too high by the mesh, estimated", 0.02, None,
+        "lowest frequencies too high because of the mesh, estimated", 0.02, None,
         "mesh finer; if the cells are of first order, cells of second order also help",
     ),
     "left-out": Limit(
         "kinds of cards of the deck that carry mass or stiffness and are left out", 0.0, None,
-        "decide for each whether the answer may do without it",
+        "decide for each card whether the result is valid without it",
     ),
     "deformation-error": Limit(
         "deformation of the reference motion outside the mode set", 0.05, None,

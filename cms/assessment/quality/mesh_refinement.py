@@ -1,12 +1,12 @@
 """Estimate of the mesh error: change of the free frequencies of a solid when its mesh is refined.
 
-(1) the bare solid, without couplings: cells of first order are raised to second, of second order divided by two along
-    every edge, on the same curved surface
-(2) free elastic frequencies f of both, f_1 of the mesh as it is, f_2 of the finer one
-(3) with f = f_0 + c h^p and half the size, f_1 - f_0 = (f_1 - f_2) / (1 - 2^-p). The order is taken as p = 1, as in
-    `cms.jobs.studies.mesh_convergence` and for its reason: beside re-entrant edges frequencies converge no faster.
-    Smooth modes of cells of second order have p = 4, and are overestimated by a factor of up to 1.9. Where cells are
-    raised, f_1 - f_2 itself is taken: what is left to the geometry is of the next order
+(1) refine the bare solid, without couplings: first-order cells become second-order cells; second-order cells are halved
+    along every edge, on the same curved surface
+(2) compute the free elastic frequencies f_1 of the given mesh and f_2 of the refined mesh
+(3) with f = f_0 + c h^p and half the size, f_1 - f_0 = (f_1 - f_2) / (1 - 2^-p). The order p = 1 is assumed, as in
+    `cms.jobs.studies.mesh_convergence`, because frequencies converge no faster if there are re-entrant edges. Smooth
+    modes of second-order cells have p = 4; their error is overestimated by a factor of up to 1.9. If the order of the
+    cells was raised, the estimate is f_1 - f_2 itself, because the remaining error is of higher order
 """
 
 from collections.abc import Mapping
@@ -68,14 +68,14 @@ def mesh_refinement(
     materials, units, incompatible_modes
         As for `solid_body`; the finer mesh has no incompatible modes.
     n_modes
-        How many elastic frequencies.
+        Number of elastic frequencies.
     most_dofs
-        Largest finer model that is made.
+        Largest number of dofs of the refined model.
 
     Raises
     ------
     QualityError
-        If the finer model would be larger, or there is no finer mesh of these cells (wedges of second order).
+        If the refined model would have more dofs, or these cells cannot be refined (wedges of second order).
     """
     stages = stages or Stages()
     with stages("finer mesh"):

@@ -35,7 +35,7 @@ def plot_frf(
     output, input
         Row and column of H.
     is_inertance
-        Acceleration instead of displacement.
+        Whether to plot acceleration instead of displacement.
     """
     ax = ax or new_axes()
     for k, (name, response) in enumerate(curves.items()):
@@ -109,7 +109,7 @@ def plot_deformation_error(errors: Mapping[str, DeformationError], norm: str = "
 
 
 def positive(values: np.ndarray) -> np.ndarray:
-    """Return the values with gaps where a logarithmic axis cannot show them."""
+    """Return the values with NaN for those that a logarithmic axis cannot show."""
     return np.where(values > 0, values, np.nan)
 
 

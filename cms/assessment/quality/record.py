@@ -35,9 +35,9 @@ class QualityRecord:
     name
         Key in `LIMITS`, such as "frequency-error".
     title
-        The question in words.
+        Checked property in words.
     value
-        Value without unit; NaN where the question does not apply.
+        Dimensionless value; NaN if the check does not apply.
     tolerance
         Largest value that passes; None: no verdict.
     verdict
@@ -84,12 +84,12 @@ class QualityRecord:
 def judge(
     name: str, value: float, reason: str, data: Mapping[str, Any] | None = None, *, action: str | None = None
 ) -> QualityRecord:
-    """Return the record of a value, with the verdict by the limit of this name; NaN fails.
+    """Return the record of a value, with its verdict according to the limit of this name; NaN fails.
 
     Parameters
     ----------
     action
-        What to do unless it passes; that of the limit by default.
+        Remedy if the value does not pass; by default the action of the limit.
 
     Raises
     ------

@@ -50,38 +50,37 @@ def check_reduction(
     Parameters
     ----------
     body
-        The coupled body that `modes` and `reduced` were made from.
+        Coupled body from which `modes` and `reduced` were made.
     modes
         The mode set of the reduction.
     reduced
         The reduced body that was made from them.
     reference
-        The full model up to a band, to share it between mode sets; by default it is made here, for the band that
-        custom allows the mode set (`usable_band`).
+        Full model up to a band, which several mode sets can share; None: it is solved here for the band in which the
+        mode set is customarily used (`usable_band`).
     uncoupled
-        The body before `couple`: adds the comparison of rigid with distributing interfaces (two more factorisations).
+        Body before `couple`; if given, rigid and distributing interfaces are compared (two more factorisations).
     snapshots
-        A reference motion: adds the deformation error.
+        Reference motion; if given, the deformation error is computed.
     own
-        What `check_body` has found of the reduced body, so that it is not asked again; None: it is asked here.
+        Records of `check_body` for the reduced body; None: they are computed here.
     options
-        What the file was asked to hold; None: its damping is compared with what its provenance says, and recovery
-        tables are not compared.
+        Expected content of the file; None: damping is compared with the provenance, recovery tables are not compared.
 
     Returns
     -------
     tuple of QualityRecord
-        Those of `check_body`, then those against the full model.
+        Records of `check_body`, then records of the comparison with the full model.
 
     Raises
     ------
     QualityError
-        If mode set or reference are of another body.
+        If mode set or reference belong to another body.
     """
     if modes.columns.shape[0] != body.n_dof:
         raise QualityError(
             f"check: mode set {modes.name!r} has columns of {modes.columns.shape[0]} dofs, body {body.name!r} has "
-            f"{body.n_dof}; check with the body it was made from"
+            f"{body.n_dof}; check with the body from which it was made"
         )
     require_same_units(body, reduced)
     if (columns := of_this_process(modes.columns)) is not modes.columns:
@@ -99,7 +98,7 @@ def check_reduction(
                 options=options,
             )
     if reference.body is not body:
-        raise QualityError(f"check: the reference is of another body than {body.name!r}")
+        raise QualityError(f"check: the reference belongs to another body than {body.name!r}")
     found = check_body(reduced) if own is None else own
     records = [record for record in found if record.name != "dropped-columns"]
     grounding = check_grounding(body)
@@ -142,5 +141,5 @@ def require_same_units(body: FEBody, reduced: ReducedBody) -> None:
     if body.units != reduced.units:
         raise QualityError(
             f"check: body {body.name!r} is in units {body.units.name}, the reduced body {reduced.name!r} in "
-            f"{reduced.units.name}; check with the job the file was made from"
+            f"{reduced.units.name}; check with the job from which the file was made"
         )

@@ -132,7 +132,7 @@ def drop_below(box: tuple[float, float, float, float], drawn: list[tuple[float, 
 def draw_axes(draw: Any, origin: Any, arms: Array, depth: Array, u: int, names: str) -> None:
     """Draw three axes whose arms in the picture are the columns of `arms`, (2, 3) [px], the farthest axis first.
 
-    y of the arms may point down (triads) or up (the corner axes, with names and inverted y).
+    The y components of the arms point down for triads; for the corner axes, which have names, they point up.
     """
     sign = -1.0 if names else 1.0
     for k in np.argsort(-np.asarray(depth)):

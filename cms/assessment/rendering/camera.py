@@ -44,9 +44,9 @@ class Camera:
 def fitted_camera(scene: Scene, size: tuple[int, int]) -> Camera:
     """Return a camera along the view direction of the scene that shows every point of every frame.
 
-    A point at (x, y, z) from the centre, in camera axes, is in the picture if |x| <= a_x (d + z) and |y| <= a_y (d +
-    z), where d is the distance of the centre. The required d is a maximum over the points. The centre is then moved to
-    the middle of the picture, twice, which suffices for a long lens.
+    A point at (x, y, z) from the centre, in camera axes, is visible if |x| <= a_x (d + z) and |y| <= a_y (d + z), where
+    d is the distance of the centre. The required d is a maximum over the points. The centre is then moved to the middle
+    of the picture, twice, which suffices for a long lens.
     """
     forward = scene.direction / np.linalg.norm(scene.direction)
     right = np.cross(forward, scene.up)
@@ -71,7 +71,7 @@ def fitting_distance(relative: Array, half: Array) -> float:
 
 
 def seen_points(scene: Scene) -> Array:
-    """Return the points that must be in the picture, (n, 3): all nodes; corners of boxes would waste space."""
+    """Return the points that must be in the picture, (n, 3): all nodes, since bounding boxes would waste space."""
     found = [surface.nodes[..., np.unique(surface.triangles), :].reshape(-1, 3) for surface in scene.surfaces]
     found += [lines.points[..., np.unique(lines.segments), :].reshape(-1, 3) for lines in scene.lines]
     return np.concatenate([part for part in found if len(part)])

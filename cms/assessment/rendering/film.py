@@ -25,9 +25,9 @@ Image = NDArray[np.uint8]  #: pixels, (height, width, 3)
 
 PICTURE_SUFFIXES = (".png",)
 FILM_SUFFIXES = (".gif", ".mp4")
-#: ordered dither, added before rounding to a
+#: ordered dither, added before rounding to a colour: it replaces bands of colour by a fine pattern that does not change
+#: between frames
 DITHER = np.array([[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]]) - 7.5
-# colour; it replaces bands by a fine pattern that does not change from frame to frame
 PALETTE_FRAMES = 60  #: number of GIF frames in memory, from which the common palette is chosen
 
 
@@ -54,7 +54,7 @@ def write_picture(image: Image, path: Path) -> None:
 def write_film(frames: Iterable[Image], path: Path, *, fps: float) -> None:
     """Write frames, each (height, width, 3) uint8, as a film in the format of the suffix.
 
-    A GIF counts in hundredths of a second: its frame rate is the nearest possible one, and it repeats for ever.
+    A GIF repeats for ever. Its frames last whole hundredths of a second, so its frame rate is the nearest possible one.
     """
     if path.suffix.lower() == ".gif":
         write_gif(frames, path, fps)

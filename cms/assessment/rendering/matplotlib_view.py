@@ -14,7 +14,7 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["matplotlib_view"]
 
-#: size of a drawing without smoothing over the size after averaging; smoothing neighbours would show seams
+#: size of the drawing before averaging divided by the final size; smoothing by matplotlib would show seams of faces
 OVERSAMPLING = 2
 
 
@@ -74,7 +74,7 @@ class DrawnSurface:
         self.color = np.array(to_rgb(surface.color))
 
     def polygons(self, camera: Camera, frame: int) -> tuple[Array, Array, Array, Array, Array]:
-        """Return depth (n,), corners (n, 3, 2), face and edge colours (n, 4), edge widths (n,) of faces and edges.
+        """Return depth (n,), corners (n, 3, 2), face and edge colours (n, 4), edge widths (n,) of all faces and edges.
 
         A translucent surface is drawn as an outline here, because seams between translucent faces would show.
         """
@@ -123,7 +123,7 @@ class DrawnSurface:
 
 
 def line_collection(kind: Any, lines: Lines, camera: Camera, frame: int) -> Any:
-    """Return the segments of a frame as a collection, without segments that start behind the eye."""
+    """Return the segments of a frame as a collection, without segments that begin behind the eye."""
     seen = camera.project(frame_of(lines.points, frame, 2))[lines.segments]
     seen = seen[(seen[..., 2] > 0).all(axis=1)]
     return kind(seen[..., :2], colors=lines.color, linewidths=OVERSAMPLING * lines.width * 0.72, alpha=lines.opacity)

@@ -65,11 +65,11 @@ def render_animation(scene: Scene, path: str | Path, *, fps: float = 25.0, on_fr
     Parameters
     ----------
     path
-        Ends in .gif or .mp4.
+        Name of the file; ends in .gif or .mp4.
     fps
         Frames per second; a GIF uses the nearest possible rate (whole hundredths of a second per frame).
     on_frame
-        Receives the number of drawn frames and of all frames, for a progress bar.
+        Callback that receives the number of drawn frames and of all frames, for a progress bar.
 
     Raises
     ------

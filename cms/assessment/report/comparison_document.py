@@ -85,7 +85,7 @@ def comparison_document(comparison: Comparison, *, stills: int = 4) -> Document:
         sections,
         comparison.name,
         "comparison of mode sets",
-        footer="Written by cms compare. The same numbers stand in the JSON and CSV files beside this page.",
+        footer="Written by cms compare. The JSON and CSV files beside this page contain the same numbers.",
     )
 
 
@@ -138,7 +138,7 @@ def verdict_section(comparison: Comparison) -> Section:
         "verdicts",
         "Verdicts",
         (TextTable(headings, rows), Paragraph(VERDICT_NOTE, "why")),
-        "Every set at its fewest modes with which all numbers keep their limits; a set that never does, at its most.",
+        "Each set is shown with the fewest modes with which all numbers keep their limits, else with the most modes.",
     )
 
 
@@ -211,9 +211,9 @@ def columns_section(comparison: Comparison) -> Section:
         rows.append(cells)
     headings = ["set", "columns", "columns>", "dropped>", "coordinates>", "residual bound>", "condition>", "time>"]
     lead = (
-        "What every set consists of at its shown number of modes. Coordinates are the independent elastic shapes that "
-        "are left when redundant columns and rigid-body motion are taken out; the time is that of the set with the "
-        "most modes and of judging all numbers of modes."
+        "Columns of every set at its shown number of modes. Coordinates are the independent elastic shapes that remain "
+        "without redundant columns and rigid-body motion. The time includes the computation of the set with the most "
+        "modes and the assessment of all numbers of modes."
     )
     return Section("columns", "Columns, rank and conditioning", (TextTable(headings, rows),), lead, "Columns")
 
@@ -226,7 +226,7 @@ def method_section(comparison: Comparison) -> Section:
         limit = LIMITS[name]
         words = f"{sentence_case(limit.title)} "
         words += f"Limit: {share(limit.tolerance)}. If missed: {limit.action}." if limit.tolerance else (
-            "Told, not judged."
+            "Without limit."
         )  # fmt: skip
         meanings.append((sentence_case(title)[:-1], words))
     source = "taken from an earlier comparison" if comparison.full.was_cached else "solved for this comparison"
@@ -238,8 +238,8 @@ def method_section(comparison: Comparison) -> Section:
     }
     rows = [[Cell(key, "name"), Cell(value)] for key, value in facts.items()]
     lead = (
-        "A set is good enough when the first six numbers keep their limits; the others are told beside them. Every "
-        "set is made once, with the most modes, from one factorisation; the sets with fewer modes are its subspaces."
+        "A set is good enough if the first six numbers keep their limits; the others are information. Every set is "
+        "computed once, with the most modes, from one factorisation; the sets with fewer modes are its subspaces."
     )
     blocks = (Terms(meanings), Heading("Provenance: model, versions, times"), TextTable(["", ""], rows))
     return Section("method", "What the numbers mean", blocks, lead, "Method")
@@ -251,7 +251,7 @@ def method_section(comparison: Comparison) -> Section:
 #: descriptions of the charts of the records
 SEEN = {
     "frequency-error": "Largest error of the elastic free-free frequencies in the band. Reduced frequencies are bounds "
-    "from above, so the lines can only fall; where a set has fewer modes than the band it has no point yet.",
+    "from above, so the lines can only fall. A set with fewer modes than the band has no point.",
     "mac": "Part of the least recovered mode shape that the set misses, mass-weighted.",
     "static-interface": "Error in energy of the static response to forces and moments on the interfaces. Sets with "
     "constraint or attachment modes answer them exactly, down to rounding.",
@@ -262,10 +262,10 @@ SEEN = {
     "frequency-response": "Error of all receptances between the interfaces, root mean square over the band.",
     "deformation-error": "Largest part of the deformation in the reference motion that lies outside the set, in "
     "energy.",
-    "residual-bound": "What the residuals guarantee without knowing the full model: no true frequency is farther away. "
-    "The true error is mostly near the square of it.",
-    "effective-mass": "Largest share, over x, y and z, of the effective mass that the set leaves out while its "
-    "interfaces are held. A set that answers rigid-body accelerations statically is not judged by it.",
+    "residual-bound": "Error bound from residuals, without the modes of the full model: a true frequency lies within "
+    "it. The true error is usually close to its square.",
+    "effective-mass": "Largest share, in x, y or z, of the effective mass with fixed interfaces that the set leaves "
+    "out. It does not matter for a set whose static response to rigid-body accelerations is exact.",
 }
 
 
@@ -286,9 +286,9 @@ def convergence_section(comparison: Comparison) -> Section:
         '<button data-column="1" aria-pressed="false">by coordinates</button></div>'
     )
     lead = (
-        "Each line is one set; the dashed line is the limit; values below an axis stand at its lower end. Lines that "
-        "cover one another belong to sets of one span. By coordinates the sets are compared at equal size of the "
-        "reduced body: some bring more static columns than others."
+        "Each line is one set; the dashed line is the limit. Values below the axis are drawn at its lower end. Lines "
+        "that coincide belong to sets with the same span. The axis of coordinates compares sets at equal size of the "
+        "reduced body, because sets have different numbers of static columns."
     )
     row = Markup(f'<div class="row">{switch}{legend(comparison)}</div>')
     return Section("convergence", "Error against number of modes", (row, Gallery(figures)), lead, "Convergence")
@@ -311,7 +311,7 @@ def frequency_section(comparison: Comparison) -> Section:
         rows.append(cells)
     lead = (
         f"Elastic frequencies of the free body up to {hertz(full.band_hz)} Hz, recomputed from every reduced body at "
-        "the number of modes that stands beside its name: the error, and below it the frequency [Hz]."
+        "the number of modes beside its name: the error, and below it the frequency [Hz]."
     )
     return Section("frequencies", "Free-free frequencies", (TextTable(headings, rows),), lead, "Frequencies")
 
@@ -336,7 +336,7 @@ def mac_section(comparison: Comparison) -> Section:
         figures.append(Figure(f"mac-{k}", chart, caption, f"{result.name}, {modes_words(point.n_modes)}"))
     lead = (
         "Down: the modes of the full model; across: those of the reduced body. Dark is 1, the same shape; white is 0. "
-        "A dark diagonal says that shapes and order agree, dark off the diagonal that modes have changed places."
+        "A dark diagonal means that shapes and order agree; dark cells beside it mean that modes have another order."
     )
     return Section("mac", "Mode shapes: MAC", (Gallery(figures, 3) if figures else nothing_to_show(),), lead, "MAC")
 

@@ -30,9 +30,9 @@ def draw_faces(surface: CadSurface, path: str | Path, *, chosen: Iterable[int] =
     Parameters
     ----------
     surface
-        The part with triangles on its faces.
+        Part with triangles on its faces.
     path
-        Ends in .png.
+        Name of the file; ends in .png.
     chosen
         Numbers of faces to highlight; only these are numbered. Empty: all faces are numbered.
     """
@@ -97,7 +97,7 @@ def visible_points(nodes: Array, triangles: dict[int, IntArray], eye: Array) -> 
     Parameters
     ----------
     nodes
-        (n_nodes, 3).
+        Node positions, (n_nodes, 3).
     triangles
         Triangles of each face by its number, (n, 3).
     eye

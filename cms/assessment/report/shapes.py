@@ -18,7 +18,7 @@ __all__ = ["shapes_json", "still_pictures"]
 
 log = logging.getLogger(__name__)
 
-SCALE = 0.09  #: largest displacement of a still picture over the diagonal of the body
+SCALE = 0.09  #: largest displacement in a still picture divided by the diagonal of the body
 SIZE = (900, 560)  #: width and height of a still picture [px]
 
 

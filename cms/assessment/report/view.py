@@ -13,7 +13,7 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["animate_mode", "mode_scene", "view_mode"]
 
-DEFAULT_SCALE = 0.09  #: largest displacement in the picture over the diagonal of the body
+DEFAULT_SCALE = 0.09  #: largest displacement in the picture divided by the diagonal of the body
 FRAMES, FPS = 36, 24.0  #: frames per film of one period, and frames per second; the film lasts 1.5 s
 
 
@@ -38,9 +38,9 @@ def view_mode(body: ReducedBody, mode: int, path: str | Path, *, scale: float | 
 def animate_mode(
     body: ReducedBody, mode: int, path: str | Path, *, scale: float | None = None, on_frame: OnFrame | None = None
 ) -> Drawing:
-    """Draw one period of a mode into a film (.gif or .mp4) that repeats without a jump; otherwise as `view_mode`.
+    """Draw one period of a mode into a film (.gif or .mp4) that repeats without a jump.
 
-    on_frame receives the number of drawn frames and of all frames.
+    `on_frame` receives the number of drawn frames and of all frames; other parameters are those of `view_mode`.
     """
     phase = 2 * np.pi * np.arange(FRAMES) / FRAMES
     scene = mode_scene(body, mode, np.sin(phase), scale=scale, size=(960, 640))

@@ -13,7 +13,7 @@ from fe_models.foundation.units import Units
 __all__ = ["CriticalLoad", "check_buckling", "critical_loads"]
 
 AXES = ("x", "y", "z")
-NEGLIGIBLE = 1e-10  #: eigenvalue over the largest one for the same load, below which its direction does not buckle
+NEGLIGIBLE = 1e-10  #: eigenvalue relative to the largest of the same load, below which its direction does not buckle
 
 
 @dataclass(frozen=True)
@@ -22,17 +22,18 @@ class CriticalLoad:
 
     load: str  #: name of the load, such as "force x at big_end", along the axes of B
     along: float  #: smallest positive critical amplitude, in `unit`
-    against: float  #: size of the smallest negative critical amplitude, in `unit`; infinite for angular velocities
+    #: absolute value of the largest negative critical amplitude, in `unit`; infinite for angular velocities
+    against: float
     unit: str
 
 
 def critical_loads(reduced: ReducedBody) -> tuple[CriticalLoad, ...]:
     """Return the critical amplitude of each unit load alone, from the reduced eigenproblem K x = -amplitude K_j x.
 
-    The balance of a load is that of the frame: in a Tisserand frame a force at an interface accelerates the body, in a
-    nodal frame the held interface answers it. Angular velocities omega: K + omega² (K_aa - 5C_aa) x = 0, the critical
-    speed of steady rotation; softening by the centrifugal force itself is counted. All are upper bounds, as close as
-    the modes come to the buckling shapes.
+    The frame determines what balances a load: in a Tisserand frame a force at an interface accelerates the body, in a
+    nodal frame the fixed interface reacts. For an angular velocity omega, (K + omega² (K_aa - 5C_aa)) x = 0 gives the
+    critical speed of steady rotation, including the softening by the centrifugal force. All amplitudes are upper
+    bounds, which are close if the modes approximate the buckling shapes well.
 
     Parameters
     ----------
@@ -110,4 +111,4 @@ def sentences(loads: tuple[CriticalLoad, ...]) -> list[str]:
         first = min(of_kind, key=lambda load: min(load.along, load.against))
         sign = "" if kind == "angular velocity" or first.along < first.against else "-"
         words.append(f"{first.load}: {sign}{min(first.along, first.against):.4g} {first.unit}")
-    return words or ["no load of these buckles the body within its modes"]
+    return words or ["none of these loads buckles the body within its modes"]

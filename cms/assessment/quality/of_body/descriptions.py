@@ -29,7 +29,7 @@ def check_labels(reduced: ReducedBody) -> QualityRecord:
     """Check that labels, sources and energy shares agree with the recorded columns."""
     columns = reduced.columns
     if columns is None:
-        return information("labels", "the file holds no columns of its mode set")
+        return information("labels", "the file does not contain the columns of its mode set")
     words, groups = columns.mode_labels(), columns.sources
     wrong = [k + 1 for k, (own, made) in enumerate(zip(reduced.labels, words, strict=True)) if own != made]
     if tuple(reduced.sources) != groups:
@@ -45,7 +45,8 @@ def check_labels(reduced: ReducedBody) -> QualityRecord:
 def check_damping_told(reduced: ReducedBody) -> QualityRecord:
     """Check that D is at least the damping in the provenance; dampers of the model may add to it.
 
-    The least eigenvalue of D less that damping, over modes of one frequency, over the largest entry of either.
+    The value is the smallest eigenvalue of the difference between D and this damping, if negative, divided by the
+    largest entry of both; first, rows and columns of both are divided by the square roots of the frequencies.
     """
     told = reduced.provenance.get("damping")
     damping = None if told is None else damping_of_words(told)
@@ -59,7 +60,7 @@ def check_damping_told(reduced: ReducedBody) -> QualityRecord:
     size = max(np.abs(own).max(initial=0.0), np.abs(made).max(initial=0.0))
     rest = (own + own.T) / 2 - made
     least = float(la.eigvalsh(rest)[0] / size) if size > 0 else 0.0
-    reason = f"D holds the damping that the provenance names, {told}"
+    reason = f"D contains the damping that the provenance names, {told}"
     if least < 0:
         reason = f"D is less than the damping that the provenance names, {told}, by {-least:.1e} of the largest"
     return judge("damping-told", max(0.0, -least), reason)
@@ -116,8 +117,8 @@ def check_step_size(reduced: ReducedBody) -> QualityRecord:
     highest, lowest = float(frequencies.max()), float(frequencies.min())
     explicit = 1 / (np.pi * highest)  # stability limit of central differences: h omega <= 2
     reason = (
-        f"highest frequency {highest:.4g} Hz, lowest {lowest:.4g} Hz; {STEPS_PER_PERIOD} steps per period ask for "
-        f"{step_size(highest):.2g} s to follow the highest, {step_size(lowest):.2g} s for the lowest; an explicit "
+        f"highest frequency {highest:.4g} Hz, lowest {lowest:.4g} Hz; {STEPS_PER_PERIOD} steps per period are "
+        f"{step_size(highest):.2g} s for the highest, {step_size(lowest):.2g} s for the lowest; an explicit "
         f"scheme is stable up to {explicit:.2g} s"
     )
     data = {

@@ -63,16 +63,17 @@ def mass_record(found: EffectiveMass) -> dict[str, Any]:
 
 
 def effective_mass_at(reduced: ReducedBody, at: str) -> EffectiveMass:
-    """Return the `effective_mass` at an interface that can be fixed, of a body with modes and inertia.
+    """Return the `effective_mass` of a body with modes and inertia at an interface that can be fixed.
 
     Raises
     ------
     QualityError
-        If the interface has its nodes on one line, so that holding it leaves a turn free, or the file is inconsistent.
+        If the nodes of the interface lie on one line, so that fixing it leaves a rotation free, or the file is
+        inconsistent.
     """
     if not reduced.is_held and not can_be_held(reduced, at):
         raise QualityError(
-            f"body {reduced.name!r}: interface {at!r}: its nodes lie on one line, so holding it leaves a turn free; "
+            f"body {reduced.name!r}: interface {at!r}: its nodes lie on one line, so fixing it leaves a rotation free; "
             "take another interface"
         )
     try:
@@ -84,12 +85,13 @@ def effective_mass_at(reduced: ReducedBody, at: str) -> EffectiveMass:
 def effective_mass(reduced: ReducedBody, at: str) -> EffectiveMass:
     """Return effective modal masses for base motion of an interface, from a modal file in any frame.
 
-    (1) x = T q with the interface held: rigid motion takes back Psi q, x_r = -G⁻¹ Psi q, G the port's rigid part. A
-        held body is driven by the ground instead: x_r = 0, and the interface only says about which point
+    (1) x = T q with the interface fixed: the rigid motion x_r = -G⁻¹ Psi q cancels Psi q, where G is the motion of the
+        interface in the rigid modes. A body held to the ground is driven by the ground instead: x_r = 0, and the
+        interface only provides the reference point
     (2) modes of Tᵀ M T, K*
     (3) participation L_k = z_kᵀ Tᵀ M X_r of unit rigid motions X_r about the interface; effective mass L_k²
 
-    The sum over all modes of the full model is the rigid mass less what sits on the interface itself.
+    The sum over all modes of the full model is the rigid mass minus the mass at the interface itself.
     """
     pencil, rows = whole_pencil(reduced), whole_port_rows(reduced, at)
     back = 0 * rows[:, 6:] if reduced.is_held else -np.linalg.solve(rows[:, :6], rows[:, 6:])
@@ -115,8 +117,8 @@ def total_scale(total: Array) -> Array:
 def check_driven_mass(reduced: ReducedBody) -> QualityRecord:
     """Report the largest share of translational mass in none of the modes, over the interfaces that can be fixed.
 
-    It holds the mass that rides on the interface in the full model too, and what higher modes would carry; the full
-    model tells them apart ("effective-mass").
+    This share consists of the mass at the interface itself and the mass of higher modes; only a check with the full
+    model distinguishes the two ("effective-mass").
     """
     if reduced.n_q == 0:
         return information("driven-mass", "the body has no modes")
@@ -126,11 +128,11 @@ def check_driven_mass(reduced: ReducedBody) -> QualityRecord:
     try:
         found = [effective_mass(reduced, name) for name in held]
     except np.linalg.LinAlgError as error:  # other records report impossible moments
-        return information("driven-mass", f"the moments of the file give no modes with an interface held: {error}")
+        return information("driven-mass", f"the moments of the file give no modes with a fixed interface: {error}")
     largest = max(found, key=lambda one: one.remainder[:3].max())
     remainder = largest.remainder
     axis = int(np.argmax(remainder[:3]))
-    reason = f"driven at {largest.at!r}, the modes carry of mass and inertia " + ", ".join(
+    reason = f"driven at {largest.at!r}, the modes carry these shares of mass and inertia: " + ", ".join(
         f"{name} {100 * (1 - r):.0f} %" for name, r in zip(DIRECTIONS, remainder, strict=True)
     )
     data = {

@@ -46,7 +46,7 @@ def check_symmetry(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_definiteness(reduced: ReducedBody) -> QualityRecord:
-    """Check that M and D have no negative eigenvalue, and K only positive ones: smallest over largest, scaled."""
+    """Check that M and D have no negative eigenvalue, and K only positive ones; value: smallest / largest, scaled."""
     values = {name: negativity(getattr(reduced, name)) for name in ("M", "K", "D")}
     stiffness = np.diag(reduced.K)
     if reduced.n_q and (stiffness <= 0).any():
@@ -72,7 +72,7 @@ def check_kinetic_energy(reduced: ReducedBody) -> QualityRecord:
 
 
 def asymmetry(A: Array) -> float:
-    """Return the largest entry of |A - Aᵀ| over that of |A|; 0 for a zero matrix."""
+    """Return the largest entry of |A - Aᵀ| divided by the largest entry of |A|; 0 for a zero matrix."""
     size = np.abs(A).max(initial=0.0)
     return float(np.abs(A - A.T).max(initial=0.0) / size) if size > 0 else 0.0
 
@@ -118,9 +118,9 @@ def check_inertia_terms(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_frame_condition(reduced: ReducedBody) -> QualityRecord:
-    """Check the frame condition: Tisserand: 1C = 2C = 0 about the centre of mass; nodal: the interface does not move.
+    """Check that 1C = 2C = 0 about the centre of mass (Tisserand frame) or that the interface does not move (nodal).
 
-    |1C_k| / sqrt(m) and |2C_k| / sqrt(tr J) are at most one for a mode of unit modal mass, so they are without unit.
+    The values |1C_k| / sqrt(m) and |2C_k| / sqrt(tr J) are dimensionless, at most one for a mode of unit modal mass.
     """
     frame = reduced.frame
     if reduced.n_q == 0:
@@ -129,24 +129,24 @@ def check_frame_condition(reduced: ReducedBody) -> QualityRecord:
         linear, angular = momenta(reduced)
         value = max(linear.max(), angular.max())
         k = int(np.argmax(np.maximum(linear, angular)))
-        reason = f"largest momentum of a mode is {value:.1e} of what its mass could carry (mode {k + 1})"
+        reason = f"largest momentum of a mode is {value:.1e} of the largest possible for its mass (mode {k + 1})"
         return judge("frame-condition", value, reason, {"linear": linear, "angular": angular})
     if frame.kind == "nodal":
         if frame.at and frame.at not in [each.name for each in reduced.interfaces]:
-            return judge("frame-condition", np.inf, f"the frame is carried by {frame.at!r}, which is no interface")
+            return judge("frame-condition", np.inf, f"the frame is attached to {frame.at!r}, which is not an interface")
         motion, where = held_motion(reduced)
         if len(motion):
             relative = np.abs(motion).max(axis=0) / mode_size(reduced)
             reason = (
-                f"{where}, which carry the frame, move by {relative.max():.1e} of the largest displacement of a mode "
+                f"{where}, which define the frame, move by {relative.max():.1e} of the largest displacement of a mode "
                 f"(mode {int(np.argmax(relative)) + 1})"
             )
             return judge("frame-condition", relative.max(), reason, {"motion": relative})
-    return information("frame-condition", f"a {frame.kind} frame leaves no condition that the file alone could show")
+    return information("frame-condition", f"the file alone cannot show the condition of a {frame.kind} frame")
 
 
 def held_motion(reduced: ReducedBody) -> tuple[Array, str]:
-    """Return the motions that a nodal frame keeps at zero, as far as the file has them, (n, n_q) [m], and their names.
+    """Return the motions that a nodal frame keeps at zero and that the file contains, (n, n_q) [m], and their names.
 
     These are six motions of a reference point (rotations times body length) or translations of fixed kept nodes.
     """
@@ -166,7 +166,7 @@ def held_motion(reduced: ReducedBody) -> tuple[Array, str]:
 def check_free_frequencies(reduced: ReducedBody) -> QualityRecord:
     """Compare the stored free-free frequencies with those computed from the moments and stiffness of the file.
 
-    They couple 1C, 2C, S, R and m with K and M, so that a wrong sign in one of them is found.
+    The frequencies depend on 1C, 2C, S, R, m, K and M together, so a wrong sign in one of these changes them.
     """
     stored = np.asarray(reduced.free_frequencies)
     if not reduced.is_held and not has_inertia(reduced):
@@ -230,7 +230,7 @@ def momenta(reduced: ReducedBody) -> tuple[Array, Array]:
 def mode_size(reduced: ReducedBody) -> Array:
     """Return the largest stored displacement of each mode, but at least that of a rigid body of the same mass, (n_q,).
 
-    A mode of unit modal mass moves by 1 / sqrt(m) in the mean, though it may leave all kept nodes at rest.
+    The mean displacement of a mode of unit modal mass is 1 / sqrt(m), even if all kept nodes are at rest in it.
     """
     size = np.linalg.norm(reduced.Phi, axis=1).max(axis=0, initial=0.0)
     at_ports = [np.linalg.norm(interface.Psi[:3], axis=0) for interface in reduced.interfaces]

@@ -31,8 +31,8 @@ def check_rigid_interfaces(reduced: ReducedBody) -> QualityRecord:
 def check_interface_places(reduced: ReducedBody) -> QualityRecord:
     """Check that the reference point of a rigid or distributing interface is a kept node and moves as this node.
 
-    Largest distance over the body length, or of the translations over a mode's largest displacement. Other writers may
-    leave reference nodes out; then nothing is judged.
+    The value is the largest distance divided by the body length, or the largest difference of translations divided by a
+    mode's largest displacement. Other programs may omit reference nodes; then there is no verdict.
     """
     defects: dict[str, float] = {}
     length, size = body_length(reduced), mode_size(reduced)
@@ -49,7 +49,7 @@ def check_interface_places(reduced: ReducedBody) -> QualityRecord:
     name = max(defects, key=lambda key: defects[key])
     reason = f"largest departure of a reference point from its node is {defects[name]:.1e}, at {name!r}"
     if "version floatframe" not in reduced.provenance:
-        return information("interface-places", f"{reason}; another program may keep none", {"defects": defects})
+        return information("interface-places", f"{reason}; another program may omit these nodes", {"defects": defects})
     return judge("interface-places", defects[name], reason, {"defects": defects})
 
 
@@ -66,7 +66,7 @@ def rigid_defect(reduced: ReducedBody, interface: ReducedInterface) -> float:
         turn = reduced.kept.of_node(row)
         if turn is None:
             continue
-        # half the curl of a solid is the rotation of its elements, which deform next to the rigid face
+        # rotations of solids are half the curl in their elements, and these deform next to the rigid face
         if reduced.kept.source[int(np.flatnonzero(reduced.kept.nodes == row)[0])] == "dofs":
             largest = max(largest, float((np.abs(turn - interface.Psi[3:]) * body_length(reduced) / size).max()))
     return largest
@@ -90,8 +90,9 @@ def check_interface_motions(reduced: ReducedBody) -> QualityRecord:
 def missing_motions(reduced: ReducedBody) -> Array:
     """Return combinations of interface motions missing in rigid motion and modes, (n_missing, 6 n_interfaces).
 
-    Left null space of the motions of all reference points with x, rotations times the body length, modes times
-    omega_1 / omega_k, so that a stiff static shape counts as much as its compliance.
+    They are the left null space of the matrix that maps rigid and modal coordinates to the motions of all reference
+    points. Rotations are multiplied by the body length, and mode k by omega_1 / omega_k, so that a stiff static shape
+    is weighted by its compliance.
     """
     length = body_length(reduced)
     stiffness = np.diag(reduced.K)

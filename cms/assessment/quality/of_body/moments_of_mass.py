@@ -16,9 +16,9 @@ from fe_models.foundation.arrays import Array
 __all__ = ["check_gram", "check_moments_of_shapes"]
 
 ROUNDING = 1e3 * np.finfo(float).eps  #: relative rounding error of the Gram matrix about the origin of B
-ALIKE = 10.0  #: largest ratio of the negativity in another frame, or for some of the shapes, to that of the model
+ALIKE = 10.0  #: largest ratio of the negativity in another frame, or of some shapes, to the negativity of the model
 LEAST_NODES = 60  #: smallest number of nodes that can represent the mass of a body
-EVEN = 0.3  #: weight of equal masses relative to the second moment in the fit
+EVEN = 0.3  #: weight, relative to the second moment, of the deviation from equal masses in the fit
 #: ratio between moments of nodal masses and of the file, above which the kept nodes do not represent its mass
 FAR_OFF = 4.0
 CLEAR = 0.1  #: moment over the largest possible one, above which its direction is checked
@@ -37,28 +37,29 @@ def check_gram(reduced: ReducedBody) -> QualityRecord:
     if 0 < value <= ALIKE * float(reduced.provenance.get(NEGATIVITY, 0.0)):
         return information(
             "gram",
-            f"the model has inertia that no distribution of its mass has, such as that of bars without rotary inertia "
-            f"({-value:.1e}): without the model its moments are not judged against each other",
+            f"the model has inertia that no distribution of its mass has, such as bars without rotary inertia "
+            f"({-value:.1e}): "
+            "its moments can be checked against each other only with the model",
         )
     reason = (
         f"some combination of positions and shapes would have a negative integral of its square ({-value:.1e})"
         if value > 0
-        else "the moments are those of one mass"
+        else "the moments are integrals over one mass distribution"
     )
     return judge("gram", value, reason)
 
 
 def check_moments_of_shapes(reduced: ReducedBody) -> QualityRecord:
-    """Check that the moments are parallel to those of masses at the kept nodes, with the shapes there.
+    """Check that the moments have about the direction of moments computed from masses at the kept nodes.
 
-    (1) find masses near to equal masses with the sum, the centre and about the second moment of the file
-    (2) compute P of each mode, and S_kl without its trace, of these masses
-    (3) compute the cosine between these moments and those of the file, if both are at least `CLEAR` of the largest that
-        the mass could have
+    (1) find nearly equal masses that have the sum, the centre and about the second moment of the file
+    (2) compute P of each mode, and S_kl without its diagonal blocks, from these masses
+    (3) compute the cosine between these moments and those of the file, if both are at least `CLEAR` times the largest
+        moment that the mass could have
 
-    Where the P of all modes together are larger or smaller than those of the file by `FAR_OFF`, the mass lies elsewhere
-    (a point mass on a light frame), and nothing is judged. Sound bodies have ratios of 0.9 to 3.2, bodies with a wrong
-    sign too.
+    If the P of all modes together differ from those of the file by more than the factor `FAR_OFF`, the mass is not at
+    the kept nodes (a point mass on a light frame), and there is no verdict. Ratios of sound bodies, and of bodies with
+    a wrong sign, are 0.9 to 3.2.
     """
     moments, nodes = reduced.moments, np.asarray(reduced.nodes)
     if moments.missing or len(nodes) < LEAST_NODES or not reduced.n_q:
@@ -85,10 +86,10 @@ def check_moments_of_shapes(reduced: ReducedBody) -> QualityRecord:
     if np.isfinite(whole):
         found["4C and 5C"] = (1 - whole) / 2
     if not found:
-        return information("moments-shapes", "no moment is large enough to tell its direction")
+        return information("moments-shapes", "no moment is large enough to determine its direction")
     worst = max(found, key=lambda key: found[key])
-    reason = f"least alike is {worst}: cosine {1 - 2 * found[worst]:.2f} to that of masses at the kept nodes"
-    return judge("moments-shapes", found[worst], f"{reason}, of {len(found)}", {"found": found})
+    reason = f"smallest cosine to moments of masses at the kept nodes is {1 - 2 * found[worst]:.2f}, of {worst}"
+    return judge("moments-shapes", found[worst], f"{reason}; {len(found)} compared", {"found": found})
 
 
 def masses_at_nodes(reduced: ReducedBody) -> Array | None:
@@ -96,7 +97,7 @@ def masses_at_nodes(reduced: ReducedBody) -> Array | None:
 
     Nodes of the surface lie farther out than the mass, so equal masses have a second moment that is up to twice too
     large. The masses w minimise |R(w) - R|² + `EVEN` n |w - 1/n|² with the correct sum and centre; total mass and
-    radius of gyration are one here. Where one of the masses is negative, the second moment is left out.
+    radius of gyration are one here. If one of the masses is negative, the fit is repeated without the second moment.
     """
     moments, n = reduced.moments, len(reduced.nodes)
     center = moments.center_of_mass

@@ -22,7 +22,8 @@ NO_TABLE = "the body has no recovery tables"
 def check_recovery_forces(reduced: ReducedBody) -> QualityRecord:
     """Check that rows of stress, strain and element force are zero in the six rigid motions.
 
-    Over the largest entry of their kind for a mode of the same largest displacement; rotations by the size of the body.
+    Their entries in rigid motions are divided by the largest entry of the same quantity in a mode with the same largest
+    displacement. Rotations are divided by the size of the body.
     """
     defects: dict[str, float] = {}
     if reduced.is_held or not reduced.n_q:
@@ -43,7 +44,7 @@ def check_recovery_forces(reduced: ReducedBody) -> QualityRecord:
                     whole = np.abs(reduced.stress).max(axis=(0, 1), initial=0.0)
                     elastic = max(elastic, (whole / np.where(shape > 0, shape, 1.0)).max(initial=0.0))
                 if quantity == "stress" and size > 0:
-                    # force of a mode over the square of the size: thin bodies have far more stress at other places
+                    # modal force / size²: a lower bound, since thin bodies have far more stress at other places
                     stiffness = np.diag(reduced.K) / np.where(shape > 0, shape, np.inf) ** 2
                     elastic = max(elastic, float(stiffness.max(initial=0.0)) / size**2)
                 key = f"{name}: {quantity}"
@@ -52,15 +53,15 @@ def check_recovery_forces(reduced: ReducedBody) -> QualityRecord:
     if not defects:
         return information("recovery-forces", "no rows of stress or element forces" if reduced.recovery else NO_TABLE)
     worst = max(defects, key=lambda key: defects[key])
-    reason = f"a rigid motion gives {defects[worst]:.1e} of what a mode of its size gives, in {worst}"
+    reason = f"a rigid motion gives {defects[worst]:.1e} of the value in a mode with the same displacement, in {worst}"
     return judge("recovery-forces", defects[worst], reason, {"defects": defects})
 
 
 def check_recovery_motions(reduced: ReducedBody) -> QualityRecord:
-    """Check that motion rows are correct in rigid motion: unit translations along mesh axes, rotations about a point.
+    """Check the rows of motions in unit translations and unit rotations of the body.
 
-    The translations of a place are the axes of B and minus its skew matrix; of a kept node or an interface the place is
-    its own.
+    The translation rows of a point at c must be A [1, -skew(c)] with the axes A of B. If the file contains the position
+    of the point, c must be this position.
     """
     if reduced.is_held:
         return information("recovery-motions", "the body is held to the ground and has no rigid motion")
@@ -71,7 +72,7 @@ def check_recovery_motions(reduced: ReducedBody) -> QualityRecord:
     if not defects:
         return information("recovery-motions", "no rows of motions" if reduced.recovery else NO_TABLE)
     worst = max(defects, key=lambda key: defects[key])
-    reason = f"rows of {worst} miss a rigid motion by {defects[worst]:.1e} of it, of {len(defects)} places"
+    reason = f"rows of {worst} deviate from a rigid motion by {defects[worst]:.1e} of it; {len(defects)} compared"
     return judge("recovery-motions", defects[worst], reason, {"defects": defects})
 
 
@@ -117,8 +118,8 @@ def known_place(reduced: ReducedBody, place: str) -> Array | None:
 def check_recovery_shapes(reduced: ReducedBody) -> QualityRecord:
     """Check that rows of kept nodes, stress points and interfaces follow from modes, stress and matrices of the file.
 
-    Differences are divided by the largest entry of the quantity, over modes of unit strain energy. Rows that only the
-    model can give are left out.
+    Differences are divided by the largest entry of the quantity, for modes of unit strain energy. Rows that only the
+    model can provide are not checked.
     """
     if not reduced.recovery or not reduced.n_q:
         return information("recovery-shapes", NO_TABLE)

@@ -26,7 +26,7 @@ NEGLIGIBLE = 1e-3  #: smallest scale of a difference, relative to the largest po
 
 
 def check_second_order(reduced: ReducedBody) -> QualityRecord:
-    """Check that force matrices of interfaces equal minus the quadratic modes of their nodes, at unit strain energy."""
+    """Check that force matrices of interfaces are minus the quadratic modes of their nodes, at unit strain energy."""
     geometric = reduced.geometric
     if geometric is None or reduced.quadratic is None or not (np.diag(reduced.K) > 0).all():
         return information("second-order", "the file has no quadratic modes, or modes without stiffness")
@@ -41,14 +41,14 @@ def check_second_order(reduced: ReducedBody) -> QualityRecord:
 def check_turned_loads(reduced: ReducedBody) -> QualityRecord:
     """Check that rotated loads follow from the moments: difference over their sum, for modes of unit strain energy.
 
-    This is exact for solids. Beams and shells are not judged: their nodes also take couples, which count by half when
-    they are turned, and their turned loads in bending are as small as that.
+    This is exact for solids. Beams and shells are not checked: their nodes also receive couples, a rotated couple
+    counts only half, and rotated loads in bending are no larger than this effect.
     """
     geometric = reduced.geometric
     if geometric is None or geometric.turned is None or not reduced.n_q or not (np.diag(reduced.K) > 0).all():
         return information("turned-loads", "the file has no turned loads, or modes without stiffness")
     if not is_solid(reduced):
-        return information("turned-loads", "the file does not say that all its cells are solid ones")
+        return information("turned-loads", "the file does not say that all its cells are solid")
     defects = dict(turned_defects(reduced, geometric))
     if not defects:
         return information(
@@ -111,7 +111,7 @@ def turned_loads(reduced: ReducedBody, geometric: GeometricStiffness) -> Array |
     (1) loads A c + b per mass, forces and moments at interfaces
     (2) in a Tisserand frame the reaction is a rigid-body acceleration; in a nodal frame it acts on the interface that
         does not move, and does no work
-    (3) the work of turned forces per mass follows from P and 1C, at interfaces from Psi; of a turned moment half counts
+    (3) the work of rotated forces per mass follows from P and 1C, at interfaces from Psi; a rotated moment counts half
     """
     moments, frame = reduced.moments, reduced.frame
     kinds = {each.name: each.kind for each in reduced.interfaces}

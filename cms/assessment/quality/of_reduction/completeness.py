@@ -16,8 +16,8 @@ __all__ = [
     "StaticCompleteness", "completeness_records", "energy_error", "load_case_responses", "static_completeness",
 ]  # fmt: skip
 
-NO_LOAD = 1e-10  #: load minus the inertia forces that balance it, over the load, below which it is rounding
-NO_ENERGY = 1e-24  #: strain energy of a response over the largest of its kind, below which it is zero
+NO_LOAD = 1e-10  #: relative difference of a load and the inertia forces that balance it, below which it is rounding
+NO_ENERGY = 1e-24  #: strain energy of a response relative to the largest of its kind, below which it is zero
 ACCELERATIONS = ("ax", "ay", "az", "alpha x", "alpha y", "alpha z")
 
 
@@ -40,10 +40,10 @@ class StaticCompleteness:
 
 
 def energy_error(body: FEBody, basis: FreeBasis, U: Array) -> Array:
-    """Return the relative energy error of columns U approximated by rigid motion and modes, (k,); NaN: no energy.
+    """Return the relative energy error of approximating columns U by rigid motion and modes, (k,); NaN: no energy.
 
-    c = Phiᵀ K u / omega², e = u - Phi c; the error is formed, not the difference of two energies. Rigid motion is taken
-    off first: it has no energy, but its rounding has.
+    With c = Phiᵀ K u / omega² the energy of the error e = u - Phi c is computed, not the difference of two energies.
+    Rigid motion is subtracted first: it has no energy, but its rounding errors have.
     """
     U = U - basis.N @ (basis.N.T @ (body.M @ U))
     K_U = body.K @ U
@@ -58,8 +58,8 @@ def energy_error(body: FEBody, basis: FreeBasis, U: Array) -> Array:
 def static_completeness(reference: FullReference, basis: FreeBasis) -> StaticCompleteness:
     """Return the error for each unit interface load and each unit rigid-body acceleration.
 
-    Interface loads are in balance with the reactions at R (attachment modes Psi_A: with R any balanced combination of
-    interface forces); accelerations act with all interfaces held (inertia-relief modes Psi_H).
+    Interface loads are balanced by the reactions at R (attachment modes Psi_A; together with R they give any balanced
+    combination of interface forces). Accelerations act with all interfaces fixed (inertia-relief modes Psi_H).
     """
     body, families = reference.body, reference.families
     Psi_H, labels = families.Psi_H, families.held_names("load")[0]

@@ -15,8 +15,8 @@ __all__ = ["column_condition", "conditioning_record", "dropped_record"]
 def column_condition(body: FEBody, modes: ModeSet, omega2: float) -> tuple[float, tuple[str, ...]]:
     """Return the condition number of the independent columns at unit length in the W-norm, and the dropped columns.
 
-    With W-orthonormal Q the columns are V = Q (Qᵀ W V): it is that of the small matrix Qᵀ W V, which a Gram matrix
-    of V would show only up to its root.
+    With W-orthonormal Q the columns are V = Q (Qᵀ W V), so V has the condition number of the small matrix Qᵀ W V. The
+    Gram matrix of V would have its square, and rounding would hide large values.
     """
     V = modes.columns
     Q, redundant = independent_columns(V, body, omega2)

@@ -2,8 +2,8 @@
 
 (1) find the modes of the file over all dofs of the model, Phi, from their values at the kept nodes (`full_shapes`)
 (2) compute each field from the model and Phi, by the functions that `reduce` uses
-(3) divide the largest difference by the size of the field; stiffness and stress over modes of unit energy, inertia over
-    modes of unit mass
+(3) divide the largest difference by the size of the field; modes have unit strain energy for stiffness and stress, and
+    unit mass for inertia
 
 The body is not reduced a second time, so signs, order and frame of the modes are free. If there are more than `FEW`
 modes, the expensive fields are compared in `PROBES` random combinations, and every mode is part of each.
@@ -169,12 +169,12 @@ def contents_records(
     Parameters
     ----------
     shapes
-        The file's modes over all dofs of the model; None: its kept nodes do not determine them.
+        Modes of the file over all dofs of the model; None if the kept nodes do not determine them.
     options
-        What the file should hold. None: the damping named in the provenance; recovery tables are not compared.
+        Expected content of the file. None: damping is compared with the provenance, recovery tables are not compared.
     """
     if shapes is None:
-        return tuple(information(name, "the file does not tell its modes over the whole body") for name in CONTENTS)
+        return tuple(information(name, "the file does not determine its modes over all dofs") for name in CONTENTS)
     case = Case(body, modes, reduced, shapes.Phi, families, basis, options)
     return tuple(record_of(name, case, compare) for name, compare in CONTENTS.items())
 
@@ -186,10 +186,10 @@ def record_of(name: str, case: Case, compare: Callable[[Case], Iterator[Compared
         found += compare(case)
     except (CmsError, FeModelsError, np.linalg.LinAlgError) as error:
         return judge(
-            name, np.inf, f"the model does not make it: {error}", {"fields": {e.field: e.defect for e in found}}
+            name, np.inf, f"the model cannot provide it: {error}", {"fields": {e.field: e.defect for e in found}}
         )
     if not found:
-        return information(name, "the file holds none, and none was asked for")
+        return information(name, "the file contains none, and none was requested")
     worst = found[int(np.argmax([each.defect for each in found]))]  # NaN counts as the largest defect
     data: dict[str, float] = {}
     for each in found:
@@ -203,7 +203,7 @@ def record_of(name: str, case: Case, compare: Callable[[Case], Iterator[Compared
 
 def missing(field: str, where: str = "") -> Compared:
     """Return the comparison result for a missing field that the file should contain."""
-    return Compared(field, np.inf, where, "the file does not hold it")
+    return Compared(field, np.inf, where, "the file does not contain it")
 
 
 # Geometry -------------------------------------------------------------------------------------------------------------
@@ -302,9 +302,9 @@ def compare_sums(case: Case) -> Iterator[Compared]:
 
 
 def compare_moments(case: Case) -> Iterator[Compared]:
-    """Compare the moments, over the largest possible ones of a mode of unit mass; 1C to 5C follow from them.
+    """Compare the moments, divided by the largest possible for a mode of unit mass; 1C to 5C follow from them.
 
-    1C and 2C are also computed from the full mass matrix, which gives them exactly for any body.
+    1C and 2C are also computed from the full mass matrix, which is exact for any body.
     """
     file, R = case.reduced.moments, case.combined
     frame = case.reduced.frame
@@ -350,7 +350,7 @@ def wanted_damping(case: Case) -> tuple[Array | None, str]:
             return None, ""
         asked = str(options.damping) if options.damping else "none"
         if asked == told:
-            return carried_damping(case, options.damping, options.frame), f"the job: {asked}, carried to this frame"
+            return carried_damping(case, options.damping, options.frame), f"the job: {asked}, transformed to this frame"
         # the conversion replaced all damping by damping ratios of the new modes
         return None if damping is None or isinstance(damping, StrainDamping) else modal_damping(
             damping, reduced.M, reduced.K, second=reduced.units.time
@@ -377,7 +377,7 @@ def carried_damping(case: Case, damping: Damping | StrainDamping | None, frame: 
 def compare_load_cases(case: Case) -> Iterator[Compared]:
     """Compare resultants and modal forces of load cases, relative to the sum of the nodal forces.
 
-    A load on dofs that the frame holds works on no mode: its modal forces are rounding errors of the shapes there.
+    A load on dofs that the frame fixes does no work in any mode: its modal forces are rounding errors of the shapes.
     """
     file, expected = case.reduced.load_cases, case.expected.load_cases
     yield same("load_cases.name", tuple(each.name for each in file), tuple(each.name for each in expected))
@@ -393,11 +393,11 @@ def compare_load_cases(case: Case) -> Iterator[Compared]:
 
 
 def compare_sources(case: Case) -> Iterator[Compared]:
-    """Compare labels and energy shares, and the columns of the file with those of the mode set up to a scale.
+    """Compare labels and energy shares, and the columns of the file with those of the mode set, except for their scale.
 
     The forces of the modes on the columns V are F = VᵀK Phi. The coordinates A satisfy V A = Phi up to rigid motion, so
-    that AᵀF = PhiᵀK Phi. Both are compared: where columns nearly repeat each other, the rounding of the first is much
-    larger than that of the second.
+    that AᵀF = PhiᵀK Phi. Both equations are checked: if columns are nearly dependent, rounding errors of V A are much
+    larger than those of AᵀF.
     """
     file = case.reduced
     if file.columns is None:
@@ -441,7 +441,7 @@ def compare_stress(case: Case) -> Iterator[Compared]:
     if file.stress is not None or is_asked:
         made = nodal_stress_modes(case.body, case.Phi @ Z, case.node_ids, frame.axes)
         if made is None and file.stress is not None:
-            yield Compared("stress", np.inf, "", "the model knows no stress at its nodes")
+            yield Compared("stress", np.inf, "", "the model does not provide stress at its nodes")
         elif made is not None and file.stress is None:
             yield missing("stress")
         elif made is not None:
@@ -485,8 +485,8 @@ def compare_recovery(case: Case) -> Iterator[Compared]:
 def compare_table(case: Case, own: RecoveryTable, made: RecoveryTable) -> Iterator[Compared]:
     """Compare rows with the same quantity and dimension in one table.
 
-    A file that was converted to another frame keeps the static part of its first frame, with the reaction there. Only
-    its positions, velocities and accelerations are compared.
+    A file that was converted to another frame keeps the static part, with the reaction, of its first frame. Only its
+    rows of positions, velocities and accelerations are compared.
     """
     is_carried = CONVERTED in case.reduced.provenance
     name = own.name
@@ -567,7 +567,7 @@ def force_of_load(case: Case, load: str) -> float:
 
 
 def compare_geometric(case: Case) -> Iterator[Compared]:
-    """Compare geometric stiffness of each kind of load over modes of unit strain energy (inverse buckling load)."""
+    """Compare the geometric stiffness of each kind of load in modes of unit strain energy (inverse buckling loads)."""
     file = case.reduced.geometric
     asked = False if case.options is None else case.options.geometric
     if file is None:
@@ -609,7 +609,7 @@ def compare_geometric(case: Case) -> Iterator[Compared]:
 
 
 def compare_quadratic(case: Case) -> Iterator[Compared]:
-    """Compare second-order displacement over modes of unit strain energy, for each node or combination of nodes."""
+    """Compare second-order displacements in modes of unit strain energy, for each node or combination of nodes."""
     file = case.reduced.quadratic
     if file is None:
         if case.options is not None and case.options.quadratic and CONVERTED not in case.reduced.provenance:

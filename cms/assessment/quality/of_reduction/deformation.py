@@ -2,8 +2,8 @@
 
     eps(t) = min_x |u_ref(t) - [Psi_R Phi] x|_W / max_t min_y |u_ref(t) - Psi_R y|_W
 
-in the norms of M, K (energy) and the nodal translations. Both minima take rigid-body motion, so neither the frame in
-which u_ref was recovered nor that of the mode set matters.
+in the norms of M, K (energy) and the nodal translations. Both minima include rigid-body motion, so the result does not
+depend on the frames of u_ref and of the mode set.
 """
 
 from collections.abc import Mapping
@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 NORMS = ("M", "K", "nodal")
-NO_DEFORMATION = 1e-10  #: M-norm of the deformation over that of the whole motion, below which it is rounding
+NO_DEFORMATION = 1e-10  #: M-norm of the deformation relative to the whole motion, below which it is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +55,8 @@ class DeformationError:
 def deformation_error(body: FEBody, basis: FreeBasis, snapshots: Snapshots) -> DeformationError:
     """Compute eps(t) of a mode set in all norms of `NORMS`.
 
-    Snapshots may carry any rigid-body motion of first order. Their few columns are projected once, whatever the number
-    of times.
+    Snapshots may contain any small rigid-body motion. Their columns are projected once, independent of the number of
+    times.
 
     Raises
     ------
@@ -94,9 +94,10 @@ def nodal_deformation_error(reduced: ReducedBody, u: Array, t: Array) -> Deforma
     Parameters
     ----------
     u
-        Displacements in B of the nodes of the file, of a richer body or a floatframe result, (n_kept, 3, n_t) [m].
+        Displacements of the nodes of the file, in B, from a body with more modes or a floatframe result,
+        (n_kept, 3, n_t) [m].
     t
-        (n_t,).
+        Times, (n_t,).
     """
     if u.shape != (len(reduced.nodes), 3, len(t)):
         raise QualityError(
@@ -116,16 +117,16 @@ def recovered_displacements(source: ReducedBody, q: Array, into: ReducedBody) ->
     Parameters
     ----------
     source
-        The body that moved, of a richer mode set.
+        Body that moved; it has more modes.
     q
-        Its modal coordinates over time, as a floatframe trajectory has them, (n_t, n_q).
+        Modal coordinates of this body over time, as in a floatframe trajectory, (n_t, n_q).
     into
-        The body that is judged; its kept nodes must be among those of the source.
+        Body to be assessed; its kept nodes must be among those of the source.
 
     Returns
     -------
     Array
-        For `nodal_deformation_error` of `into`, (n_kept, 3, n_t) [m].
+        Displacements for `nodal_deformation_error` of `into`, (n_kept, 3, n_t) [m].
 
     Raises
     ------
@@ -177,7 +178,7 @@ def relative(t: Array, error: Mapping[str, Array], size: Mapping[str, Array]) ->
     largest = {norm: float(values.max()) for norm, values in size.items()}
     for norm, value in largest.items():
         if not value > 0:
-            raise QualityError(f"deformation error: the reference motion has no size in the norm {norm}")
+            raise QualityError(f"deformation error: the reference motion is zero in the norm {norm}")
     return DeformationError(
         t,
         {norm: values / largest[norm] for norm, values in error.items()},

@@ -117,7 +117,7 @@ class Compared:
     """Comparison of one field of a file with the same field of the model."""
 
     field: str  #: field name, as in `FIELDS`
-    defect: float  #: largest difference over the size of the field; infinite for differing texts and counts
+    defect: float  #: largest difference divided by the size of the field; infinite for differing texts and counts
     where: str = ""  #: description of the place of the largest difference
     doubt: str = ""  #: description of a difference that is not numerical
 
@@ -168,8 +168,8 @@ def apart(field: str, got: Array, wanted: Array, size: Array | float, where: str
     Parameters
     ----------
     axes
-        Words for the axes of the arrays, such as "mode mode", that name the place of the largest difference; "-" for an
-        axis that is not named.
+        Names of the axes of the arrays, such as "mode mode", to describe the index of the largest difference; "-" for
+        an axis without name.
     """
     got, wanted = np.asarray(got), np.asarray(wanted)
     if got.shape != wanted.shape:

@@ -26,7 +26,7 @@ class FrequencyComparison:
     mac: Array  #: MAC weighted by mass, (n_full, n_reduced)
     mac_nodal: Array  #: MAC of the translations of all nodes, (n_full, n_reduced)
     partner: IntArray  #: reduced mode with the largest mass-weighted MAC for each full mode, (n_full,); -1: none
-    partner_error: Array  #: frequency of the partner over that of the full mode, minus 1, (n_full,)
+    partner_error: Array  #: frequency of the partner divided by the frequency of the full mode, minus 1, (n_full,)
     #: part of each full shape in the span of the partners of its cluster, mass-weighted, 0 to 1, (n_full,)
     recovered: Array
     recovered_nodal: Array  #: the same in nodal translations; for a single mode, its MAC with the partner, (n_full,)
@@ -45,7 +45,7 @@ def mac(A: Array, B: Array, M_B: Array | None = None) -> Array:
     A, B
         Shapes, (n, n_a) and (n, n_b).
     M_B
-        M B for the mass-weighted criterion of shapes that are M-orthonormal, (n, n_b); None: the plain one.
+        M B for the mass-weighted criterion of M-orthonormal shapes, (n, n_b); None: the unweighted criterion.
     """
     if M_B is not None:
         return np.asarray((A.T @ M_B) ** 2)
@@ -65,8 +65,8 @@ def compare_frequencies(reference: FullReference, basis: FreeBasis) -> Frequency
 def compare_shapes(full: Array, reduced: Array, massed: Array, a: Array, b: Array) -> FrequencyComparison:
     """Compare frequencies and shapes of two models.
 
-    Shapes of multiple or nearly equal frequencies are known up to a rotation only, so `recovered` takes the part of a
-    full shape in the span of all partners of its cluster.
+    Shapes of equal or nearly equal frequencies are arbitrary up to a rotation among them, so `recovered` is the part of
+    a full shape in the span of all partners of its cluster.
 
     Parameters
     ----------

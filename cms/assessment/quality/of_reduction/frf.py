@@ -28,7 +28,7 @@ POINTS = 400
 #: distances of added points from a resonance, in half bandwidths
 AROUND = np.array([0.0, 0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0, 8.0, 12.0])
 UNDAMPED = 1e-4  #: relative frequency distance of points around an undamped resonance, whose peak is infinite
-LOWEST = 0.05  #: lower end of the band over the first elastic frequency; below it the body moves rigidly
+LOWEST = 0.05  #: lower end of the band divided by the first elastic frequency; below it the body moves rigidly
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,17 +70,17 @@ def frequency_grid(lowest: float, highest: float, points: int = POINTS) -> Array
 def resonance_grid(grid: Array, resonances: Array, ratios: Array) -> Array:
     """Add points around resonances to a grid, so that peaks have their full height at any damping, (n_f,) [Hz].
 
-    A peak is at f_k sqrt(1 - 2 zeta²) and half as wide as 2 zeta f_k: points at multiples of the half width from there,
-    half of them within it. Of a resonance without damping the point itself is left out.
+    A peak is at f_k sqrt(1 - 2 zeta²) with half bandwidth zeta f_k. Points are added at the distances `AROUND`, in half
+    bandwidths, on both sides of the peak. The peak itself is omitted if the resonance is undamped.
 
     Parameters
     ----------
     grid
-        Ascending, (n,) [Hz].
+        Ascending frequencies, (n,) [Hz].
     resonances
-        f_k, (n_modes,) [Hz].
+        Natural frequencies f_k, (n_modes,) [Hz].
     ratios
-        zeta_k, none negative, (n_modes,) [-].
+        Damping ratios zeta_k, none negative, (n_modes,) [-].
     """
     in_band = (resonances > grid[0] / 2) & (resonances < 2 * grid[-1]) & (ratios < np.sqrt(0.5))
     f, zeta = resonances[in_band], ratios[in_band]
@@ -100,7 +100,10 @@ def basis_ports(reference: FullReference, basis: FreeBasis) -> PortModel:
 
 
 def compare_responses(full: FrequencyResponse, reduced: FrequencyResponse, length: float) -> Array:
-    """Return the relative error at each frequency, (n_f,): Frobenius norm, rotations times, moments over the length."""
+    """Return the relative error at each frequency, (n_f,), in the Frobenius norm.
+
+    Rotations are multiplied by the length, and moments divided by it.
+    """
     out, into = (
         np.array([length if label.rsplit(" ", 1)[1].startswith("r") else 1.0 for label in labels])
         for labels in (full.outputs, full.inputs)
@@ -120,7 +123,7 @@ def response_comparison(
     model
         The reduced body at its ports: `basis_ports` of a mode set, `port_model` of a file.
     frequencies
-        Instead of the default grid, up to the band of the reference, (n_f,) [Hz].
+        Frequencies up to the band of the reference, (n_f,) [Hz]; None: the default grid.
 
     Raises
     ------
@@ -131,7 +134,7 @@ def response_comparison(
     if model.names != reference.ports.names:
         raise QualityError(
             f"body {body.name!r}: the reduced body has the interfaces {', '.join(model.names)}, the full model "
-            f"{', '.join(reference.ports.names)}; check with the job the file was made from"
+            f"{', '.join(reference.ports.names)}; check with the job from which the file was made"
         )
     if frequencies is None:
         frequencies = frequency_grid(LOWEST * float(reference.frequencies[0]), reference.band)

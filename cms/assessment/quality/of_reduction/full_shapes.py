@@ -1,9 +1,10 @@
-"""The modes of a modal file over all dofs of its full model, found again in the span of a mode set.
+"""Modes of a modal file over all dofs of its full model, reconstructed in the span of a mode set.
 
-A file keeps its modes at some nodes only. Where those determine x in phi_file = [Psi_R Phi] x, the full shapes follow,
-in any frame; what is left at the nodes says whether file, model and mode set belong together. Where they do so only
-with the rotations of kept points, these are taken too. Else (a beam that keeps its ends) the mode set is finished again
-in the frame the file names, and modes of one frequency are turned onto those of the file.
+A file keeps its modes at some nodes only. If these nodes determine x in phi_file = [Psi_R Phi] x, the full shapes
+follow, in any frame. The remaining difference at the nodes shows whether file, model and mode set belong together. If
+translations do not determine x, rotations of kept points are added. If these do not suffice either (a beam that keeps
+only its ends), the finishing step is repeated in the frame that the file names, and modes of equal frequency are
+rotated to those of the file.
 """
 
 from dataclasses import dataclass, replace
@@ -41,7 +42,7 @@ class FullShapes:
 
     Phi: Array  #: modes over the dofs, (n_dof, n_q)
     Z: Array  #: coordinates of the modes in the elastic shapes of the mode set, (n, n_q)
-    #: largest distance at the kept nodes and interfaces beyond rounding of the set, over a mode's largest displacement
+    #: largest difference at kept nodes and interfaces beyond rounding, divided by a mode's largest displacement
     misfit: float
 
     def __post_init__(self) -> None:
@@ -107,9 +108,9 @@ def kept_turns(body: FEBody, reduced: ReducedBody, X: Array) -> Array:
 
 
 def turned_onto(found: Array, wanted: Array, stiffness: Array) -> Array:
-    """Return the orthogonal matrix that rotates modes of equal stiffness closest to the wanted ones, (n_q, n_q).
+    """Return the orthogonal matrix that best rotates modes of equal stiffness to the wanted ones, (n_q, n_q).
 
-    Modes that the rows do not show stay as they are.
+    Modes that are zero in the rows are not changed.
     """
     turn = np.eye(len(stiffness))
     is_apart = np.abs(np.diff(stiffness)) > ONE_FREQUENCY * np.maximum(stiffness[1:], stiffness[:-1])
@@ -121,7 +122,7 @@ def turned_onto(found: Array, wanted: Array, stiffness: Array) -> Array:
 
 
 def kept_motion(body: FEBody, reduced: ReducedBody, X: Array) -> Array:
-    """Return motions of kept nodes and reference points in the columns X, axes of B, rotations times length, (n, k)."""
+    """Return motions of kept nodes and reference points in columns X, axes of B, (n, k); rotations times length."""
     axes = reduced.frame.axes
     at_nodes = body.translations(X)[reduced.node_ids]
     rows = [np.einsum("ba,nbk->nak", axes, at_nodes).reshape(-1, X.shape[1])]
@@ -144,7 +145,7 @@ def motion_scale(body: FEBody, reduced: ReducedBody) -> Array:
 
 
 def misfit(found: Array, wanted: Array, rounding: ShapeRounding) -> float:
-    """Return the largest difference beyond rounding, over the largest motion of each mode."""
+    """Return the largest difference beyond rounding, divided by the largest motion of each mode."""
     largest = np.abs(wanted).max(axis=0, initial=0.0)
     distance = beyond(np.abs(found - wanted).max(axis=0, initial=0.0), rounding.motion)
     return float((distance / np.where(largest > 0, largest, 1.0)).max(initial=0.0))
@@ -179,9 +180,9 @@ def named_frame(frame: BodyFrame) -> Frame | HeldFrame:
 def same_body_record(body: FEBody, basis: FreeBasis, reduced: ReducedBody, shapes: FullShapes | None) -> QualityRecord:
     """Return the record "same-body": the file has the free-free frequencies of the set, and modes in its span.
 
-    Only the part of a difference counts that rounding of the columns of the set does not explain. A change e of a shape
-    changes Phiᵀ M Phi by Phiᵀ M e + eᵀ M Phi + eᵀ M e, and Phiᵀ K Phi likewise. Modes of light nodes are combinations
-    of nearly dependent columns in which motions of heavy nodes cancel: little of the mass of the columns is left.
+    Only the part of a difference that exceeds rounding of the columns of the set counts. A change e of a shape changes
+    Phiᵀ M Phi by Phiᵀ M e + eᵀ M Phi + eᵀ M e, and Phiᵀ K Phi likewise. Rounding matters for modes of light nodes: they
+    are combinations of nearly dependent columns in which motions of heavy nodes cancel.
     """
     own = basis.frequencies()
     stored = reduced.free_frequencies

@@ -15,9 +15,9 @@ from fe_models.foundation.arrays import Array, frozen
 __all__ = ["HeldMass", "answered_statically", "held_mass", "held_mass_record"]
 
 DIRECTIONS = ("ux", "uy", "uz", "rx", "ry", "rz")
-HELD = 1e-8  #: singular value of the interface motions over the largest, below which a combination keeps them fixed
+HELD = 1e-8  #: relative singular value of the interface motions, below which a combination keeps them fixed
 MASS_TOLERANCE = 1e-10  #: relative residual of the solutions with M_II
-NO_MASS = 1e-9  #: moving mass over the body mass, below which a direction has no moving mass
+NO_MASS = 1e-9  #: moving mass divided by the body mass, below which a direction has no moving mass
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,10 +43,10 @@ class HeldMass:
 def held_mass(reference: FullReference, basis: FreeBasis) -> HeldMass:
     """Compute the effective masses of a mode set with all interfaces fixed.
 
-    (1) combinations of [N Phi] that do not move the held dofs: null space of their rows, rotations times the length
-    (2) their modes z; participation L = zᵀ M d of unit rigid-body motions d, effective mass L²
-    (3) the full model's sum b_Iᵀ M_II⁻¹ b_I, b = M d, by conjugate gradients; what distributing interfaces take out of
-        it (a mean motion each) is not taken off
+    (1) find combinations of [N Phi] that do not move the fixed dofs: null space of their rows, rotations times length
+    (2) find their modes z; participation L = zᵀ M d of unit rigid-body motions d, effective mass L²
+    (3) compute the sum for the full model, b_Iᵀ M_II⁻¹ b_I, b = M d, by conjugate gradients; the mean motions that
+        distributing interfaces prevent are not subtracted
     """
     body, families = reference.body, reference.families
     d = rigid_motion_of_dofs(body.nodes, body.dofs, body.nodes.mean(axis=0))
@@ -93,8 +93,8 @@ def full_held_mass(reference: FullReference, b: Array) -> Array:
 def held_mass_record(held: HeldMass, *, is_static_complete: bool = False) -> QualityRecord:
     """Return the record "effective-mass" for the translation with the largest share of mass in no mode.
 
-    Where the mode set answers rigid-body accelerations statically, what its modes leave out is not lost: nothing is
-    judged.
+    If the static response of the mode set to rigid-body accelerations is exact, missing modes lose nothing: then there
+    is no verdict.
     """
     data = {
         "frequencies_hz": held.frequencies,
@@ -107,7 +107,7 @@ def held_mass_record(held: HeldMass, *, is_static_complete: bool = False) -> Qua
         return information("effective-mass", "nothing but the interfaces has mass", data)
     remainder = held.remainder
     k = int(np.argmax(remainder[:3]))
-    reason = f"with all interfaces held {len(held.frequencies)} modes carry of what can vibrate " + ", ".join(
+    reason = f"with fixed interfaces {len(held.frequencies)} modes carry these shares of moving mass: " + ", ".join(
         f"{name} {100 * (1 - r):.0f} %" for name, r in zip(DIRECTIONS, remainder, strict=True)
     )
     record = judge("effective-mass", max(0.0, remainder[k]), reason, data)

@@ -67,7 +67,7 @@ def with_kind(body: FEBody, kind: str) -> FEBody:
         If the body is coupled already, or has only interfaces of kind "nodes".
     """
     if body.recovery is not None and body.interfaces and body.is_coupled:
-        raise QualityError(f"body {body.name!r}: is coupled already; its interfaces cannot change kind any more")
+        raise QualityError(f"body {body.name!r}: is coupled already; its interfaces can no longer change kind")
     if not has_both_kinds(body):
         raise QualityError(f"body {body.name!r}: has no rigid or distributing interface to compare")
     interfaces = tuple(replace(i, kind=kind) if can_be_both(body, i) else i for i in body.interfaces)

@@ -72,11 +72,11 @@ def geometric_shift(center: Array) -> Array:
 
 
 def check_grounding(body: FEBody) -> QualityRecord:
-    """Check that rigid-body modes cause no force: largest |K Psi_R| over |K| |Psi_R|, rotations over the body length.
+    """Check that rigid-body modes cause no force: largest |K Psi_R| / (|K| |Psi_R|), rotations divided by body length.
 
     A body that is declared as fixed to the ground is not checked.
 
-    Row by row would be sharper, but the rows of a rigid interface are sums that cancel, and keep their rounding.
+    A check relative to each row would be stricter, but rows of a rigid interface are sums that cancel up to rounding.
     """
     Psi_R = rigid_motion_of_dofs(body.nodes, body.dofs, body.nodes.mean(axis=0))
     Psi_R[:, 3:] /= body.length

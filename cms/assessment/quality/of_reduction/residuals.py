@@ -1,15 +1,15 @@
 """Error bounds of reduced eigenpairs, computed from their residuals alone.
 
-For phi with phiᵀ M phi = 1, theta = phiᵀ K phi and Psi_Rᵀ M phi = 0 expand phi = sum c_j phi_j in the true elastic
-modes. The residual r = K phi - theta M phi has |r|²_G = sum (lambda_j - theta)² c_j² / lambda_j, G the flexibility of
-the free body, and sum lambda_j c_j² = theta, so that
+Let phiᵀ M phi = 1, theta = phiᵀ K phi and Psi_Rᵀ M phi = 0, and expand phi = sum c_j phi_j in the true elastic modes.
+With the flexibility G of the free body, the residual r = K phi - theta M phi satisfies
+|r|²_G = sum (lambda_j - theta)² c_j² / lambda_j. Since sum lambda_j c_j² = theta,
 
     min_j |lambda_j - theta| / lambda_j <= |r|_G / sqrt(theta) = |phi - theta G M phi|_K / sqrt(theta) =: b
 
 There is a true frequency f with |(f_reduced / f)² - 1| <= b. In the energy product 1 / theta is the Rayleigh quotient
-of G M, so the error is of second order (Temple-Kato): |theta / lambda_j - 1| <= b² / gap, gap the distance of theta /
-lambda from 1 over the other modes. With the other reduced frequencies in place of lambda, and those nearer than b
-counted to the same cluster, this is an estimate.
+of G M, so the error is of second order (Temple-Kato): |theta / lambda_j - 1| <= b² / gap, where gap is the smallest
+|theta / lambda - 1| of the other modes. The estimate uses the other reduced frequencies for lambda; those nearer than b
+belong to the same cluster and do not count.
 """
 
 from dataclasses import dataclass

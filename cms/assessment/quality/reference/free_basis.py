@@ -24,8 +24,8 @@ MASSLESS = 1e-12  #: modal mass times omega_1² of a shape of unit W-norm, below
 class ShapeRounding:
     """Rounding errors of shapes due to rounding of the columns of their mode set, in three norms.
 
-    A shape phi = sum_k a_k v_k is known to sum_k |a_k| eps |v_k|. Nearly dependent columns have large coefficients a_k,
-    and the span of such a set is known less well.
+    The rounding error of a shape phi = sum_k a_k v_k is sum_k |a_k| eps |v_k|. It is large for nearly dependent
+    columns, because their coefficients a_k are large.
     """
 
     motion: Array  #: error in the norm of the displacement, rotations times body length, (n,)
@@ -75,17 +75,17 @@ class FreeBasis:
 
 
 def free_basis(body: FEBody, modes: ModeSet, families: Families) -> FreeBasis:
-    """Return the free-free modes in the span of a mode set, in mean axes, whatever the frame of the file.
+    """Return the free-free modes in the span of a mode set, in mean axes, independent of the frame of the file.
 
     Parameters
     ----------
     families
-        Those of the body; only its rigid-body motions are used.
+        Mode families of the body; only the rigid-body motions are used.
 
     Raises
     ------
     ModeSetError, BodyError
-        As the finishing step of `reduce`.
+        If the finishing step of `reduce` would fail.
     """
     N, M_N = families.free.N, families.free.M_N
     condition = FrameCondition(
@@ -108,9 +108,9 @@ def free_basis(body: FEBody, modes: ModeSet, families: Families) -> FreeBasis:
 def ritz_basis(body: FEBody, X: Array, N: Array) -> FreeBasis:
     """Apply the Rayleigh-Ritz method to the span of columns, without rigid-body motion.
 
-    (1) W-orthonormal columns Q, W = K + omega_1² M, redundant ones dropped; what rounding has made of rigid-body
-        motion in the small remainders of nearly redundant columns is taken off
-    (2) Qᵀ M Q y = mu Qᵀ W Q y; omega² = (1 - omega_1² mu) / mu, and the static ones (mu = 0) last
+    (1) find W-orthonormal columns Q, W = K + omega_1² M, and drop redundant columns; then subtract rigid-body motion,
+        which rounding leaves in nearly redundant columns
+    (2) solve Qᵀ M Q y = mu Qᵀ W Q y; omega² = (1 - omega_1² mu) / mu; static shapes (mu = 0) are last
 
     Parameters
     ----------

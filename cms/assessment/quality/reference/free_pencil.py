@@ -67,16 +67,16 @@ def free_elastic_modes(reduced: ReducedBody) -> tuple[Array, Array, np.ndarray]:
     Returns
     -------
     omega2
-        Squared frequencies, stiffness of massless shapes, (n,) [1/s²].
+        Squared frequencies; for massless shapes the stiffness, (n,) [1/s²].
     X
         Shapes over x, (n_r + n_q, n).
     is_massive
-        (n,) bool.
+        Whether each shape has mass, (n,) bool.
 
     Raises
     ------
     numpy.linalg.LinAlgError
-        If the body has no inertia about some axis, or a mode neither stiffness nor mass.
+        If the body has no inertia about some axis, or a mode has neither stiffness nor mass.
     """
     pencil = free_pencil(reduced)
     T = np.eye(reduced.n_q)
@@ -90,17 +90,17 @@ def free_elastic_modes(reduced: ReducedBody) -> tuple[Array, Array, np.ndarray]:
 
 
 def frequency_distance(own: Array, stored: Array) -> Array:
-    """Return the relative differences between frequencies and stored ones, if known; both ascending.
+    """Return the relative differences between computed and stored frequencies, both ascending.
 
-    The mass of a mode is omega_1² / omega² of its energy in units of the first mode, and rounding leaves it an error of
-    eps: a frequency is known to eps omega² / omega_1². Light frames with point masses have modes of 1e6 times the first
-    frequency. Beyond `KNOWN_RATIO` differences count less in this proportion, and one list may be longer than the other
-    by modes so high that rounding decides whether they have mass.
+    Rounding limits the accuracy: for unit energy the modal mass is proportional to omega_1² / omega² and has an error
+    of eps, so the relative error of a frequency is eps omega² / omega_1². Light frames with point masses have modes at
+    1e6 times the first frequency. Beyond the ratio `KNOWN_RATIO`, differences are reduced in this proportion, and modes
+    may be missing in one of the lists, because rounding decides whether they have mass.
 
     Raises
     ------
     ValueError
-        If one list is longer by others.
+        If other modes are missing in one of the lists.
     """
     n = min(len(own), len(stored))
     first = min(own[0], stored[0]) if n else 0.0

@@ -19,7 +19,7 @@ from fe_models.foundation.arrays import Array
 __all__ = ["FullReference", "usable_band"]
 
 CUTOFF_MARGIN = 1.5  #: customary ratio of the highest retained frequency to the highest frequency of interest
-MODES_BEYOND = 1.5  #: upper frequency of the full modes over that of the band
+MODES_BEYOND = 1.5  #: highest frequency of the full modes divided by the band
 
 
 class FullReference:
@@ -89,7 +89,7 @@ class FullReference:
 
 
 def usable_band(modes: ModeSet, reduced: ReducedBody) -> float:
-    """Return the highest frequency for which a mode set is customarily used [Hz]: highest vibration mode over 1.5.
+    """Return the highest frequency for which a mode set is customarily used [Hz]: that of its highest mode / 1.5.
 
     For a set with at most one vibration mode, it is the first free-free frequency.
     """
@@ -100,5 +100,5 @@ def usable_band(modes: ModeSet, reduced: ReducedBody) -> float:
     highest = vibration.max() / time / CUTOFF_MARGIN if len(vibration) else 0.0
     band = float(max(highest, 1.001 * first))
     if not band > 0:
-        raise QualityError(f"body {reduced.name!r}: has no elastic frequency to compare; give the band yourself")
+        raise QualityError(f"body {reduced.name!r}: has no elastic frequency to compare; specify the band")
     return band

@@ -107,11 +107,11 @@ def modal_response(
     Parameters
     ----------
     frequencies
-        Above 0, (n_f,) [Hz].
+        Frequencies above 0, (n_f,) [Hz].
     damping
-        zeta, the ratio of every elastic free mode.
+        Damping ratio zeta of every elastic free mode.
     time
-        [s] of the body's time unit.
+        Time unit of the body [s].
 
     Raises
     ------
@@ -141,12 +141,12 @@ def resonances(model: PortModel, *, damping: float, time: float = 1.0) -> tuple[
 def file_resonances(reduced: ReducedBody, *, damping: float | None = None) -> tuple[Array, Array]:
     """Return frequencies and damping ratios of the free body without joints, (n_massive,) [Hz] and [-].
 
-    With D of the file, each ratio follows from its diagonal in these modes, xᵀ D x / 2 omega (light damping).
+    By default each ratio follows from D of the file, xᵀ D x / 2 omega (light damping).
 
     Parameters
     ----------
     damping
-        Ratio of every mode instead.
+        Damping ratio of every mode; None: from D.
     """
     if damping is not None:
         require_damping(damping)
@@ -164,9 +164,9 @@ def file_response(reduced: ReducedBody, frequencies: Array, *, damping: float | 
     Parameters
     ----------
     frequencies
-        Above 0, (n_f,) [Hz].
+        Frequencies above 0, (n_f,) [Hz].
     damping
-        Ratio of every elastic free mode; None: the D of the file.
+        Damping ratio of every elastic free mode; None: D of the file.
     """
     time = reduced.units.time
     if damping is not None:

@@ -14,7 +14,7 @@ from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
 
 __all__ = ["Ports"]
 
-COLLINEAR = 1e-6  #: spread of nodes across their line over that along it, below which they define no rotation
+COLLINEAR = 1e-6  #: ratio of the spread of nodes across and along their line, below which they define no rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ class Ports:
 def port_matrix(body: FEBody, interface: Interface) -> sp.csr_array:
     """Return the motion of a reference point, (6, n_dof): of its node, of a node that moves it, or the mean motion.
 
-    Collinear nodes have only a mean translation; their rotation rows are zero.
+    Collinear nodes have only a mean translation; the rows of their rotation are zero.
     """
     dofs = np.asarray(interface.dofs)
     if len(dofs) == 6 and len(np.unique(body.dofs[dofs, 0])) == 1:

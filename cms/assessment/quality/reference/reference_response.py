@@ -1,12 +1,13 @@
-"""Response of the full model at its ports, in a rich basis whose error the residual measures.
+"""Response of the full model at its ports, in an enriched basis whose error is estimated from the residual.
 
-(1) free modes up to twice the band
-(2) the static response to the port loads (exact at frequency 0) and its first inertia correction G M G f
-(3) Rayleigh-Ritz; in the band the modes left out answer as ω² / ω_k² to the power of the corrections
-(4) residual r = P f - (K - ω² M) u of the response at the top of the band, between two modes, and e = G r. The error of
-    H_ij is r_iᵀ (K - ω² M)⁻¹ r_j, of second order; r has no part along the kept modes and the others lie above twice
-    the band, so it is at most 4/3 of r_iᵀ e_j. (At the ports e itself is zero: the basis holds G f, so f_iᵀ G r_j = 0)
-(5) while that is above the tolerance: e joins the basis, from (3)
+(1) compute free modes up to twice the band
+(2) add the static response to the port loads (exact at frequency 0) and its first inertia correction G M G f
+(3) apply Rayleigh-Ritz; after n corrections the error due to the missing mode k is of order (ω² / ω_k²)^n
+(4) compute the residual r = P f - (K - ω² M) u of the response at the top of the band, between two modes, and e = G r.
+    The error of H_ij is r_iᵀ (K - ω² M)⁻¹ r_j, of second order. Since r has no part along the kept modes, and the
+    others lie above twice the band, the error is at most 4/3 r_iᵀ e_j. (At the ports e itself is zero: the basis
+    contains G f, so f_iᵀ G r_j = 0)
+(5) while this error is above the tolerance, add e to the basis and repeat from (3)
 """
 
 from dataclasses import dataclass
@@ -23,7 +24,7 @@ from fe_models.foundation.sparse.sparse_product import SymmetricProduct
 
 __all__ = ["RESPONSE_TOLERANCE", "ReferenceResponse", "reference_response"]
 
-MODES_BEYOND = 2.0  #: upper frequency of the free modes over that of the band
+MODES_BEYOND = 2.0  #: highest frequency of the free modes divided by the band
 RESPONSE_TOLERANCE = 1e-5  #: largest relative error of the reference response at the top of the band
 UNSEEN_GAIN = 4 / 3  #: largest lambda / (lambda - omega²) of modes above twice the band
 MOST_ROUNDS = 5
@@ -50,7 +51,7 @@ def reference_response(families: Families, ports: Ports, band: float) -> Referen
     Raises
     ------
     QualityError
-        If the residual stays above the tolerance.
+        If the error remains above the tolerance.
     """
     body = families.body
     M, K = SymmetricProduct(body.M), SymmetricProduct(body.K)

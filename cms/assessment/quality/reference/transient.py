@@ -1,8 +1,8 @@
-"""Reference motions of the full model under given load histories: deformation snapshots that mode sets are judged by.
+"""Reference motions of the full model under given load histories: deformations over time to assess mode sets.
 
-(1) modes of the body, free or with interfaces held, up to a cut-off; static response G f of the loads and G M G f
+(1) modes of the body, free or with fixed interfaces, up to a cut-off; static response G f of the loads and G M G f
 (2) Rayleigh-Ritz in their span
-(3) per mode q'' + 2 zeta omega q' + omega² q = p(t), p linear between the given times: exact from one to the next
+(3) exact integration of each mode, q'' + 2 zeta omega q' + omega² q = p(t), with p linear between the given times:
 
     [q, q', p, p'] is a linear system without input over one step; its matrix exponential is the step.
 """
@@ -29,7 +29,7 @@ from fe_models.foundation.records import ArrayShape, checked_fields
 __all__ = ["LoadHistory", "Snapshots", "interface_forces", "support_acceleration", "transient", "transient_in"]
 
 
-NO_LOAD = 1e-10  #: load minus the inertia forces that balance it, over the load, below which it is rounding
+NO_LOAD = 1e-10  #: relative difference of a load and the inertia forces that balance it, below which it is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,14 +80,14 @@ def interface_forces(body: FEBody, histories: Mapping[str, Array], t: Array) -> 
 
 
 def support_acceleration(body: FEBody, acceleration: Array, t: Array, *, origin: Array | None = None) -> LoadHistory:
-    """Return the inertia load -M Psi_R a(t) in an accelerating frame, for the motion relative to it, to first order.
+    """Return the inertia load -M Psi_R a(t) for the small motion relative to an accelerating frame.
 
     Parameters
     ----------
     acceleration
-        Of the point `origin` and angular, mesh axes, (6, n_t) [m/s², 1/s²].
+        Acceleration of the point `origin` and angular acceleration, mesh axes, (6, n_t) [m/s², 1/s²].
     origin
-        Point the angular acceleration is about, (3,) [m]; mesh origin by default.
+        Reference point of the acceleration, (3,) [m]; by default the mesh origin.
     """
     Psi_R = rigid_motion_of_dofs(body.nodes, body.dofs, np.zeros(3) if origin is None else origin)
     return LoadHistory(-(body.M @ Psi_R), t, np.asarray(acceleration))
@@ -104,25 +104,25 @@ def transient(
 ) -> Snapshots:
     """Integrate the full model under a load history, from rest: steps (1) to (3) of this module.
 
-    A free body's deformation in mean axes results (its rigid motion is left out), or that of a body whose named
-    interfaces do not move.
+    The result is the deformation of a free body in mean axes, without its rigid motion, or the deformation of a body
+    with fixed interfaces.
 
     Parameters
     ----------
     cutoff
-        Modes up to this frequency follow the load dynamically, those above statically with a first inertia correction
-        [Hz]; several times the highest frequency in the load.
+        Modes up to this frequency respond dynamically, higher modes statically with a first inertia correction [Hz].
+        Choose several times the highest frequency of the load.
     held
-        Names of interfaces that are held.
+        Names of fixed interfaces.
     damping
-        Ratio of every mode.
+        Damping ratio of every mode.
     is_preloaded
-        Start in equilibrium with the first load instead of undeformed.
+        Whether the motion starts in equilibrium with the first load instead of undeformed.
 
     Raises
     ------
     QualityError
-        If nothing is loaded, or the times are too far apart for the cut-off to mean anything.
+        If the load does not deform the body, or the times are too far apart for the cut-off.
     """
     body = families.body
     if load.F.shape[0] != body.n_dof:
@@ -134,14 +134,14 @@ def transient(
 
 
 def transient_in(basis: FreeBasis, load: LoadHistory, *, damping: float = 0.0, is_preloaded: bool = False) -> Snapshots:
-    """Integrate a free body in the span of a mode set: a Guyan-reduced or otherwise richer reference, step (3) alone.
+    """Integrate a free body in the span of a mode set by step (3) alone: a reference with more modes, or a Guyan model.
 
     Parameters
     ----------
     basis
-        `free_basis` of the mode set.
+        Result of `free_basis` for the mode set.
     damping, is_preloaded
-        As `transient`.
+        As for `transient`.
     """
     if load.F.shape[0] != len(basis.Phi):
         raise QualityError(f"transient: loads over {load.F.shape[0]} dofs, the mode set has {len(basis.Phi)}")

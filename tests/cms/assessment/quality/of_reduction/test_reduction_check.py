@@ -397,7 +397,7 @@ def test_checks_refuse_what_does_not_belong_together(body, reference):
     reduced = reduce(body, modes)
     with pytest.raises(QualityError, match="has columns of"):
         check_reduction(couple(bar(nx=4, kind="hexahedron")), modes, reduced)
-    with pytest.raises(QualityError, match="reference is of another body"):
+    with pytest.raises(QualityError, match="reference belongs to another body"):
         check_reduction(replace(body), modes, reduced, reference=reference)
     with pytest.raises(QualityError, match="is in units mm-t-s"):
         check_reduction(replace(body, units=unit_system("mm-t-s")), modes, reduced)
