@@ -16,8 +16,9 @@ SLOWEST = tuple(
     for name in (
         "floatframe/engine/structure_preserving/test_every_element", "cms/cli/test_commands",
         "pipeline/test_split_line", "floatframe/engine/structure_preserving/test_every_part",
-        "floatframe/laws/test_every_constant", "floatframe/engine/compiling/test_lean_laws",
-        "floatframe/machines/test_road_car", "floatframe/design/laboratory/test_laboratory",
+        "floatframe/test_own_kinds", "floatframe/laws/test_every_constant",
+        "floatframe/engine/compiling/test_lean_laws", "floatframe/machines/test_road_car",
+        "floatframe/design/laboratory/test_laboratory",
         "floatframe/design/generation/test_generate", "test_groups",
         "floatframe/engine/structure_preserving/test_compiled_steps", "floatframe/simulation/test_step_watch",
         "campaign/test_campaign", "floatframe/cli/test_commands", "floatframe/design/optimization/test_optimization",

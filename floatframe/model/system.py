@@ -164,11 +164,10 @@ class System:
         if not self.bodies:
             raise ModelError(f"{where}: expected at least one body, got none")
         require_names(f"{where}: bodies", [body.name for body in self.bodies], taken=(GROUND.name,))
-        named = [force.name for force in self.forces if not isinstance(force, Gravity)]
+        named = [joint.name for joint in self.joints] + [coupler.name for coupler in self.couplers]
+        named += [force.name for force in self.forces if not isinstance(force, Gravity)]
         named += [element.name for element in self.elements]
-        require_names(
-            f"{where}: joints, forces and elements", [joint.name for joint in (*self.joints, *self.couplers)] + named
-        )
+        require_names(f"{where}: joints, forces and elements", named)
         for kind in ("sensors", "inputs", "outputs", "events", "fmus", "controllers"):
             require_names(f"{where}: {kind}", [each.name for each in getattr(self, kind)])
         for body in self.bodies:

@@ -49,7 +49,7 @@ def turning_with(system: System, omega: Array) -> System:
                 if abs(motion(0.0, 1) - rate) > SAME * speed or abs(motion(0.0, 2)) > SAME * speed**2:
                     motions[own.name] = polynomial_of_time([float(motion(0.0)), rate])
             if motions != dict(given):
-                joint = replace(joint, motions=motions)  # type: ignore[arg-type]
+                joint = replace(joint, motions=motions)
         joints.append(joint)
     if all(one is other for one, other in zip(joints, system.joints, strict=True)):
         return system

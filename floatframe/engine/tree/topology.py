@@ -18,9 +18,10 @@ from floatframe.engine.compiling.markers import joint_markers, marker_pose, n_q_
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.kernels.model import COUPLER, JOINT, Model
 from floatframe.engine.kernels.records import filled
-from floatframe.engine.tree.charts import FREE, SIDE_B, Column, chart_of
 from floatframe.engine.tree.kernels.tree import COLUMN, FAR_MODE, NEAR_MODE, Tree
 from floatframe.model.functions.time_functions import TimeFunction
+from floatframe.model.joints import SlidingJoint
+from floatframe.model.joints.joint import MOVES_IN_A, SIDE_B, TURNS_IN_B, Column
 from floatframe.model.rotations import rotation_matrix
 from floatframe.model.system import System
 
@@ -122,11 +123,10 @@ def charts_of(system: System, compiled: CompiledSystem) -> dict[int, tuple[Colum
     charts = {}
     model, n_q = compiled.model, n_q_of(system)
     for k, joint in enumerate(system.joints):
-        a, b = joint_markers(system, joint, compiled.placed) if type(joint).__name__ != "SlidingJoint" else (None, None)
-        if a is None or b is None:
+        if isinstance(joint, SlidingJoint):
             continue
-        axes = (marker_pose(marker, compiled.placed, n_q)[1] for marker in (a, b))
-        columns = chart_of(joint, *axes)
+        ends = joint_markers(system, joint, compiled.placed)
+        columns = joint.columns(*(marker_pose(marker, compiled.placed, n_q)[1] for marker in ends))
         rows = range(model.connections.w0[k], model.connections.w0[k + 1])
         has_normal_friction = any(
             model.joint_forces.coefficient[model.rows.force0[row] : model.rows.force1[row]].any() for row in rows
@@ -170,7 +170,7 @@ def spanning_tree(system: System, model: Model, charts: dict[int, tuple[Column, 
         if left:
             body = max(left, key=lambda i: (mass[i], -i))
             depth[body] = 1
-            branches.append(Branch(body, -1, -1, FREE))
+            branches.append(Branch(body, -1, -1, MOVES_IN_A + TURNS_IN_B))
             reach(body)
     return branches
 
@@ -190,7 +190,7 @@ def driving_motion(system: System, compiled: CompiledSystem, each: Branch, colum
     row = -1 if each.joint < 0 else driving_row(compiled, each.joint, column)[0]
     if row < 0:
         return None
-    return system.joints[each.joint].motions[compiled.coordinates[row]]  # type: ignore[union-attr]
+    return system.joints[each.joint].motions[compiled.coordinates[row]]  # type: ignore[attr-defined]
 
 
 def own_row(compiled: CompiledSystem, joint: int, column: Column) -> int:

@@ -126,7 +126,7 @@ def with_held_inputs(system: System, names: Sequence[str] | None = None) -> tupl
     for joint in system.joints:
         motions = dict(getattr(joint, "motions", {}))
         driven = {c: held[f"joints.{joint.name}.{c}"] for c in motions if f"joints.{joint.name}.{c}" in held}
-        joints.append(replace(joint, motions=motions | driven) if driven else joint)  # type: ignore[arg-type]
+        joints.append(replace(joint, motions=motions | driven) if driven else joint)
     for channel in force_channels(system):
         if channel.name in held:
             forces += channel_forces(channel, held[channel.name])

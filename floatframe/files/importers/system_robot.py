@@ -193,7 +193,7 @@ class Exporter:
         placed = in_parent.inverse @ self.at(child) @ self.frames[child]
         kind, axis, turn = TYPES[type(joint)], np.array([1.0, 0.0, 0.0]), Frame()
         if kind != "fixed":
-            along = self.at(a).R @ frame_a.R @ joint.axis  # type: ignore[union-attr]
+            along = self.at(a).R @ frame_a.R @ joint.axis  # type: ignore[attr-defined]
             axis = (self.at(child) @ self.frames[child]).R.T @ (along if is_forward else -along)
             axis = rounded(axis)
             value = self.values.get(joint.name, 0.0)

@@ -1,5 +1,6 @@
-"""Joints, in one file for each family; `JOINTS` is the registry for the system file."""
+"""Joints, in one file for each family; `JOINTS` is the registry for the system file, `Joint` their base class."""
 
+from floatframe.model.joints.joint import Joint
 from floatframe.model.joints.lower_pairs import (
     CylindricalJoint,
     PlanarJoint,
@@ -37,24 +38,6 @@ __all__ = [
     "SphericalJoint",
     "UniversalJoint",
 ]
-
-Joint = (
-    ConstantOrientation
-    | ConstantVelocityJoint
-    | CylindricalJoint
-    | DistanceJoint
-    | FixedJoint
-    | PlanarJoint
-    | PointOnLine
-    | PointOnPlane
-    | PrismaticJoint
-    | RevoluteJoint
-    | RollingDisc
-    | ScrewJoint
-    | SlidingJoint
-    | SphericalJoint
-    | UniversalJoint
-)
 
 JOINTS = {
     "constant-orientation": ConstantOrientation,

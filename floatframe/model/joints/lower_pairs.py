@@ -16,6 +16,7 @@ from floatframe.model.bodies.markers import Place
 from floatframe.model.checked_values import number
 from floatframe.model.functions.time_functions import TimeFunction
 from floatframe.model.joints.axis_frame import axis_in_b, checked_axes, checked_motions, normals_of, turning_frame
+from floatframe.model.joints.joint import SIDE_B, TURNS_IN_B, Column, Joint
 from floatframe.model.joints.rows import (
     DOT,
     FORCE,
@@ -46,7 +47,7 @@ __all__ = ["CylindricalJoint", "PlanarJoint", "PrismaticJoint", "RevoluteJoint",
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class RevoluteJoint:
+class RevoluteJoint(Joint):
     """Allows one rotation between two markers, about an axis; five constraints.
 
     The axis is given in the axes of marker A (the ground axes, if A is on the ground with the default triad). On B it
@@ -89,6 +90,10 @@ class RevoluteJoint:
         held = (Row(DOT, self.axis, n, part=MOMENT) for n in normals_of(axis_b))
         return (*point_rows(), *held, turn_row(self.axis, frame, MOMENT, self.motions, "angle"))
 
+    def columns(self, A_a: Array, A_b: Array) -> tuple[Column, ...]:
+        """Return the angle about the axis of A."""
+        return (Column("angle", alpha=self.axis),)
+
 
 # the prismatic joint (slider): one translation along an axis ----------------------------------------------------------
 
@@ -96,7 +101,7 @@ class RevoluteJoint:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class PrismaticJoint:
+class PrismaticJoint(Joint):
     """Lets marker B slide along an axis of marker A without rotation; five constraints.
 
     The point of B stays on the line through the point of A. The fixed orientation is that of the assembled bodies.
@@ -138,6 +143,10 @@ class PrismaticJoint:
             slide_row(self.axis, self.motions, "distance"),
         )
 
+    def columns(self, A_a: Array, A_b: Array) -> tuple[Column, ...]:
+        """Return the distance along the axis of A."""
+        return (Column("distance", tau=self.axis, unit="m"),)
+
 
 # the screw joint: rotation about an axis, and translation along it in a fixed ratio -----------------------------------
 
@@ -148,7 +157,7 @@ METRE = Quantity(1.0, LENGTH)
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class ScrewJoint:
+class ScrewJoint(Joint):
     """Lets marker B rotate about an axis and slide along it by `lead` for each turn; five constraints.
 
     The point of B stays on the line through the point of A. Coordinates: `angle` of B about the axis, zero as
@@ -214,6 +223,11 @@ class ScrewJoint:
             drive,
         )
 
+    def columns(self, A_a: Array, A_b: Array) -> tuple[Column, ...]:
+        """Return the angle about the axis of A, which moves B by lead/(2 pi) along it."""
+        slope = self.lead / (2 * np.pi)
+        return (Column("angle", tau=slope * self.axis, alpha=self.axis, factors=(("distance", 1 / slope),)),)
+
 
 # the cylindrical joint: translation along an axis and rotation about it -----------------------------------------------
 
@@ -221,7 +235,7 @@ class ScrewJoint:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class CylindricalJoint:
+class CylindricalJoint(Joint):
     """Lets marker B slide along an axis and rotate about it; four constraints.
 
     The point of B stays on the line through the point of A. Coordinates: `distance` between the points along the axis;
@@ -268,6 +282,10 @@ class CylindricalJoint:
             turn_row(self.axis, frame, MOMENT_B, self.motions, "angle"),
         )
 
+    def columns(self, A_a: Array, A_b: Array) -> tuple[Column, ...]:
+        """Return the distance along the axis of A, and the angle about it."""
+        return (Column("distance", tau=self.axis, unit="m"), Column("angle", alpha=self.axis))
+
 
 # the spherical joint: two markers have a common point -----------------------------------------------------------------
 
@@ -275,7 +293,7 @@ class CylindricalJoint:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class SphericalJoint:
+class SphericalJoint(Joint):
     """Holds the point of marker B at the point of marker A; three constraints.
 
     Parameters
@@ -292,11 +310,14 @@ class SphericalJoint:
 
     size = 3  #: components of the unknown wrench: force
     moment_b = NO_MOMENT  #: no moment acts
-    coordinates = ()
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
         """Return the rows; axes and positions of the markers do not matter."""
         return point_rows()
+
+    def columns(self, A_a: Array, A_b: Array) -> tuple[Column, ...]:
+        """Return three rotations of B."""
+        return TURNS_IN_B
 
 
 # the planar joint: motion in a plane ----------------------------------------------------------------------------------
@@ -305,7 +326,7 @@ class SphericalJoint:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class PlanarJoint:
+class PlanarJoint(Joint):
     """Keeps the point of marker B in a plane of marker A, with parallel normals; three constraints.
 
     Coordinates: `first` and `second`, the position of the point of B in the plane along the two directions of
@@ -351,4 +372,14 @@ class PlanarJoint:
             slide_row(first, self.motions, "first"),
             slide_row(second, self.motions, "second"),
             turn_row(self.axis, turning_frame(self.axis, axis_b, A_a, A_b), MOMENT_B, self.motions, "angle"),
+        )
+
+    def columns(self, A_a: Array, A_b: Array) -> tuple[Column, ...]:
+        """Return two distances in the plane of A, and the angle about its normal at the point of B."""
+        first, second = normals_of(self.axis)
+        normal = axis_in_b(self.axis, self.axis_b, A_a, A_b)
+        return (
+            Column("first", tau=first, unit="m"),
+            Column("second", tau=second, unit="m"),
+            Column("angle", alpha=normal, side=SIDE_B),
         )

@@ -15,6 +15,7 @@ from floatframe.model.bodies.markers import Place
 from floatframe.model.checked_values import rotation_of
 from floatframe.model.functions.time_functions import TimeFunction
 from floatframe.model.joints.axis_frame import axis_in_b, checked_axes, checked_motions, normals_of
+from floatframe.model.joints.joint import MOVES_IN_A, SIDE_B, Column, Joint
 from floatframe.model.joints.rows import (
     DOT,
     FORCE,
@@ -37,7 +38,7 @@ __all__ = ["ConstantOrientation", "ConstantVelocityJoint", "FixedJoint", "Univer
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class FixedJoint:
+class FixedJoint(Joint):
     """Fixes marker B to marker A; six constraints.
 
     The fixed orientation is that of the assembled bodies, unless `rotation` is given.
@@ -59,7 +60,6 @@ class FixedJoint:
 
     size = 6  #: components of the unknown wrench: force, moment
     moment_b = MOMENT  #: index at which the moment on B starts in the wrench
-    coordinates = ()
 
     def __post_init__(self) -> None:
         if self.rotation is not None:
@@ -70,6 +70,10 @@ class FixedJoint:
         R_AB = A_a.T @ A_b if self.rotation is None else self.rotation
         return (*point_rows(), *orientation_rows(R_AB))
 
+    def columns(self, A_a: Array, A_b: Array) -> tuple[Column, ...]:
+        """Return no columns: the joint allows no motion."""
+        return ()
+
 
 # the constant-orientation joint: two bodies move without relative rotation --------------------------------------------
 
@@ -77,7 +81,7 @@ class FixedJoint:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class ConstantOrientation:
+class ConstantOrientation(Joint):
     """Fixes the orientation of marker B relative to marker A; three constraints.
 
     The fixed orientation is that of the assembled bodies, unless `rotation` is given.
@@ -99,7 +103,6 @@ class ConstantOrientation:
 
     size = 6  #: components of the unknown wrench
     moment_b = MOMENT  #: index at which the moment on B starts in the wrench
-    coordinates = ()
 
     def __post_init__(self) -> None:
         if self.rotation is not None:
@@ -110,6 +113,10 @@ class ConstantOrientation:
         R_AB = A_a.T @ A_b if self.rotation is None else self.rotation
         return (*(Row(GAUGE, axis, part=FORCE) for axis in np.eye(3)), *orientation_rows(R_AB))
 
+    def columns(self, A_a: Array, A_b: Array) -> tuple[Column, ...]:
+        """Return three distances along the axes of A."""
+        return MOVES_IN_A
+
 
 # the universal joint (Cardan, Hooke): two axes that intersect at right angles -----------------------------------------
 
@@ -117,7 +124,7 @@ class ConstantOrientation:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class UniversalJoint:
+class UniversalJoint(Joint):
     """Joins two points, and keeps an axis of marker A normal to an axis of marker B; four constraints.
 
     Coordinates, zero as assembled: `angle` of the cross about the axis of A; `angle_b` of B relative to the cross about
@@ -171,13 +178,17 @@ class UniversalJoint:
             turn_row_b(self.axis, self.axis_b, z_b, self.motions, "angle_b"),
         )
 
+    def columns(self, A_a: Array, A_b: Array) -> tuple[Column, ...]:
+        """Return the angle of the cross about the axis of A, and the angle of B about its own axis."""
+        return (Column("angle", alpha=self.axis), Column("angle_b", alpha=self.axis_b, side=SIDE_B))
+
 
 # the constant-velocity joint (Rzeppa, tripod): two shafts at any angle that rotate at equal speed ---------------------
 
 
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class ConstantVelocityJoint:
+class ConstantVelocityJoint(Joint):
     """Joins two points, and makes the shafts through them rotate equally at any angle between them; four constraints.
 
     B only rotates relative to A about axes normal to the bisector of both shafts. The angular velocities of the shafts
@@ -204,7 +215,6 @@ class ConstantVelocityJoint:
 
     size = 6  #: components of the unknown wrench: force and moment
     moment_b = MOMENT  #: index at which the moment on B starts in the wrench
-    coordinates = ()
 
     def __post_init__(self) -> None:
         checked_axes(self)

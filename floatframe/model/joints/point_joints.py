@@ -15,6 +15,7 @@ from floatframe.model.bodies.markers import Place
 from floatframe.model.checked_values import number
 from floatframe.model.functions.time_functions import TimeFunction
 from floatframe.model.joints.axis_frame import checked_axes, checked_motions, normals_of
+from floatframe.model.joints.joint import Joint
 from floatframe.model.joints.rows import DISTANCE, NO_MOMENT, ROD, SLIDE, SPAN, Row, RowCoordinate, arm_rows, slide_row
 
 __all__ = ["DistanceJoint", "PointOnLine", "PointOnPlane"]
@@ -26,7 +27,7 @@ __all__ = ["DistanceJoint", "PointOnLine", "PointOnPlane"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class PointOnLine:
+class PointOnLine(Joint):
     """Keeps the point of marker B on a line through the point of marker A; two constraints.
 
     Coordinate `distance`: from the point of A to the point of B, along the line.
@@ -69,7 +70,7 @@ class PointOnLine:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class PointOnPlane:
+class PointOnPlane(Joint):
     """Keeps the point of marker B on a plane through the point of marker A; one constraint.
 
     Coordinates: `first` and `second`, the position of the point of B in the plane along the two directions of
@@ -114,7 +115,7 @@ class PointOnPlane:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class DistanceJoint:
+class DistanceJoint(Joint):
     """Keeps the points of two markers at a distance, like a massless rod; one constraint.
 
     Coordinate `distance`.

@@ -14,6 +14,7 @@ from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker, Place, body_name
 from floatframe.model.checked_values import number
 from floatframe.model.joints.axis_frame import checked_axes, normals_of
+from floatframe.model.joints.joint import Joint
 from floatframe.model.joints.rows import MOMENT_B, RIM, RIM_HEIGHT, ROLL, Row, arm_rows
 
 __all__ = ["RollingDisc"]
@@ -24,7 +25,7 @@ METRE = Quantity(1.0, LENGTH)
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class RollingDisc:
+class RollingDisc(Joint):
     """A thin disc about the point of marker B rolls without slip on a plane through the point of marker A.
 
     It has one position constraint, the contact, and two velocity constraints: the rim does not slide at the contact. It
@@ -56,7 +57,6 @@ class RollingDisc:
 
     size = 9  #: components of the unknown wrench
     moment_b = MOMENT_B  #: index at which the moment on B starts in the wrench
-    coordinates = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "radius", number(f"joint {self.name!r}: radius", self.radius, above=0.0))

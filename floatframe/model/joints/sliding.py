@@ -15,6 +15,7 @@ from floatframe.model.bodies.markers import Marker, Place
 from floatframe.model.checked_values import unit_vector
 from floatframe.model.functions.time_functions import TimeFunction
 from floatframe.model.joints.axis_frame import checked_motions
+from floatframe.model.joints.joint import Joint
 from floatframe.model.joints.rows import LINE, LINE_FREE, LINE_TURN, MOMENT, NO_MOMENT, Row, orientation_rows
 
 __all__ = ["SlidingJoint"]
@@ -25,7 +26,7 @@ ALONG, ACROSS, UPWARD = range(3)  #: directions of LINE rows
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class SlidingJoint:
+class SlidingJoint(Joint):
     """Keeps the point of marker B on the deformed line through interfaces of a flexible body; two constraints.
 
     The line leads from marker A through the interfaces `line`, in their order; undeformed it is straight. Between the

@@ -15,7 +15,6 @@ from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.kernels.model import Model
 from floatframe.engine.kernels.records import filled
-from floatframe.engine.tree.charts import SIDE_A
 from floatframe.engine.tree.kernels.tree import Tree
 from floatframe.engine.tree.recursion.nodes import FIXED, NO_MARKER, ROTATION, SCREW, TRANSLATION, Nodes
 from floatframe.engine.tree.topology import SystemTree, tree_of
@@ -23,6 +22,7 @@ from floatframe.model.bodies.added_mass import second_moments
 from floatframe.model.bodies.marker_shape import MarkerShape
 from floatframe.model.joints import FixedJoint, SphericalJoint, UniversalJoint
 from floatframe.model.joints.axis_frame import axis_in_b, normals_of, turning_frame
+from floatframe.model.joints.joint import SIDE_A
 from floatframe.model.rotations import euler_parameters, rotation_matrix
 from floatframe.model.state import State
 from floatframe.model.system import System
