@@ -37,7 +37,7 @@ def body_n_q(body: Body) -> int:
 def body_types(bodies: Sequence[Body]) -> tuple[list[RigidBody | ReducedBody], IntArray]:
     """Return the distinct bodies, instances of one reduced body counted once, and the type of each body.
 
-    A reduced body that is not stiffened comes without its geometric stiffness.
+    Reduced bodies that are not stiffened are returned without their geometric stiffness.
     """
     types: list[RigidBody | ReducedBody] = []
     kind, keys = [], []
@@ -67,7 +67,7 @@ def point_inertia(mass: float, r: Array) -> Array:
 def axis_of_inertia(J: Array, within: float = SYMMETRIC) -> Array:
     """Return the symmetry axis of an inertia tensor, (3,); zero if there is none, or if all three moments are equal.
 
-    within: difference of the moments across the axis, by the largest one.
+    within: allowed difference of the two moments across the axis, relative to the largest moment.
     """
     moments, axes = np.linalg.eigh(J)
     gaps = np.diff(moments)

@@ -90,8 +90,8 @@ class CoordinateElements:
     def give_lengths(self, radii: Array, length: float, units: Units) -> None:
         """Set the ranges of coordinates and rates over which laws change, from radii of gyration of bodies, (n_b,).
 
-        A distance by the length that a force says, or the size of the smaller body, in a second, 1 m/s at most; angles
-        by 1 rad.
+        The range of a distance is the length that its force declares, or else the size of the smaller body; the range
+        of its rate is this length in a second, at most 1 m/s. Angles have the ranges 1 rad and 1 rad/s.
         """
         second = 1 / units.time
         for record, each, own in zip(self.coordinates, self.placed, self.lengths, strict=True):
@@ -242,7 +242,7 @@ def find_coordinate(system: System, where: str, coordinate: Coordinate, made: Co
     a = find_marker(system, f"{where}: marker_a", coordinate.marker_a)
     b = find_marker(system, f"{where}: marker_b", coordinate.marker_b)
     if a.body == b.body:
-        raise ModelError(f"{where}: expected markers on two bodies, got both on one")
+        raise ModelError(f"{where}: expected markers on two bodies, got both on one body")
     (r_a, A_a), (r_b, A_b) = (marker_pose(m, made.placed, made.n_q) for m in (a, b))
     if isinstance(coordinate, AxialDistance):
         return PlacedCoordinate(a, b, RowCoordinate("", PUSH, coordinate.axis))

@@ -76,7 +76,7 @@ def direction(x: Sequence[float] | Array) -> Direction:
 def counted_angles(system: System, placed: State) -> list[tuple[CountedAngle, TimeFunction | None]]:
     """Return the angles of a system without duplicates, each with the function that prescribes it, or None."""
     found: list[tuple[CountedAngle, TimeFunction | None]] = []
-    between: dict[tuple[int, int, float], list[CountedAngle]] = {}  # the same two bodies
+    between: dict[tuple[int, int, float], list[CountedAngle]] = {}  # angles between the same two bodies
     n_q = n_q_of(system)
 
     def add(angle: CountedAngle, motion: TimeFunction | None) -> None:

@@ -12,15 +12,15 @@ __all__ = ["plan_elimination"]
 def plan_elimination(sizes: list[int], ends_of_bodies: list[list[int]], connection_of: IntArray) -> Elimination:
     """Plan the block LU factorisation of a structurally symmetric matrix.
 
-    (1) two connections are neighbours if they have an end on one body;
-    (2) the connection with the fewest neighbours is eliminated next, its neighbours become neighbours of each other
+    (1) two connections are neighbours if both have an end on the same body;
+    (2) the connection with the fewest neighbours is eliminated next, and its neighbours become neighbours of each other
         (minimum degree: no fill for chains and trees);
-    (3) every block that is ever touched gets its place in one flat store.
+    (3) every block of the factors that is not zero gets its position in one flat array.
 
     Parameters
     ----------
     sizes
-        Rows of each connection.
+        Number of rows of each connection.
     ends_of_bodies
         Markers that are ends of connections, for each body.
     connection_of
@@ -51,7 +51,7 @@ def plan_elimination(sizes: list[int], ends_of_bodies: list[list[int]], connecti
     upper: list[int] = []
     update: list[int] = []
     after0, update0 = [0], [0]
-    waiting = [(len(neighbours[j]), j) for j in range(n)]  # entries whose number has changed since then are skipped
+    waiting = [(len(neighbours[j]), j) for j in range(n)]  # an entry is skipped if its number has changed since then
     heapify(waiting)
     is_left = [True] * n
     while waiting:

@@ -1,8 +1,8 @@
 """Conversion of states, results and small motions between body frames of the engine and body frames of the files.
 
 Kernels, start, integrators and analyses work in the frames of the engine, where stiffened bodies move in mean axes
-(`floatframe.model.bodies.mean_axes`). What a user gives and gets, states, results and shapes, speaks of the frames of
-the files.
+(`floatframe.model.bodies.mean_axes`). States, results and shapes that a user gives and gets refer to the frames of the
+files.
 """
 
 from typing import Literal
@@ -70,7 +70,7 @@ def changed_state(compiled: CompiledSystem, state: State, u_dot: Array, way: Way
 def changed(compiled: CompiledSystem, arrays: tuple[Array, ...], way: Way) -> tuple[Array, ...]:
     """Return r (..., n_b, 3), p (..., n_b, 4), q (..., n_q), u and u_dot (..., n_u) in the other set of body frames."""
     r, p, q, u, u_dot = (np.array(array) for array in arrays)
-    with np.errstate(over="ignore", invalid="ignore"):  # NaN of a motion that diverges
+    with np.errstate(over="ignore", invalid="ignore"):  # a motion that diverges contains NaN
         for i, axes in enumerate(compiled.mean_axes):
             if axes is None:
                 continue

@@ -138,8 +138,8 @@ def interface_at_node(body: FlexibleBody, where: str, node: int | str) -> str:
     if not found:
         names = ", ".join(each.name for each in reduced.interfaces) or "it has none"
         raise ModelError(
-            f"{where}: node {node} of body {body.name!r} is no interface, and joints and forces need its static modes: "
-            f'make it one in the job ([interfaces.NAME] kind = "rigid", nodes = [{node}]), or take one of: {names}'
+            f"{where}: node {node} of body {body.name!r} is not an interface, and joints and forces need its static "
+            f'modes: add it to the job ([interfaces.NAME] kind = "rigid", nodes = [{node}]), or take one of: {names}'
         )
     return found[0]
 
@@ -158,7 +158,7 @@ def joint_markers(system: System, joint: Joint, placed: State) -> tuple[MarkerDa
         b = find_marker(system, f"{where}: marker_b", given_b)
         a = marker_as_placed(system, f"{where}: marker_a", body_name(given_a), b, placed)
     else:
-        raise ModelError(f"{where}: expected a Marker at one end at least, got two bodies; say where the joint is")
+        raise ModelError(f"{where}: expected a Marker at one end at least, got two bodies; give the joint's position")
     if a.body == b.body:
         name = GROUND.name if a.body < 0 else system.bodies[a.body].name
         raise ModelError(f"{where}: expected markers on two bodies, got both on {name!r}")
@@ -182,7 +182,8 @@ def marker_with_pose(system: System, where: str, name: str, pose: tuple[Array, A
     if isinstance(body, FlexibleBody):
         choices = ", ".join(interface.name for interface in body.reduced.interfaces)
         raise ModelError(
-            f"{where}: a flexible body can be held at an interface only; give a Marker on {name!r}, one of: {choices}"
+            f"{where}: joints and forces act on a flexible body only at its interfaces; give a Marker on {name!r} at "
+            f"one of: {choices}"
         )
     R = rotation_matrix(placed.p[index])
     return MarkerData(index, MarkerShape(R.T @ (r_P - placed.r[index]), R.T @ A_P))

@@ -65,7 +65,7 @@ def ends_of(a: MarkerData, b: MarkerData) -> tuple[End, End]:
 def require_two_bodies(where: str, a: MarkerData, b: MarkerData) -> None:
     """Raise `ModelError` if both markers are on one body."""
     if a.body == b.body:
-        raise ModelError(f"{where}: expected markers on two bodies, got both on one")
+        raise ModelError(f"{where}: expected markers on two bodies, got both on one body")
 
 
 def bushing_markers(system: System, bushing: Bushing, placed: State) -> tuple[MarkerData, MarkerData]:
@@ -80,7 +80,7 @@ def bushing_markers(system: System, bushing: Bushing, placed: State) -> tuple[Ma
         if found[k] is None:
             other = found[1 - k]
             if other is None:
-                raise ModelError(f"{where}: expected a Marker at one end at least, got two bodies; say where it is")
+                raise ModelError(f"{where}: expected a Marker at one end at least, got two bodies; give its position")
             name = body_name(given[k])  # type: ignore[arg-type]
             pose = marker_pose(other, placed, n_q_of(system))
             found[k] = marker_with_pose(system, f"{where}: marker_{'ab'[k]}", name, pose, placed)

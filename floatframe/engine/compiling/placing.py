@@ -1,18 +1,18 @@
-"""Placement by their joints of bodies for which no position is given.
+"""Joints place the bodies for which no position is given.
 
-A body without a position begins where its mesh is drawn. Its joints then move it to the nearest pose that they ask for:
+A body without a position begins where its mesh is drawn. Its joints then move it to the nearest pose that fulfils them:
 
-    (1) the body with the most held directions to bodies already placed comes next; placed from the beginning are the
-        ground, bodies with a position, bodies with a joint to the ground as a whole (it lies where their marker is
-        drawn), and the first body of a part without any of them
-    (2) orientation     its own; a body without one takes the smallest rotation that fulfils the first joint with
+    (1) The next body is the one with the most directions fixed by joints to placed bodies. Placed from the beginning
+        are the ground, bodies with a position, bodies with a joint to the ground itself (the joint is where their
+        marker is drawn), and the first body of a connected part without any of these.
+    (2) orientation     the given one; a body without one takes the smallest rotation that fulfils the first joint with
                         `axis_b` or `rotation`
-    (3) position        the shortest translation d with n · (r_B + d - r_A) = f, in the least squares, for the held
-                        directions n of its joints to bodies already placed; f is 0, or a prescribed distance at t = 0
+    (3) position        the shortest translation d with n · (r_B + d - r_A) = f, in the least-squares sense, for the
+                        directions n that its joints to placed bodies fix; f is 0, or a prescribed distance at t = 0
 
-What the joints leave free stays as drawn: a distance along an axis, an angle, a body that only springs hold. A joint
-with one marker lies where this marker is, and asks for no pose. Joints that close loops can stay open; the start of a
-run closes them (initial.py).
+Whatever the joints leave free stays as drawn: a distance along an axis, an angle, a body supported only by springs. A
+joint with one marker is at this marker and demands no pose. Joints that close loops can stay open; the start of a run
+closes them (initial.py).
 """
 
 from collections.abc import Mapping
@@ -39,7 +39,7 @@ __all__ = ["held_directions", "placed_bodies", "placed_state"]
 
 AT_JOINT = 1e-9  #: gap of a joint, relative to the size of the system, up to which a body keeps its position
 PARALLEL = 1e-9  #: sine of an angle up to which axes count as parallel
-OPPOSITE = 1e-8  #: size of the sum of two unit vectors up to which they count as opposite: the root of its rounding
+OPPOSITE = 1e-8  #: length of the sum of two unit vectors up to which they count as opposite: root of its roundoff
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +81,7 @@ def place_bodies(system: System) -> PlacedBodies:
     links = links_of(system) if waiting else []
     length = length_of(bodies, links) if waiting else 1.0
     done = {-1, *range(len(bodies))} - waiting
-    rank = dict.fromkeys(sorted(waiting), 0)  # number of held directions to placed bodies
+    rank = dict.fromkeys(sorted(waiting), 0)  # number of directions that joints to placed bodies fix
     for i in waiting:
         rank[i] = rank_of(bodies, links[i], done)
     while rank:
@@ -144,10 +144,10 @@ def rows_of(bodies: list[Body], link: Link) -> tuple[Row, ...]:
 
 
 def held(bodies: list[Body], link: Link) -> tuple[Array, Array]:
-    """Return the directions in which a joint fixes the distance of its points, ground axes, (n, 3), and these, (n,)."""
+    """Return the directions in which a joint fixes a distance, ground axes, (n, 3), and these distances, (n,)."""
     _, A = pose(bodies, link.other if link.is_b else link.own)
     rows = rows_of(bodies, link)
-    screws = [row for row in rows if row.kind == SCREW]  # the distance along the axis follows the angle, zero as drawn
+    screws = [row for row in rows if row.kind == SCREW]  # the distance along the axis is that of the angle zero
     found = [(row.x, 0.0) for row in rows if row.kind == POINT]
     found += [(A @ np.cross(row.x, row.z), 0.0) for row in screws]
     for row in rows:
@@ -191,8 +191,8 @@ def placed(bodies: list[Body], i: int, links: list[Link], length: float) -> Body
 def asked_rotation(bodies: list[Body], link: Link) -> Array | None:
     """Return the smallest rotation, (3, 3), after which a body satisfies the axes of a joint; None if it already does.
 
-    Two rows E · D = 0 with one axis E of A hold it along the normal of the two D of B. Three hold all axes: the k-th of
-    A along D of the row before.
+    Two rows E · D = 0 with the same axis E of A keep E parallel to the normal of both axes D of B. Three rows fix all
+    axes: the k-th axis E of A is parallel to the axis D of B in the row before.
     """
     rows = [row for row in rows_of(bodies, link) if row.kind == DOT and row.c == 0.0]
     if len(rows) < 2:
@@ -201,7 +201,7 @@ def asked_rotation(bodies: list[Body], link: Link) -> Array | None:
     A_a, A_b = (other, own) if link.is_b else (own, other)
     x, y = A_a @ np.array([row.x for row in rows]).T, A_b @ np.array([row.y for row in rows]).T  # columns
     if len(rows) == 3:
-        turn = x @ np.roll(y, 1, axis=1).T  # turns B
+        turn = x @ np.roll(y, 1, axis=1).T  # rotation of B
         turn = turn if link.is_b else turn.T
         return None if np.abs(turn - np.eye(3)).max() <= PARALLEL else turn
     if len(rows) > 3 or not np.allclose(x[:, 0], x[:, 1], rtol=0, atol=PARALLEL):
@@ -214,7 +214,7 @@ def asked_rotation(bodies: list[Body], link: Link) -> Array | None:
 def rotation_between(here: Array, there: Array) -> Array | None:
     """Return the smallest rotation, (3, 3), from one unit vector to another; None if they are parallel.
 
-    It is the reflection of `here` followed by that of the direction in the middle, accurate up to half a turn.
+    It consists of two reflections, first of `here`, then of the direction in the middle; accurate up to half a turn.
     """
     if np.linalg.norm(there - here) <= PARALLEL:
         return None

@@ -58,7 +58,7 @@ class PlacedLaw:
     def sizes(self) -> list[float]:
         """Typical sizes of the inputs of the law, see `compiling.callbacks.law_templates`.
 
-        Without a time of its own velocities are measured by 1 m/s, or by its length in a second where that is less.
+        If the law declares no time, the size of velocities is 1 m/s, or the length of the law in a second if less.
         """
         states, multipliers = list(self.law.state_sizes), list(self.law.multiplier_sizes)
         time = self.law.time
@@ -209,7 +209,7 @@ def law_of(element: Element, placed: Placed) -> ElementLaw:
         raise ModelError(f"{where}: law: expected an ElementLaw, got {law!r}")
     n = len(placed.on_ground)
     if n > 62:
-        raise ModelError(f"{where}: expected 62 markers at most, got {n}")
+        raise ModelError(f"{where}: expected at most 62 markers, got {n}")
     if all(placed.on_ground):
         raise ModelError(f"{where}: all its markers are on the ground, where nothing moves; expected one on a body")
     acts = ("wrench",) * n if law.acts is None else tuple(law.acts)

@@ -4,16 +4,16 @@ The kinetic energy of a body changes by
 
     v·(qᵀK_t q_dot + omega × 1/2 qᵀK_t q) + omega·(qᵀK_r q_dot) - 1/2 Σ omega_a omega_b qᵀK_ab q
 
-so that the equations of motion (kernels/body.py) need, beside K_t and the two terms of second order in q_dot,
+so that the equations of motion (kernels/body.py) need, besides K_t and the two terms of second order in q_dot,
 
     J_ab -= qᵀ K_ab q,   B_a,k += (K_r,a q)_k,   D_k -= (K_ab q)_k + 1/2 tilde((K_r q)_k)
 
-(D_k from 2 Σ q_dot_k D_k omega = J_dot omega + omega × B q_dot). What depends on q in them is made of S_ab alone, so
-that all three are had by
+(D_k from 2 Σ q_dot_k D_k omega = J_dot omega + omega × B q_dot). Without stiffening, the terms of J, B and D_k that
+depend on q are formed from S_ab alone. All three changes therefore result from
 
     S_ab += K_ab - 1/2 delta_ab Σ_c K_cc + 1/2 tilde_ab(K_r)
 
-at no cost in the time loop: delta_ab Σ_c S_cc - S_ab changes by -K_ab - 1/2 tilde_ab(K_r), and S_zy - S_yz by K_r,x.
+without cost in the time loop: delta_ab Σ_c S_cc - S_ab changes by -K_ab - 1/2 tilde_ab(K_r), S_zy - S_yz by K_r,x.
 """
 
 import numpy as np

@@ -126,7 +126,7 @@ def add_sliding(system: System, made: ConnectionLists, lines: Lines, joint: Slid
 
 
 # whether every body can be accelerated: mass, inertia about every axis, and mass or stiffness of every mode -----------
-# Bodies are eliminated one by one, each by its own matrix, so that none may be without inertia, joints or not.
+# Bodies are eliminated one by one, each by its own matrix. So every body needs inertia, even if its joints fix it.
 
 
 NO_INERTIA = 1e-13  #: ratio of the smallest to the largest principal moment below which the smallest counts as zero
@@ -135,8 +135,8 @@ NO_INERTIA = 1e-13  #: ratio of the smallest to the largest principal moment bel
 def require_inertia(bodies: Sequence[RigidBody | FlexibleBody]) -> None:
     """Raise `ModelError` with the name of a body that has a motion without inertia.
 
-    That is a rigid body, or a beam without thickness, that has no moment of inertia about an axis, and a mode that
-    has neither mass nor stiffness.
+    Such a motion is the rotation of a rigid body, or of a beam without thickness, about an axis without moment of
+    inertia, or a mode that has neither mass nor stiffness.
     """
     checked: list[ReducedBody] = []
     for body in bodies:
@@ -159,9 +159,9 @@ def require_moments(where: str, inertia: Array) -> None:
     axis = axes[:, 0] * np.sign(axes[np.argmax(np.abs(axes[:, 0])), 0])
     direction = ", ".join(f"{value:.3g}" for value in axis + 0.0)
     raise ModelError(
-        f"{where}: it has no inertia about its axis [{direction}]: expected a moment above zero, got {moments[0]:.3g} "
-        f"beside {moments[-1]:.3g}; nothing would resist its rotation. Give the moment of its real thickness (m r²/2 "
-        "for a round rod of radius r), or replace a massless rod by a distance joint"
+        f"{where}: it has no inertia about its axis [{direction}], so that nothing resists its rotation: expected a "
+        f"moment above zero, got {moments[0]:.3g} (the largest is {moments[-1]:.3g}). Give the moment of its real "
+        "thickness (m r²/2 for a round rod of radius r), or replace a massless rod by a distance joint"
     )
 
 
@@ -172,8 +172,8 @@ def require_modes(where: str, reduced: ReducedBody) -> None:
     if len(nothing):
         k = int(nothing[0])
         raise ModelError(
-            f"{where}: mode {k + 1} ({reduced.labels[k]}) has neither mass nor stiffness, so that any force would move "
-            "it without end; reduce the body again, or leave the mode out"
+            f"{where}: mode {k + 1} ({reduced.labels[k]}) has neither mass nor stiffness, so that its motion under a "
+            "force is unlimited; reduce the body again, or leave the mode out"
         )
 
 
@@ -230,7 +230,7 @@ class CompiledSystem:
     def gap_sizes(self) -> Array:
         """Reference size for the gap of each row, (n_w,).
 
-        The length of the system for a length, 1 for an angle, and for the sum of a coupler that of its terms.
+        It is the length of the system for a length, 1 for an angle, and the sum of the terms' sizes for a coupler.
         """
         rows, coordinates = self.model.rows, self.model.coordinates
         size = np.where(is_held_length(rows.kind), self.length, 1.0)
@@ -470,10 +470,10 @@ def marker_record(
 def row_softness(system: System, made: ConnectionLists, types: BodyTypes, kind_of_body: IntArray) -> Array:
     """Return the compliance, divided by c_k, of rows that share reactions, (n_w,); zero if sharing is not requested.
 
-    A joint shares by how its two bodies give way: SOFT times the sum of their 1/m for distances, of their 1/J for
-    angles, J the mean of the principal moments of inertia about the centre of mass. A body with a small moment about an
-    axis turns by 1/J_min, whose rounding the compliance of angles must stand above: it is at least ROUNDING/J_min, but
-    no more than MOST_SOFT/J.
+    The compliance of a joint follows from its two bodies: SOFT times the sum of their 1/m for distances, and of their
+    1/J for angles, where J is the mean of the principal moments of inertia about the centre of mass. If a body has a
+    small moment J_min about an axis, the compliance of angles must exceed the roundoff of 1/J_min: it is at least
+    ROUNDING/J_min, but at most MOST_SOFT/J.
     """
     soft = np.zeros(len(made.rows))
     if system.redundant != "minimum-norm":
@@ -503,8 +503,8 @@ def principal_moments(types: BodyTypes) -> Array:
 def body_sizes(made: ConnectionLists, places: list[Array], placed: State, radii: Array) -> Array:
     """Return, for each body, the size of the group of bodies connected to it without the ground, (n_b,).
 
-    The largest arm of a marker or radius of gyration (radii, (n_b,)), or the extent of their points and of those that
-    hold them.
+    It is the largest of: the arms of their markers, their radii of gyration (radii, (n_b,)), and the extent of their
+    origins and markers, including the markers on the ground to which they are connected.
     """
     n_b = len(radii)
     together = np.arange(n_b)
@@ -516,12 +516,12 @@ def body_sizes(made: ConnectionLists, places: list[Array], placed: State, radii:
         return i
 
     bodies = [marker.body for marker in made.markers]
-    first: dict[int, int] = {}  # one body of each connection
+    first: dict[int, int] = {}  # the first body of each connection
     for c, i in zip(made.connection_of, bodies, strict=True):
         if c >= 0 and i >= 0:
             together[head(i)] = head(first.setdefault(c, i))
     size = np.zeros(n_b)
-    points: list[list[Array]] = [[] for _ in range(n_b)]  # of the bodies connected to each head
+    points: list[list[Array]] = [[] for _ in range(n_b)]  # points of the bodies connected to each head
     for i in range(n_b):
         k = head(i)
         size[k] = max(size[k], radii[i])
@@ -544,7 +544,7 @@ def extent(points: Array) -> float:
         return 0.0
     radii = np.linalg.norm(points - points.mean(axis=0), axis=1)
     least = float(np.linalg.norm(points - points[np.argmax(radii)], axis=1).max())
-    outer = points[radii >= least - radii.max()]  # two points nearer to the centre are no further apart than `least`
+    outer = points[radii >= least - radii.max()]  # points nearer to the centre are within `least` of all other points
     return max(least, *(float(np.linalg.norm(outer - each, axis=1).max()) for each in outer))
 
 

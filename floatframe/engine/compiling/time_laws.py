@@ -1,7 +1,7 @@
 """The functions of time of a system: of its forces, joints, couplers and elements.
 
-They are found in the fields of forces, joints, couplers and elements, and of what these fields hold (controllers,
-components of circuits), unless a field says that its functions have another argument (`NOT_OF_TIME`).
+They are found in the fields of forces, joints, couplers and elements, and of the objects in these fields (controllers,
+components of circuits), unless a field declares that its functions have another argument (`NOT_OF_TIME`).
 """
 
 from collections.abc import Iterable, Iterator, Mapping

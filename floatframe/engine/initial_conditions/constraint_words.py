@@ -41,7 +41,7 @@ def drive_name(compiled: CompiledSystem, row: int) -> str:
 def conflict_of_drives(compiled: CompiledSystem, work: Work, state: State) -> str:
     """Return a message about prescribed motions in conflict with joints or each other, "" if there is no conflict.
 
-    A drive is taken back where its row is spanned by those of the joints and of the drives before it.
+    A drive is in conflict if its row is a combination of the rows of the joints and of the drives before it.
     """
     model = compiled.model
     holds = np.flatnonzero(is_held(model.rows.kind))
@@ -66,7 +66,7 @@ def conflict_of_drives(compiled: CompiledSystem, work: Work, state: State) -> st
                     partners = " and ".join(drive_name(compiled, int(holds[i])) for i in others)
                     words.append(f"{name} and {partners} prescribe the same motion")
                 else:
-                    words.append(f"{name} prescribes a motion that the joints already hold in this position")
+                    words.append(f"{name} prescribes a motion that the joints prevent in this position")
                 continue
         basis.append(int(k))
     return "; ".join(words)

@@ -1,7 +1,8 @@
 """Mobility: the number of independent motions of a system, and its redundant constraints.
 
-Rows of the constraint Jacobian, turned by the Cholesky factors of the masses so that they have one unit and norm one,
-are taken joint by joint: a row that the rows before it span repeats them (Gram-Schmidt, twice for accuracy).
+The rows of the constraint Jacobian are multiplied by the inverse Cholesky factors of the masses, so that all have the
+same unit, and scaled to norm one. They are then taken joint by joint: a row that is a combination of earlier rows is
+redundant (Gram-Schmidt, twice for accuracy).
 """
 
 from collections.abc import Mapping

@@ -1,13 +1,13 @@
 """Jumps of velocities after an impact, and at the start if prescribed motions begin with a velocity.
 
-In an impact constraints become active at an instant, or reverse the rate of a coordinate.
+In an impact, constraints become active at an instant, or reverse the rate of a coordinate.
 
-With M the masses of all bodies and modes and G the rows of all constraints, those of joints among them,
+Let M be the masses of all bodies and modes and G the rows of all constraints, including those of joints. Then
 
     M (u_after - u) - Jᵀ i = 0,    G u_after = -e G u for the rows that strike, 0 for all others
 
-i are impulses. No weight but the mass enters, so that momentum is kept and the energy lost is that of the impact law
-(Pfeiffer & Glocker (1996), with Newton's coefficient e of each row).
+where i are impulses. Only the mass weights the change, so that momentum is conserved and the loss of energy is that of
+the impact law (Pfeiffer & Glocker (1996), with Newton's coefficient e of each row).
 """
 
 from collections.abc import Mapping
@@ -54,11 +54,11 @@ def impact(
     Parameters
     ----------
     compiled
-        The system with the constraints that begin to hold.
+        The system including the constraints that become active.
     known
-        Unknowns of the connections before, (n_w,): counted angles and states of forces.
+        Unknowns of the connections before the impact, (n_w,): counted angles and states of forces.
     restitution
-        By row: the part of its rate with which it is thrown back; 0 where a row is not named.
+        Coefficient of restitution by row; 0 for rows that are not named.
     """
     from floatframe.engine.kernels.entry import rates_of_constraints
 
@@ -80,8 +80,9 @@ def impact(
 def words_of_begun_drives(system: System, t: float, state: State | None, h: float) -> str:
     """Return a message about the prescribed rate that differs most from the bodies at t, "" if all rates agree.
 
-    A motion then begins with velocities that fit, the nearest ones by mass and modal stiffness. Rigid mechanisms move
-    so; what is elastic, as bars of segments, takes it as a blow whose waves long steps h do not follow.
+    If they do not agree, the motion begins with the nearest consistent velocities (weighted by mass and modal
+    stiffness). This is right for rigid mechanisms. On elastic parts, such as bars of segments, it acts as an impulse
+    whose waves long steps h do not resolve.
     """
     from floatframe.engine.kernels.entry import rates_of_constraints
 
@@ -108,8 +109,8 @@ def words_of_begun_drives(system: System, t: float, state: State | None, h: floa
         return ""
     unit = f"{system.units.length_symbol if is_length[k] else 'rad'}/{system.units.time_symbol}"
     return (
-        f"{drive_name(compiled, int(drives[k]))} begins at t = {t:g} with {wanted[k]:.4g} {unit}, {off[k]:.4g} {unit} "
-        "from what its bodies as given have: all begin with consistent velocities, which acts as an impulse on elastic "
-        "parts; begin it gradually (cycloidal_spin_up), give the bodies consistent velocities, or resolve the impulse "
-        "with a smaller h"
+        f"{drive_name(compiled, int(drives[k]))} begins at t = {t:g} with {wanted[k]:.4g} {unit}, which differs by "
+        f"{off[k]:.4g} {unit} from the given velocities of its bodies. The motion begins with consistent velocities; "
+        "this acts as an impulse on elastic parts. Begin the drive gradually (cycloidal_spin_up), give the bodies "
+        "consistent velocities, or resolve the impulse with a smaller h"
     )

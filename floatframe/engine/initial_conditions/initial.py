@@ -1,13 +1,13 @@
 """Consistent initial conditions: assembled positions, compatible velocities, accelerations and reactions.
 
 All three solve the same system with the mass matrix M of the bodies and the rows G of the joints (P, V as in
-joints/rows/kinds.py; unknown reactions w, their lines GAUGE and SPRING included):
+joints/rows/kinds.py; the unknown reactions w include the rows GAUGE and SPRING):
 
     (1) positions       W dx - Jᵀ w = 0,       G dx = -g           W = M + s K; Newton until g = 0
     (2) velocities      W du - Jᵀ w = 0,       G du = -G u
     (3) accelerations   M u_dot - Jᵀ w = f,    G u_dot = -d(G)/dt u
 
-W adds the stiffness, scaled, to the mass, so that (1) and (2) move bodies rather than deform them.
+W is the mass plus the scaled stiffness, so that (1) and (2) move the bodies instead of deforming them.
 """
 
 from dataclasses import dataclass, replace
@@ -153,7 +153,7 @@ def consistent_motion(
 ) -> ConsistentState:
     """Return the result of `consistent_state` in the frames of the engine, for a state in the frames of the files.
 
-    angle: counted angles of a motion before, (n_angles,), whose turned bushings go on; None: those of the state.
+    angle: counted angles of an earlier motion, (n_angles,), from which bushings continue; None: those of the state.
     """
     compiled = compiled_system(system)
     given = compiled.placed if state is None else checked(compiled, state)
@@ -251,7 +251,7 @@ def closed(compiled: CompiledSystem, model: Model, work: Work, state: State, w: 
             y, _ = solve(with_modal_weight(model, parts.H, STIFF_START), parts, np.zeros(len(work.state.u)), -error)
         except RuntimeError:
             break
-        if not np.abs(y).max() < ENDLESS:  # or not a number: the equations are singular
+        if not np.abs(y).max() < ENDLESS:  # also true for NaN: the equations are singular
             break
         state = displaced(model, state, in_ground_axes(model, state, y))
     return state, np.where(np.abs(error / scale).max() <= 1e-9, 0.0, error)
@@ -266,7 +266,7 @@ def refuse_open_joints(compiled: CompiledSystem, work: Work, state: State, error
     reach = ", and that the drives stay within reach" if is_driven else ""
     unplaced = [repr(name) for name, is_free in zip(compiled.body_names, compiled.by_joints, strict=True) if is_free]
     if unplaced:
-        reach += f". No position is given for {', '.join(unplaced)}: in a loop, give orientations near the meant ones"
+        reach += f". No position is given for {', '.join(unplaced)}: in a loop, give orientations near the real ones"
     raise ModelError(
         f"the joints cannot be closed from the given positions: {open_joints(compiled, error)}; place the bodies "
         f"nearer to their joints, or check lengths and axes{reach}"
@@ -284,7 +284,7 @@ def require_independent_constraints(compiled: CompiledSystem, work: Work, tree: 
         return
     rows, _ = scaled_constraints(model, work, state)
     if not rows.any(axis=1).all():
-        raise ModelError("a joint acts on the ground alone")
+        raise ModelError("a joint connects only the ground; expected a body at one end at least")
     vectors = np.linalg.svd(rows.T)[2][::-1].T  # columns, beginning with those of the smallest singular values
     conflict = conflict_of_drives(compiled, work, state)
     if conflict:
@@ -303,8 +303,8 @@ def require_independent_constraints(compiled: CompiledSystem, work: Work, tree: 
     raise ModelError(
         f"{n_redundant} of {int(holds.sum())} constraints repeat others, so that reactions are not "
         f"unique: see joints {', '.join(repr(name) for name in involved)} (in order, {told} repeat those before); "
-        "replace one by a joint that holds less (a fixed joint by a revolute, a revolute by a spherical one), or let "
-        'them share the load: redundant = "minimum-norm"'
+        "replace one by a joint with fewer constraints (a fixed joint by a revolute, a revolute by a spherical one), "
+        'or let them share the load: redundant = "minimum-norm"'
     )
 
 
@@ -373,8 +373,8 @@ def solve_accelerations(
         y, change = solve(with_mass_for_all(model, parts.H), parts, forces, rows)
         w = w + change
         raise_errors_of(compiled.callbacks)
-        # friction that depends on the normal force is not linear in the reactions, and users' forces are not in states
-        # or accelerations
+        # friction that depends on the normal force is not linear in the reactions, and users' forces are not linear in
+        # states or accelerations
         is_linear = not has_normal_friction(model) and not len(model.states.row) and not feels_accelerations
         if is_linear or np.abs(change).max(initial=0.0) <= 1e-10 * np.abs(w).max(initial=0.0):
             break
@@ -393,16 +393,16 @@ def require_numbers(compiled: CompiledSystem, work: Work) -> None:
     no_number = int(work.counted.no_number)
     if no_number:
         raise ModelError(
-            f"{compiled.connection_words(no_number - 1)} gives what is no number (NaN or infinity) where it is placed; "
-            "see its law, or place its bodies where it is known"
+            f"{compiled.connection_words(no_number - 1)} is not finite (NaN or infinity) in the initial position; "
+            "check its law, or place its bodies where the law is defined"
         )
 
 
 def start_unknowns(model: Model, known: Array | None = None) -> Array:
     """Return the initial connection unknowns, (n_w,): states of user forces at their initial values, the others zero.
 
-    With unknowns that are known from before: these states, and the coordinates of couplers and user forces, whose
-    angles are those next to them.
+    With known unknowns of an earlier motion, the states and the coordinates of couplers and user forces have these
+    values, and angles continue from them.
     """
     w = np.zeros(int(model.connections.w0[-1]))
     w[model.states.row] = model.states.start
@@ -420,9 +420,9 @@ def has_normal_friction(model: Model) -> bool:
 def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t: float, h: float) -> Array:
     """Return d(u_dot)/dt at a consistent state, (n_u,), by a difference over a tenth of the time step h.
 
-    Its error is of second order in h. The difference is central, but forward in time where something may depend on it,
-    since that may begin or jump at t. It reaches over no contact that closes or opens, whose force the first step has
-    not met yet; zero where a contact is nearer than a millionth of the step.
+    Its error is of second order in h. The difference is central, but forward if functions of time or laws may depend on
+    t, because they may begin or jump there. Its interval contains no closing or opening of a contact, whose force does
+    not act yet; the result is zero if this happens within a millionth of the step.
     """
     model, state, u_dot = compiled.model, consistent.state, consistent.u_dot
     work, s = work_from(model, consistent.w), OF_STEP * h
@@ -454,8 +454,8 @@ def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t:
 
 # drives of angles that begin far from where their bodies were placed: selection of the root of their row --------------
 # The row of a driven angle, (E cos f + Z sin f) · D = sin(f - th), vanishes at th = f and half a turn from there, and
-# Newton's method converges to the nearer root. From far away the drive is moved there in steps of an eighth of a turn;
-# a row whose axes E, Z are rotated by delta prescribes f - delta.
+# Newton's method converges to the nearer root. If th is far from f, the drive therefore approaches f in steps of an
+# eighth of a turn: a row whose axes E, Z are rotated by delta prescribes f - delta.
 
 
 FAR = np.pi / 4  #: deviation of a prescribed angle above which it is reached in increments, and the largest increment
@@ -495,19 +495,19 @@ def sense_of(model: Model, rows: IntArray) -> Array:
 def stages(way: Array) -> list[Array]:
     """Return the deviations of prescribed angles that remain after each increment but the last, (n_drives,) each.
 
-    No step where all drives are near: they close by themselves.
+    There are none if all drives are near their values.
     """
     n = int(np.ceil(np.abs(way).max(initial=0.0) / FAR))
     return [way * (1 - k / n) for k in range(1, n)]
 
 
 # wrong roots of rotations: rows of products of axes also vanish at half a turn ----------------------------------------
-# A fixed orientation is held by x_A·y' = y_A·z' = z_A·x' = 0, where the axes x', y', z' of B should be parallel to
-# those of A. An axis is held by E·n_1 = E·n_2 = 0, E of A, n_1 × n_2 the axis of B. With R the rotation between the
-# two, the first equations are R_12 = R_23 = R_31 = 0. R is orthogonal, so that three cases are left: R = 1, half a turn
-# about x, y or z (1 and -1 on the diagonal), and a third of a turn about a diagonal of the cube (only R_13, R_21 and
-# R_32 are not zero). The second equations hold where the axes are parallel or opposite. Newton's method converges to
-# the nearest of these solutions.
+# Rows x_A·y' = y_A·z' = z_A·x' = 0 fix an orientation, in which the axes x', y', z' of B should be parallel to those of
+# A. Rows E·n_1 = E·n_2 = 0 fix an axis E of A, which should be parallel to the axis n_1 × n_2 of B. With the rotation R
+# between A and B, the first rows are R_12 = R_23 = R_31 = 0. Because R is orthogonal, they have three kinds of
+# solutions: R = 1, half a turn about x, y or z (1 and -1 on the diagonal), and a third of a turn about a diagonal of
+# the cube (only R_13, R_21 and R_32 are not zero). The second rows vanish if the axes are parallel or opposite.
+# Newton's method converges to the nearest of these solutions.
 
 
 def require_no_half_turns(compiled: CompiledSystem, work: Work, state: State) -> None:
@@ -520,7 +520,7 @@ def require_no_half_turns(compiled: CompiledSystem, work: Work, state: State) ->
     work
         Working arrays; overwritten.
     state
-        With its joints closed, in the frames of the engine.
+        State with closed joints, in the frames of the engine.
     """
     model = compiled.model
     if not (model.rows.kind == DOT).any():
@@ -545,20 +545,20 @@ def require_no_half_turns(compiled: CompiledSystem, work: Work, state: State) ->
         if min(along) < 0.5:
             turn = "half a turn" if min(along) < -0.5 else "a third of a turn"
             raise ModelError(
-                f"joint {name!r} is closed {turn} away from its orientation: its equations have a solution there too; "
-                "place its bodies nearer to this orientation, or rotate its given axis (axis_b, rotation)"
+                f"joint {name!r} is closed {turn} away from its orientation, at another solution of its equations; "
+                "place its bodies nearer to the right orientation, or rotate its given axis (axis_b, rotation)"
             )
 
 
 # number of redundant constraints, distinguished from poorly conditioned constraints -----------------------------------
-# Joints of a tree are never redundant: each adds a body, and N, the motions of the bodies by the coordinates of the
-# tree, spans all allowed motions. So the rank of all constraints G is
+# Joints of a tree are never redundant, because each adds a body. The columns of N, the motions of the bodies due to the
+# coordinates of the tree, span all motions that these joints allow. So the rank of all constraints G is
 #
 #     rank G = rows of the tree + rank (G_c N),      G_c the rows that close loops.
 #
 # A chain of any length has no G_c, although the smallest singular value of G, scaled by the masses, falls with the
 # square of the number of its links. Rows of G_c N are scaled to length one, coordinates by the mass that they move.
-# Its small singular values belong to redundant constraints if there is a gap above them, or if they are rounding;
+# Its small singular values belong to redundant constraints if there is a gap above them, or if they are roundoff;
 # those of long trusses decrease without a gap. In the usual case of few, well-conditioned constraints this analysis
 # is skipped, because N needs the kernels of relative coordinates, which are compiled at their first use.
 

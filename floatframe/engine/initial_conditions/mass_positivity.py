@@ -1,8 +1,8 @@
 """Check that the mass matrices of stiffened bodies are positive definite at a state.
 
-The kinetic energy of a stiffened body is cut off after the second order of the deformation (docs/theory.md §7), so that
-it can become negative where a linear one cannot: at far deflections. (In a frame held where the body is hinged, shapes
-that nearly are a rigid rotation make it so early: therefore stiffened bodies move in mean axes.)
+The kinetic energy of a stiffened body is truncated after the second order of the deformation (docs/theory.md §7), so
+that, unlike that of a linear body, it can become negative at large deflections. (In a frame fixed to the hinge of the
+body, shapes that are nearly a rigid rotation make it negative early. Therefore stiffened bodies move in mean axes.)
 """
 
 import numpy as np
@@ -43,6 +43,6 @@ def indefinite_mass_words(names: tuple[str, ...]) -> str:
         return ""
     told = ", ".join(repr(name) for name in names)
     return (
-        f"the mass matrix of the stiffened body {told} is not positive definite there: its deformation is beyond the "
-        "second order; split it into parts (cms split, [body] part)"
+        f"the mass matrix of the stiffened body {told} is not positive definite there: its deformation is too large "
+        "for a theory of second order; split it into parts (cms split, [body] part)"
     )

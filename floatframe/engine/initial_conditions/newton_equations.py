@@ -40,7 +40,7 @@ __all__ = [
 DENSE = 150  #: number of equations up to which a dense factorisation is faster than a sparse one
 STIFF = 1e3  #: factor by which the scaled stiffness in W exceeds the mass for the softest mode
 STIFF_START = 1e6  #: the same factor for closing a placement, where stiff modes must hardly deform
-#: factor of velocities in the sum of K and D from which D is found: its terms are then far above the rounding of K
+#: factor of D in the sum of K and D from which D is extracted, so that its terms are far above the roundoff of K
 FAST = 2.0**40
 MASSLESS = 10.0  #: frequency of the artificial mass of a massless mode, relative to the highest frequency
 
@@ -109,7 +109,7 @@ def linearized(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> 
 def by_velocities(model: Model, work: Work, by_positions: Linearized) -> tuple[tuple[Array, ...], sp.csr_array]:
     """Return the derivatives by velocities of body forces, (6 + n, 6 + n) each, and of rows, (n_w, n_u).
 
-    by_positions: those by positions, at the same iterate.
+    by_positions: derivatives by positions at the same iterate.
     """
     both = linearized(model, work, 0.0, FAST, 1.0)
     D = tuple((A - B) / FAST for A, B in zip(both.H, by_positions.H, strict=True))
@@ -141,13 +141,13 @@ def entries(parts: list[tuple[Array, int, int]]) -> tuple[Array, IntArray, IntAr
 class NewtonFactors:
     """Factors of the coupled equations H y - Jᵀ w = forces, G y + V w = rows.
 
-    The equations are scaled by `balanced_scales`: otherwise units and the size of the system would choose the pivots.
+    The equations are scaled by `balanced_scales`; otherwise the choice of pivots would depend on units and system size.
     """
 
     def __init__(self, H: tuple[Array, ...], parts: Linearized) -> None:
         """Factorise the matrix, as a dense one if it is small; RuntimeError if it is exactly singular.
 
-        A pivot of zero in the dense matrix may be rounding of terms of very different size; the order of sparse
+        A zero pivot of the dense matrix may be due to roundoff of terms of very different size. The order of sparse
         elimination keeps such terms apart.
         """
         first = np.cumsum([0, *(len(block) for block in H)]).tolist()
@@ -191,9 +191,9 @@ def solve(H: tuple[Array, ...], parts: Linearized, forces: Array, rows: Array) -
 def balanced_scales(diagonal: Array, J: Any, G: Any, V: Any) -> tuple[Array, Array]:
     """Return scale factors of unknowns (y, w) and equations that bring stiffnesses and rows to size one.
 
-    The stiffness of an unknown y is the size of its diagonal in H plus that of the springs, whose rows V w = -G y give
-    J G/V, unless that is rounding. Without the springs, bodies that only springs hold would be scaled by the rounding
-    errors in H.
+    The stiffness of an unknown y is the absolute value of its diagonal entry in H plus the stiffness of the springs,
+    J G/V by their rows V w = -G y, unless that is roundoff. Without the springs, bodies that are supported only by
+    springs would be scaled by the roundoff in H.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Limits on how far joints may move bodies from their given positions: large moves are logged, huge ones rejected.
 
-Newton's method closes the joints from any place; from far away it can end in another configuration than the one that
-was meant (an elbow the other way round).
+Newton's method closes the joints from any position. From far away it can end in another configuration than the intended
+one (with an elbow bent to the other side).
 """
 
 import logging
@@ -24,8 +24,8 @@ REFUSED = 3.0  #: displacement, relative to the size of the largest body, above 
 def require_placed_near(compiled: CompiledSystem, placed: State, closed: State) -> None:
     """Log the body that the joints moved far, and raise `ModelError` if a body was moved too far.
 
-    Prescribed motions may move bodies far at their beginning: with them it is told, not refused. So may the joints of a
-    loop that place bodies without a position.
+    Prescribed motions, and the joints of a loop that place bodies without a position, may move bodies far at the start.
+    Their moves are only logged.
 
     Parameters
     ----------
@@ -45,19 +45,20 @@ def require_placed_near(compiled: CompiledSystem, placed: State, closed: State) 
     if given.max() > REFUSED * size.max() and not is_driven:
         far = int(np.argmax(given))
         raise ModelError(
-            f"body {compiled.body_names[far]!r} was placed {way[far]:.3g} from where its joints hold it; the largest "
-            f"body has a size of {size.max():.3g}: place it at its joints, or check the units of its position"
+            f"body {compiled.body_names[far]!r} was placed {way[far]:.3g} from the position that its joints require, "
+            f"but the largest body has a size of {size.max():.3g}; place it at its joints, or check the units of its "
+            "position"
         )
     if by_joints[i]:
         log.warning(
             "body %r has no position: closing its joints moved it by %.3g, %.2g of its size; from this distance they "
-            "can close in another configuration, so give a position and an orientation near the one that is meant",
+            "can close in another configuration, so give an approximate position and orientation",
             compiled.body_names[i], way[i], way[i] / size[i],
         )  # fmt: skip
         return
     log.warning(
-        "body %r was placed %.3g from where its joints hold it, %.2g of its size, and was moved there; from this "
-        "distance it can end in another configuration, so place it at its joints",
+        "body %r was placed %.3g from the position that its joints require, %.2g of its size, and was moved there; "
+        "from this distance it can end in another configuration, so place it at its joints",
         compiled.body_names[i], way[i], way[i] / size[i],
     )  # fmt: skip
 

@@ -1,30 +1,32 @@
 """Initial accelerations without the components that a step of the given size cannot resolve.
 
-A start knows the accelerations u_dot of the equations of motion alone. Where a mode, a spring or a damper is far
-faster than the step, they throw the body on which it acts. The matrix of a Newton step tells fast from slow:
+At a start, only the accelerations u_dot of the equations of motion are known. If a mode, a spring or a damper is much
+faster than the step, they would move its bodies much too far in the first step. The matrix of a Newton step separates
+fast motions from slow ones:
 
     (1) z = Z y:  (M + s gamma h D + s beta h² K) z - Jᵀ mu = M y,   G z = G y
     (2) u_dot becomes (2 Z - Z²) u_dot,   a = u_dot + (alpha_m - alpha_f) h Z d(u_dot)/dt
 
-for all unknowns alike: modes, bodies on springs, rates of joints. G z = G y keeps the accelerations those of closed
-joints. What the step follows well stays, since 2 Z - Z² = 1 - (1 - Z)²: the change is of second order in h. What the
-step does not follow goes: h² a stays of the size of what is displaced, where h² u_dot grows with (omega h)².
+for all unknowns alike: modes, bodies on springs, rates of joints. With G z = G y the accelerations still satisfy the
+joints. Because 2 Z - Z² = 1 - (1 - Z)², motions that the step resolves change only to second order in h. Motions that
+it does not resolve are removed: h² a remains comparable to the displacement, while h² u_dot grows with (omega h)².
 
-s = gamma - 1/2, at most 1, is the numerical damping of the method. With it no restart makes a mode grow, whatever
-omega h and rho_inf are, and however often the motion begins anew; with s = 1 a mode that the method hardly damps can
-grow, by 2.5 % a restart for rho_inf = 0.98. Methods without numerical damping need no filter: the trapezoidal rule
-has a = u_dot in every step, and for rho_inf = 1 the motion of a linear system does not depend on a
+s = gamma - 1/2, at most 1, is the numerical damping of the method. With this s no restart makes a mode grow, for any
+omega h, rho_inf and number of restarts. With s = 1, a mode that the method hardly damps can grow, by 2.5 % per restart
+for rho_inf = 0.98. Methods without numerical damping need no filter: the trapezoidal rule has a = u_dot in every step,
+and for rho_inf = 1 the motion of a linear system does not depend on a
 (`tests/floatframe/engine/initial_conditions/test_step_filter.py`).
 
 The velocities are changed by
 
     (3) (M + gamma h D + beta h² K) du - Jᵀ mu = 0,   G du = -g(after)/h
 
-for the rows of positions whose rates the steps do not hold (g taken as zero in all others). `after` is where the first
-step leads with accelerations that are filtered with s = 1: so it closes the joints without a kick. The change is O(h²).
+for the rows of positions whose rates the steps do not constrain (g is set to zero in all other rows). `after` is the
+end of the first step with accelerations that are filtered with s = 1, so that this step closes the joints without a
+kick. The change is O(h²).
 
-Where the steps take the spin w of a body about its axis e by itself, the filter and the rates are those of axes which
-do not spin: the part w omega × e of u_dot is not filtered, and D has what it adds.
+If the steps integrate the spin w of a body about its axis e separately, the filter and the rates are those in axes that
+do not spin: the part w omega × e of u_dot is not filtered, and its contribution is part of D.
 """
 
 from dataclasses import dataclass, replace
@@ -97,9 +99,10 @@ def step_filter(
 ) -> StepFilter:
     """Return the filter with matrix M + c_d D + c_k K at time t, at a state with its accelerations and wrenches.
 
-    spin: of bodies whose D is that of axes which do not spin with them. work: made by `work_from`; overwritten.
-    K holds what forces do as they turn with the bodies. Those of modes that the step does not follow are no part of it:
-    a first filter, without any forces, tells which stay.
+    spin: bodies whose D is taken in axes that do not spin with them. work: arrays from `work_from`; overwritten.
+
+    K includes the change of forces that rotate with the bodies, except forces of modes that the step does not resolve.
+    A first filter, without any forces, finds which forces remain.
     """
     model, state = compiled.model, consistent.state
     work = work_from(model, consistent.w) if work is None else work
@@ -189,7 +192,7 @@ def beginning_of(
 ) -> Beginning:
     """Return initial accelerations and rates at t for step size h; z None: unfiltered, from the equations of motion.
 
-    spin: of bodies whose accelerations are filtered without the turn of their axes.
+    spin: bodies whose accelerations are filtered without the part due to the rotation of their axes.
     """
     turn = np.zeros_like(consistent.u_dot) if spin is None else spin.turn
     u_dot = consistent.u_dot if z is None else turn + z.twice(consistent.u_dot - turn)
@@ -203,7 +206,7 @@ def closing_velocities(z: StepFilter, after: State, w: Array, t: float, h: float
     """Return the velocity correction du of (3), (n_u,), for some rows, (n_w,), in a step of size h; z: with s = 1."""
     model = z.compiled.model
     work, unknowns = work_from(model, w), start_unknowns(model, w)
-    if len(model.coordinates.row):  # angles of couplers and user forces are those nearest to the predicted ones
+    if len(model.coordinates.row):  # angles of couplers and user forces are taken nearest to the predicted angles
         row = model.coordinates.row
         work.state.time[...] = t
         set_iterate(work, z.state, w=unknowns)

@@ -170,7 +170,7 @@ def body_equations(body: ReducedBody | FlexibleBody, *, stiffening: bool | Liter
         return body_equations(body.moved, stiffening=body.is_stiffened)
     if stiffening is True and body.geometric is None:
         raise ModelError(
-            f"body_equations: stiffening is asked for, but the reduced body {body.name!r} holds no geometric stiffness"
+            f"body_equations: stiffening is requested, but reduced body {body.name!r} holds no geometric stiffness"
         )
     n = body.n_q
     moments = body.moments.left_out if body.moments.missing else body.moments

@@ -61,7 +61,7 @@ class Configurations:
         return result
 
     def normalized(self, x: Array) -> Array:
-        """Return x with Euler parameters of unit length, which products of many rotations lose by rounding."""
+        """Return x with Euler parameters of unit length; products of many rotations change their length by roundoff."""
         result = np.array(x, dtype=float)
         for i, _, _ in self.parts():
             result[i + 3 : i + 7] /= np.linalg.norm(result[i + 3 : i + 7])

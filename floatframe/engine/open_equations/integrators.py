@@ -52,7 +52,7 @@ def radau(eq: Equations, x: Array, v: Array, times: Array, *, tolerance: float =
         else:
             raise ConvergenceError("radau: Newton's method failed", t=t, h=h, residual=float(np.abs(change).max()))
         x, v = ends
-        # these have the same order as x and v; those of the stages have order three
+        # this a and lam have the same order as x and v; the a and lam of the stages have order three
         a, lam = eq.accelerations(t + h, x, v)
         kept.append((x, v, lam))
     return tuple(np.array(part) for part in zip(*kept, strict=True))  # type: ignore[return-value]
@@ -64,7 +64,7 @@ def stage_rows(eq: Equations, t: float, h: float, x: Array, v: Array, stages: Ar
     a, lam = a.reshape(3, eq.n_v), lam.reshape(3, eq.n_lam)
     v_i, group = v + h * A @ a, eq.configurations
     D = h * A @ v_i
-    for _ in range(12):  # D is the fixed point of its own small equation, because rotations do not commute
+    for _ in range(12):  # D is found by fixed-point iteration: it depends on itself, as rotations do not commute
         D, before = h * A @ np.array([group.inverse_tangent(d) @ w for d, w in zip(D, v_i, strict=True)]), D
         if np.abs(D - before).max() <= 1e-15 * max(np.abs(D).max(), 1.0):
             break

@@ -42,7 +42,7 @@ class Layout:
         Raises
         ------
         ModelError
-            If there is none; the message has the nearest name.
+            If there is none; the message contains the nearest name.
         """
         components: Sequence[Component] = {"x": self.x, "v": self.v, "lam": self.lam}[vector]
         for component in components:

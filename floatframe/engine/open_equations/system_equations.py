@@ -3,12 +3,12 @@
     M(x) a = f(t, x, v) + G(t, x)ᵀ lam,     g(t, x) = 0,     x_dot = v (see `Configurations`)
 
 with constraint rates G v = g_1(t, x) and G a = g_2(t, x, v). All values come from the kernels that `integrate` uses
-(docs/theory.md §6, §10). In the kernels, the complete wrench w of each connection is unknown, with as many rows:
-constraint rows, and rows that define the wrench, C w = b. Here the latter are solved,
+(docs/theory.md §6, §10). In the kernels, the complete wrench w of each connection is unknown and has as many rows:
+constraint rows, and rows C w = b that define the wrench. Here the latter are solved:
 
     w = w_0(t, x, v) + W(t, x) lam,   C w_0 = b (least norm),   C W = 0,   Jᵀ W = Gᵀ,
 
-which leaves the forces f = f_bodies + Jᵀ w_0, and one multiplier for each constraint row.
+This leaves the forces f = f_bodies + Jᵀ w_0, and one multiplier for each constraint row.
 """
 
 from dataclasses import dataclass, replace
@@ -417,8 +417,8 @@ class Equations:
             if np.abs(left).max(initial=0.0) > allowed:
                 c = int(np.searchsorted(self.model.connections.w0, int(np.abs(left).argmax()), side="right")) - 1
                 raise ModelError(
-                    f"open_equations: {self.compiled.connection_names[c]!r}: its force depends on itself, not on the "
-                    "motion alone; take it out"
+                    f"open_equations: {self.compiled.connection_names[c]!r}: its force depends on itself, not only on "
+                    "the motion; remove it"
                 )
         result = self.work.bodies.residual.copy()
         for i, (_, j, _) in enumerate(self.configurations.parts()):
@@ -464,19 +464,19 @@ def open_equations(system: System) -> Equations:
     if len(model.states.row):
         users = np.searchsorted(model.connections.w0, model.states.row, side="right") - 1
         raise ModelError(
-            f"open_equations: {compiled.connection_names[int(users[0])]!r} has states of its own, which are no part of "
-            "x and v; give its forces without states, and integrate the states beside"
+            f"open_equations: {compiled.connection_names[int(users[0])]!r} has states of its own, which are not part "
+            "of x and v; give its forces without states, and integrate the states separately"
         )
     felt = [each.element.name for each in compiled.laws if each.law.accelerations]
     if felt:
         raise ModelError(
-            f"open_equations: element {felt[0]!r} uses accelerations, which are no part of x and v; give its "
+            f"open_equations: element {felt[0]!r} uses accelerations, which are not part of x and v; give its "
             "masses as bodies"
         )
     if has_normal_friction(model):
         raise ModelError(
             "open_equations: friction by the force in its joint (JointForce: coefficient) makes f depend on the "
-            "multipliers; take it out, or give friction by itself"
+            "multipliers; remove it, or give a friction force that does not depend on them"
         )
     model = model._replace(rows=model.rows._replace(soft=np.zeros_like(model.rows.soft)))
     structure = structure_of(model)

@@ -181,7 +181,7 @@ def test_limits_that_make_no_sense_are_refused(options, words):
 
 
 def test_mistakes_with_couplers_in_events_are_answered():
-    with pytest.raises(ModelError, match="engaged at the start; say engaged = false"):
+    with pytest.raises(ModelError, match="engaged at the start; set engaged = false"):
         integrate(shafts(engaged=True), METHOD, 1.0, 1e-2)
     with pytest.raises(ModelError, match="has limits and is switched by them alone"):
         integrate(shafts(limits=Limits(upper=1.0)), METHOD, 1.0, 1e-2)

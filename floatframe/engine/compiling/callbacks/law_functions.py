@@ -1,9 +1,9 @@
 """The functions of elements as C functions that the kernels call by their address.
 
-A function of numba is compiled behind a C function once for all elements that share it, whatever their numbers of
-markers and states: by the lean compiler, or by plain numba where that does not know what the function does (a line of
-the log says so). The machine code is kept beside the package, under a key that changes with all the function refers
-to (`law_source`); one that refers to what has no such key is compiled anew in each process.
+A numba function is compiled as a C function once for all elements that share it, whatever their numbers of markers and
+states. If the lean compiler does not support what the function does, plain numba compiles it, and the log says so. The
+machine code is stored beside the package, under a key that changes with all objects to which the function refers
+(`law_source`). If one of these has no key, the function is compiled again in each process.
 """
 
 import ctypes
@@ -84,7 +84,7 @@ def compiled_callback(where: str, function: Any, kind: str, template: Callable[[
     if key not in compiled:
         digest = digest_of(function)
         if digest is not None:
-            digest ^= level  # of optimisation, which decides the machine code too
+            digest ^= level  # the level of optimisation, which the machine code depends on too
         whole = lean_c_function(where, function, template, digest) if is_lean else None
         try:
             whole = whole or c_function(filled(template, function, digest or 1), digest is not None)
@@ -109,7 +109,7 @@ def reason_of(error: Exception) -> str:
 def lean_c_function(
     where: str, function: Any, template: Callable[[int], FunctionType], digest: int | None
 ) -> Any | None:  # fmt: skip
-    """Return a numba function as a C function by the lean compiler; None if that cannot compile it."""
+    """Return a numba function compiled by the lean compiler as a C function; None if it cannot compile the function."""
     from floatframe.engine.kernels.compiler import law
     from floatframe.engine.kernels.compiler.stored import compiler_key
 
@@ -118,7 +118,7 @@ def lean_c_function(
         made = filled(template, function, (digest or 1) ^ int(compiler_key()[:14], 16))
         made.__globals__.update(names)
         return c_function(made, digest is not None, pipeline_class=law.LawEntryCompiler)
-    except Exception as error:  # of any kind, as not all passes of numba are used; plain numba tells what is wrong
+    except Exception as error:  # of any kind, as some passes of numba are skipped; plain numba reports the real error
         log.info("%s: %s is compiled by plain numba: %s", where, function.__name__, reason_of(error))
         return None
 
@@ -139,8 +139,8 @@ def c_function(made: FunctionType, is_stored: bool, **options: Any) -> Any:
 def filled(template: Callable[[int], FunctionType], function: Any, digest: int) -> FunctionType:
     """Return the function of a template in which the user's function replaces `law`.
 
-    Its name says the digest, so that each law has an index of its own in the cache: two processes that add different
-    laws to one index at the same moment give both the same file, and the code of one law under the key of the other.
+    Its name contains the digest, so that each law has its own index in the cache. With a common index, two processes
+    that add different laws at the same moment would write the same file, and one law would get the code of the other.
     """
     made = template(digest)
     names = made.__globals__ | {"law": function}

@@ -1,4 +1,7 @@
-"""Derivatives of the law of an element by fourth-order differences, for its outputs and to check its own tangent."""
+"""Derivatives of the law of an element by fourth-order differences.
+
+They are used for linearised outputs, and to check the tangent that the element provides.
+"""
 
 from collections.abc import Sequence
 
@@ -51,7 +54,7 @@ def difference_slopes(
 ) -> Array:  # fmt: skip
     """Return the derivatives of all results by all variables, (6 n + n_z + n_lam + n_seen, n_columns).
 
-    sizes: by which inputs are measured, see `PlacedLaw.sizes`.
+    sizes: typical sizes of the inputs, which scale the steps, see `PlacedLaw.sizes`.
     """
     n, width, n_z, n_lam, n_seen = head[:5]
     n_out, n_columns = 6 * n + n_z + n_lam + n_seen, (width - 6) * n + n_z + n_lam

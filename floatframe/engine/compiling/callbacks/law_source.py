@@ -29,7 +29,7 @@ def digest_of(function: Any) -> int | None:
 def add_value(digest: Any, value: Any, seen: dict[int, bool]) -> None:
     """Add to the key the object that a name refers to; `seen` maps each visited function to whether it is complete."""
     if seen.get(id(value)) is False:
-        raise NoKeyError  # it calls itself: numba cannot use such code from disk
+        raise NoKeyError  # the function calls itself: numba cannot use such code from disk
     if id(value) in seen:
         return
     if isinstance(getattr(value, "py_func", None), FunctionType):  # of numba

@@ -2,15 +2,17 @@
 
     void f(const int64 *head, const double *inputs, const double *data, double *outputs)
 
-head: numbers of markers n, of the motion of each, of states, multipliers, outputs and data, the markers that move as
-bits, 0. inputs: t, motions, states, multipliers. data: numbers of the law; for derivatives by differences, after them
-the sizes by which its inputs are measured: of places, velocities, angular velocities, accelerations, angular
-accelerations, of each state and each multiplier (0: not known). outputs: wrenches, rates of states, what is held, what
-is seen; or the derivatives of these but for the last, row by row, by dr, dphi, dv, domega of each marker, states,
-multipliers. Of a law that asks for accelerations, da and dalpha follow on domega.
+head: the number of markers n, of values in the motion of a marker, of states, multipliers, outputs and data; the
+markers on moving bodies as bits; 0.
+inputs: t, motions, states, multipliers.
+data: numbers of the law. For derivatives by differences, typical sizes of the inputs follow: of positions, velocities,
+angular velocities, accelerations, angular accelerations, of each state and each multiplier (0: unknown).
+outputs: wrenches, rates of states, constraints, outputs of the element. For derivatives: the derivatives of all these
+but the last, row by row, by dr, dphi, dv, domega of each marker, states, multipliers. If the law depends on
+accelerations, da and dalpha follow domega.
 
-The templates are filled in by `law_functions`: `law` stands for the function of the user; with the lean compiler,
-`carray` and `new_vector` are those of `kernels/compiler/law.py`.
+`law_functions` fills in the templates: `law` stands for the function of the user. With the lean compiler, `carray` and
+`new_vector` come from `kernels/compiler/law.py`.
 """
 
 import numpy as np
@@ -21,10 +23,10 @@ __all__ = ["complex_template", "difference_template", "given_template", "value_t
 
 HEAD = 8
 TINY = 1e-30  # step along the imaginary axis
-STEP = 1e-6  # relative step of central differences, by the sizes of inputs
+STEP = 1e-6  # step of central differences, relative to the sizes of the inputs
 SIZES = 5  # sizes of motions; those of states follow
 LEAST = 1e-3  # size of states and multipliers if no other is known
-ROUNDING = 2e-15  # fraction of a number below which a step is lost in rounding
+ROUNDING = 2e-15  # fraction of a number below which a step is lost in roundoff
 
 
 def law(*arguments):
@@ -59,7 +61,7 @@ def value_template(digest):
 
 
 def given_template(digest):
-    """Return the C function of the derivatives for a law whose user has given them."""
+    """Return the C function of the derivatives for a law whose derivatives the user provides."""
 
     def slopes(head_at, inputs_at, data_at, slopes_at):
         head = carray(head_at, HEAD)
@@ -151,7 +153,7 @@ def difference_template(digest):
             if m < n and not (moving >> m) & 1:
                 continue
             first = 1 + m * width
-            at = o + k - per * n  # indices of the inputs that move
+            at = o + k - per * n  # index of the input that varies
             if m < n and j < 3:
                 at, size = first + j, sizes[0]
             elif m < n and j < 6:
@@ -177,7 +179,7 @@ def difference_template(digest):
                         x[m, 3 + 3 * c + i] = sin * A_b + cos * A_c
                 else:
                     y[at - 1] = inputs[at] + s
-                    way = y[at - 1] - inputs[at] if side == 0 else way - (y[at - 1] - inputs[at])  # as it was rounded
+                    way = y[at - 1] - inputs[at] if side == 0 else way - (y[at - 1] - inputs[at])  # the rounded step
                 out[:] = 0.0
                 law(inputs[0], x, z, lam, data, wrench, z_dot, g, out[n_out:])
                 for i in range(n_out):

@@ -52,7 +52,7 @@ def compiled_callback(force: UserForce, n: int, n_forces: int, n_states: int) ->
     from numba.core.errors import NumbaError
 
     function = force.function
-    assert function is not None  # the caller knows
+    assert function is not None  # the caller has checked this
     n_in, n_out = 1 + 2 * n + n_states, n_forces + n_states
     pointer = types.CPointer(types.float64)
 
@@ -92,7 +92,7 @@ def returned_value_error(name: str, kind: str) -> ReturnedValueError:
 def python_callback(force: UserForce, n: int, n_forces: int, n_states: int) -> Callback:
     """Return a Python function as a C function; after an error it returns NaN."""
     function = force.function
-    assert function is not None  # the caller knows
+    assert function is not None  # the caller has checked this
     n_in, n_out = 1 + 2 * n + n_states, n_forces + n_states
     callback = Callback(f"force {force.name!r}", 0, None, is_python=True)
 
@@ -129,7 +129,7 @@ def cost_words(callback: Callback) -> str:
     each = 1e6 * seconds / max(n, 1)
     return (
         f"{callback.name}: its Python function was called {n} times, {each:.3g} µs each, {seconds:.3g} s in all; "
-        "compiled by numba.njit it would cost next to nothing"
+        "compile it by numba.njit to make this time negligible"
     )
 
 
@@ -139,6 +139,6 @@ def raise_errors_of(callbacks: Sequence[Callback]) -> None:
         error, callback.error = callback.error, None
         if error is None:
             continue
-        if isinstance(error, ReturnedValueError) or not isinstance(error, Exception):  # the latter: an interrupt
+        if isinstance(error, ReturnedValueError) or not isinstance(error, Exception):  # such as KeyboardInterrupt
             raise error
         raise ModelError(f"{callback.name}: its function raised {type(error).__name__}: {error}") from error

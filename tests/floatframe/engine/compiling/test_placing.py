@@ -221,7 +221,7 @@ def test_a_loop_of_a_file_closes_without_positions_in_silence(tmp_path, caplog):
     assert system.body("rod").position is None
     assert_allclose(states[1]["block"], states[0]["block"], rtol=0, atol=1e-10)
     assert_allclose(states[1]["rod"], states[0]["rod"], rtol=0, atol=1e-10)
-    assert "from where its joints hold it" not in caplog.text
+    assert "from the position that its joints require" not in caplog.text
 
 
 def test_a_loop_that_closes_far_from_where_bodies_hang_is_told(caplog):

@@ -119,7 +119,7 @@ def test_an_acceleration_may_be_coupled_in_an_iteration(two_masses):
 
 def test_a_run_alone_refuses_units_of_other_programs(two_masses, tmp_path):
     system, run = read_system(two_masses)
-    with pytest.raises(ModelError, match=r"act beside it \(fmus: second\): use floatframe run"):
+    with pytest.raises(ModelError, match=r"is coupled to units of other programs \(fmus: second\): use floatframe run"):
         integrate(system, run.integrator, 0.1, run.h)
     with pytest.raises(FloatframeError, match="which cannot be part of a unit"):
         write_fmu(two_masses, tmp_path / "first.fmu")

@@ -133,7 +133,7 @@ FAULTS = {
     "outside": (Law(outside), "raised IndexError: index 2 is out of bounds"),
     "random": (Law(counting), "two calls with the same numbers give different results"),
     "inputs": (Law(greedy, data=[1.0]), "its function changes data, which is an input"),
-    "no number": (Law(rooted, data=[0.2999]), "element 'e' gives what is no number (NaN or infinity)"),
+    "no number": (Law(rooted, data=[0.2999]), "element 'e' is not finite (NaN or infinity) in the initial position"),
     "what does nothing": (Law(two_parts, acts=("none", "force")), "moment x on marker 2: written, but acts = 'force'"),
     "opposite": (Law(two_parts, is_opposite=True), "is_opposite says the forces on both markers are opposite"),
 }
