@@ -13,7 +13,6 @@ from cms.cli.outputs import PICTURES, TABLES, output_file, write_outputs
 
 if TYPE_CHECKING:
     from floatframe.analyses import Equilibrium, LinearSystem, Locus, SystemModes
-    from floatframe.analyses.linear.channels import AnyInput, AnyOutput
     from floatframe.model.system import System
     from floatframe.pictures.body_colors import BodyColor
 
@@ -238,7 +237,6 @@ def campbell_command(
     """
     from floatframe.analyses import campbell
     from floatframe.analyses.linear.plots import campbell_figure
-    from floatframe.cli.channel_names import chosen
     from floatframe.errors import ModelError
 
     model, _ = read_in_formulation(system, None, set_values)
@@ -248,7 +246,7 @@ def campbell_command(
     with stages() as clock, clock("modes over the speed") as advance:
         locus = campbell(
             model, values, axis=vector(axis, "--axis"), center=vector(center, "--center"), n_modes=n_modes,
-            outputs=chosen(model, outputs, model.outputs), progress=lambda done, all_: advance(done / all_),
+            outputs=outputs or None, progress=lambda done, all_: advance(done / all_),
         )  # fmt: skip
     if locus.outputs:
         print_steady(locus, model.units.time_symbol)
@@ -313,8 +311,8 @@ def linearized(
     axis: str,
     center: str,
     *,
-    inputs: "tuple[AnyInput, ...]" = (),
-    outputs: "tuple[AnyOutput, ...]" = (),
+    inputs: Sequence[str] | None = (),
+    outputs: Sequence[str] | None = (),
     formulation: str = "absolute",
 ) -> "LinearSystem":
     """Return the system linearised about rest, or about a steady rotation."""

@@ -10,7 +10,6 @@ from cms.cli.arguments import SetValues
 from cms.cli.console import guarded, print_table, say
 from cms.cli.outputs import PICTURES, TABLES, output_file, write_outputs
 from floatframe.cli.analyses import Axis, Center, Formulation, Speed, SystemArgument, linearized, read_in_formulation
-from floatframe.cli.channel_names import chosen
 
 if TYPE_CHECKING:
     from floatframe.analyses import LinearSystem
@@ -22,7 +21,9 @@ MOST_LEFT_OUT = 6  #: largest number of omitted columns that are listed individu
 
 Inputs = Annotated[
     list[str],
-    typer.Option("--input", "-i", help="A name of [inputs], forces.NAME.amplitude, joint.angle, body/interface:x."),
+    typer.Option(
+        "--input", "-i", help="A name of [inputs], a force (motor.torque), joint.angle, body/interface:x; repeatable."
+    ),
 ]
 Outputs = Annotated[
     list[str],
@@ -66,8 +67,8 @@ def linearize_command(
         speed,
         axis,
         center,
-        inputs=chosen(model, inputs, model.inputs),
-        outputs=chosen(model, outputs, model.outputs),
+        inputs=inputs or None,
+        outputs=outputs or None,
         formulation=form,
     )
     space = write_state_space(linear, path)
@@ -117,8 +118,8 @@ def response_command(
         speed,
         axis,
         center,
-        inputs=chosen(model, inputs, model.inputs),
-        outputs=chosen(model, outputs, model.outputs),
+        inputs=inputs or None,
+        outputs=outputs or None,
         formulation=form,
     )
     print_left_out(linear)

@@ -40,11 +40,11 @@ class Controller:
     period
         Time between two calls, a whole multiple of the step size of a run [s].
     inputs
-        Measured values, the argument x of the function: columns of sensors, "tip x", and coordinates of joints,
+        Measured values, the argument x of the function: columns of sensors, "tip.x", and coordinates of joints,
         "hub.angle" or "hub.angle.rate".
     outputs
-        Names of forces: the output is the motor of a joint force (in place of its own), or the factor of a point force
-        or a body load.
+        Names of forces, "motor" or "motor.torque": the output is the motor of a joint force (in place of its own), or
+        the factor of a point force or a body load.
     function
         Called as function(t, x) and returns the outputs, (n_outputs,), or one number; with `state` as function(t, x,
         state), and returns the outputs and the next state. The array x is (n_inputs,).

@@ -8,6 +8,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError, ResultsError
+from floatframe.model.forces import driven_forces
 from floatframe.model.system import System
 from floatframe.results.sensors import coordinate_sensors, measured, measurement_of, sensor_of, sensors_of
 from floatframe.results.sensors.loads import CoordinateSensor, ReactionSensor
@@ -96,7 +97,7 @@ def controller_samples(system: System, trajectory: Trajectory, name: str) -> Mea
     states = np.array(found["states"], dtype=float).reshape(len(found["t"]), -1)
     columns = {key: np.array(values, dtype=float) for key, values in found["outputs"].items()}
     columns |= {f"state {k + 1}": states[:, k] for k in range(states.shape[1])}
-    unit_of = {getattr(force, "name", ""): amplitude_unit(system.units, force) for force in system.forces}
+    unit_of = {each: amplitude_unit(system.units, force) for each, force in driven_forces(system.forces).items()}
     units = {key: unit_of[key] if key in found["outputs"] else "1" for key in columns}
     return Measurement(name, np.array(found["t"], dtype=float), columns, units)
 

@@ -32,7 +32,7 @@ from floatframe.model.state import State
 from floatframe.model.system import System
 from floatframe.results.head import Head
 from floatframe.results.results_file import MemorySource
-from floatframe.results.sensors import sensor_of
+from floatframe.results.sensors import measurement_of
 from floatframe.results.trajectory import Trajectory
 from floatframe.simulation.events import Event, events_of, off_at_start, require_events, switched
 from floatframe.simulation.motion_head import joint_rows
@@ -190,7 +190,7 @@ class EventWatch:
                 arrays = joint_rows(self.full, [self.in_files(row) for row in rows])
                 head = replace(self.head, summary={"events": self.happened})
                 motion = Trajectory(head, MemorySource(arrays), is_complete=False)
-            found = sensor_of(self.full, event.watch).measure(self.full, motion).columns
+            found = measurement_of(self.full, motion, event.watch).columns
             name = event.column or next(iter(found))
             if name not in found:
                 raise ModelError(f"event {event.name!r}: column: expected one of {', '.join(found)}, got {name!r}")

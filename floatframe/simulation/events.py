@@ -23,7 +23,7 @@ from floatframe.model.forces import BodyLoad, Bushing, Force, JointForce, PointF
 from floatframe.model.functions.time_functions import constant
 from floatframe.model.joints.coordinate_coupler import CoordinateCoupler
 from floatframe.model.system import System
-from floatframe.results.sensors import sensor_of
+from floatframe.results.sensors import sensor_and_column
 
 __all__ = [
     "DIRECTIONS",
@@ -75,7 +75,7 @@ class Event:
     name
         Name of the event, unique in the system.
     watch
-        Name of a sensor of the system, or "joint.coordinate"; "": the event has a time.
+        A sensor of the system, "tip", a column of it, "tip.x", or "joint.coordinate"; "": the event has a time.
     level
         Level in the unit of the watched quantity.
     direction
@@ -162,9 +162,11 @@ def require_events(system: System) -> None:
         where = f"event {event.name!r}"
         if event.watch:
             try:
-                sensor_of(system, event.watch)
+                _, column = sensor_and_column(system, event.watch)
             except ModelError as error:
                 raise ModelError(f"{where}: watch: {error}") from error
+            if column and event.column:
+                raise ModelError(f"{where}: expected one column, got {event.column!r} beside watch = {event.watch!r}")
         for name in (*event.switch_on, *event.switch_off):
             if name in couplers:
                 require_switched(where, couplers[name], is_first_on=name in first_on)

@@ -15,7 +15,7 @@ from floatframe.model.bodies.rigid_body import RigidBody
 from floatframe.model.joints.sliding import SlidingJoint
 from floatframe.model.system import System
 from floatframe.results.joint_coordinates import as_placed
-from floatframe.results.sensors import sensor_of
+from floatframe.results.sensors import sensor_and_column
 from floatframe.results.sensors.loads import CoordinateSensor
 from floatframe.simulation.events import Event
 
@@ -40,8 +40,8 @@ def direct_values(system: System, event: Event) -> Values | None:
     """
     if event.at is not None:
         return lambda rows: rows.t
-    sensor = sensor_of(system, event.watch)
-    if type(sensor) is CoordinateSensor and event.column in ("", "value"):
+    sensor, column = sensor_and_column(system, event.watch)
+    if type(sensor) is CoordinateSensor and (column or event.column) in ("", "value"):
         return counted_angle_of(system, sensor)
     return None
 

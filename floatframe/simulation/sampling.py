@@ -24,12 +24,12 @@ from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.kernels.memory import Rows
 from floatframe.errors import ModelError
 from floatframe.model.controller import Controller
-from floatframe.model.forces import WITH_AMPLITUDE, BodyLoad, JointForce, PointForce
+from floatframe.model.forces import WITH_AMPLITUDE, driven_forces
 from floatframe.model.functions.time_functions import N_COEFFICIENTS, TimeFunction
 from floatframe.model.system import System
 from floatframe.results.head import Head
 from floatframe.results.results_file import MemorySource
-from floatframe.results.sensors import coordinate_sensors, measurement_of
+from floatframe.results.sensors import measurement_of
 from floatframe.results.trajectory import Trajectory
 from floatframe.simulation.events import has_events
 from floatframe.simulation.held_functions import force_numbers
@@ -92,14 +92,14 @@ class Sampling:
             if n * N_COEFFICIENTS * len(each.outputs) > MOST_NUMBERS:
                 raise ModelError(f"controller {each.name!r}: {n} calls in a run are too many; take a longer period")
             begins = t_start + h * (every[each.name] * np.arange(n, dtype=float))
-            for name in each.outputs:
+            for name in forces_of(system, each):
                 if name in functions:
                     raise ModelError(f"controller {each.name!r}: outputs: {name!r} is an output of another controller")
                 functions[name] = TimeFunction(begins, np.zeros((n, N_COEFFICIENTS)))
         held = with_outputs(system, functions)
         compiled, made = compiled_system(held), []
         for each in controllers:
-            numbers = [force_numbers(held, compiled, {name})[0] for name in each.outputs]
+            numbers = [force_numbers(held, compiled, {name})[0] for name in forces_of(system, each)]
             made.append(Sampled(each, every[each.name], tuple(numbers), each.state))
         return cls(held, t_start, h, tuple(made))
 
@@ -204,27 +204,28 @@ def steps_of(controller: Controller, h: float) -> int:
 
 def with_outputs(system: System, functions: Mapping[str, TimeFunction]) -> System:
     """Return the system whose named forces have these functions of time as motors and factors."""
-    forces = list(system.forces)
-    choices = {force.name: k for k, force in enumerate(forces) if isinstance(force, BodyLoad | JointForce | PointForce)}
-    for name, function in functions.items():
+    forces: list[Any] = list(system.forces)
+    for k, force in enumerate(forces):
+        function = functions.get(getattr(force, "name", ""))
+        if function is not None:
+            forces[k] = replace(force, **{WITH_AMPLITUDE[type(force)]: function})
+    return replace(system, forces=forces)
+
+
+def forces_of(system: System, controller: Controller) -> list[str]:
+    """Return the forces of a controller's outputs by name; `ModelError` with the nearest name if there is none."""
+    choices = driven_forces(system.forces)
+    for name in controller.outputs:
         if name not in choices:
             hint = nearest(name, list(choices)) if choices else "; the system has no such force"
             raise ModelError(f"controllers: outputs: no joint force, point force or body load {quoted(name)}{hint}")
-        force = forces[choices[name]]
-        forces[choices[name]] = replace(force, **{WITH_AMPLITUDE[type(force)]: function})  # type: ignore[arg-type]
-    return replace(system, forces=forces)
+    return [choices[name].name for name in controller.outputs]
 
 
 def value_of(system: System, motion: Trajectory, controller: Controller, name: str) -> float:
     """Return the current value of an input."""
     try:
-        columns = measurement_of(system, motion, name).columns
+        found = measurement_of(system, motion, name)
+        return float(found.columns[found.only()][-1])
     except ModelError as error:
         raise ModelError(f"controller {controller.name!r}: inputs: {error}") from error
-    if len(columns) > 1 and name not in [sensor.name for sensor in coordinate_sensors(system)]:
-        first = next(iter(columns))
-        raise ModelError(
-            f"controller {controller.name!r}: inputs: {name!r} has the columns {', '.join(columns)}; name one, such as "
-            f'"{name} {first}"'
-        )
-    return float(next(iter(columns.values()))[-1])

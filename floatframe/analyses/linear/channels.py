@@ -12,8 +12,12 @@ from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.linear.force_inputs import ForceInput, force_input_unit
 from floatframe.analyses.linear.inputs import BaseMotion, DriveMotion, ParameterInput
 from floatframe.errors import ModelError
+from floatframe.model.bodies.markers import Marker
+from floatframe.model.forces import driven_forces
 from floatframe.model.system import Named, System
+from floatframe.results.sensors import coordinate_sensors, sensor_and_column
 from floatframe.results.sensors.channels import VALUE, Channel, CoordinateChannel, StressChannel
+from floatframe.results.sensors.loads import CoordinateSensor
 from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.small_motions.rows import LinearColumns, Rows, joined
 from floatframe.results.small_motions.small_motions import SmallMotions
@@ -26,10 +30,15 @@ __all__ = [
     "Observed",
     "channel_unit",
     "inputs_of",
+    "named_input",
+    "named_output",
     "observed",
     "outputs_of",
     "require_input",
 ]
+
+
+DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")  #: components of the motion of a place
 
 
 class AnyOutput(Protocol):
@@ -141,6 +150,84 @@ def inputs_of(carried: Iterable[Named]) -> tuple[AnyInput, ...]:
 def outputs_of(carried: Iterable[Named]) -> tuple[AnyOutput, ...]:
     """Return the outputs of a system, which stores them under a general type."""
     return cast(tuple[AnyOutput, ...], tuple(carried))
+
+
+def named_output(system: System, output: AnyOutput | str) -> AnyOutput:
+    """Return an output; a text names an output or input of the system, "body/interface:x", or any sensor or column.
+
+    Raises
+    ------
+    ModelError
+        If there is none; the message has the nearest name.
+    """
+    if not isinstance(output, str):
+        return output
+    own = {each.name: each for each in (*outputs_of(system.outputs), *outputs_of(system.inputs))}
+    if output in own:
+        return own[output]
+    if (place := named_place(output)) is not None:
+        return place
+    sensor, column = sensor_and_column(system, output)
+    if isinstance(sensor, CoordinateSensor) and column in ("", VALUE):
+        return CoordinateChannel(output, sensor.joint, sensor.coordinate)
+    return Column(sensor, column, output) if column else sensor
+
+
+def named_input(system: System, channel: AnyInput | str) -> AnyInput:
+    """Return an input; a text names an input of the system, a force, a drive, a coordinate, or "body/interface:x".
+
+    Forces are named as `driven_forces` does, drives "joints.hub.angle"; the name of a coordinate, "hub.angle", means
+    the force along it.
+
+    Raises
+    ------
+    ModelError
+        If there is none; the message has the nearest name.
+    """
+    if not isinstance(channel, str):
+        return channel
+    own = {each.name: each for each in (*inputs_of(system.inputs), *inputs_of(system.outputs))}
+    forces = driven_forces(system.forces)
+    drives = {
+        f"joints.{joint.name}.{coordinate}": DriveMotion(f"joints.{joint.name}.{coordinate}", joint.name, coordinate)
+        for joint in system.joints
+        for coordinate in getattr(joint, "motions", {})
+    }
+    coordinates = {each.name: each for each in coordinate_sensors(system)}
+    if channel in own:
+        return own[channel]
+    if channel in forces:
+        return ForceInput(channel, forces[channel].name)
+    if channel in drives:
+        return drives[channel]
+    if (text := channel.replace(" ", ".")) in coordinates or (text := channel) in coordinates:
+        sensor = cast(CoordinateSensor, coordinates[text])
+        return CoordinateChannel(channel, sensor.joint, sensor.coordinate)
+    if (place := named_place(channel)) is not None:
+        return place
+    hint = nearest(channel, [*own, *forces, *drives, *coordinates])
+    raise ModelError(
+        f"system {system.name!r}: no input {quoted(channel)}: expected an input of the system, a force such as "
+        f"'motor.torque', a drive such as 'joints.hub.angle', a coordinate, or body/interface:component{hint}"
+    )
+
+
+def named_place(name: str) -> Channel | None:
+    """Return the channel "body/interface:component" or "body:component"; None if the text has another form.
+
+    Raises
+    ------
+    ModelError
+        If there is no such component.
+    """
+    place, colon, component = name.rpartition(":")
+    if not colon:
+        return None
+    if component not in DIRECTIONS:
+        raise ModelError(f"channel {name!r}: expected body/interface:component{nearest(component, DIRECTIONS)}")
+    body, _, interface = place.partition("/")
+    k = DIRECTIONS.index(component)
+    return Channel(name, Marker(body, interface or None), np.eye(3)[k % 3], "translation" if k < 3 else "rotation")
 
 
 def require_input(channel: Any) -> None:

@@ -20,7 +20,7 @@ from floatframe.engine.initial_conditions.newton_equations import linearized, se
 from floatframe.engine.kernels.work import new_work
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import body_name
-from floatframe.model.forces import WITH_AMPLITUDE, BodyLoad, JointForce, PointForce
+from floatframe.model.forces import WITH_AMPLITUDE, BodyLoad, PointForce, driven_forces
 from floatframe.model.functions.time_functions import TimeFunction, constant
 from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_matrix
 from floatframe.model.system import System
@@ -28,7 +28,7 @@ from floatframe.results.sensors.measurement import amplitude_unit
 from floatframe.results.small_motions.small_motions import InputForce, SmallMotions
 from floatframe.results.trajectory import Trajectory
 
-__all__ = ["ForceInput", "force_column", "force_input_unit", "forces_of_amplitude", "forces_with_amplitude"]
+__all__ = ["ForceInput", "force_column", "force_input_unit", "forces_of_amplitude"]
 
 
 @frozen_copies
@@ -55,14 +55,9 @@ class ForceInput:
         return "1"
 
 
-def forces_with_amplitude(system: System) -> dict[str, Any]:
-    """Return, by name, the forces whose amplitude or motor can be an input."""
-    return {force.name: force for force in system.forces if isinstance(force, PointForce | BodyLoad | JointForce)}
-
-
 def force_of(system: System, channel: ForceInput) -> Any:
     """Return the force of the input; `ModelError` suggests the closest name if there is none."""
-    known = forces_with_amplitude(system)
+    known = driven_forces(system.forces)
     if channel.force not in known:
         names = [force.name for force in system.forces if hasattr(force, "name")]
         what = "has no amplitude or motor" if channel.force in names else "does not exist"

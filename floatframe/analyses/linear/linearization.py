@@ -33,6 +33,8 @@ from floatframe.analyses.linear.channels import (
     AnyOutput,
     channel_unit,
     inputs_of,
+    named_input,
+    named_output,
     observed,
     outputs_of,
     require_input,
@@ -367,8 +369,8 @@ def linearize(
     system: System,
     about: Equilibrium | None = None,
     *,
-    inputs: Annotated[Sequence[AnyInput] | None, Takes(Sequence[Named] | None)] = None,
-    outputs: Sequence[AnyOutput] | None = None,
+    inputs: Annotated[Sequence[AnyInput | str] | None, Takes(Sequence[Named | str] | None)] = None,
+    outputs: Sequence[AnyOutput | str] | None = None,
     formulation: str = "absolute",
 ) -> LinearSystem:
     """Linearise a system about an equilibrium, a steady rotation or a steady running motion.
@@ -380,10 +382,12 @@ def linearize(
     about
         Result of `static_equilibrium`, `steady_rotation` or `steady_motion`; by default the equilibrium at rest.
     inputs
-        Channels (forces along them), `DriveMotion`, `BaseMotion`, `ParameterInput`. None: those of the system.
+        Names, such as "motor.torque" (a force), "hub.angle" (the force along it) or "jib/tip:z"; or channels (forces
+        along them), `DriveMotion`, `BaseMotion`, `ParameterInput`. None: those of the system.
     outputs
-        Sensors (one output for each linear column, see `LinearSystem.left_out`), their columns (`Column`) and channels;
-        directions rotate with a steady rotation. None: those of the system.
+        Names, such as "pin.angle", "tip.x" or "tip" (one output for each linear column, see `LinearSystem.left_out`);
+        or sensors, their columns (`Column`) and channels. Directions rotate with a steady rotation. None: those of the
+        system.
     formulation
         "relative": z are the coordinates of the joints of the tree and the modes, less those that close its loops, and
         have names, `LinearSystem.coordinates`. "absolute": z are any independent motions.
@@ -394,8 +398,8 @@ def linearize(
         If there is no such formulation, nothing can move, the state moves but is not steady, a channel is at a place
         that does not exist, or a requested column is not linear here.
     """
-    inputs = inputs_of(system.inputs) if inputs is None else tuple(inputs)
-    outputs = outputs_of(system.outputs) if outputs is None else tuple(outputs)
+    inputs = tuple(named_input(system, each) for each in (inputs_of(system.inputs) if inputs is None else inputs))
+    outputs = tuple(named_output(system, each) for each in (outputs_of(system.outputs) if outputs is None else outputs))
     for channel in inputs:
         require_input(channel)
     about = static_equilibrium(system, formulation=formulation) if about is None else about

@@ -13,7 +13,7 @@ from fe_models.foundation.documents.table import Table
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from floatframe.analyses.equilibrium import Equilibrium, steady_rotation
-from floatframe.analyses.linear.channels import AnyOutput, outputs_of
+from floatframe.analyses.linear.channels import AnyOutput, named_output, outputs_of
 from floatframe.analyses.linear.linearization import LinearSystem, linearize
 from floatframe.analyses.linear.system_modes import system_modes
 from floatframe.analyses.snapshot import snapshot
@@ -330,7 +330,7 @@ def campbell(
     axis: Array | tuple[float, float, float] = (0.0, 0.0, 1.0),
     center: Array | tuple[float, float, float] = (0.0, 0.0, 0.0),
     n_modes: int | None = None,
-    outputs: Sequence[AnyOutput] | None = None,
+    outputs: Sequence[AnyOutput | str] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Locus:
     """Return frequencies and damping of a steadily rotating system as functions of its speed, in the rotating frame.
@@ -347,8 +347,8 @@ def campbell(
     n_modes
         Number of modes to follow; default: all.
     outputs
-        Sensors and channels whose steady values are returned (`Locus.steady`), such as bearing forces over the speed.
-        None: the outputs of the system.
+        Sensors, channels or names, whose steady values are returned (`Locus.steady`), such as bearing forces over the
+        speed. None: the outputs of the system.
     progress
         Called with the number of completed speeds and the number of all speeds.
     """
@@ -356,7 +356,7 @@ def campbell(
     center = array_of_shape("campbell: center", center, (3,))
     last: list[Equilibrium] = []
     seen_at: dict[float, dict[str, tuple[float, str]]] = {}
-    observed = outputs_of(system.outputs) if outputs is None else tuple(outputs)
+    observed = [named_output(system, each) for each in (outputs_of(system.outputs) if outputs is None else outputs)]
 
     def at(speed: float) -> LinearSystem:
         state = last[0].state if last else None

@@ -20,7 +20,7 @@ from floatframe.integrators.integrator import joined_rows
 from floatframe.model.state import State
 from floatframe.model.system import System
 from floatframe.results.results_file import MemorySource
-from floatframe.results.sensors import EnergySensor, MomentumSensor, Sensor, measured, sensor_of
+from floatframe.results.sensors import EnergySensor, MomentumSensor, Sensor, measured, sensor_and_column
 from floatframe.results.trajectory import Trajectory
 from floatframe.simulation.motion_head import joint_rows
 
@@ -69,16 +69,12 @@ def wanted_of(outputs: Sequence[str] | Mapping[str, str | tuple[str, Take]]) -> 
 
 def columns_of(system: System, wanted: tuple[OutputRequest, ...]) -> tuple[Column, ...]:
     """Return the columns of outputs; `ModelError` with the nearest name if there is no such sensor."""
-    coordinates = [f"{joint.name}.{name}" for joint in system.joints for name in joint.coordinates]
-    sensors = [*(sensor.name for sensor in system.sensors), *coordinates]
     found = []
     for each in wanted:
-        fitting = [name for name in sensors if each.of == name or each.of.startswith(f"{name} ")]
-        if not fitting:
-            raise ModelError(f"output {each.name!r}: of = {quoted(each.of)}: no such sensor{nearest(each.of, sensors)}")
-        name = max(fitting, key=len)
-        column = each.of[len(name) + 1 :]
-        sensor = sensor_of(system, name)
+        try:
+            sensor, column = sensor_and_column(system, each.of)
+        except ModelError as error:
+            raise ModelError(f"output {each.name!r}: of = {quoted(each.of)}: {error}") from error
         if isinstance(sensor, EnergySensor) and column in OF_THE_WAY:
             raise ModelError(
                 f"output {each.name!r}: {column!r} is an integral over the whole motion, which is not differentiated; "
@@ -107,11 +103,7 @@ def values_at(neighbour: Neighbour, columns: tuple[Column, ...], points: Sequenc
     values, units = [], []
     for each in columns:
         measurement = measured(neighbour.system, motion, [each.sensor])[each.sensor.name]
-        names = list(measurement.columns)
-        column = names[0] if not each.column and len(names) == 1 else each.column
-        if column not in names:
-            hint = nearest(column, names) if column else f"; expected one of its columns: {', '.join(names)}"
-            raise ModelError(f"sensitivities: sensor {each.sensor.name!r} has no column {column!r}{hint}")
+        column = measurement.only(each.column)
         values.append(measurement.columns[column])
         units.append(measurement.units[column])
     return np.array(values).T.reshape(len(points), len(columns)), units

@@ -31,7 +31,7 @@ from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ModelError, ResultsError
 from floatframe.files.system_file.run_section import RunOptions, formulation_of, required_run
 from floatframe.model.system import System
-from floatframe.results.sensors import measured, sensor_of
+from floatframe.results.sensors import measurement_of
 from floatframe.results.trajectory import Trajectory
 from floatframe.simulation.integrate import integrate
 
@@ -292,23 +292,12 @@ def output_value(output: Output, system: System, motion: Trajectory) -> tuple[fl
 
 def column_of(output: Output, system: System, motion: Trajectory) -> tuple[Array, str]:
     """Return the values over time from which an output is computed, (n_t,), and their unit."""
-    coordinates = [f"{joint.name}.{name}" for joint in system.joints for name in joint.coordinates]
-    sensors = [*(sensor.name for sensor in system.sensors), *coordinates]
-    fitting = [name for name in sensors if output.of == name or output.of.startswith(name + " ")]
-    if not fitting:
-        raise ModelError(
-            f"output {output.name!r}: of = {quoted(output.of)}: no such sensor{nearest(output.of, sensors)}"
-        )
-    name = max(fitting, key=len)
-    measurement = measured(system, motion, [sensor_of(system, name)])[name]
-    column = output.of[len(name) + 1 :]
-    columns = list(measurement.columns)
-    if not column and len(columns) == 1:
-        column = columns[0]
-    if column not in columns:
-        hint = nearest(column, columns) if column else f"; expected one of its columns: {', '.join(columns)}"
-        raise ModelError(f"output {output.name!r}: of = {output.of!r}: sensor {name!r} has no column {column!r}{hint}")
-    return measurement.columns[column], measurement.units[column]
+    try:
+        found = measurement_of(system, motion, output.of)
+        column = found.only()
+    except ModelError as error:
+        raise ModelError(f"output {output.name!r}: of = {quoted(output.of)}: {error}") from error
+    return found.columns[column], found.units[column]
 
 
 def output_value_of_modes(output: Output, modes: SystemModes, per_second: float) -> tuple[float, str]:

@@ -18,7 +18,7 @@ from floatframe.engine.kernels import model
 from floatframe.engine.kernels.model import COUPLER, USER_FORCE
 from floatframe.engine.kernels.records import filled, of_items
 from floatframe.errors import ModelError
-from floatframe.model.bodies.coordinates import AxialAngle, AxialDistance, Coordinate, JointCoordinate
+from floatframe.model.bodies.coordinates import AxialAngle, AxialDistance, Coordinate, JointCoordinate, coordinate_of
 from floatframe.model.forces import UserForce
 from floatframe.model.functions.expressions import Tape, compile_expression
 from floatframe.model.joints.axis_frame import axis_in_b, turning_frame
@@ -235,8 +235,9 @@ def add_coordinates(
     return w0 + len(rows)
 
 
-def find_coordinate(system: System, where: str, coordinate: Coordinate, made: Connections) -> PlacedCoordinate:
+def find_coordinate(system: System, where: str, wanted: Coordinate | str, made: Connections) -> PlacedCoordinate:
     """Return a coordinate in the assembled position; `ModelError` suggests the closest name if it does not exist."""
+    coordinate = coordinate_of(where, wanted)
     if isinstance(coordinate, JointCoordinate):
         return coordinate_of_joint(system, where, coordinate, made)
     a = find_marker(system, f"{where}: marker_a", coordinate.marker_a)

@@ -19,7 +19,7 @@ from fe_models.foundation.paths import replace_file
 from floatframe.errors import FloatframeError, ModelError
 from floatframe.files.cosimulation.interface import Variable, content_of, interface, parameter_paths, read_unit
 from floatframe.files.cosimulation.model_description import NEEDS, Description, model_description
-from floatframe.files.cosimulation.unit import Unit, UnitState
+from floatframe.files.cosimulation.unit import Unit, UnitState, sensor_names
 
 __all__ = ["SETTINGS", "SYSTEM", "HostedUnit", "WrittenFmu", "slave_script", "words_of", "write_fmu"]
 
@@ -212,7 +212,7 @@ def write_fmu(
     files = resource_files(system, content)
     settings = {
         "inputs": [each.name for each in unit.held],
-        "outputs": [sensor.name for sensor in unit.sensors],
+        "outputs": sensor_names(unit.system, unit.outputs),
         "seconds": seconds,
         "variables": [asdict(each) for each in variables],
     }

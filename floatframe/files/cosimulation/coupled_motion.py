@@ -15,7 +15,7 @@ from floatframe.files.cosimulation.interface import output_variables
 from floatframe.files.cosimulation.unit import Unit
 from floatframe.integrators.integrator import Integrator
 from floatframe.model.system import System
-from floatframe.results.sensors import sensors_of
+from floatframe.results.sensors import sensor_and_column
 from floatframe.results.trajectory import Trajectory
 from floatframe.results.writer import ResultsPlace, ResultsWriter
 from floatframe.simulation.foreign_units import Coupling, ForeignUnit
@@ -142,9 +142,12 @@ class Master:
     ) -> None:
         self.slaves, self.coupling = slaves, coupling
         sources = {source for slave in slaves for source in slave.unit.inputs.values()}
-        sensors = {source: sensor_and_column(system, source) for source in sources}
+        try:
+            sensors = {source: sensor_and_column(system, source) for source in sources}
+        except ModelError as error:
+            raise ModelError(f"fmus: {error}") from error
         targets = targets_of(system, [slave.unit for slave in slaves])
-        inputs, outputs = list(dict.fromkeys(targets.values())), sorted({sensor for sensor, _ in sensors.values()})
+        inputs, outputs = list(dict.fromkeys(targets.values())), sorted({sensor.name for sensor, _ in sensors.values()})
         self.unit = Unit(system, integrator, h, inputs, outputs)
         self.sensors = sensors
         self.columns: dict[str, str] = {}  #: name of the unit's output for each source
@@ -154,8 +157,8 @@ class Master:
         self.unit.begin()
         outputs = {each.name: each for each in output_variables(self.unit, self.unit.system)}
         for source, (sensor, column) in self.sensors.items():
-            names = [name for name in outputs if name.rpartition(".")[0] == sensor]
-            name = names[0] if column is None else f"{sensor}.{column}"
+            names = [name for name in outputs if name.rpartition(".")[0] == sensor.name]
+            name = f"{sensor.name}.{column}" if column else names[0]
             if name not in outputs:
                 raise ModelError(f"fmus: no column {quoted(source)}{nearest(source, names)}")
             self.columns[source] = name
@@ -267,18 +270,6 @@ def largest_change(a: Signals, b: Signals) -> float:
     """Return the largest relative change of a signal (relative to 1e-12 if the signal is zero)."""
     changes = [abs(y[n] - x[n]) / max(abs(x[n]), abs(y[n]), 1e-12) for x, y in zip(a, b, strict=True) for n in x]
     return max(changes, default=0.0)
-
-
-def sensor_and_column(system: System, source: str) -> tuple[str, str | None]:
-    """Return sensor (or joint coordinate) and column for "tip.x" or "hinge.angle"; None: the first column."""
-    names = [sensor.name for sensor in sensors_of(system)]
-    names += [f"{joint.name}.{coordinate}" for joint in system.joints for coordinate in joint.coordinates]
-    if source in names:
-        return source, None
-    sensor, _, column = source.rpartition(".")
-    if sensor in names:
-        return sensor, column
-    raise ModelError(f"fmus: no sensor or joint coordinate {quoted(source)}{nearest(source, names)}")
 
 
 def targets_of(system: System, units: Sequence[ForeignUnit]) -> dict[str, str]:

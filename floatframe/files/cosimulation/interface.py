@@ -150,7 +150,7 @@ def interface(unit: Unit, content: Mapping[str, Any], paths: Mapping[str, str], 
 
 def output_variables(unit: Unit, system: System) -> Iterator[Variable]:
     """Yield the outputs of an initialised unit."""
-    for sensor, measurement in zip(unit.sensors, unit.measured(), strict=True):
+    for (sensor, _), measurement in zip(unit.sensors, unit.measured(), strict=True):
         is_of_state = isinstance(sensor, OF_THE_STATE) or (
             isinstance(sensor, PlaceSensor) and sensor.quantity != "acceleration"
         )

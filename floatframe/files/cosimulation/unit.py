@@ -18,7 +18,7 @@ from floatframe.files.cosimulation.held_inputs import HeldInput, function_number
 from floatframe.integrators.integrator import Integrator
 from floatframe.model.system import System
 from floatframe.results.results_file import MemorySource
-from floatframe.results.sensors import Measurement, sensor_of, sensors_of
+from floatframe.results.sensors import Measurement, sensor_and_column, sensors_of
 from floatframe.results.trajectory import Trajectory
 from floatframe.simulation.events import events_of
 from floatframe.simulation.held_functions import write_function
@@ -94,9 +94,9 @@ def quintic(begin: Array, end: Array, duration: float) -> Array:
 
 
 def sensor_names(system: System, outputs: Sequence[str] | None) -> list[str]:
-    """Return the sensors for outputs: the named ones, else all sensors of the system, else all joint coordinates."""
+    """Return the names of the outputs: the given ones, else all sensors of the system, else all joint coordinates."""
     if outputs is not None:
-        return [sensor_of(system, name).name for name in outputs]
+        return list(outputs)
     named = [sensor.name for sensor in sensors_of(system)]
     return named or [f"{joint.name}.{coordinate}" for joint in system.joints for coordinate in joint.coordinates]
 
@@ -116,7 +116,7 @@ class Unit:
     integrator: Integrator
     h: float  #: largest step size of the integrator [s]
     names: Sequence[str] | None = None  #: names of the inputs; None: the default of `with_held_inputs`
-    #: sensors or joint coordinates for outputs; None: the default of `sensor_names`
+    #: sensors, their columns or joint coordinates for outputs; None: the default of `sensor_names`
     outputs: Sequence[str] | None = None
     inputs: dict[str, float] = field(init=False)  #: present values of the inputs
     notes: list[str] = field(init=False, default_factory=list)  #: messages about bodies that left their linear range
@@ -151,7 +151,7 @@ class Unit:
         self.numbers = {each.name: function_numbers(self.system, compiled, each) for each in self.held}
         for name, found in self.numbers.items():
             assert found, f"input {name} is not in the compiled system"
-        self.sensors = [sensor_of(self.system, name) for name in sensor_names(self.system, self.outputs)]
+        self.sensors = [sensor_and_column(self.system, name) for name in sensor_names(self.system, self.outputs)]
         self.inputs = {}
         for each in self.held:
             start = (each.start, 0.0, 0.0)
@@ -288,7 +288,8 @@ class Unit:
         assert self.row is not None
         arrays = joint_rows(self.system, [rows_of_file(compiled_system(self.system), self.row)])
         motion = Trajectory(self.head, MemorySource(arrays), is_complete=False)
-        return [sensor.measure(self.system, motion) for sensor in self.sensors]
+        found = [(sensor.measure(self.system, motion), column) for sensor, column in self.sensors]
+        return [one.taken(column) if column else one for one, column in found]
 
     def values(self) -> dict[str, float]:
         """Return the outputs by name "sensor.column"."""

@@ -16,6 +16,7 @@ from floatframe.analyses.linear.channels import AnyInput, AnyOutput, Column
 from floatframe.analyses.linear.force_inputs import ForceInput
 from floatframe.analyses.linear.inputs import BaseMotion, DriveMotion, ParameterInput
 from floatframe.errors import ModelError
+from floatframe.files.system_file.coordinate_section import of_joint
 from floatframe.files.system_file.keys import Name, Number, Positive
 from floatframe.files.system_file.place_key import (
     TOLERANCE_WORDS,
@@ -37,6 +38,7 @@ from floatframe.results.sensors import (
 from floatframe.results.sensors.body_loads import INTERFACE_AXES
 from floatframe.results.sensors.channels import QUANTITIES, RATES, Channel, CoordinateChannel, StressChannel
 from floatframe.results.sensors.loads import AXES
+from floatframe.results.sensors.measurement import owner_and_column
 from floatframe.results.sensors.places import PLACE_QUANTITIES
 from floatframe.simulation.events import DIRECTIONS, Event
 from floatframe.simulation.foreign_units import SCHEMES, Coupling, ForeignUnit
@@ -271,7 +273,12 @@ class ChannelSection(Table):
     relative_to: str | None = Field(None, description="the name of the body against which it is taken")
     relative_marker: MeasuredPlace | None = Field(None, description="an interface of, or a position in that body")
     joint: str | None = Field(None, description="the name of a joint")
-    coordinate: str | None = Field(None, description="a coordinate of the joint")
+    coordinate: str | None = Field(None, description='a coordinate of the joint; without joint "JOINT.COORDINATE"')
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_joint(cls, value: Any) -> Any:
+        return of_joint(value)
 
     def way(self) -> str:
         """Return the group of `WAYS` to which the keys belong; `ValueError` if they are of different groups."""
@@ -352,7 +359,7 @@ class OutputSection(ChannelSection):
         None, description=f"one of {', '.join(STRESS_COMPONENTS)}: the output is a stress"
     )
     position: Vector3 | None = Field(None, description="a position in the body, [x, y, z]: the nearest node is taken")
-    sensor: str | None = Field(None, description="the name of a table [sensors.NAME]")
+    sensor: str | None = Field(None, description='the name of a table [sensors.NAME], or a column, "tip.x"')
     column: str | None = Field(None, description='a column of the sensor, such as "force x"; default: all')
 
     @model_validator(mode="after")
@@ -365,12 +372,13 @@ class OutputSection(ChannelSection):
         """Return the output of the table; `ModelError` with the nearest name if there is no such sensor."""
         way = self.way()
         if way == "sensor":
-            names = [sensor.name for sensor in sensors]
-            if self.sensor not in names:
-                hint = nearest(str(self.sensor), names)
+            known = {sensor.name: sensor for sensor in sensors}
+            owner, column = owner_and_column(str(self.sensor), known)
+            if owner not in known or (column and self.column):
+                hint = nearest(str(self.sensor), known)
                 raise ModelError(f"outputs.{name}: no sensor {quoted(str(self.sensor))}{hint}")
-            found = sensors[names.index(self.sensor)]
-            return replace(found, name=name) if self.column is None else Column(found, self.column, name)
+            column = column or self.column or ""
+            return Column(known[owner], column, name) if column else replace(known[owner], name=name)
         if way == "component":
             return StressChannel(name, str(self.body), str(self.component), np.array(self.position))
         return self.place_or_coordinate(name, RATES.index(self.measure))

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from fe_models.foundation.toml_file import Matrix3, Table, Vector3, choice
 from fe_models.foundation.words import nearest
 from floatframe.errors import ModelError
-from floatframe.files.system_file.coordinate_section import CoordinateSection, marker_of
+from floatframe.files.system_file.coordinate_section import CoordinateSection, NamedCoordinate, marker_of
 from floatframe.files.system_file.keys import Name, NotNegative, NotNegativeOrSix, NumberOrSix, Positive
 from floatframe.files.system_file.motion_section import MotionSection, require_quantity
 from floatframe.files.system_file.place_key import PlaceOnBody
@@ -265,7 +265,9 @@ class ForceSection(Table):
         None, description=f"one of {', '.join(DISSIPATIONS)}"
     )
     slow: Positive | None = Field(None, description="a number above 0, the least speed of approach")
-    coordinates: dict[str, CoordinateSection] | None = Field(None, description="tables of coordinates by name")
+    coordinates: dict[str, NamedCoordinate] | None = Field(
+        None, description='coordinates by name, each "JOINT.COORDINATE" or a table'
+    )
     forces: dict[str, str] | None = Field(None, description="expressions of forces, text, by coordinate")
     rates: dict[str, str] | None = Field(None, description="expressions of the rates of states, text, by state")
     switches: dict[str, str] | None = Field(

@@ -3,7 +3,7 @@
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, StringConstraints, model_validator
+from pydantic import BeforeValidator, Field, StringConstraints, model_validator
 
 from cms.body.address import Address
 from fe_models.foundation.toml_file import Matrix3, Table, Vector3, choice
@@ -11,7 +11,7 @@ from floatframe.files.system_file.place_key import PlaceOnBody
 from floatframe.model.bodies.coordinates import AxialAngle, AxialDistance, Coordinate, JointCoordinate, PointDistance
 from floatframe.model.bodies.markers import Marker
 
-__all__ = ["CoordinateSection", "marker_of"]
+__all__ = ["CoordinateSection", "NamedCoordinate", "marker_of", "of_joint"]
 
 Name = Annotated[str, StringConstraints(min_length=1)]
 COORDINATES = {"axial-distance": AxialDistance, "axial-angle": AxialAngle, "point-distance": PointDistance}
@@ -27,11 +27,24 @@ def marker_of(body: str, place: str | Address | tuple[float, float, float] | Non
     return Marker(body, position=None if place is None else np.array(place), triad=axes)
 
 
+def of_joint(value: Any) -> Any:
+    """Return the table of a coordinate; "hub.angle", alone or as its key coordinate, names joint and coordinate."""
+    table = {"coordinate": value} if isinstance(value, str) else value
+    if not isinstance(table, dict) or table.keys() & {"joint", "type", "body"}:
+        return table
+    joint, dot, coordinate = str(table.get("coordinate", "")).rpartition(".")
+    if joint and dot and coordinate:
+        return table | {"joint": joint, "coordinate": coordinate}
+    if isinstance(value, str):
+        raise ValueError("expected a coordinate of a joint, such as 'hub.angle', or a table")
+    return table
+
+
 class CoordinateSection(Table):
     """A coordinate of a joint, or between markers on two bodies."""
 
     joint: Name | None = Field(None, description="the name of a joint")
-    coordinate: Name | None = Field(None, description="a coordinate of the joint")
+    coordinate: Name | None = Field(None, description='a coordinate of the joint; without joint "JOINT.COORDINATE"')
     type: choice("type of coordinate", lambda: tuple(COORDINATES)) | None = Field(  # type: ignore[valid-type]
         None, description=f"instead of a joint, one of {', '.join(COORDINATES)}"
     )
@@ -42,6 +55,11 @@ class CoordinateSection(Table):
     triad_a: Matrix3 | None = Field(None, description="the axes of marker_a, [x axis, y axis, z axis]")
     triad_b: Matrix3 | None = Field(None, description="the axes of marker_b, [x axis, y axis, z axis]")
     axis: Vector3 | None = Field(None, description="the axis in the axes of marker_a, [x, y, z]")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_joint(cls, value: Any) -> Any:
+        return of_joint(value)
 
     @model_validator(mode="after")
     def _joint_or_markers(self) -> "CoordinateSection":
@@ -57,7 +75,7 @@ class CoordinateSection(Table):
                     raise ValueError(f"a coordinate of a joint has no key {key}")
             return self
         if self.coordinate is not None:
-            raise ValueError("coordinate: expected only with joint")
+            raise ValueError("joint: missing; expected the joint of the coordinate, also as coordinate = 'hub.angle'")
         for key in ("body_a", "body_b"):
             if getattr(self, key) is None:
                 raise ValueError(f'{key}: missing; expected the name of a body, or "ground"')
@@ -80,3 +98,9 @@ class CoordinateSection(Table):
         if self.type == "point-distance":
             return PointDistance(a, b)
         return COORDINATES[str(self.type)](a, b, np.array(self.axis))
+
+
+#: a coordinate that may be given by its name
+NamedCoordinate = Annotated[
+    CoordinateSection, BeforeValidator(of_joint, json_schema_input_type=CoordinateSection | str)
+]

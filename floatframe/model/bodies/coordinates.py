@@ -10,13 +10,13 @@ from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.checked_values import unit_vector
 
-__all__ = ["AxialAngle", "AxialDistance", "Coordinate", "JointCoordinate", "PointDistance", "coordinate_words"]
+__all__ = ["AxialAngle", "AxialDistance", "Coordinate", "JointCoordinate", "PointDistance", "coordinate_of"]
 
 
 @dataclass(frozen=True)
 @checked_fields(ModelError)
 class JointCoordinate:
-    """A coordinate of a joint, a distance or an angle, free or prescribed.
+    """A coordinate of a joint, a distance or an angle, free or prescribed; the text "hub.angle" stands for it.
 
     Parameters
     ----------
@@ -28,6 +28,20 @@ class JointCoordinate:
 
     joint: str
     coordinate: str
+
+    @staticmethod
+    def of_name(name: str) -> "JointCoordinate":
+        """Return the coordinate for a text "joint.coordinate" or "joint coordinate".
+
+        Raises
+        ------
+        ModelError
+            If the text is not of this form.
+        """
+        joint, _, coordinate = name.rpartition("." if "." in name else " ")
+        if not (joint and coordinate):
+            raise ModelError(f"coordinate {name!r}: expected joint.coordinate, such as 'hub.angle'")
+        return JointCoordinate(joint, coordinate)
 
 
 @frozen_copies
@@ -102,10 +116,16 @@ class PointDistance:
 Coordinate = JointCoordinate | AxialDistance | AxialAngle | PointDistance
 
 
-def coordinate_words(where: str, value: object) -> Coordinate:
-    """Return a coordinate unchanged; `ModelError` if it is not a coordinate."""
+def coordinate_of(where: str, value: object) -> Coordinate:
+    """Return a coordinate, also from its name; `ModelError` if it is not a coordinate."""
+    if isinstance(value, str):
+        try:
+            return JointCoordinate.of_name(value)
+        except ModelError as error:
+            raise ModelError(f"{where}: {error}") from None
     if not isinstance(value, Coordinate):
         raise ModelError(
-            f"{where}: expected a JointCoordinate, AxialDistance, AxialAngle or PointDistance, got {value!r}"
+            f"{where}: expected a coordinate of a joint ('hub.angle', JointCoordinate), AxialDistance, AxialAngle or "
+            f"PointDistance, got {value!r}"
         )
     return value

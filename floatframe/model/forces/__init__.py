@@ -1,5 +1,8 @@
 """Forces and loads; `FORCES` is the registry for the system file."""
 
+from collections.abc import Iterable
+from typing import Any
+
 from floatframe.model.forces.bushing import Bushing
 from floatframe.model.forces.loads import BodyLoad, Gravity, PointForce
 from floatframe.model.forces.sphere_contact import SphereContact
@@ -18,6 +21,7 @@ __all__ = [
     "SphereContact",
     "SpringDamper",
     "UserForce",
+    "driven_forces",
 ]
 
 Force = BodyLoad | Bushing | Gravity | JointForce | PointForce | SphereContact | SpringDamper | UserForce
@@ -34,3 +38,17 @@ FORCES = {
 
 #: name of the function of time in each type of force
 WITH_AMPLITUDE = {PointForce: "amplitude", BodyLoad: "amplitude", JointForce: "motor"}
+
+
+def driven_forces(forces: Iterable[Any]) -> dict[str, PointForce | BodyLoad | JointForce]:
+    """Return the forces whose amplitude or motor can be an input, by all their names.
+
+    These are "push", "push.amplitude" and "forces.push.amplitude" for a force or load with an amplitude, and "motor",
+    "motor.torque" ("motor.force" along a distance) and "forces.motor.motor" for a joint force.
+    """
+    found: dict[str, PointForce | BodyLoad | JointForce] = {}
+    for force in forces:
+        if (key := WITH_AMPLITUDE.get(type(force))) is not None:
+            short = key if key == "amplitude" else "torque" if force.is_angular else "force"
+            found |= dict.fromkeys((force.name, f"{force.name}.{short}", f"forces.{force.name}.{key}"), force)
+    return found

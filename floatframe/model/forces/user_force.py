@@ -10,7 +10,7 @@ import numpy as np
 
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
-from floatframe.model.bodies.coordinates import Coordinate, coordinate_words
+from floatframe.model.bodies.coordinates import Coordinate, coordinate_of
 from floatframe.model.checked_values import number
 from floatframe.model.functions.expressions import CONSTANTS, FUNCTIONS, compile_expression
 from floatframe.model.functions.time_functions import NOT_OF_TIME, TimeFunction
@@ -28,7 +28,7 @@ class UserForce:
     In expressions (see `functions.expressions`), `phi` is the value of the coordinate of that name, `phi_dot` is its
     rate, and `t` is the time. States, parameters and tables have their own names:
 
-        UserForce("pid", {"phi": JointCoordinate("hub", "angle")},
+        UserForce("pid", {"phi": "hub.angle"},
                   forces={"phi": "-kp*(phi - aim(t)) - kd*phi_dot - ki*e"},
                   rates={"e": "phi - aim(t)"}, states={"e": 0.0},
                   parameters={"kp": 40.0, "kd": 4.0, "ki": 10.0}, functions={"aim": smooth_step(0, 1, 0, 0.5)})
@@ -43,7 +43,7 @@ class UserForce:
     name
         Name of the force, unique in the system.
     coordinates
-        Observed coordinates, along which forces may act, by name.
+        Observed coordinates, along which forces may act, by name; "hub.angle" is that of a joint.
     forces
         Expressions by coordinate, or names.
     rates
@@ -66,7 +66,7 @@ class UserForce:
     """
 
     name: str
-    coordinates: Mapping[str, Coordinate]
+    coordinates: Mapping[str, Coordinate | str]
     forces: Mapping[str, str] | Sequence[str] = field(default_factory=dict)
     rates: Mapping[str, str] = field(default_factory=dict)
     states: Mapping[str, float] = field(default_factory=dict)
@@ -81,8 +81,8 @@ class UserForce:
         where = f"force {self.name!r}"
         if not isinstance(self.coordinates, Mapping) or not self.coordinates:
             raise ModelError(f"{where}: coordinates: expected a dict with one coordinate at least, by name")
-        for key, coordinate in self.coordinates.items():
-            coordinate_words(f"{where}: coordinates: {key}", coordinate)
+        coordinates = {k: coordinate_of(f"{where}: coordinates: {k}", each) for k, each in self.coordinates.items()}
+        object.__setattr__(self, "coordinates", coordinates)
         require_words(where, self.inputs)
         require_words(where, [*self.inputs, *self.parameters])
         require_words(where, [*self.inputs, *self.parameters, *self.functions])

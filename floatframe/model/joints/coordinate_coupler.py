@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
-from floatframe.model.bodies.coordinates import Coordinate, coordinate_words
+from floatframe.model.bodies.coordinates import Coordinate, coordinate_of
 from floatframe.model.checked_values import number
 from floatframe.model.functions.time_functions import TimeFunction, constant
 
@@ -82,7 +82,7 @@ class CoordinateCoupler:
     """
 
     name: str
-    terms: Sequence[tuple[Coordinate, float]]
+    terms: Sequence[tuple[Coordinate | str, float]]
     constant: float | TimeFunction | None = None
     engaged: bool = True
     limits: Limits | None = None
@@ -100,7 +100,7 @@ class CoordinateCoupler:
             value = number(f"{where}: coefficient {k + 1}", factor)
             if value == 0:
                 raise ModelError(f"{where}: coefficient {k + 1}: expected a number other than zero; leave the term out")
-            checked.append((coordinate_words(f"{where}: term {k + 1}", coordinate), value))
+            checked.append((coordinate_of(f"{where}: term {k + 1}", coordinate), value))
         object.__setattr__(self, "terms", tuple(checked))
         if self.limits is not None:
             if not isinstance(self.limits, Limits):

@@ -15,7 +15,7 @@ from floatframe.results.sensors.body_loads import InterfaceForceSensor, Recovery
 from floatframe.results.sensors.channels import Channel, CoordinateChannel, StressChannel
 from floatframe.results.sensors.elements import BushingSensor, ControlSensor, CouplerSensor, ElementSensor
 from floatframe.results.sensors.loads import CoordinateSensor, EnergySensor, ModeSensor, MomentumSensor, ReactionSensor
-from floatframe.results.sensors.measurement import Measurement, Sensor
+from floatframe.results.sensors.measurement import Measurement, Sensor, owner_and_column
 from floatframe.results.sensors.places import (
     PLACE_QUANTITIES,
     AngleSensor,
@@ -64,6 +64,7 @@ __all__ = [
     "coordinate_sensors",
     "measured",
     "measurement_of",
+    "sensor_and_column",
     "sensor_of",
     "sensor_points",
     "sensors_of",
@@ -144,45 +145,53 @@ def make_coordinate_sensors(system: System) -> tuple[Sensor, ...]:
 
 
 def sensor_of(system: System, name: str) -> Sensor:
-    """Return a sensor by name, or a new sensor for "joint.coordinate" or "element.output".
+    """Return a sensor by name, or a new sensor for "joint.coordinate" or "element.output"; it must be no column.
+
+    Raises
+    ------
+    ModelError
+        If there is none, or the name is that of a column.
+    """
+    sensor, column = sensor_and_column(system, name)
+    if column:
+        raise ModelError(f"{quoted(name)}: expected the name of a sensor, got its column; take {quoted(sensor.name)}")
+    return sensor
+
+
+def sensor_and_column(system: System, name: str) -> tuple[Sensor, str]:
+    """Return the sensor that a name means, and the name of one of its columns, "" for all.
+
+    A name is that of a sensor, of an output of the system, or of a coordinate, "pin.angle"; of a column of one of
+    these, "tip.x" or "tip x"; or of an output of an element, "damper.force" or "damper force".
 
     Raises
     ------
     ModelError
         If there is none; the message has the nearest name.
     """
-    coordinates = coordinate_sensors(system)
-    owner, _, output = name.rpartition(".")
-    for each in coordinates:
-        if each.name == name:
-            return each
-    if owner in [element.name for element in system.elements]:
-        return ElementSensor(name, owner, output)
-    for sensor in sensors_of(system):
-        if sensor.name == name:
-            return sensor
-    choices = [each.name for each in (*system.sensors, *coordinates, *system.elements)]
-    raise ModelError(f"system {system.name!r}: no sensor or joint coordinate {quoted(name)}{nearest(name, choices)}")
+    known: dict[str, Sensor] = {each.name: each for each in (*system.outputs, *system.sensors)}  # type: ignore[misc]
+    known |= {each.name: each for each in coordinate_sensors(system)}
+    elements = [element.name for element in system.elements]
+    owner, column = owner_and_column(name, [*known, *elements])
+    if owner in known and (owner not in elements or not column):
+        return known[owner], column
+    if not column:
+        hint = nearest(name, [*known, *elements])
+        raise ModelError(f"system {system.name!r}: no sensor or joint coordinate {quoted(name)}{hint}")
+    return ElementSensor(name, owner, column), ""
 
 
 def measurement_of(system: System, trajectory: Trajectory, name: str) -> Measurement:
-    """Return the measurement of "sensor" or "joint.coordinate", or a column: "sensor.column" or "sensor column".
+    """Return the measurement of a sensor, coordinate or column by name, as `sensor_and_column` reads it.
 
     Raises
     ------
     ModelError
         If there is no such sensor, coordinate or column; the message has the nearest name.
     """
-    names = {sensor.name for sensor in (*system.sensors, *coordinate_sensors(system))}
-    owner, _, column = name.rpartition(" " if name.rpartition(" ")[0] in names else ".")
-    elements = [element.name for element in system.elements]
-    if name in names or owner in elements or owner not in names:
-        sensor = sensor_of(system, name)
-        return measured(system, trajectory, [sensor])[sensor.name]
-    whole = measured(system, trajectory, [sensor_of(system, owner)])[owner]
-    if column not in whole.columns:
-        raise ModelError(f"sensor {owner!r}: no column {quoted(column)}{nearest(column, list(whole.columns))}")
-    return Measurement(name, whole.t, {column: whole.columns[column]}, {column: whole.units[column]})
+    sensor, column = sensor_and_column(system, name)
+    whole = measured(system, trajectory, [sensor])[sensor.name]
+    return whole.taken(column, name) if column else whole
 
 
 # descriptions of the points that sensors use: the requested place, the node used for it, and their distance -----------

@@ -1,7 +1,7 @@
 """The measurement of a sensor: named columns over time, each with its unit."""
 
-from collections.abc import Mapping
-from dataclasses import Field, dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import Field, dataclass, replace
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -11,14 +11,14 @@ from fe_models.foundation.presentation import Summary, presented
 from fe_models.foundation.records import FrozenMapping, frozen_copies
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
-from floatframe.errors import ResultsError
+from floatframe.errors import ModelError, ResultsError
 from floatframe.model.forces import Force, JointForce
 from floatframe.model.system import System
 from floatframe.results.small_motions.rows import LinearColumns
 from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Trajectory
 
-__all__ = ["Measurement", "Sensor", "amplitude_unit", "unit_words", "vector_columns"]
+__all__ = ["Measurement", "Sensor", "amplitude_unit", "owner_and_column", "unit_words", "vector_columns"]
 
 
 @presented
@@ -74,6 +74,34 @@ class Measurement:
         """The columns that are quantities over time, by name."""
         return {name: values for name, values in self.columns.items() if name not in self.numbers}
 
+    def only(self, column: str = "") -> str:
+        """Return the name of a column; "" means the only one, or the value of a coordinate.
+
+        Raises
+        ------
+        ModelError
+            If there is no such column, or several.
+        """
+        if not column and (len(self.columns) == 1 or "value" in self.columns):
+            return next(iter(self.columns))
+        if not column:
+            first = quoted(f"{self.sensor}.{next(iter(self.columns))}")
+            raise ModelError(
+                f"sensor {self.sensor!r} has the columns {', '.join(self.columns)}; name one, such as {first}"
+            )
+        if column not in self.columns:
+            raise ModelError(f"sensor {self.sensor!r}: no column {quoted(column)}{nearest(column, list(self.columns))}")
+        return column
+
+    def taken(self, column: str, name: str = "") -> "Measurement":
+        """Return the measurement of one column alone, under a name; "": that of the sensor."""
+        column = self.only(column)
+        return replace(
+            self, sensor=name or self.sensor, columns={column: self.columns[column]},
+            units={column: self.units[column]},
+            numbers=(column,) if column in self.numbers else (),
+        )  # fmt: skip
+
     def head(self, column: str) -> str:
         """Return the name of a column in the table of a motion."""
         return f"{self.sensor} {column}".strip()
@@ -98,6 +126,16 @@ class Sensor(Protocol):
 
     def linear(self, small: SmallMotions) -> LinearColumns:
         """Return its columns as linear functions of small motions."""
+
+
+def owner_and_column(name: str, owners: Iterable[str]) -> tuple[str, str]:
+    """Return ("tip", "x") for "tip.x" or "tip x", and ("tip", "") for "tip"; ("", "") if it begins with no owner."""
+    known = set(owners)
+    if name in known:
+        return name, ""
+    fitting = [each for each in known if name.startswith((f"{each}.", f"{each} "))]
+    owner = max(fitting, key=len, default="")
+    return owner, name[len(owner) + 1 :] if owner else ""
 
 
 def vector_columns(values: Array, unit: str, *, prefix: str = "") -> tuple[dict[str, Array], dict[str, str]]:

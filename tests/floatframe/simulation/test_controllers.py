@@ -345,7 +345,7 @@ def test_an_error_in_a_function_is_told_by_name():
     ([pid(outputs="moter")], "outputs: no joint force, point force or body load 'moter'; did you mean 'motor'"),
     ([pid(), replace(pid(), name="other")], "controller 'other': outputs: 'motor' is an output of another controller"),
     ([pid(inputs=["pin.angel"])], "controller 'pid': inputs: .*did you mean 'pin.angle'"),
-    ([pid(inputs=["tip"])], "controller 'pid': inputs: 'tip' has the columns x, y, z, size; name one, such as"),
+    ([pid(inputs=["tip"])], "controller 'pid': inputs: sensor 'tip' has the columns x, y, z, size; name one, such as"),
 ])  # fmt: skip
 def test_impossible_controllers_are_refused_before_the_run(controllers, words):
     system = rotor(*controllers, sensors=[PlaceSensor("tip", Marker("hub"))])

@@ -292,7 +292,7 @@ def test_bad_input_is_told():
     refused("expected an index of 0 to 2", parameters=["bodies.rod.inertia.3.0"])
     refused("2 indices", parameters=["bodies.rod.inertia.0"])
     refused("take turn.0", parameters=["bodies.rod.orientation.0"])
-    refused("no such sensor", of=["xx x"])
+    refused("no sensor or joint coordinate 'xx x'", of=["xx x"])
     refused("no column", of=["x w"])
     refused("integral over the whole motion", of=["energy work"])
     refused("no method 'adjoined'", method="adjoined")

@@ -200,7 +200,7 @@ def test_study_without_any_result_says_why_and_fails(folder):
     ("number = 3\n", "", "expected values, or first, last and number"),
     ("first = 1.0", "first = -1.0", "expected first and last above 0"),
     ('analysis = "modes"', 'combine = "together"', "expected as many values of each parameter, got gravity 2, mass 3"),
-    ('analysis = "modes"', 'analysis = "run"', "of = 'frequency 1': no such sensor; choices: hinge.angle, tip"),
+    ('analysis = "modes"', 'analysis = "run"', "no sensor or joint coordinate 'frequency 1'; choices: hinge"),
     ("[outputs.swing]\nof = \"frequency 1\"", "[outputs]", "expected one table [outputs.NAME] at least"),
 ])  # fmt: skip
 def test_mistakes_are_answered_before_any_work(folder, old, new, words):
@@ -212,7 +212,10 @@ def test_mistakes_are_answered_before_any_work(folder, old, new, words):
 
 def test_column_of_a_sensor_is_named_with_its_choices(folder):
     text = STUDY.replace('"modes"', '"run"').replace('"frequency 1"', '"{}"')
-    for of, words in (("tip", "expected one of its columns: x, y, z, size"), ("tip siz", "did you mean 'size'")):
+    for of, words in (
+        ("tip", "has the columns x, y, z, size"),
+        ("tip siz", "did you mean 'size'"),
+    ):
         (folder / "study.toml").write_text(text.format(of))
         assert words in sweep(folder / "study.toml", code=2)
 

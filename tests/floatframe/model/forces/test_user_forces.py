@@ -331,7 +331,7 @@ def test_a_state_that_does_not_stand_is_not_linearised():
     ("make", "words"),
     [
         (lambda: UserForce("u", {}), "coordinates: expected a dict with one coordinate"),
-        (lambda: UserForce("u", {"phi": 3}), "coordinates: phi: expected a JointCoordinate"),
+        (lambda: UserForce("u", {"phi": 3}), "coordinates: phi: expected a coordinate of a joint"),
         (lambda: UserForce("u", {"a b": HUB["phi"]}, {}), "expected a name of letters, digits and _, got 'a b'"),
         (lambda: UserForce("u", {"sin": HUB["phi"]}, {}), "the name 'sin' is used twice, or that of a function"),
         (lambda: UserForce("u", HUB, {"psi": "1"}), "no coordinate 'psi'; choices: phi"),
