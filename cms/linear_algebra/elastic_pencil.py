@@ -19,15 +19,15 @@ def elastic_eigenvectors(G_K: Array, G_M: Array, omega2_1: float) -> tuple[Array
     (1) transform to a basis in which W = K + omega_1² M is the identity, after scaling W to a unit diagonal
     (2) an eigenvalue mu of M in this basis gives omega² = (1 - omega_1² mu) / mu
     (3) solve again in nearly diagonal form, for relative accuracy at the stiff end of the spectrum
-    (4) (3) leaves the soft end an error of eps times the stiffest omega²: solve bands of the spectrum once more, each
-        by itself
+    (4) after (3) the softest modes still have an error of eps times the stiffest omega²: solve each band of the
+        spectrum once more by itself
 
     Returns
     -------
     Z
         Coefficients by ascending omega², M-normalised (W-normalised if there is no mass), (k, k).
     is_massive
-        (k,) bool.
+        Whether each vector has mass, (k,) bool.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def elastic_eigenvectors(G_K: Array, G_M: Array, omega2_1: float) -> tuple[Array
     energy, directions = la.eigh(W / np.outer(size, size))  # (1)
     if len(energy) and energy[0] <= INDEPENDENT * energy[-1]:
         raise np.linalg.LinAlgError(
-            f"a direction has {energy[0] / energy[-1]:.1e} of the energy of others, which is rounding"
+            f"a direction has {energy[0] / energy[-1]:.1e} of the energy of the others, which is rounding"
         )
     basis = directions / np.sqrt(energy) / size[:, None]
     mu, Y = la.eigh(basis.T @ G_M @ basis)  # (2)
@@ -60,7 +60,7 @@ def elastic_eigenvectors(G_K: Array, G_M: Array, omega2_1: float) -> tuple[Array
 def turn_to_diagonal(G_K: Array) -> Array:
     """Return an orthogonal matrix, (k, k), that diagonalises a nearly diagonal, ascending stiffness, band by band.
 
-    The first band of a second pass is narrower, for close modes on the two sides of a border of the first pass.
+    A second pass has shifted bands (its first is narrower), for close modes that a border of the first pass separates.
     """
     turn = np.eye(len(G_K))
     for width in (BAND, np.sqrt(BAND)):

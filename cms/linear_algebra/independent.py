@@ -1,10 +1,10 @@
 """Independent columns of a mode set in the norm W = K + omega_1² M, and the redundant columns (docs/theory.md §3).
 
-A Gram matrix squares the condition number of the columns. A column with a small pivot in its Gram matrix is therefore
-not judged there: its remainder is formed, measured, and judged separately. This is a pivoted QR in blocks.
+A Gram matrix squares the condition number of the columns. A small pivot in it therefore does not decide whether a
+column is redundant: the remainder of this column is computed, and its length decides. This is a pivoted QR in blocks.
 
 The columns of a body with many interfaces are the largest array of all, so they are not copied. Gram matrices are
-formed from a few products K v and M v at a time, one half of each (`Products`). A basis is stored as columns times a
+computed from a few products K v and M v at a time, one half of each (`Products`). A basis is stored as columns times a
 small matrix (`Basis`) until the shapes are needed. Columns may be distributed (`SpreadColumns`); operations on them are
 then distributed too.
 """
@@ -155,10 +155,10 @@ def independent_basis(
 ) -> tuple[Basis, IntArray]:
     """Return a W-orthonormal basis of the span of columns, W = K + omega_1² M, and the indices of redundant columns.
 
-    (1) pivoted Cholesky of the Gram matrix of unit columns selects the columns that it can judge
+    (1) pivoted Cholesky of the Gram matrix of unit columns selects columns with pivots above `TRUSTED_PIVOT`
     (2) if no column is left and the Gram matrix is well conditioned, its factor gives the basis: Q = V Z
-    (3) otherwise Q is formed, and made W-orthonormal once more by its own Gram matrices
-    (4) for the remaining columns the remainder against Q is formed, measured and judged, and so on
+    (3) otherwise compute Q, and orthonormalise it once more by its own Gram matrices
+    (4) compute the remainders of the other columns outside Q, drop those that are redundant, and repeat from (1)
 
     Parameters
     ----------

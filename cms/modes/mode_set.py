@@ -180,7 +180,7 @@ def checked_modes(
     kind
         Kind of modes, for messages, such as "fixed-interface".
     find
-        Computes modes by number or cutoff.
+        Method of `Families` that computes modes by number or cutoff.
     wanted
         Number of modes, or cutoff.
 

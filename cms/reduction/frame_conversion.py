@@ -47,18 +47,19 @@ __all__ = ["Change", "convert_frame", "converted"]
 def convert_frame(reduced: ReducedBody, frame: Frame, *, damping: Damping | None = None) -> ReducedBody:
     """Return the same reduced body in another body frame, with newly diagonalised modes.
 
-    Free-free frequencies, stiffness, damping and loads are those of the same body. The motion is the same up to second
-    order in q (theory.md §4). The damping matrix is transformed, D'' = Zᵀ D Z, so that a deformation dissipates the
-    same energy in both frames; in general it is no longer diagonal. Quadratic modes need the elements and are dropped.
+    Free-free frequencies, stiffness, damping and loads of the body do not change. The motion differs only by terms of
+    second order in q (theory.md §4). The damping matrix is transformed, D'' = Zᵀ D Z, so that a deformation dissipates
+    the same energy in both frames; in general it is no longer diagonal. Quadratic modes need the elements and are
+    dropped.
 
     Parameters
     ----------
     reduced
-        A reduced body, in any frame.
+        Reduced body in any frame.
     frame
-        The new frame.
+        New frame.
     damping
-        Replaces the damping by ratios of the new modes, or by Rayleigh damping.
+        Damping of the new modes, by ratios or Rayleigh damping; None: the transformed damping.
 
     Raises
     ------
@@ -75,8 +76,8 @@ def converted(reduced: ReducedBody, frame: Frame, *, damping: Damping | None = N
     """Return the result of `convert_frame`, and the change of frame."""
     if reduced.is_held or isinstance(frame, HeldFrame):
         raise BodyError(
-            f"reduced body {reduced.name!r}: a body that is held to the ground has the frame of the ground, and a "
-            "free one any other; reduce it again with or without its supports"
+            f"reduced body {reduced.name!r}: a body held to the ground has the frame of the ground, and a free body "
+            "has any other frame; reduce it again with or without its supports"
         )
     C, target = condition_of(reduced, frame)  # step (1)
     require_convertible(reduced, target)
@@ -123,8 +124,8 @@ def condition_of(reduced: ReducedBody, frame: Frame) -> tuple[Array, BodyFrame]:
         sums = reduced.nodal_sums
         if sums is None:
             raise BodyError(
-                f"reduced body {reduced.name!r}: a Buckens frame needs weighted sums over the nodes, which are not on "
-                "record (a file of version 1, or nodes on one line); reduce it anew with this frame"
+                f"reduced body {reduced.name!r}: a Buckens frame needs weighted sums over the nodes, which are not "
+                "stored (a file of version 1, or nodes on one line); reduce it anew with this frame"
             )
         c = sums.S / sums.w
         R_c = sums.R - sums.w * np.outer(c, c)
@@ -225,8 +226,8 @@ def modes_of(reduced: ReducedBody, M: Array) -> tuple[Array, np.ndarray]:
         return elastic_eigenvectors(reduced.K, M, omega2_1)
     except np.linalg.LinAlgError as error:
         raise BodyError(
-            f"reduced body {reduced.name!r}: among its {reduced.n_q} shapes there is rigid-body motion ({error}); a "
-            "body frame carries none"
+            f"reduced body {reduced.name!r}: its {reduced.n_q} shapes contain rigid-body motion ({error}); expected "
+            "only elastic shapes"
         ) from error
 
 
@@ -373,7 +374,7 @@ def changed_point_stress(points: PointStress, change: Change) -> PointStress:
 def changed_labels(reduced: ReducedBody, Z: Array) -> tuple[tuple[str, ...], Array]:
     """Return labels and energy shares of the new modes; without source columns, shares refer to the old modes.
 
-    The energy Z_kᵀ K Z_k splits into Z_lk K_l Z_lk without mixed terms, because the old modes are K-orthogonal.
+    The energy Z_kᵀ K Z_k is the sum of the terms Z_lk K_l Z_lk, because the old modes are K-orthogonal.
     """
     if reduced.columns is not None:
         columns: SourceColumns = reduced.columns.of_modes(Z)

@@ -7,13 +7,13 @@ The modal file holds diagonalised modes without rigid motion. Together with the 
 The interfaces move by u_b = B z, where B follows from their positions and maps Psi. If B has full row rank, z follows
 from u_b and the remaining coordinates (docs/theory.md §2):
 
-(1) N is a basis of the motions that hold all interfaces, B N = 0
+(1) N is a basis of the motions in which all interfaces are at rest, B N = 0
 (2) constraint modes Z: B Z = 1 with minimal energy, so that NᵀK_z Z = 0
 (3) fixed-interface modes N X of the pencil (Nᵀ K_z N, Nᵀ M_z N), with unit mass
 (4) T = [Z, N X] gives K = Tᵀ K_z T, and M and D likewise; loads are Tᵀ (force, torque, h)
 
-The span is that of the body with its rigid motion; nothing is lost or added. A Craig-Bampton body gives its original
-superelement.
+The columns of T have the span of rigid motion and modes of the body, so nothing is lost or added. For a Craig-Bampton
+body the result is its original superelement.
 """
 
 from dataclasses import dataclass
@@ -29,12 +29,11 @@ from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, IntArray
 
 __all__ = ["BoundaryNode", "InterfaceModel", "interface_model"]
 
-RANK_TOLERANCE = 1e-9  #: singular value of the scaled map over the largest one, below which it counts as zero
-ROUNDING_MOTION = (
-    1e-12  #: interface motion of a mode below this share of its largest is rounding: the frame holds the interface;
-)
-#: rotations are multiplied by the extent of the body
-#: mass of a fixed-interface mode of unit stiffness over the largest one, below which it counts as zero
+RANK_TOLERANCE = 1e-9  #: relative singular value of the scaled map, below which it counts as zero
+#: motion of the interfaces in a mode relative to its largest motion, below which it is rounding because the frame is at
+#: the interface; rotations are multiplied by the extent of the body
+ROUNDING_MOTION = 1e-12
+#: mass of a fixed-interface mode of unit stiffness relative to the largest, below which it counts as zero
 MASSLESS = 1e-14
 
 
@@ -98,7 +97,7 @@ def interface_model(body: ReducedBody) -> InterfaceModel:
     ------
     ExportError
         If its modes do not move all interface dofs independently (the message names the missing constraint modes), or
-        if its interfaces do not hold it.
+        if it can move with all interfaces fixed.
     """
     nodes, B = boundary_of(body)
     M, K, D, loads = free_matrices(body)
@@ -161,8 +160,8 @@ def still_modes(body: ReducedBody, motion: Array, components: IntArray) -> Array
 
     `motion` has a row for each of `components`: 0-2 translations, 3-5 rotations, (n, n_q).
 
-    If the frame is at the only interface, no mode moves it. The remaining motion of about 1e-19 in random directions
-    would otherwise be scaled up and replace the rigid motions.
+    If the frame is at the only interface, no mode moves it. Without this check, rounding errors of about 1e-19 would be
+    scaled up and replace the rigid motions.
     """
     extent = float(np.ptp(body.nodes, axis=0).max(initial=0.0))
     if not len(motion) or extent == 0.0:  # a single point has no length by which to scale rotations
@@ -198,7 +197,7 @@ def require_rank(body: ReducedBody, nodes: tuple[BoundaryNode, ...], scaled: Arr
     raise ExportError(
         f"body {body.name!r}: its {body.n_q} modes{'' if body.is_held else ' and 6 rigid motions'} move only {rank} of "
         f"the {n_b} dofs of its interfaces independently, and matrices over the interfaces need all of them; "
-        f"missing constraint modes: {shown}. Reduce the body with a set that holds a static mode for each "
+        f"missing constraint modes: {shown}. Reduce the body with a set that has a static mode for each "
         "(craig-bampton, guyan, rubin), or with fewer interfaces"
     )
 
@@ -210,7 +209,7 @@ def held_factor(body: ReducedBody, K_N: Array) -> tuple[Array, bool]:
     if free:
         raise ExportError(
             f"body {body.name!r}: its interfaces do not hold it: {free} motions without energy remain when all are "
-            "fixed, so that there are no constraint modes; it needs interfaces that hold all rigid motions"
+            "fixed, so there are no constraint modes; give it interfaces that prevent all rigid motions"
         )
     factor, lower = la.cho_factor(K_N) if len(K_N) else (K_N, False)
     return factor, bool(lower)

@@ -55,8 +55,9 @@ __all__ = ["assembled", "reduce"]
 
 log = logging.getLogger(__name__)
 
-FAR = 10.0  #: distance of the frame from the mesh origin over the radius of gyration, beyond which R loses two digits
-OF_MASSES = 1e-9  #: largest negativity of moments that mass distributions have by rounding
+#: distance of the frame from the mesh origin divided by the radius of gyration, beyond which R loses two digits
+FAR = 10.0
+OF_MASSES = 1e-9  #: largest negativity that rounding causes in the moments of a mass distribution
 ROUNDING = 1e3 * np.finfo(float).eps  #: relative rounding error of a second moment about the mesh origin
 SHAPES_AT_ONCE = 64  #: number of shapes whose displacements of all nodes are in memory at a time
 
@@ -80,21 +81,21 @@ def reduce(
     source
         A coupled body, or the `Families` that made `modes`; the geometric stiffness then reuses their factorisation.
     modes
-        A mode set of that body.
+        A mode set of this body.
     frame
-        Body reference frame. Default: that of the given static states, else Tisserand (mean axis), or the ground for a
-        held body.
+        Body reference frame. Default: the frame of the given static states, else Tisserand (mean axis), or the ground
+        for a held body.
     damping
-        Damping added to the body's own D, which is projected; default: none.
+        Damping in addition to the projection of the body's own D; default: none.
     stress
-        Whether to keep the stress of the modes at the kept nodes and the stress points, if the body knows it.
+        Whether to keep the stress of the modes at the kept nodes and the stress points, if the body provides it.
     geometric
         Whether to add the geometric stiffness of the unit loads (`cms.GeometricStiffness`). With it, a multibody system
         stiffens the body by its spin, accelerations and interface loads. Default: True if the elements are known and it
-        needs at most 2 GB (`cms.modes.families.cost`); a warning and the provenance say if
-        it is left out. It costs a factorisation, unless `source` brings one, the static solution of 12 + 6 n_interfaces
-        loads, and one pass over the elements. Alternatively, the static states of the unit loads (`unit_states`), which
-        need no further factorisation; `frame` is then omitted.
+        needs at most 2 GB (`cms.modes.families.cost`); otherwise a warning and the provenance say that it is left out.
+        It costs a factorisation (unless `source` has one), the static solution of 12 + 6 n_interfaces loads, and one
+        pass over the elements. The static states of the unit loads (`unit_states`) may be given instead of True: they
+        need no further factorisation, and `frame` is then omitted.
     quadratic
         Whether to add quadratic modes, the second-order displacement of every kept node (`quadratic_modes`), together
         with the geometric stiffness that supplies their inertia. They are meant for slender bodies and cost three
@@ -142,8 +143,8 @@ def reduce(
         condition = states.condition
     else:
         raise ModeSetError(
-            f"reduce: the unit states are those of body {states.body.name!r} in a {states.condition.frame.kind} frame; "
-            f"expected states of this very body {body.name!r}, and no frame beside them"
+            f"reduce: the unit states belong to body {states.body.name!r} in a {states.condition.frame.kind} frame; "
+            f"expected states of this body object {body.name!r}, and no other frame"
         )
     finished = finish(body, modes, condition)
     keeping = keep_nodes(body, keep) if keep else body
@@ -249,11 +250,12 @@ def reduced_moments(body: FEBody, Phi: Array, frame: BodyFrame) -> Moments:
 
 
 def with_near_second_moment(gram: Array, body: FEBody, frame: BodyFrame) -> Array:
-    """Return the Gram matrix with first and second moment about the origin of B where that is far from the mesh origin.
+    """Return the Gram matrix with more accurate first and second moments if B is far from the mesh origin.
 
-    About the mesh origin R has a relative error of eps (distance / size)². A unit rotation about the origin of B moves
-    a point by the coordinates that are needed: e_z × c has c_x along y. All dofs of the mesh take part, also those that
-    are held. The given array is overwritten if the rotations differ from the positions by rounding only.
+    About the mesh origin R has a relative error of eps (distance / size)². Here the moments are computed about the
+    origin of B, from the displacements of unit rotations, which are the coordinates: e_z × c has the y component c_x.
+    All dofs of the mesh are used, including fixed dofs. The given array is overwritten if the new moments agree with
+    the old ones except for rounding.
     """
     assert body.element_model is not None
     own, far = float(np.trace(gram[1:4, 1:4])), float(gram[0, 0] * (frame.origin @ frame.origin))

@@ -300,7 +300,7 @@ def test_a_file_of_version_1_is_converted_and_says_what_it_lacks():
     assert_allclose(new.moments.C2, 0, rtol=0, atol=1e-10)
     assert new.energy_shares.shape == (2, 2)
     assert all(label.startswith("nodal mode ") for label in new.labels)
-    with pytest.raises(BodyError, match="not on record"):
+    with pytest.raises(BodyError, match="not stored"):
         convert_frame(old, BuckensFrame())
 
 

@@ -111,7 +111,7 @@ def columns_within(budget: float, shape: ReductionShape) -> ReductionShape:
     if reduction_peak(shape) <= budget or reduction_peak(stored) >= reduction_peak(shape):
         return shape
     log.warning(
-        "memory: %d columns of %d dofs need %s, more than %s; they are stored on disk: %s, and up to %s on disk in "
+        "memory: %d columns of %d dofs need %s, more than %s; stored on disk they need %s, and up to %s on disk in "
         "%s. Fewer columns avoid this: interface_modes = 20 in [reduction] for interfaces of many nodes",
         shape.n_columns, shape.n_dof, gigabytes(reduction_peak(shape)), gigabytes(budget),
         gigabytes(reduction_peak(stored)), gigabytes(8.0 * ON_DISK * shape.n_dof * shape.n_columns),
@@ -159,8 +159,8 @@ def refusal(budget: float, inside: Peak, outside: Peak) -> str:
     }
     name = max(stages, key=lambda each: stages[each][0])
     return (
-        f"memory = {gigabytes(budget)}: this needs {gigabytes(inside.most)}, and {gigabytes(outside.most)} with its "
-        f"factor on disk, which is {name}; allow that much, or take {stages[name][1]}"
+        f"memory = {gigabytes(budget)}: this needs {gigabytes(inside.most)}, or {gigabytes(outside.most)} with its "
+        f"factor on disk, most for {name}; allow that much, or take {stages[name][1]}"
     )
 
 

@@ -29,11 +29,11 @@ __all__ = ["EigenResult", "FactorMismatchError", "eigenmodes", "no_modes", "orie
 
 SMALL = 300  #: number of dofs up to which dense matrices are faster
 LARGEST_DENSE = 3000  #: number of dofs up to which dense matrices are affordable if many of the modes are wanted
-SHIFT = 1e-6  #: shift for a free body over the median of K_kk / M_kk; near the first elastic omega²
+SHIFT = 1e-6  #: shift for a free body divided by the median of K_kk / M_kk; close to the first elastic omega²
 SHIFT_SMALL = 1e-4  #: the same for a small dense pencil
-ZERO = 1e-13  #: omega² over that median, below which it is rounding of K: a rigid-body mode
+ZERO = 1e-13  #: omega² divided by this median, below which it is rounding of K: a rigid-body mode
 TIGHTEST, LOOSEST = 1e-13, 0.1  #: smallest tolerance that rounding allows, and largest meaningful tolerance
-MISMATCH = 1e-3  #: residual of K x = omega² M x over its terms, up to which the factor can be that of K - sigma M
+MISMATCH = 1e-3  #: relative residual of K x = omega² M x, above which the factor is not that of K - sigma M
 MOST_PROOFS = 3
 GAP = 1e-4  #: relative gap between two values of omega² that is sufficient for counting modes
 
@@ -51,7 +51,7 @@ class EigenResult:
     omega2: Annotated[Array, ArrayShape(("n_modes",))]
     frequencies: Annotated[Array, ArrayShape(("n_modes",))]  #: natural frequencies [Hz]
     Phi: Annotated[Array, ArrayShape((None, "n_modes"))]  #: mode shapes; `SpreadColumns` if the body is distributed
-    #: |x - (omega² - sigma) (K - sigma M)⁻¹ M x|_M of x before its last inverse iteration; NaN: not measured
+    #: |x - (omega² - sigma) (K - sigma M)⁻¹ M x|_M for x before its last inverse iteration; NaN: not measured
     residuals: Annotated[Array, ArrayShape(("n_modes",), has_nan=True)]
     n_solves: int  #: number of solved right-hand sides
     method: str  #: name and settings of the solver
@@ -95,7 +95,7 @@ def eigenmodes(
     n_modes
         Number of modes, or a `ModeCount` for all modes up to a frequency [Hz], with or without proof.
     factorization
-        Existing factorisation of K - shift M; None: made and freed here.
+        Existing factorisation of K - shift M; None: K - shift M is factorised here, and the factor freed.
     solver
         Solver, or its name (`cms.linear_algebra.solvers.registry`), if no factorisation is given; default: the fastest
         installed solver.
@@ -106,10 +106,10 @@ def eigenmodes(
         Largest residual |x - (omega² - sigma) S x|_M of a unit x. It bounds the relative error of omega² - sigma; the
         actual error is of the order of its square.
     numbering
-        Numbers of the rows by which the random start vector is assigned. The rows of one body in two orders then start
-        equally, and the modes agree better than the tolerance. Default: the order of the rows.
+        Number of each row, which selects its value in the random start vector. A body with rows in another order then
+        has the same start vector, and its modes agree better than the tolerance. Default: the order of the rows.
     progress
-        Receives the number of modes found and the number wanted (0 while that is unknown).
+        Callback that receives the number of found modes and of wanted modes (0 while this is unknown).
 
     Raises
     ------
@@ -155,8 +155,7 @@ def eigenmodes(
         k = wanted.n if wanted.omega2 is None else int((modes.omega2[: modes.n_wanted] <= wanted.omega2).sum())
         residuals, method = modes.residuals, search.description
         n_solves, solver = operator.n_solves, factorization.description
-        # if K itself is factorised, there is no rigid-body mode, however far the mesh's omega² exceed those of the
-        # modes
+        # if K itself is factorised, there is no rigid-body mode, even if the highest omega² of the mesh is very large
         zero = max(ZERO * scale, 1e-9 * abs(shift)) if shift else 0.0
         if (modes.omega2 < -zero).any():
             raise EigenError(
@@ -170,7 +169,7 @@ def eigenmodes(
             space.close()
         stays = space is not None and space.has_rows_of(K)
         Phi = columns if stays else of_this_process(columns)
-        del columns  # before the space is closed, where ranks drop data without references
+        del columns  # before the space is closed, because ranks then free data without references
         Phi = combine(Phi, orientation(Phi, omega2)[:, :k], order="C")
     omega2 = omega2[:k]
     _require_match(K, M, Phi, omega2, shift, tolerance)
@@ -281,7 +280,7 @@ def orientation(Phi: Any, omega2: Array) -> Array:
     Phi
         Modes by ascending frequency, (n, k); distributed modes are collected one frequency at a time.
     omega2
-        Their squared frequencies, (k,) [1/s²].
+        Squared frequencies of the modes, (k,) [1/s²].
     """
     k = Phi.shape[1]
     Z = np.zeros((k, k))
@@ -308,8 +307,7 @@ def _standard_rotation(group: Array) -> Array:
         if length[row] > 0:
             direction = rest[row] / length[row]
             rest = rest - np.outer(rest @ direction, direction)
-    # rows of the leading entries = L Qᵀ with lower triangular L, so Q transforms them to L; its diagonal is made
-    # positive
+    # the leading rows are L Qᵀ with lower triangular L, so Q transforms them to L; signs make its diagonal positive
     Q, R = np.linalg.qr(group[leading].T)
     return Q * np.where(np.diag(R) < 0, -1.0, 1.0)
 

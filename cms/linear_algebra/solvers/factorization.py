@@ -30,7 +30,7 @@ __all__ = [
 #: relative residual after two solves, above which a matrix is singular; condition number 1e12 causes 1e-4
 SINGULAR = 1e-3
 
-#: a sparse matrix, or a block of one that is only formed while its entries are needed
+#: a sparse matrix, or a block of a larger matrix that is only computed while its entries are needed
 Matrix: TypeAlias = sp.csc_array | PrincipalBlock
 
 
@@ -170,7 +170,7 @@ def _ready(A: Matrix, definite: bool, solver: Solver) -> Callable[[], Factor]:
     if whole.shape[0] != whole.shape[1] or whole.shape[0] == 0:
         raise FactorizationError(f"factorize: expected a square matrix with at least one row, got {whole.shape}")
     if not np.isfinite(whole.data).all():
-        raise FactorizationError("factorize: the matrix holds NaN or infinite entries")
+        raise FactorizationError("factorize: the matrix contains NaN or infinite entries")
     lower = lower_triangle(whole)
     del whole
     if definite:

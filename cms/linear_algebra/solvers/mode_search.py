@@ -28,7 +28,7 @@ __all__ = ["BlockLanczos", "DenseSearch", "KrylovSearch", "RitzPairs"]
 # largest eigenvalues theta = 1 / (omega² - sigma) belong to the modes nearest above the shift.
 
 
-DEPENDENT = 1e-10  #: length of a new direction over that of its block, below which it is rounding
+DEPENDENT = 1e-10  #: length of a new direction relative to its block, below which it is rounding
 TAME = 1e-3  #: ratio of shortest to longest new direction, above which one orthogonalisation pass is exact to 1e-13
 SETTLED = 1e-12  #: share of the shortest new direction that a pass may remove without recomputing its product with M
 ROUNDOFF = 1e-14  #: error of M-orthonormal columns that needs no correction
@@ -205,9 +205,9 @@ MOST_COLUMNS = 40  #: largest number of solved columns per wanted mode and guard
 MOST_REFINEMENTS = 4
 VISIBLE = 1e-6  #: change of a mode in a solve that has no effect on the M-norm, because the changed part has no mass
 FLOOR = 1e-13  #: residual from the recurrence, below which it is only rounding
-NEGLIGIBLE = 1e-12  #: theta over the largest one, below which a mode has no mass
-NEGATIVE = 1e-8  #: size of a negative theta over the largest one, above which it is more than rounding
-MASSLESS = 1e-13  #: eigenvalue of M over the largest one, below which a direction has no mass
+NEGLIGIBLE = 1e-12  #: ratio of theta to the largest theta, below which a mode has no mass
+NEGATIVE = 1e-8  #: ratio of |theta| of a negative theta to the largest theta, above which it is not rounding
+MASSLESS = 1e-13  #: ratio of an eigenvalue of M to the largest, below which a direction has no mass
 
 
 class KrylovSearch:
@@ -258,7 +258,7 @@ class KrylovSearch:
                 if is_done:
                     return ritz, k
                 if lanczos.is_exhausted:
-                    raise EigenError(f"eigenmodes: expected {k} modes, found all there are: {len(ritz.theta)}")
+                    raise EigenError(f"eigenmodes: expected {k} modes, but only {len(ritz.theta)} exist")
                 # computing the eigenpairs of T becomes more expensive as T grows
                 next_look = max(lanczos.m + lanczos.m // 64, k)
                 lanczos.grow(basis_size(k, lanczos.block))
@@ -384,7 +384,6 @@ def refuse_negative(theta: Array) -> None:
     if len(theta) and theta[-1] < -NEGATIVE * theta[0]:
         raise EigenError(
             "eigenmodes: an eigenvalue omega² lies below the shift; expected a stiffness and a mass without negative "
-            "energy, and a shift below the lowest mode. A mass that is slightly indefinite, as some programs write "
-            "it, is "
+            "energy, and a shift below the lowest mode. A slightly indefinite mass, as some programs write it, is "
             "repaired by repair_mass = true in the [body] of a job, repair_mass=True of body_from_matrices"
         )

@@ -28,7 +28,7 @@ ANALYSE_AND_FACTORIZE, SOLVE, RELEASE = 12, 33, -1  # phase
 CHUNK = 64  #: number of right-hand sides per call; larger blocks are not faster, and the workspace grows with them
 #: pivots below 1e-13 of the matrix norm are set to this bound and counted; PARDISO then refines
 PIVOT_PERTURBATION = 13
-#: backward error of a stable factorisation, far above rounding (1e-15) and far below a lost one (1e-3 and more)
+#: largest backward error of a stable factorisation, far above rounding (1e-15), far below instability (1e-3 and more)
 STABLE = 1e-9
 
 NOT_FACTORIZED = {
@@ -100,7 +100,7 @@ class PardisoFactor:
         self._mtype = POSITIVE_DEFINITE if definite else INDEFINITE
         self._factorize(definite=definite, matching=not definite)
         if not definite and not (first := self._backward_error()) < STABLE:
-            # matching fixes pairs of pivots by the size of their entries, and the rest may then grow without bound
+            # matching chooses pairs of pivots by the size of their entries; remaining entries may grow without bound
             self.close()
             self._factorize(definite=False, matching=False)
             if not self._backward_error() < first:
@@ -146,7 +146,7 @@ class PardisoFactor:
     def _backward_error(self) -> float:
         """Return max |A x - b| / (|A| |x| + |b|) over the rows, from two solves with a random column.
 
-        It is rounding whatever the condition of A, unless pivots grow.
+        It is as small as rounding for any condition number of A, unless pivots grow.
         """
         b = self.solve(np.random.default_rng(0).standard_normal((self.n, 1)))
         b /= np.linalg.norm(b)

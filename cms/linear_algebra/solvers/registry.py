@@ -1,7 +1,7 @@
 """The solvers by name, for `--solver`, `solver` in job files and `solver=`.
 
 To add a solver, add a line to `SOLVERS`: its name, the function that makes a factor (`MakeFactor` of
-`fe_models.foundation.solver`), and the function that says what is missing, "" if nothing.
+`fe_models.foundation.solver`), and the function that describes what is missing ("" if nothing is).
 """
 
 from functools import partial
@@ -69,7 +69,7 @@ def solver_of(choice: str | Solver | None = None) -> Solver:
     Raises
     ------
     FactorizationError
-        If there is no solver of that name, or it is not installed; the message says what to install.
+        If there is no solver with this name, or it is not installed; the message says what to install.
     """
     if isinstance(choice, Solver):
         return choice

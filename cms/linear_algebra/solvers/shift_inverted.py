@@ -148,9 +148,9 @@ def measured_residual(operator: ShiftInverted, modes: Modes) -> tuple[float, flo
     Returns
     -------
     residual
-        In the M-norm: an estimate of the root of the sum, which bounds each |r_j|_M.
+        Estimate in the M-norm, (Σ_j |r_j|_M²)^½, which bounds each |r_j|_M.
     defect
-        The same without M, relative to the columns; this also measures massless components.
+        Estimate in the Euclidean norm, relative to the columns; it includes massless components.
     """
     k = modes.n_wanted
     Z, above_shift = modes.Z[:, :k], modes.omega2[:k] - operator.shift

@@ -26,7 +26,7 @@ from fe_models.foundation.sparse.submatrix import spread_block
 __all__ = ["RankSpace", "SlepcSearch", "search_on_ranks"]
 
 
-# the tall columns of an iteration, distributed by rows: rank 0 holds keys of them, and small matrices -----------------
+# the tall columns of an iteration, distributed by rows: rank 0 stores their keys, and small matrices ------------------
 # Rank 0 runs the iteration and decides. All ranks perform operations on columns with their own rows at once. The rows
 # are distributed like those of the factor, so solves need no redistribution, and no array as long as the body passes
 # through rank 0.
@@ -96,9 +96,9 @@ class RankSpace:
 def search_on_ranks(
     factorization: Inverse, numbering: IntArray | None
 ) -> tuple["type[SlepcSearch] | None", RankSpace | None]:
-    """Return the mode search of a solver on ranks, None for block Lanczos, and where block Lanczos has its columns.
+    """Return the mode search of the solver, None for block Lanczos, and the space for the columns of block Lanczos.
 
-    Without a factor on several ranks, both are None: block Lanczos with the arrays of this process.
+    The space is None unless the factor is distributed over several ranks: then the columns are arrays of this process.
     """
     if not isinstance(factorization, Factorization) or not isinstance(factorization.factor, PetscFactor):
         return None, None
@@ -143,7 +143,7 @@ def solved_here(ranks: Ranks, key: str, rows: Rows, b: Part) -> Array:
 
 GUARDS = 4  #: number of modes beyond the wanted ones, which show where the cutoff frequency is exceeded
 FIRST_GUESS = 30  #: assumed number of modes if only a cutoff frequency is given
-#: factor on the tolerance of the caller for SLEPc, which applies it to theta, whose error is the residual squared
+#: factor on the caller's tolerance for SLEPc, which tests the error of theta, and this is the square of the residual
 SHARPER = 1e-6
 
 

@@ -80,7 +80,7 @@ class Blocks:
 
     @cached_property
     def by_height(self) -> IntArray:
-        """Priority of each block on the way down, (n_blocks,): blocks with the longest path below come first."""
+        """Priority of each block in the back substitution, (n_blocks,): the longest path below comes first."""
         height = self.work.copy()
         for k, above in enumerate(self.above):
             if above >= 0:

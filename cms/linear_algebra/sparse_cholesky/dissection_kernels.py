@@ -13,7 +13,7 @@ __all__ = ["dissect"]
 jit = njit(cache=True, nogil=True, error_model="numpy")
 
 WAYS = 6  #: number of orderings of a part; each gives a cut
-NEAR = 1.5  #: cost over the smallest cost up to which cuts are refined; then the best is used
+NEAR = 1.5  #: largest ratio of a cut's cost to the smallest cost for which it is refined; the best refined cut is used
 
 
 @jit

@@ -84,7 +84,7 @@ class PanelsInFile:
         if status is not None and status.f_bavail * status.f_frsize < needed:
             self._file.close()
             raise FactorRoomError(
-                f"the factor takes {needed / 1e9:.3g} GB of disk, {where} has "
+                f"the factor needs {needed / 1e9:.3g} GB of disk, {where} has "
                 f"{status.f_bavail * status.f_frsize / 1e9:.3g} GB; choose another folder by TMPDIR"
             )
 

@@ -1,8 +1,8 @@
 """Compiled loops over fronts that compute the factor; imported only where used.
 
 A front with w columns and u rows below them is stored as F, (w + u, w), and its update matrix as U, (u, u), column by
-column in flat arrays. Of symmetric parts only the lower triangle is used. Update matrices in a subtree lie on a stack
-until the parent takes them.
+column in flat arrays. Of symmetric parts only the lower triangle is used. Update matrices in a subtree are stored on a
+stack until they are added to the parent.
 """
 
 from typing import Any, NamedTuple
@@ -28,7 +28,7 @@ __all__ = [
 ]
 
 TOGETHER = 8  #: number of tiles that are written together
-STRIPE = 64  #: columns whose rows below BLAS eliminates at once; products do the rest, at twice the speed
+STRIPE = 64  #: number of columns per triangular solve of BLAS; products between stripes do the rest, twice as fast
 
 jit = njit(cache=True, nogil=True, error_model="numpy")
 

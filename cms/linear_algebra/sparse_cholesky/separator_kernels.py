@@ -129,11 +129,11 @@ def best_move(graph, cut, largest):
 
 @jit
 def refine(graph, cut):
-    """Improve a separator by moving its vertices, which pull neighbours into it; return its cost.
+    """Improve a separator by moving its vertices to a side; neighbours on the other side enter it. Return its cost.
 
-    (1) among the vertices that have not moved in this pass, the one with the largest gain moves, even at a loss; its
-        neighbours on the other side enter the separator
-    (2) the best intermediate separator is kept; passes end when one brings no gain
+    (1) among the vertices that have not moved in this pass, move the one with the largest gain, even if the gain is
+        negative; its neighbours on the other side enter the separator
+    (2) restore the best separator of the pass; end when a pass brings no gain
     """
     best = cost_of(cut.size)
     largest = LARGEST * cut.size.sum()

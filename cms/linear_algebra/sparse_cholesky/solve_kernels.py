@@ -1,9 +1,9 @@
 """Compiled substitution with the tiles of fronts; imported only where used.
 
-Columns pass together in rows of `width` = 8 len(parts) numbers (`cms.linear_algebra.sparse_cholesky.tiles`). A front
-has its own rows of them. On the way up it also has rows with the contributions of itself and its descendants to the
-rows below its columns, which its parent takes. There are as many rows as the tiles have, so the last ones may be
-unused.
+Right-hand sides are stored by rows of `width` = 8 len(parts) numbers (`cms.linear_algebra.sparse_cholesky.tiles`). A
+front has such rows for its own columns. In the forward substitution it also has the contributions of itself and its
+descendants to the rows below its columns, which are added to the rows of its parent. The number of rows is rounded up
+to whole tiles, so the last rows may be unused.
 """
 
 import numpy as np
@@ -38,7 +38,10 @@ def begin_rows(tree, f, parts, order, b, own, below):
 
 @jit
 def take_rows(place, left, w, width, own, below):
-    """Add the contributions of a child to the rows of its parent, one row for each row below the child."""
+    """Add a child's contribution to its parent: row k of `left` goes to row place[k] of the parent front.
+
+    The rows of a front are its own columns first, then the rows below them.
+    """
     for k in range(place.size):
         if place[k] < w:
             at = place[k] * width

@@ -148,7 +148,7 @@ def largest_eigenpairs(A: Array, above: float) -> tuple[Array, Array]:
 # elimination ----------------------------------------------------------------------------------------------------------
 
 
-DEPENDENT = 1e-10  #: size of a constraint over the largest one, below which it is redundant
+DEPENDENT = 1e-10  #: size of a constraint relative to the largest, below which it is redundant
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +165,8 @@ class Substructure:
     children: tuple[int, ...]
     #: pivots of a root with multipliers, whose L then has the factors of SciPy's `lu_factor`; otherwise None
     pivots: IntArray | None = None
-    spread: Array | None = None  #: in that case S with S Sᵀ f = u for [K Cᵀ; C 0] [u; .] = [f; 0], (s, s - n_ties)
+    #: root with multipliers: S with S Sᵀ f = u for [K Cᵀ; C 0] [u; .] = [f; 0], (s, s - n_ties); otherwise None
+    spread: Array | None = None
 
     @property
     def stop(self) -> int:
@@ -249,12 +250,12 @@ def eliminate_part(part: Part) -> Reduced:
 def eliminate(
     part: Part, t: int, below: Sequence[Remainder], children: tuple[int, ...]
 ) -> tuple[Substructure, Remainder]:
-    """Eliminate substructure t of a part; s are its dofs, b those of enclosing separators.
+    """Eliminate substructure t of a part; s are its dofs, b the dofs of enclosing separators.
 
     (1) assemble K and M of s and b: entries of the body in the columns of s, plus contributions of the substructures
         below
     (2) K_ss = L Lᵀ,  W = L⁻¹ K_sb,  Psi = -L⁻ᵀ W;  K_bb <- K_bb - Wᵀ W
-    (3) modes with b held: K_ss phi = omega² M_ss phi up to the bound; none if K_ss - bound M_ss is positive definite
+    (3) modes with b fixed: K_ss phi = omega² M_ss phi up to the bound; none if K_ss - bound M_ss is positive definite
     (4) M_bb <- Psi_ᵀ M Psi_ with Psi_ = [Psi; 1]: M_bb + Psiᵀ X + Xᵀ Psi,  X = M_sb + M_ss Psi / 2
     (5) mass between own modes and b: phiᵀ (M_sb + M_ss Psi);  between modes below and b: D_b + D_s Psi, and own modes:
         D_s phi
@@ -320,7 +321,7 @@ def _root_with_multipliers(
     Q, R, _ = la.qr(C.T, pivoting=True)
     size = np.abs(np.diag(R))
     if not (len(size) and size[-1] > DEPENDENT * size[0]) or len(size) < len(C):
-        raise FactorizationError("substructures: ties of distributing interfaces depend on each other")
+        raise FactorizationError("substructures: constraints of distributing interfaces are linearly dependent")
     Z = Q[:, len(C) :]
     K, M = (np.asfortranarray(Z.T @ A[np.ix_(~is_tie, ~is_tie)] @ Z) for A in (K_ss, M_ss))
     L = K.copy(order="F")

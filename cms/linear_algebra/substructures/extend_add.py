@@ -13,7 +13,8 @@ jit = njit(cache=True, nogil=True, error_model="numpy")
 def extend_add(A_ss, A_sb, A_bb, A, place, p):
     """Add the lower triangle of A, (n, n), to lower triangles A_ss, (s, s), and A_bb, (b, b), and to A_sb, (s, b).
 
-    The first p rows of A belong to positions `place` of s, the others to those of b; both ascend. Fortran order.
+    The first p rows of A belong to positions `place` in s, the others to positions in b; both are ascending. All
+    matrices are in Fortran order.
     """
     n = len(A)
     for j in range(p):

@@ -38,10 +38,10 @@ def guessed_omega2(dissection: Dissection, K: sp.csc_array, M: sp.csc_array, cou
     """Estimate omega² of the highest of `count` modes, tending to be too high [1/s²].
 
     (1) choose subtrees that share no dof, each with some of the wanted modes
-    (2) compute the modes of a few of them, with all other dofs held
+    (2) compute the modes of a few of them, with all other dofs fixed
     (3) take the count-th of all these modes, each weighted with the number of dofs that it represents
 
-    Holding dofs raises frequencies. With all subtrees, (3) would be an upper bound; a sample gives an estimate.
+    Fixed dofs raise frequencies. With all subtrees, (3) would be an upper bound; a sample gives an estimate.
     """
     starts, parents = dissection.starts, dissection.parents
     first = dissection.first_of_subtrees()
@@ -79,14 +79,14 @@ def _lowest(K: sp.csc_array, M: sp.csc_array, dofs: IntArray, n_modes: int) -> A
 log = logging.getLogger(__name__)
 
 LEAF = 200  #: number of dofs of a part; larger parts need more arithmetic, smaller parts more calls
-#: guard modes beyond the wanted ones that take part: a number, and a share of the wanted modes
+#: number of guard modes that are computed beyond the wanted modes: a constant, plus a share of the wanted modes
 GUARDS, GUARD_SHARE = 12, 0.08
 MOST_STEPS = 8  #: largest number of inverse iteration steps
 SHARE = 8  #: smallest number of interior dofs per wanted mode
-#: cutoff factors: the number of modes grows with frequency for a surface, and with its third power for a solid
+#: cutoff factors: the number of modes is proportional to frequency for a surface, and to its third power for a solid
 THIN, SOLID = 20.0, 4.0
-DENSER, MANY = 14.0, 400  #: cutoff factor of shells, and largest number of dofs per wanted mode for which it applies
-TOO_HIGH = 1.5  #: factor by which the estimate of the highest frequency is usually too high, or more
+DENSER, MANY = 14.0, 400  #: cutoff factor of shells with at most so many dofs per wanted mode
+TOO_HIGH = 1.5  #: factor by which the estimate of the highest frequency is usually at least too high
 MARGIN = 1.1  #: factor on a cutoff frequency, because reduced frequencies are above the true ones
 #: increase of the bound (as a frequency) if too few substructure modes are found, and number of increases
 RAISE, MOST_RAISES = 2.0, 3
@@ -124,7 +124,7 @@ class MultilevelResult:
     errors: Array  #: upper estimate of the relative error of each frequency, (k,)
     n_steps: int  #: number of inverse iteration steps
     n_reduced: int  #: total number of modes of all substructures
-    cutoff_factor: float  #: frequency up to which substructure modes are retained, over the highest wanted frequency
+    cutoff_factor: float  #: highest frequency of retained substructure modes divided by the highest wanted frequency
     tree: SubstructureTree
 
     def __post_init__(self) -> None:
@@ -148,29 +148,29 @@ def multilevel_modes(
         too high by the factor `TOO_HIGH`
     (3) every substructure is reduced to its own modes up to the bound, and eliminated from the enclosing ones; this is
         repeated with a higher bound if there are fewer modes than wanted plus guards
-    (4) for a number of modes: a better estimate of the highest frequency, from the reduced pencil up to the first
-        estimate, gives a lower bound that keeps enough modes
-    (5) the lowest modes of the reduced pencil, expanded down the tree
-    (6) steps of inverse iteration with the tree, while the remaining error is above the tolerance
+    (4) for a number of modes: estimate the highest frequency again, from the reduced pencil up to the first estimate;
+        lower the bound accordingly
+    (5) compute the lowest modes of the reduced pencil, and expand them down the tree
+    (6) take steps of inverse iteration with the tree while the remaining error is above the tolerance
 
     The frequencies are those of a Rayleigh-Ritz basis, so they are never below the true ones.
 
     Parameters
     ----------
     interior
-        The interior; its stiffness is definite except for multipliers.
+        Interior of the body; its stiffness is positive definite except for multipliers.
     wanted
         A number of modes, or all up to a cutoff, with or without proof by the inertia of a factorisation. Without the
         proof, a mode closer below the cutoff than the tolerance may be missed, because its frequency is too high.
     tolerance
-        Largest relative error of a frequency. A warning reports larger errors that remain after some steps.
+        Largest relative error of a frequency. If larger errors remain after `MOST_STEPS` steps, a warning reports them.
     cutoff_factor
         A larger factor keeps more substructure modes and needs fewer steps (6). None: 20 for shells and beams, 14 if
         there are at most 400 interior dofs per wanted mode, 4 for solids.
     tasks
-        Where subtrees are eliminated; None: in threads of this process.
+        Workers that eliminate subtrees; None: threads of this process.
     rows
-        Number of dofs of the returned modes, and which of them are the interior; None: the modes are over the interior.
+        Number of dofs of the returned modes, and the indices of interior dofs; None: the modes have only interior dofs.
     solver
         Solver for the proof; None: the fastest installed solver.
 
@@ -227,8 +227,8 @@ def multilevel_modes(
     k = count if wanted.n is not None else int((modes.omega2 <= highest).sum())
     if wanted.n is None and k == p < kept.sum():
         raise EigenError(
-            f"multilevel: {wanted.description}: all {p} modes that take part came to lie below it, so that others "
-            "may be missing; choose a larger cutoff_factor"
+            f"multilevel: {wanted.description}: all {p} computed modes are below this frequency, so others may be "
+            "missing; choose a larger cutoff_factor"
         )
     errors = errors[:k]
     if (worst := errors > tolerance).any():

@@ -76,7 +76,7 @@ class ApproximateModes:
         (1) r = x - omega² K⁻¹ M x,  a = |r|²_K / omega²,  b = |r|²_M  for each mode, with one solve for each
         (2) for many modes: a from above by random probes; b / a from sums of neighbours, r_j / omega_j with random
             signs
-        (3) (a + b / (1 - omega² / omega_next²)) / 2, where omega_next is the first mode that does not take part
+        (3) (a + b / (1 - omega² / omega_next²)) / 2, where omega_next belongs to the first mode that is not iterated
             (docs/theory.md §2)
         (4) repeat (1) for those that (2) finds above the tolerance, at most for the worst `PROBES`
         """
@@ -122,9 +122,9 @@ class ApproximateModes:
     def _probed(self, count: int) -> Array:
         """Step (2): return an upper bound of a for each mode, valid except for one mode in a thousand, (count,).
 
-        With y = omega² M x - K x, a is yᵀ K⁻¹ y / omega². For probes w with covariance K⁻¹, (wᵀ y)² has this as its
-        mean, and a sum over the probes has a chi² distribution. It is divided by the quantile below which it hardly
-        ever lies.
+        With y = omega² M x - K x, a is yᵀ K⁻¹ y / omega². For random probes w with covariance K⁻¹, (wᵀ y)² has the mean
+        omega² a, and its sum over the probes has a chi² distribution. The sum is divided by the quantile of probability
+        `RARE`.
         """
         W = np.random.default_rng(0).standard_normal((self.tree.n, PROBES))
         self.tree.spread_ordered(W)
@@ -170,8 +170,8 @@ def reduced_modes(omega2: Array, M: ReducedMass, count: int) -> tuple[Array, Arr
     """Return the lowest `count` eigenvalues, ascending, and M-orthonormal vectors, (n, count).
 
     (1) solve the pencil of the lowest substructure modes, some for each wanted mode
-    (2) use four times as many, and so on up to all, adding new ones to first order; if that is not accurate enough, use
-        subspace iteration that starts with these vectors
+    (2) use four times as many, and so on up to all, and add the new modes by a first-order correction; if this is not
+        accurate enough, continue by subspace iteration from these vectors
     """
     n = len(omega2)
     few = min(n, max(START * count, DENSE // 2))
@@ -193,7 +193,7 @@ def reduced_modes(omega2: Array, M: ReducedMass, count: int) -> tuple[Array, Arr
 def _widened(omega2: Array, M: ReducedMass, lam: Array, Z: Array, is_new: NDArray[np.bool_]) -> tuple[Array, Array]:
     """Step (2): return the eigenpairs with new substructure modes in addition to those of Z, (n_old, k).
 
-    (1) contribution of a step of subspace iteration along the new modes, d = D⁻¹ M_no Z Lambda; it only scales Z
+    (1) components of a step of subspace iteration along the new modes, d = D⁻¹ M_no Z Lambda; the step only scales Z
     (2) H = Lambda + B,  B = dᵀ D d;  G = 1 + A + Aᵀ + dᵀ M_nn d,  A = dᵀ M_no Z = B Lambda⁻¹
     (3) H c = lam G c,  Z <- [Z; d] C
     """
@@ -213,9 +213,9 @@ def _symmetric(A: Array) -> Array:
 
 
 def _is_settled(before: Array, lam: Array, cut: float) -> bool:
-    """Return whether the remaining share of the last change is small after a step.
+    """Return whether the error that remains after a step, as a share of the last change, is small.
 
-    The missing part of the modes lies along modes above the cut; a step leaves about (lam / cut)² of their error.
+    The missing part of the modes lies along modes above the cut; a step reduces it by a factor of about (lam / cut)².
     """
     left = (before / lam - 1) * np.minimum(LAG * (lam / cut) ** 2, 0.5)
     return bool((left <= SETTLED).all())
@@ -228,7 +228,7 @@ def _lowest(omega2: Array, few: int) -> NDArray[np.bool_]:
 def _iterated(omega2: Array, M: ReducedMass, lam: Array, Z: Array, cut: float) -> tuple[Array, Array]:
     """Step (2): subspace iteration Y = D⁻¹ M Z, D = diag(omega²), H = Yᵀ D Y, G = Yᵀ M Y, H c = lam G c, Z <- Y C.
 
-    It ends when the error that a step leaves is small.
+    It ends when the error after a step is small.
     """
     M_Z = M @ Z
     for _ in range(MOST_STEPS):

@@ -97,8 +97,8 @@ class SubstructureTree:
     def solve_ordered(self, b: Array) -> None:
         """Overwrite b, (n, k) in C order, rows in elimination order, with K⁻¹ b.
 
-        (1) up: f_b <- f_b + Psiᵀ f_s from all substructures below;  u_s = K_ss⁻¹ f_s
-        (2) down: u_s <- u_s + Psi u_b
+        (1) forward, from the leaves to the root: f_b <- f_b + Psiᵀ f_s;  u_s = K_ss⁻¹ f_s
+        (2) back, from the root to the leaves: u_s <- u_s + Psi u_b
         """
 
         def part(columns: slice) -> None:
@@ -128,7 +128,8 @@ class SubstructureTree:
     def spread_ordered(self, Xi: Array) -> None:
         """Overwrite Xi, (n, k) in C order, rows in elimination order, with W Xi, where W Wᵀ = K⁻¹.
 
-        From the root down: u_s = L_s⁻ᵀ xi_s + Psi u_b. With multipliers, W Wᵀ f = K⁻¹ f on the motions, for f on them.
+        From the root down: u_s = L_s⁻ᵀ xi_s + Psi u_b. With multipliers, W Wᵀ f = K⁻¹ f holds for the motions, if f has
+        no entries on multipliers.
         """
 
         def part(columns: slice) -> None:
@@ -166,9 +167,9 @@ def substructure_tree(
     multipliers
         Multipliers, as dofs in elimination order; the root owns them and the dofs that they tie.
     tasks
-        Where subtrees are eliminated; None: in threads of this process.
+        Workers that eliminate subtrees; None: threads of this process.
     progress
-        Receives the number of finished tasks and of all tasks.
+        Callback that receives the number of finished tasks and of all tasks.
 
     Raises
     ------
@@ -198,7 +199,7 @@ def substructure_tree(
         for run, each in zip(runs, tasks.map(eliminate_part, parts, progress=progress), strict=True):
             keep(run, each)
         del parts
-    # one BLAS thread each: OpenBLAS threads wait for each other longer than they work on fronts of this size
+    # one BLAS thread per task: on fronts of this size, OpenBLAS threads would mostly wait for each other
     with bounded_threads(1), ThreadPoolExecutor(body.n_threads) as pool:
         if tasks is None:
             work.update({pool.submit(eliminate_part, body.part(run)): run for run in runs})

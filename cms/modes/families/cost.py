@@ -2,8 +2,8 @@
 
 The geometric stiffness has a matrix over all modes for each unit load: 12 loads of the frame, 6 distributed over the
 nodes, and 6 for each interface (for kind "nodes", of the mean motion of its nodes). Forty interfaces and two thousand
-modes need 9 GB, which is too much for a default. Fewer modes (interface reduction) or loads of chosen interfaces only
-make it small; loads at the other interfaces then do not stiffen the body.
+modes need 9 GB, which is too much for a default. It becomes small with fewer modes (interface reduction), or with the
+loads of chosen interfaces only; loads at the other interfaces then do not stiffen the body.
 """
 
 import os
@@ -26,10 +26,10 @@ PROPOSED = 20  #: number of interface modes that the report proposes
 SQUARES = 26  #: number of matrices over the modes in a modal file: moments, invariants, M, K, D, columns
 TALL = 3  #: number of arrays over all dofs and columns in memory together: columns, shapes, mesh displacement
 TALL_PRODUCTS = 10.0  #: number of products of two such arrays: Gram matrices, shapes, moments
-CUBES = 100.0  #: operations of eigenproblems and matrix products over the cubed number of columns
+CUBES = 100.0  #: operations of eigenproblems and matrix products, divided by the cube of the number of columns
 UNASKED = 2e9  #: largest size of a geometric stiffness that is computed by default [bytes]
-HELD = 4.0  #: peak memory of its computation over its size
-SPARSE = 10.0  #: time of an operation in a sparse product over that in a dense product
+HELD = 4.0  #: peak memory while the geometric stiffness is computed, divided by its size
+SPARSE = 10.0  #: time of an operation in a sparse product divided by its time in a dense product
 NAMED = 5  #: largest number of interfaces that a note lists
 
 #: whether to compute the geometric stiffness, or the interfaces whose loads it includes
@@ -64,9 +64,10 @@ def reduction_cost(body: FEBody, n_columns: int, *, stress: bool = True, n_const
     n_columns
         Number of columns of the mode set.
     stress
-        Whether the file holds the stress of the modes.
+        Whether the file contains the stress of the modes.
     n_constraint_modes
-        Number of constraint modes that are combined to fewer columns: they are held twice, and have one Gram matrix.
+        Number of constraint modes that are combined to fewer columns. Two copies of them are in memory, and they have
+        one Gram matrix.
     """
     n, k = body.n_dof, n_columns
     n_kept = len(np.unique(np.concatenate([body.surface.ravel(), *(each.nodes for each in body.interfaces)])))
@@ -92,8 +93,8 @@ def large_interfaces(body: FEBody) -> list[str]:
     fewer = reduction_cost(body, interface_reduction_size(body, PROPOSED), n_constraint_modes=len(body.b)).description
     return [
         f"body {body.name!r}: interface {interface.name!r} of {len(interface.nodes)} nodes has "
-        f"{len(np.asarray(interface.dofs))} boundary dofs: as many static solves and modes of the body. With all of "
-        f"them: {whole}. Consider interface reduction: interface_modes = {PROPOSED} in [reduction] "
+        f"{len(np.asarray(interface.dofs))} boundary dofs, each with a static solution and a mode of the body. With "
+        f"all of them: {whole}. Consider interface reduction: interface_modes = {PROPOSED} in [reduction] "
         f"(with_characteristic_modes) keeps its rigid motions and its softest modes: {fewer}; kind rigid or "
         "distributing has 6"
         for interface in large
@@ -187,7 +188,7 @@ def remedies(body: FEBody, n_modes: int) -> str:
         )
     first = body.interfaces[0].name if body.interfaces else ""
     return (
-        f"{reduced}geometric_stiffness = [{first!r}] has the loads of the frame and of the interfaces it names alone, "
+        f"{reduced}geometric_stiffness = [{first!r}] has only the loads of the frame and of the named interfaces, "
         f"{stiffness_bytes(body, n_modes, [first]) / 1e9:.2g} GB and about "
         f"{duration(stiffness_seconds(body, n_modes, [first]))} for one".replace("'", '"')
     )

@@ -57,7 +57,7 @@ class Families(AbstractContextManager["Families"]):
     def __init__(
         self, body: FEBody, *, announce: bool = True, solver: str | Solver | None = None, to_disk: bool = False
     ) -> None:
-        """Find the rigid-body modes and fixed dofs of a coupled body; families are computed when they are first used.
+        """Find the rigid-body modes and held dofs of a coupled body; families are computed when they are first used.
 
         Parameters
         ----------
@@ -90,7 +90,7 @@ class Families(AbstractContextManager["Families"]):
         self._flexibilities: dict[bytes, Flexibility] = {}
         #: independent rigid-body modes about the mean of the nodes, (n_dof, n_r), and their components, (n_r,)
         self.Psi_R, self.rigid_components = independent_rigid_modes(body)
-        #: determinate dofs R, ascending, (n_r,), and those in the interior if B leaves a rigid-body motion free
+        #: determinate dofs R, ascending, (n_r,), and those of them in the interior if B leaves a rigid-body motion free
         self.r, self.interior_r = determinate_partition(body, self.Psi_R)
         self.h = np.concatenate([body.b, self.interior_r])  #: held dofs: B, then the interior dofs of R, (n_h,)
 
@@ -101,7 +101,7 @@ class Families(AbstractContextManager["Families"]):
         self._is_open = False
 
     def forget_vibration_modes(self) -> None:
-        """Discard the vibration modes: their roundoff depends on the number of modes requested before."""
+        """Discard the vibration modes, because their roundoff depends on the number of modes requested before."""
         self._modes.clear()
 
     # -- Partition -------------------------------------------------------------------------------------------------
@@ -249,7 +249,7 @@ class Families(AbstractContextManager["Families"]):
         if (force > GROUNDED * scale).any():
             raise BodyError(
                 f"body {self.body.name!r}: K times its rigid-body modes is {(force / scale).max():.1e} of |K|, "
-                "expected 0: held to the ground, or nodes not where K has them; release it, or mend the nodes"
+                "expected 0: held to the ground, or nodes have wrong positions; release it, or correct the nodes"
             )
 
     def _cached(

@@ -101,7 +101,7 @@ def _mechanism_message(body: FEBody, i: IntArray, K_ii: sp.csc_array, M_ii: sp.c
     start = f"body {body.name!r}: with all interfaces held its stiffness is singular"
     try:
         modes = eigenmodes(K_ii, M_ii, n_modes=min(7, len(i) - 1), solver=solver)
-    # the mechanism matters more than the reason why its motion could not be computed
+    # report the mechanism, even if its motion could not be computed
     except (EigenError, FactorizationError):
         return f"{start}; it has a mechanism, or a part that no interface holds"
     energy = np.einsum("nk,nk->k", modes.Phi, K_ii @ modes.Phi)
@@ -132,14 +132,12 @@ class CondensedBody:
 def held_factor(
     condensed: CondensedBody, Z: Array, S_z: Array, e: IntArray, K_load: Array | None = None
 ) -> tuple[Array, tuple[Array, bool]]:
-    """Factorise S_ee, scaled by its diagonal: the scale, (n_e,), and the Cholesky factor.
-
-    S_z = Zᵀ (S + K_load) Z.
+    """Factorise S_ee, a block of S_z = Zᵀ (S + K_load) Z; return its scale (n_e,), from its diagonal, and its factor.
 
     Raises
     ------
     BodyError
-        If a motion of z_e costs neither the body nor its load any energy: a mechanism.
+        If a motion z_e has no energy in the body and its load: a mechanism.
     """
     S_ee = S_z[np.ix_(e, e)]
     if not len(e):
@@ -154,6 +152,6 @@ def held_factor(
         return size, la.cho_factor(S_ee * np.outer(size, size), lower=True)
     except la.LinAlgError as error:
         raise BodyError(
-            f"body {body.name!r}: its stiffness seen from the interfaces is lost in the rounding of much larger terms; "
-            "give stiff springs and stiff short members stiffnesses nearer to those of their neighbours"
+            f"body {body.name!r}: its stiffness at the interfaces is lost in the rounding of much larger terms; "
+            "choose stiffnesses of stiff springs and short stiff members closer to those of their neighbours"
         ) from error

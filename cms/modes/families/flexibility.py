@@ -29,7 +29,7 @@ from fe_models.foundation.tall.columns import combine, inner, of_this_process
 __all__ = ["BoundaryConditions", "Flexibility", "elastic_modes"]
 
 RIGID_MOTION = 1e-7  #: violation of the boundary conditions by a unit rigid-body motion, below which the motion is free
-COUNTED = 1e-11  #: eigenvalue of the scaled boundary block over the largest one, above which its sign is certain
+COUNTED = 1e-11  #: relative eigenvalue of the scaled boundary block, above which its sign is certain
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ class Flexibility:
     """
 
     def __init__(self, condensed: CondensedBody, conditions: BoundaryConditions, r: IntArray | None = None) -> None:
-        """Prepare the operator; r gives the pivots among the columns of Z, which pivoted QR would choose otherwise."""
+        """Prepare the operator; r are the pivots among the columns of Z; None: pivoted QR chooses them."""
         self.condensed, self.conditions = condensed, conditions
         body, h, Z = condensed.fixed.body, condensed.fixed.b, conditions.Z
         self._K_hi = sp.csr_array(body.K[:, h].T)[:, condensed.fixed.i]
@@ -224,7 +224,7 @@ def _free_motions(condensed: CondensedBody, conditions: BoundaryConditions) -> A
     scaled = scaled / column
     against = scaled - (Z / size[:, None]) @ (Z.T @ (scaled * size[:, None]))
     spring = _root_of_load(condensed, conditions, size) @ (Psi_R[h] / column)
-    no_condition = np.zeros((Psi_R.shape[1], Psi_R.shape[1]))  # rows for all rigid-body motions, or a vector is missing
+    no_condition = np.zeros((Psi_R.shape[1], Psi_R.shape[1]))  # enough rows that the SVD returns all right vectors
     _, sizes, vectors = la.svd(np.vstack([against, spring, no_condition]), full_matrices=False)
     return (Psi_R / column) @ vectors[sizes < RIGID_MOTION].T
 
@@ -232,7 +232,7 @@ def _free_motions(condensed: CondensedBody, conditions: BoundaryConditions) -> A
 def _root_of_load(condensed: CondensedBody, conditions: BoundaryConditions, size: Array) -> Array:
     """Return R with Rᵀ R = K_load / k, (k, n_h), where k is the largest stiffness of the body at the interfaces.
 
-    Singular values of R resolve motions of the size of rounding, the eigenvalues of K_load their squares alone.
+    Singular values of R resolve motions of the size of rounding; eigenvalues of K_load would be their squares.
     """
     if conditions.K_load is None:
         return np.zeros((0, len(size)))
@@ -287,7 +287,7 @@ def _expansion(condensed: CondensedBody, Z: Array) -> sp.csc_array:
 # vibration modes of a body whose interfaces are free, loaded, or partly held (docs/theory.md §2) ----------------------
 
 
-#: rounding of a body's energy over the energy of a mode that its neighbours alone hold, above which omega² is lost
+#: for a mode held by the neighbours alone: rounding of the body's energy relative to omega², above which omega² is lost
 LOST = 2e-3
 
 
@@ -320,17 +320,17 @@ def _lost_in_rounding(flexibility: Flexibility) -> EigenError:
     softest = "" if load is None else f", those of its neighbours {np.abs(np.diag(load)).max():.1e} at most"
     name = flexibility.condensed.fixed.body.name
     return EigenError(
-        f"body {name!r}: its slowest modes are lost in rounding: some motion besides the "
-        f"rigid ones has almost no stiffness compared with the largest stiffness, {largest:.1e}{softest}; rounding is "
-        f"some {np.finfo(float).eps * largest:.1e}: increase the stiffness of this motion, or remove it"
+        f"body {name!r}: its slowest modes are lost in rounding: some motion besides the rigid ones has almost no "
+        f"stiffness compared with the largest stiffness, {largest:.1e}{softest}; rounding is about "
+        f"{np.finfo(float).eps * largest:.1e}: increase the stiffness of this motion, or remove it"
     )
 
 
 def _proven(flexibility: Flexibility, modes: EigenResult, asked: ModeCount) -> EigenResult:
     """Return the modes after a check that the inertia confirms their number, counted for boundary and interior.
 
-    The proof of `eigenmodes` factorises K - sigma M as a whole. The reference node of a distributing interface has
-    neither mass nor stiffness, only multipliers, so that its pivots there are zero.
+    The proof of `eigenmodes` would factorise K - sigma M as a whole. This fails for the reference node of a
+    distributing interface, which has zero pivots, because it has multipliers but neither mass nor stiffness.
     """
     k = len(modes.omega2)
     wanted = ModeCount(k) if asked.cutoff is None else asked

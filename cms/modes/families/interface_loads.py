@@ -16,8 +16,8 @@ from fe_models.foundation.tall.columns import of_this_process
 
 __all__ = ["InterfaceLoad", "boundary_load", "condensed_load", "point_load"]
 
-INDEFINITE = 1e-10  #: negative eigenvalue of a scaled load over the largest one, above which it is more than rounding
-COLLINEAR = 1e-6  #: second radius of the members over the first, below which they are collinear, as for couplings
+INDEFINITE = 1e-10  #: relative negative eigenvalue of a scaled load, above which it is more than rounding
+COLLINEAR = 1e-6  #: ratio of the second radius of the members to the first, below which they are collinear
 
 
 @dataclass(frozen=True, eq=False)

@@ -54,7 +54,7 @@ def receptance_of_pencil(b: Array, K: Array, M: Array, *, loss: float, omega2: f
     K, M
         Pencil of the columns, (n, n); K + omega² M positive definite.
     omega2
-        A positive number between the scales of K and M [1/s²], such as the first elastic omega².
+        A positive number of the magnitude of K / M [1/s²], such as the first elastic omega².
     """
     mu, Y = la.eigh(M, K + omega2 * M)
     return Receptance(b @ Y, 1 - omega2 * mu, np.maximum(mu, 0.0), loss)

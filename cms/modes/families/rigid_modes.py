@@ -32,7 +32,8 @@ def independent_rigid_modes(body: FEBody) -> tuple[Array, IntArray]:
     Returns
     -------
     Psi_R
-        (n_dof, n_r); n_r is 6 in space, 3 for a body with plane dofs, 1 for a row of masses; columns d [-], theta [m].
+        Modes, (n_dof, n_r), with columns d [-] and theta [m]; n_r is 6 in space, 3 for a body with plane dofs, 1 for a
+        row of masses.
     components
         Index of each mode among d_x d_y d_z theta_x theta_y theta_z, (n_r,).
 
@@ -71,7 +72,7 @@ def determinate_partition(body: FEBody, Psi_R: Array) -> tuple[IntArray, IntArra
     r
         Determinate dofs, (n_r,), ascending.
     extra
-        Those of R that are interior dofs; empty if the interfaces hold the body.
+        Dofs of R in the interior; empty if the interfaces hold the body.
     """
     if not Psi_R.shape[1]:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
@@ -98,13 +99,13 @@ def _in_lengths(body: FEBody, Psi_R: Array) -> Array:
 
 
 # motions without strain energy: which they are, how many, and where they are largest ---------------------------------
-# An energy uᵀ K u is a sum of terms K_kk u_k² and of others that are no larger. Rounding leaves about eps times their
-# sum instead of zero. A motion is free if its energy is below this rounding, however soft the body is compared with its
-# stiffest part.
+# An energy uᵀ K u is a sum of terms K_kk u_k² and of others that are no larger. For a motion without energy, rounding
+# gives about eps times this sum instead of zero. A motion counts as free if its energy is below this rounding error,
+# independent of the ratio between the softest and the stiffest part of the body.
 
 
-WITHIN_ROUNDING = 30.0  #: energy over its rounding error, below which a motion is free; free motions have 0.01 to 1
-SUSPECT = 1e-6  #: energy over the sum of K_kk u_k², above which a direction is certainly not free
+WITHIN_ROUNDING = 30.0  #: ratio of energy to rounding error, below which a motion is free; free motions have 0.01 to 1
+SUSPECT = 1e-6  #: ratio of energy to the sum of K_kk u_k², above which a direction is certainly not free
 
 
 def rounding_of_energy(body: FEBody, u: Array) -> Array:
@@ -127,7 +128,7 @@ def free_motions(body: FEBody, X: Array, C: Array, S: Array, terms: Array, load:
     S
         (X C)ᵀ K (X C) + Cᵀ K_load C, (m, m).
     terms
-        Sum of the terms K_kk x_k² of each column of X, or a part of the sum that has its magnitude, (k,).
+        Sum of the terms K_kk x_k² of each column of X, or a dominant part of this sum, (k,).
     load
         K_load, the stiffness of neighbours over the columns of X, (k, k); None if there are none.
     """
@@ -160,7 +161,7 @@ def mechanism_words(body: FEBody, u: Array) -> str:
     return (
         f"body {body.name!r}: {u.shape[1]} motion{'s' if several else ''} besides the rigid ones "
         f"cost{'' if several else 's'} no energy: a mechanism (or a wire whose bending is lost in the rounding of its "
-        f"tension), largest at {moving_nodes(body, np.arange(body.n_dof), u)}; join the parts or add what holds them"
+        f"tension), largest at {moving_nodes(body, np.arange(body.n_dof), u)}; join the parts or support them"
     )
 
 

@@ -25,9 +25,9 @@ __all__ = [
     "unrestrained_attachment_modes",
 ]
 
-RESIDUAL = 1e-12  #: energy of a residual attachment mode over that of the attachment mode, below which it is rounding
-STIFF = 1e-14  #: compliance over the largest (rotations times body length squared), below which it is rounding
-ROUNDING_ENERGY = 1e-24  #: energy of an inertia-load response over the largest, below which both factors are rounding
+RESIDUAL = 1e-12  #: energy of a residual attachment mode relative to its attachment mode, below which it is rounding
+STIFF = 1e-14  #: relative compliance (rotations times body length squared), below which it is rounding
+ROUNDING_ENERGY = 1e-24  #: relative energy of an inertia-load response, below which load and response are rounding
 BLOCK = 60  #: number of right-hand sides per solve; wider blocks are not faster and need more memory
 BLOCK_OF_RANKS = 16  #: number of right-hand sides per solve of a distributed body, whose columns pass through rank 0
 
@@ -42,7 +42,7 @@ def constraint_modes(fixed: FixedInterfaceBody, *, to_disk: bool = False) -> Arr
     Returns
     -------
     Array
-        (n_dof, n_b), translations per translation [-] or per rotation [m].
+        Constraint modes, (n_dof, n_b), translations per translation [-] or per rotation [m].
     """
     body, n = fixed.body, len(fixed.b)
     if body.layout is not None:
@@ -78,7 +78,7 @@ def redundant_constraint_modes(free: Flexibility) -> Array:
     Returns
     -------
     Array
-        (n_dof, n_e), the constraint modes of the E dofs.
+        Constraint modes of the E dofs, (n_dof, n_e).
     """
     return of_this_process(free.condensed.Psi_C[:, free.e])
 
@@ -89,7 +89,7 @@ def attachment_modes(free: Flexibility) -> Array:
     Returns
     -------
     Array
-        (n_dof, n_e), translations per force [m/N] or per moment [1/N].
+        Attachment modes, (n_dof, n_e), translations per force [m/N] or per moment [1/N].
     """
     return of_this_process(combine(free.condensed.Psi_C[:, free.e], free.solve_boundary(np.eye(len(free.e)))))
 
@@ -107,8 +107,8 @@ def inertia_relief_modes(fixed: FixedInterfaceBody, Psi_R: Array) -> Array:
     Returns
     -------
     Array
-        (n_dof, n_r), translations per acceleration [s²] or per angular acceleration [m s²]. Exactly zero, not rounding,
-        if the body does not deform (such as a planar body, out of its plane).
+        Inertia-relief modes, (n_dof, n_r), translations per acceleration [s²] or per angular acceleration [m s²]. They
+        are exactly zero if the body does not deform (such as a planar body accelerated out of its plane).
     """
     Psi_H = np.zeros(Psi_R.shape)
     F = (fixed.body.M @ Psi_R)[fixed.i]
@@ -128,8 +128,8 @@ def unrestrained_attachment_modes(free: Flexibility) -> Array:
     Returns
     -------
     Array
-        (n_dof, n_b), with Psi_Rᵀ M Psi_U = 0; translations per force [m/N] or per moment [1/N]. Exactly zero, not
-        rounding, if the free body responds to a load by acceleration alone.
+        Modes, (n_dof, n_b), with Psi_Rᵀ M Psi_U = 0; translations per force [m/N] or per moment [1/N]. A column is
+        exactly zero if the free body responds to its load by acceleration alone.
     """
     n_b, h = len(free.condensed.fixed.body.b), free.condensed.fixed.b
     on_boundary = np.zeros((len(h), n_b))  # u_h under the unit forces, with R fixed

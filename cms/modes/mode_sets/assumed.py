@@ -16,7 +16,7 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["assumed_modes"]
 
-NEGLIGIBLE = 1e-9  #: largest displacement of a column over that of its beam field, below which the column is omitted
+NEGLIGIBLE = 1e-9  #: displacement of a column relative to its beam field, below which the column is omitted
 #: relative difference of the two smallest principal moments of inertia that is needed to identify the axis
 SLENDER_RATIO = 1e-6
 
@@ -43,11 +43,11 @@ def assumed_modes(
         (Euler-Bernoulli: sections stay normal to the bent axis)
     (3) torsion theta(s):      theta t × r, rotation theta t  (Saint-Venant without warping)
 
-    The fields are sampled at the nodes. The terms in brackets are the lateral contraction. A solid needs them;
-    otherwise its bending stiffness is that of a bar with held sides, too large by the factor (1 - nu) / ((1 + nu) (1 -
-    2 nu)). If `poisson` is given, they are tied to the strain. Otherwise each is a separate column with nu = 1 and a
-    free amplitude. They are left out if all nodes lie on one line along the axis, as for a beam. Degree 0 (and 1 for
-    bending) is rigid-body motion and is covered by Psi_R. [1]_
+    The fields are evaluated at the nodes. The terms in brackets are the lateral contraction. A solid needs them:
+    without contraction its bending stiffness is too large by the factor (1 - nu) / ((1 + nu) (1 - 2 nu)). If `poisson`
+    is given, the contraction is part of each field. Otherwise it is a separate column with nu = 1 and its own
+    amplitude. It is left out if all nodes lie on one line along the axis, as for a beam. Degree 0 (and 1 for bending)
+    is rigid-body motion, which Psi_R provides. [1]_
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def assumed_modes(
 
     References
     ----------
-    .. [1] The field with its contraction solves the equations of a prismatic bar in tension and in pure bending exactly
+    .. [1] With contraction, the field is the exact solution for a prismatic bar in tension and in pure bending
        (Saint-Venant), see docs/theory.md.
     """
     body = body_of(body)
@@ -161,7 +161,7 @@ def section_axes(
         t = t / np.linalg.norm(t)
     if p.shape != (3,) or not np.isfinite(p).all():
         raise ModeSetError(f"assumed_modes: point = {point}; expected a point [x, y, z]")
-    # inertia normal to the axis; a weight moves the axis itself to the last place
+    # principal axes of the section: a large eigenvalue is added for t, which eigh then returns last
     across = np.eye(3) - np.outer(t, t)
     _, e = np.linalg.eigh(across @ J @ across + 10 * np.trace(J) * np.outer(t, t))
     e_1 = e[:, 0] * np.sign(e[np.argmax(np.abs(e[:, 0])), 0])

@@ -57,8 +57,8 @@ def cubic_splines(s: Array, span: Array, n: int, first: int) -> AxisFunctions:
     n_all = n + first
     if n_all < CUBIC + 1:
         raise ModeSetError(
-            f"assumed_modes: {n} splines: cubic splines come in sets of at least {CUBIC + 1 - first} here; "
-            f"choose {CUBIC + 1 - first} or more, or Legendre polynomials"
+            f"assumed_modes: expected at least {CUBIC + 1 - first} cubic splines here, got {n}; choose "
+            f"{CUBIC + 1 - first} or more, or Legendre polynomials"
         )
     inner = np.linspace(span[0], span[1], n_all - CUBIC + 1)
     knots = np.concatenate([np.full(CUBIC, span[0]), inner, np.full(CUBIC, span[1])])
@@ -73,7 +73,7 @@ AXIS_FUNCTIONS = {"legendre": legendre, "monomials": monomials, "splines": cubic
 
 
 def axis_functions(family: str, s: Array, span: Array, n: int, first: int) -> AxisFunctions:
-    """Return n functions of a family at the points s in the span; they are complete with all degrees below `first`."""
+    """Return n functions of a family at the points s in the span; degrees below `first` complete them."""
     if family not in AXIS_FUNCTIONS:
         raise ModeSetError(f"assumed_modes: unknown functions {quoted(family)}{nearest(family, AXIS_FUNCTIONS)}")
     return AXIS_FUNCTIONS[family](s, span, n, first)

@@ -28,7 +28,7 @@ __all__ = ["BalancedSystem", "balance", "balanced_truncation"]
 
 
 NOTHING_NEW = 1e-6  #: remainder of a unit direction outside the span of earlier ones, below which it is dependent
-NEGATIVE = 1e-9  #: largest negative eigenvalue of a Gramian, over the largest eigenvalue, that counts as rounding
+NEGATIVE = 1e-9  #: largest negative eigenvalue of a Gramian relative to its largest, that counts as rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,15 +49,16 @@ class BalancedSystem:
 def balance(omega2: Array, D: Array, B: Array, C: Array | None = None) -> BalancedSystem:
     """Balance the position and velocity of a symmetric second-order system with loads B u and responses y = Cᵀ q.
 
-    (1) A P + P Aᵀ + b bᵀ = 0 in the states x = (omega q, q_dot), where P is the controllability Gramian of the loads B,
-        and P_C the same for loads C
+    (1) A P + P Aᵀ + b bᵀ = 0 in the states x = (omega q, q_dot), where P is the controllability Gramian of the loads B;
+        P_C is the controllability Gramian of loads C
     (2) the system is symmetric, E x_dot = ..., E = [[D, 1], [1, 0]], so the observability Gramian is E P_C E, and the
         Hankel singular values sqrt(eig(P E P_C E)) are the singular values of R_Cᵀ E R with P = R Rᵀ
     (3) its velocity part is the position part of P_C; positions are balanced against velocities by the singular values
         sigma of L_Cᵀ L, P_p = L Lᵀ, with controllable directions L v and observable directions L_C u
-    (4) T holds both kinds of directions in turn, by descending sigma, orthonormalised; if C = B they coincide, and T
-        diagonalises P_p = T diag(sigma) Tᵀ; the leading columns of T project M, D and K by one congruence, which keeps
-        them symmetric and definite; with both kinds of directions the error is of second order, as with two projections
+    (4) T contains both kinds of directions alternately, by descending sigma, orthonormalised; if C = B they coincide,
+        and T diagonalises P_p = T diag(sigma) Tᵀ. The leading columns of T project M, D and K by one congruence, which
+        keeps them symmetric and definite. Because T contains both kinds, the error is of second order, as with two
+        projections
 
     Parameters
     ----------
@@ -120,13 +121,13 @@ def root(P: Array) -> Array:
     if values.min() < -NEGATIVE * values.max():
         raise ModeSetError(
             f"balance: the Gramian has an eigenvalue {values.min() / values.max():.1e} of its largest, expected none "
-            "below 0 but for rounding; give more damping or fewer modes"
+            "below 0 except for rounding; give more damping or fewer modes"
         )
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
 def in_turn(reached: Array, seen: Array) -> Array:
-    """Return an orthonormal basis, (n, n), of reached and observed directions in turn; dependent ones are omitted.
+    """Return an orthonormal basis, (n, n), of reached and observed directions alternately, without dependent ones.
 
     Parameters
     ----------
@@ -155,9 +156,9 @@ log = logging.getLogger(__name__)
 FEWEST_RICH = 60  #: smallest number of free modes of the rich basis
 LOWER_PART = 0.6  #: default number of modes in the rich basis of a small body, as a share of all its modes
 RICH_FACTOR = 3  #: number of free modes of the rich basis per requested mode
-#: length of a residual attachment mode over that of the attachment mode, below which it is rounding
+#: length of a residual attachment mode relative to the attachment mode, below which it is rounding
 NOTHING_LEFT = 1e-7
-STIFF = 1e-12  #: compliance of a boundary dof over the largest, below which it is rounding
+STIFF = 1e-12  #: compliance of a boundary dof relative to the largest, below which it is rounding
 FEWEST_FOUND = 4  #: smallest number of free modes that balancing needs
 REPORTED = 12  #: number of singular values reported in the options of the set; its data contain all of them
 
@@ -203,8 +204,8 @@ def balanced_truncation(
         if the eigensolver cannot find that many.
     inputs, outputs
         Interfaces at which loads act and responses are measured, or single components, such as "big_end" or "big_end
-        uz". Default: all boundary dofs; if only inputs are given, they are the outputs too. The response to loads
-        elsewhere, such as joints at other interfaces, is only as good as the directions for the chosen dofs.
+        uz". Default: all boundary dofs; if only inputs are given, they are the outputs too. Responses to other loads,
+        such as joints at other interfaces, may be inaccurate, because the directions are chosen for these dofs only.
 
     Raises
     ------
@@ -342,8 +343,8 @@ def most_free_modes(families: Families, n: int) -> EigenResult:
         except EigenError as error:
             if n <= FEWEST_FOUND:
                 raise ModeSetError(
-                    f"balanced_truncation: body {families.body.name!r}: the rich basis needs free modes, and not even "
-                    f"{n} were found: {error}"
+                    f"balanced_truncation: body {families.body.name!r}: the rich basis needs at least {n} free modes, "
+                    f"which were not found: {error}"
                 ) from error
             log.info("balanced truncation: %d free modes were not found (%s); fewer are tried", n, error)
             n = max(FEWEST_FOUND, 2 * n // 3)

@@ -45,8 +45,8 @@ def with_characteristic_modes(
     body
         The body from which the set was made.
     n_modes
-        Number of deforming modes for each interface, or for all together if `together`; a larger number than there are
-        keeps all. A `ModeCount` gives a cutoff frequency instead.
+        Number of deforming modes for each interface, or for all together if `together`. If fewer exist, all are kept.
+        A `ModeCount` gives a cutoff frequency instead.
     together
         Whether to use one pencil for all these interfaces instead of one for each. The rigid-body motions of each
         interface are kept in both cases.
@@ -54,8 +54,7 @@ def with_characteristic_modes(
     Raises
     ------
     ModeSetError
-        If the body has no interface of kind "nodes" with more than rigid motion, or the set has no constraint modes of
-        it.
+        If the body has no interface of kind "nodes" that can deform, or the set has no constraint modes of it.
 
     References
     ----------

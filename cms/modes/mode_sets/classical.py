@@ -251,7 +251,7 @@ def _directions(body: FEBody, interface: Interface, component: str) -> Array:
     directions = np.zeros((len(node), len(nodes)))
     directions[np.arange(len(node)), [nodes.index(n) for n in node.tolist()]] = axis[local]
     if np.abs(np.linalg.norm(directions, axis=0) - 1).max() > 1e-9:
-        raise BodyError(f"{where}: it has no dof {component} along its axes; its dofs cannot be released so")
+        raise BodyError(f"{where}: it has no dof {component} along its axes, so this component cannot be released")
     return directions
 
 
@@ -268,7 +268,7 @@ def craig_bampton(
 
     (1) Psi_C: constraint modes, with interior part -K_II⁻¹ K_IB
     (2) K_II phi = omega² M_II phi, all boundary dofs held
-    (3) with free boundary dofs: phi of the body with the other boundary dofs held, as columns phi - Psi_C phi_B
+    (3) with free boundary dofs: modes phi with the other boundary dofs held, as columns phi - Psi_C phi_B
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ from fe_models.foundation.words import nearest, quoted
 __all__ = ["EXTRA_COLUMNS", "with_centrifugal", "with_load_cases"]
 
 IN_THE_SPAN = 1e-6  #: part of a response outside the span, in the energy norm, below which the response is not added
-#: energy of a column, relative to the energy of its dofs taken singly, below which it is rigid-body motion
+#: energy of a column relative to the sum of the energies of its single dofs, below which it is rigid-body motion
 ROUNDING = 1e-13
 
 
@@ -28,9 +28,9 @@ def with_load_cases(modes: ModeSet, body: FEBody | Families, *, names: Sequence[
     """Add the static responses to the load cases of a body to a mode set.
 
     (1) held: K_II⁻¹ f_I with all boundary dofs held; makes the response of a supported body exact
-    (2) accelerating: Pᵀ G P f of the free body, in equilibrium with the acceleration by the load; exact in free motion
-    (3) of each response only the part u - V (Vᵀ K V)⁺ Vᵀ K u that the set lacks is added, if it exceeds 1e-6 of the
-        response and its energy exceeds the rounding: a part that is rigid-body motion has none
+    (2) accelerating: Pᵀ G P f of the free body, in equilibrium with its acceleration; makes the free motion exact
+    (3) add only the part u - V (Vᵀ K V)⁺ Vᵀ K u of each response, which is outside the span of the set, and only if it
+        exceeds 1e-6 of the response and its energy exceeds rounding (rigid-body motion has no energy)
 
     A statically complete set needs one column per load case, other sets two. Uniform gravity has no response (2).
 
@@ -46,7 +46,7 @@ def with_load_cases(modes: ModeSet, body: FEBody | Families, *, names: Sequence[
     Raises
     ------
     ModeSetError
-        If there are no load cases, or no load case of that name.
+        If there are no load cases, or no load case has that name.
     """
     source, body = body, body_of(body)
     cases = [case for case in body.load_cases if case.kind != CENTRIFUGAL]
@@ -69,8 +69,8 @@ def with_load_cases(modes: ModeSet, body: FEBody | Families, *, names: Sequence[
 def with_centrifugal(modes: ModeSet, body: FEBody | Families) -> ModeSet:
     """Add the static responses to the six centrifugal fields of steady rotation to a mode set.
 
-    This works as `with_load_cases` does, with the loads of `centrifugal_loads`. A rigid interface eliminates its
-    members. Their centrifugal field is no rigid motion, so the load must be made before coupling:
+    This works like `with_load_cases`, with the loads of `centrifugal_loads`. A rigid interface eliminates its members.
+    Their centrifugal field is not a rigid motion, so the load must be computed before coupling:
 
     >>> body = replace(body, load_cases=(*body.load_cases, *centrifugal_loads(body)))  # doctest: +SKIP
     >>> modes = with_centrifugal(modes, couple(body))                                  # doctest: +SKIP
@@ -94,7 +94,7 @@ def with_centrifugal(modes: ModeSet, body: FEBody | Families) -> ModeSet:
         if T is not None and (T.nnz != T.shape[0] or not (T.data == 1.0).all()):
             raise ModeSetError(
                 f"with_centrifugal: body {body.name!r} has eliminated dofs (rigid interfaces), whose centrifugal load "
-                "cannot be told from the coupled mass; add centrifugal_loads(body) to its load cases before coupling"
+                "does not follow from the coupled mass; add centrifugal_loads(body) to its load cases before coupling"
             )
         cases = centrifugal_loads(body)
     return _with_responses(modes, source, cases, "")
@@ -156,7 +156,7 @@ def _not_in_span(body: FEBody, V: Array, U: Array, F: Array) -> tuple[Array, np.
     for k in range(U.shape[1]):
         x = rest[:, [k]] - new @ (new.T @ (K @ rest[:, [k]]))  # responses to proportional loads are added only once
         left = abs(float(x[:, 0] @ (K @ x)[:, 0]))
-        # A load that is balanced by rigid-body acceleration leaves only rounding, far less than its dofs taken singly.
+        # if rigid-body acceleration balances the load, the energy is rounding, far below the energy of its single dofs
         is_new[k] = left > IN_THE_SPAN**2 * energy[k] and energy[k] > IN_THE_SPAN**2 * local[k]
         is_new[k] &= not without_energy(body, x)[0]
         if is_new[k]:

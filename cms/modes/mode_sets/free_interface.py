@@ -25,7 +25,7 @@ from fe_models.foundation.tall.columns import combine
 
 __all__ = ["craig_chang", "dual_craig_bampton", "herting", "macneal", "normal_modes", "rubin"]
 
-DEPENDENT = 1e-12  #: eigenvalue of the scaled residual flexibility over the largest, below which it is rounding
+DEPENDENT = 1e-12  #: relative eigenvalue of the scaled residual flexibility, below which it is rounding
 
 
 def normal_modes(
@@ -98,8 +98,8 @@ def macneal(
 ) -> ModeSet:
     """MacNeal's span, equal to that of `rubin`; his reduction only differs in the pencil (no residual inertia) [1]_.
 
-    A floating frame needs the inertia of every shape, so it is kept here. `reduced_pencil.macneal_pencil` gives
-    MacNeal's pencil for comparison.
+    A floating frame needs the inertia of every shape, so residual inertia is kept here. `reduced_pencil.macneal_pencil`
+    gives MacNeal's pencil for comparison.
     Errors are those of `rubin`.
 
     Parameters
@@ -233,6 +233,6 @@ def _pseudo_inverse(G: Array) -> Array:
     values, vectors = la.eigh((scaled + scaled.T) / 2)
     kept = values > DEPENDENT * values[-1]
     half = size[:, None] * vectors[:, kept] / np.sqrt(values[kept])
-    # a zero diagonal entry has a zero row, in the inverse too, so that rounding makes no shapes
+    # a zero diagonal entry has a zero row, also in the inverse, so that rounding does not become a shape
     half[diagonal <= 0] = 0.0
     return half @ half.T

@@ -23,7 +23,7 @@ log = logging.getLogger(__name__)
 
 OVER = ("coupled", "mesh")  #: kinds of dofs over which columns can be given
 WORDS = {"coupled": "coupled dofs", "mesh": "dofs of the mesh"}
-#: ratio of the median omega² of the columns to that of the other interpretation, above which the other one is meant
+#: ratio of the median omega² of the columns to its value in the other interpretation, above which the other is correct
 DEARER = 10.0
 #: share of the motion of a rigid interface that its members cannot follow, above which a warning is given
 NOT_RIGID = 0.1
@@ -50,7 +50,7 @@ def coupled_columns(where: str, body: FEBody, V: Array, over: str | None) -> tup
     Returns
     -------
     columns
-        (n_dof, k).
+        Columns over the coupled dofs, (n_dof, k).
     options
         Description of the conversion, for the record of the mode set.
 
@@ -76,8 +76,8 @@ def coupled_columns(where: str, body: FEBody, V: Array, over: str | None) -> tup
         own, else_ = (float(np.sqrt(np.median(rayleigh(body, read[name])))) for name in (over, other))
         if own**2 > DEARER * else_**2:
             raise ModeSetError(
-                f'{where}: columns_over = "{over}": in this order, the columns vibrate at {own / (2 * np.pi):.4g} per '
-                f"time unit (median of sqrt(uᵀKu / uᵀMu) / 2 pi), as {WORDS[other]} at {else_ / (2 * np.pi):.4g}; give "
+                f'{where}: columns_over = "{over}": with these dofs, columns vibrate at {own / (2 * np.pi):.4g} per '
+                f"time unit (median of sqrt(uᵀKu / uᵀMu) / 2 pi), with {WORDS[other]} {else_ / (2 * np.pi):.4g}; give "
                 f'columns_over = "{other}", or correct the order of the rows'
             )
     return columns, options

@@ -70,8 +70,8 @@ def krylov(
     band
         Range of frequencies (from, to) over which the error is estimated [Hz].
     load_cases
-        Whether the load cases of the body are among the loads. Centrifugal load cases never are: their response is
-        static.
+        Whether the load cases of the body are among the loads. Centrifugal load cases are not, because their response
+        is static.
 
     Raises
     ------
@@ -170,8 +170,8 @@ class _Span:
     def _orthonormal(self, X: Array) -> DisplacementColumns:
         """Return W-orthonormal directions of elastic columns X outside the span: step (3).
 
-        Multipliers are set to zero: motions that satisfy the constraints have the same energy with any multipliers, and
-        the remainder of a motion in the span would be rounding beside them.
+        Multipliers are set to zero. Motions that satisfy the constraints have the same energy with any multipliers, but
+        with large multipliers the remainder of a motion would be lost in rounding.
         """
         free = self.families.free
         X = (X - free.N @ (free.M_N.T @ X)) * self._is_motion[:, None]
@@ -196,7 +196,7 @@ class _Span:
         Z = np.zeros((len(G), rank))
         Z[pivots[:rank] - 1] = la.solve_triangular(np.triu(factor[:rank, :rank]), np.eye(rank))
         block = self._products(block.X @ Z)
-        # the smaller the remainder, the larger the part of the span in its rounding error
+        # a small remainder still contains part of the span, due to rounding
         block = self._without_span(block)
         G = gram(block.X, block.KX) + self.omega2 * gram(block.X, block.MX)
         return self._products(block.X @ la.solve_triangular(la.cholesky(G), np.eye(rank)))
@@ -300,6 +300,6 @@ def _mode_set(
     columns = Block(span.columns.X[:, :n_kept], span.labels[:n_kept], span.groups[:n_kept])
     rigid = rigid_block(families, families.Psi_R, "rigid-body")
     modes = mode_set("krylov", families, [rigid, columns], options=options)
-    # columns not counted by n_modes; smaller sets of this kind contain them too
+    # number of columns that n_modes does not count; smaller sets contain them too
     n_static = np.array([float(rigid.columns.shape[1] + min(n_first, n_kept))])
     return replace(modes, data={"omega2": np.array(span.omega2), "n_static": n_static})

@@ -58,7 +58,7 @@ def multilevel(
         Substructures keep their modes up to this factor times the cutoff, or times the highest wanted frequency; 1.2 or
         more. None: 20 for shells and beams, 14 if there are at most 400 interior dofs per wanted mode, 4 for solids.
     workers
-        Where subtrees are eliminated: a number of processes, dask, or dask://host:port; None: threads of this process.
+        Workers that eliminate subtrees: number of processes, dask, or dask://host:port; None: threads of this process.
 
     Raises
     ------

@@ -97,7 +97,7 @@ def dual_craig_bampton_pencil(
 ) -> ReducedPencil:
     """Dual Craig-Bampton reduction with interface forces f as unknowns; bodies are assembled by equal forces.
 
-    (1) u = Psi_R q_r + Phi q + Psi_d f in the symmetric equations of (u, -f), K u - f_B = 0, u_B given
+    (1) insert u = Psi_R q_r + Phi q + Psi_d f in the symmetric equations of (u, -f), K u - f_B = 0, with given u_B
     (2) K = [0 0 -R_Bᵀ; 0 Lambda -Phi_Bᵀ; -R_B -Phi_B -G_d],  M = diag(Psi_Rᵀ M Psi_R, 1, M_d),  M_d = Psi_dᵀ M Psi_d
     (3) the last row is u_B = R_B q_r + Phi_B q + (G_d + omega² M_d) f, with the residual flexibility to order omega²
 

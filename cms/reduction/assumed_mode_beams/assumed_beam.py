@@ -49,7 +49,7 @@ __all__ = ["beam_from_assumed_modes", "beam_geometric_stiffness", "tube"]
 
 
 N_RINGS, N_CORNERS = 21, 8
-THINNEST = 5e-3  #: radius of the skin over the beam length, used if the beam has no rotary inertia
+THINNEST = 5e-3  #: radius of the skin divided by the beam length, used if the beam has no rotary inertia
 
 
 def tube(line: BeamLine) -> tuple[Array, Array, IntArray]:
@@ -119,11 +119,11 @@ def beam_from_assumed_modes(
         Position x of each interface, by name; default: "start" and "end".
     frame
         Default: Tisserand (mean axes, for a free beam). `NodalFrame("start")` gives functions clamped there;
-        `NodalFrame(dofs=...)` holds six (station, component).
+        `NodalFrame(dofs=...)` fixes six (station, component) pairs.
     damping
         Damping; default: none.
     geometric
-        Whether to add the geometric stiffness of the unit loads, with which a system stiffens the body.
+        Whether to compute the geometric stiffness of the unit loads, with which loads stiffen the body in a system.
 
     Returns
     -------
@@ -136,7 +136,7 @@ def beam_from_assumed_modes(
     ModeSetError
         If a number is negative, no function is requested, or the family is unknown.
     BodyError
-        If a law is not positive, a station is not on the beam, or the frame cannot be attached.
+        If a mass or stiffness law is not positive, a station is not on the beam, or the frame cannot be attached.
     """
     where = f"beam_from_assumed_modes: {name!r}"
     if functions not in AXIS_FUNCTIONS:
@@ -251,7 +251,7 @@ def station_places(where: str, line: BeamLine, places: Mapping[str, float]) -> A
     outside = [name for name, value in places.items() if not 0 <= float(value) <= line.length]
     if outside:
         raise BodyError(
-            f"{where}: station {outside[0]!r}: expected a place within 0 .. {line.length:g}, got {places[outside[0]]:g}"
+            f"{where}: station {outside[0]!r}: expected a position in 0 .. {line.length:g}, got {places[outside[0]]:g}"
         )
     if not len(x):
         raise BodyError(f"{where}: expected at least one station, where joints and forces act; got none")
@@ -367,9 +367,9 @@ def provenance(line: BeamLine, functions: str, counts: Mapping[str, int], droppe
 
 
 # geometric stiffness of a straight beam without a mesh, from section forces in equilibrium (theory.md §7) -------------
-# n(x), m(x) are the forces that the part beyond x exerts on the part before it. They result from loads per unit mass,
-# loads on stations and the support reaction beyond x. They do work on the second-order strains of a section, and n·e_x
-# also on those of its twisted fibres. Loads off the axis do work on the second-order rotation of their section:
+# n(x) and m(x) are the force and moment of the part beyond x on the part before it: resultants of the loads per unit
+# mass, the loads on stations and the support reaction beyond x. They do work on the second-order strains of a section,
+# and n·e_x also on those of its twisted fibres. Loads off the axis do work on the second-order rotation of the section:
 #
 #     Gamma = u' - theta × e  +  [-theta × u' + ½ theta × (theta × e)],   kappa = theta'  +  [-½ theta × theta']
 

@@ -1,8 +1,8 @@
-"""Damping of the modes of a reduced body: ratios by mode or by frequency, or Rayleigh's mix of mass and stiffness.
+"""Damping of the modes of a reduced body: ratios by mode or by frequency, or Rayleigh damping.
 
 A ratio zeta gives D_kk = 2 zeta omega_k M_kk, where omega_k is the frequency of mode k in the given body frame. In a
-nodal frame the nodes of the frame are held; in the mean-axis frame the frequencies are free-free. The same ratios in
-two frames are therefore two different dampings.
+nodal frame the nodes of the frame are fixed; in the mean-axis frame the frequencies are free-free. Equal ratios in two
+frames therefore give different damping.
 """
 
 import ast
@@ -133,7 +133,7 @@ Damping = ModalDamping | PerModeDamping | RampDamping | RayleighDamping
 
 
 def damping_of_words(words: str) -> Damping | None:
-    """Return the damping whose printed form is this text, as in the provenance; None for "none" and unknown texts."""
+    """Return the damping whose `repr` is this text, as in the provenance; None for "none" and unknown texts."""
     known = {kind.__name__: kind for kind in (ModalDamping, PerModeDamping, RampDamping, RayleighDamping)}
     try:
         call = ast.parse(words, mode="eval").body

@@ -27,13 +27,13 @@ from fe_models.foundation.tall.columns import combine, combined, copied, dots, i
 __all__ = ["IN_SPAN", "FinishedBasis", "elastic_directions", "finish", "orthonormal_motions"]
 
 
-#: shape energy from a Gram matrix over its rounding error, below which the energy is computed from the shape
+#: ratio of a shape's energy from a Gram matrix to its rounding error, below which it is computed from the shape
 SUSPECT_ENERGY = 1e3
 #: rounding error in PhiᵀMPhi, below which shapes are formed directly from the columns of the set
 TRUSTED_ROUNDING = 1e-11
 ORTHONORMAL_DEFECT = 1e-9  #: largest accepted entry of Phi.T M Phi - 1, unless rounding of M is larger
 LOST_MASS = 1e-6  #: largest accepted rounding error of a modal mass due to M, relative to the modal mass
-LOST_STIFFNESS = 1e-2  #: largest accepted relative rounding error of a modal stiffness; the frequency has half of that
+LOST_STIFFNESS = 1e-2  #: largest accepted relative rounding error of a modal stiffness; half as much in frequency
 MARGIN = 10.0  #: factor from the rounding errors of modal masses to those of their products
 
 
@@ -41,7 +41,7 @@ MARGIN = 10.0  #: factor from the rounding errors of modal masses to those of th
 class FinishedBasis:
     """M-orthonormal, K-diagonal elastic shapes in the chosen frame, and their origin."""
 
-    Phi: Array  #: (n_dof, n_q); `SpreadColumns` if the columns of the mode set are distributed
+    Phi: Array  #: shapes, (n_dof, n_q); `SpreadColumns` if the columns of the mode set are distributed
     M: Array  #: Phi.T M Phi, (n_q, n_q): identity, zero rows for massless static shapes
     K: Array  #: Phi.T K Phi, (n_q, n_q), diagonal
     columns: SourceColumns  #: columns of the mode set, and their shares in the energy of each shape
@@ -100,13 +100,13 @@ def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedB
     for lost, most, words in ((of_mass, LOST_MASS, "mass"), (of_stiffness, LOST_STIFFNESS, "stiffness")):
         if lost > most:
             raise BodyError(
-                f"{where}: the {words} of a shape is known to {lost:.1e} of it only, expected {most:.0e}: the matrix "
-                "has it beside much larger terms, as torsion and bending of a thin wire across the mesh axes; "
-                "turn the mesh so that the wire lies along an axis, or make it thicker"
+                f"{where}: the {words} of a shape has a relative rounding error of {lost:.1e}, expected {most:.0e}: "
+                "the matrix has much larger terms, as for torsion and bending of a thin wire across the mesh axes; "
+                "rotate the mesh so that the wire lies along an axis, or make it thicker"
             )
     if defect > max(ORTHONORMAL_DEFECT, MARGIN * of_mass):
         raise ModeSetError(
-            f"{where}: shapes are M-orthonormal to {defect:.1e} only, expected {ORTHONORMAL_DEFECT:.0e}; "
+            f"{where}: shapes are M-orthonormal only to {defect:.1e}, expected {ORTHONORMAL_DEFECT:.0e}; "
             "its columns are too ill-conditioned"
         )
     turn = orientation(Phi, omega2)
@@ -131,9 +131,9 @@ def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedB
 def normalised_again(Phi: Array, is_massive: np.ndarray, products: Products) -> tuple[Array, float]:
     """Return the small matrix that makes the computed shapes M-orthonormal, and the remaining defect.
 
-    The modal mass of a shape of light nodes is a small difference in the Gram matrix of the columns, but a sum of small
-    terms in that of the formed shapes. Shapes are processed in the order of their frequency (Gram-Schmidt). Each is
-    therefore corrected only by slower shapes, whose stiffness is small compared to its own.
+    For a shape of light nodes, the modal mass from the Gram matrix of the columns is a small difference of large terms;
+    computed from the shape itself, it is a sum of small terms. Shapes are orthonormalised by ascending frequency
+    (Gram-Schmidt), so each is corrected only by slower shapes, whose stiffness is small compared to its own.
     """
     T = np.eye(len(is_massive))
     for _ in range(2):
@@ -157,7 +157,7 @@ class ElasticPencil:
     X: Array
     Z: Array  #: shapes as combinations of the basis, (k, n_q)
     elastic: Array  #: directions of the basis without rigid-body motions, (k, n_q)
-    is_massive: np.ndarray  #: (n_q,) bool
+    is_massive: np.ndarray  #: whether each shape has mass, (n_q,) bool
     free_omega2: Array  #: squared elastic frequencies of the unsupported reduced body, ascending [1/s²]
     defect: float  #: largest entry of Zᵀ G_M Z - 1
     rounding: float  #: estimated rounding error of PhiᵀMPhi - 1 due to rounding of G_M
@@ -200,8 +200,8 @@ def first_elastic(where: str, body: FEBody, V: Array, G_K: Array, G_M: Array, co
     """Estimate omega_1² of the free body: the smallest Rayleigh quotient of a column without its rigid part [1/s²].
 
     Each quotient is an upper bound. The smallest is accurate enough to scale a norm. Columns whose energy is rounding,
-    such as those of parts without a connection, are left out. It is rounded to a power of two, so that the norm is the
-    same in every frame: rounding would otherwise decide which of two nearly dependent columns is redundant.
+    such as those of parts without a connection, are left out. The result is rounded to a power of two, so that the norm
+    is the same in every frame: otherwise rounding would decide which of two nearly dependent columns is redundant.
     """
     rigid = inner(condition.M_Psi_R, V)
     stiffness, mass = np.diag(G_K), np.diag(G_M)
@@ -247,7 +247,7 @@ def free_elastic(Q: Basis, elastic: Array, condition: FrameCondition, omega2_1: 
 
 
 # rigid-body motion in the span of columns, found from the rigid-body vectors themselves (docs/theory.md §3) -----------
-# No ratio of energies decides, so the slowest elastic shape may be arbitrarily slow compared to the stiffest shape.
+# Ratios of energies play no role, so the slowest elastic shape may be arbitrarily slow compared to the stiffest shape.
 
 
 #: squared W-length of the remainder of a unit rigid-body motion, below which the span contains the motion
@@ -258,7 +258,7 @@ NO_INERTIA = 1e-12  #: eigenvalue of the scaled rigid mass matrix below which a 
 def orthonormal_motions(rigid_mass: Array, omega2: float) -> Array:
     """Return S, (n_r, k), that makes rigid-body motions R S orthonormal in W = K + omega² M, where K R = 0.
 
-    Motions without inertia have zero W-length, so k is smaller than n_r by their number.
+    Motions without inertia have zero W-length and are omitted, so k may be smaller than n_r.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Body reference frames: the condition that separates elastic displacement from rigid-body motion (docs/theory.md §4).
 
 A frame is a condition Wᵀ u = 0 with six rows. It changes columns v to v - Psi_R (Wᵀ Psi_R)⁻¹ Wᵀ v, the same deformation
-relative to the frame. K does not depend on the frame, M does.
+relative to the frame. M depends on the frame, K does not.
 """
 
 from collections.abc import Callable
@@ -29,8 +29,8 @@ __all__ = [
     "determinate_rows", "frame_condition",
 ]  # fmt: skip
 
-NO_INERTIA = 1e-12  #: moment of inertia over the largest one, below which it counts as zero
-RANK_TOLERANCE = 1e-8  #: smallest pivot of the fixed dofs: a lever arm over the extent of the nodes
+NO_INERTIA = 1e-12  #: moment of inertia relative to the largest, below which it counts as zero
+RANK_TOLERANCE = 1e-8  #: smallest pivot of the fixed dofs: a lever arm divided by the extent of the nodes
 Axes = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 
 
@@ -40,7 +40,7 @@ class NodalFrame:
     """Frame attached to six dofs that do not deform: dofs of an interface, given dofs, or automatically chosen dofs.
 
     Its origin is the reference point of the interface (or the centre of mass if none is named); its axes are the mesh
-    axes. Of an interface of kind "nodes" six determinate dofs are held, chosen by pivoted QR.
+    axes. For an interface of kind "nodes", pivoted QR chooses six determinate dofs to fix.
 
     Parameters
     ----------

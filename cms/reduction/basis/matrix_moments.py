@@ -4,7 +4,7 @@ A linear field u = E c has the nodal values (E c, rotation ½ curl). With nodal 
 products below exact if the inertia is isotropic. Otherwise the result is labelled approximate.
 
 The rigid motion in a shape needs no approximation. It is separated first, so that the moments of one body in two frames
-are those of the same deformations: reducing in a frame and converting to it give the same.
+belong to the same deformations: reduction in a frame and conversion to this frame give the same moments.
 """
 
 import numpy as np
@@ -16,14 +16,14 @@ from fe_models.foundation.tall.columns import in_memory
 
 __all__ = ["gram_from_matrices"]
 
-MASSLESS = 1e-12  #: inertia of a rigid motion over the largest one, below which it is rounding (masses on a line)
-ISOTROPIC = 1e-9  #: relative difference between the rigid mass matrix and that of m, S, J, up to which they agree
+MASSLESS = 1e-12  #: inertia of a rigid motion relative to the largest, below which it is rounding (masses on a line)
+ISOTROPIC = 1e-9  #: largest relative difference of rigid mass matrices from M and from m, S, J that counts as agreement
 
 
 def gram_from_matrices(body: FEBody, Phi: Array, origin: Array | None = None) -> Array:
     """Return the Gram matrix ∫ a aᵀ dm of a = [1, c, phi_x, phi_y, phi_z] from M and the node positions.
 
-    (0) phi = phi' + d + theta × c, where phi' has no momentum (`rigid_parts`); (2) to (4) are those of phi'
+    (0) phi = phi' + d + theta × c, where phi' has no momentum (`rigid_parts`); (2) to (4) use phi'
     (1) m, S, R from the rigid-body mass matrix: exact
     (2) 1C = Psi_tᵀ M Phi: exact
     (3) P_ab,k = (field c_a e_b)ᵀ M phi_k, whose antisymmetric part 2C is exact
@@ -33,12 +33,12 @@ def gram_from_matrices(body: FEBody, Phi: Array, origin: Array | None = None) ->
     Parameters
     ----------
     origin
-        Point that c starts from, (3,) [m]; default: the mesh origin, about which a body far away loses digits.
+        Reference point of c, (3,) [m]; default: the mesh origin, which costs digits if the body is far away.
 
     Returns
     -------
     Array
-        (4 + 3 n_q, 4 + 3 n_q) in mesh axes.
+        Gram matrix in mesh axes, (4 + 3 n_q, 4 + 3 n_q).
     """
     at = np.zeros(3) if origin is None else origin
     C = rigid_parts(body, in_memory(Phi), at)  # step (0)
@@ -93,7 +93,7 @@ def gram_from_matrices(body: FEBody, Phi: Array, origin: Array | None = None) ->
 
 
 def rigid_parts(body: FEBody, Phi: Array, origin: Array) -> Array:
-    """Return the rigid motions [d; theta] about a point that have the momentum of the shapes, (6, n_q).
+    """Return the rigid motions [d; theta] about a point with the same momenta as the shapes, (6, n_q).
 
     They are zero if the mass matrix does not describe rigid motion, as for a body with fixed dofs.
     """

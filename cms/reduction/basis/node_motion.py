@@ -128,17 +128,17 @@ def kept_points(body: FEBody, Phi: Array, axes: Array, row_of: IntArray) -> Kept
     """Return the kept points of a body, with their rotations.
 
     (1) if all three rotations of the node are dofs (beams, shells, leaders of rigid groups): these dofs
-    (2) else, if the elements know the rotation: half the curl of the displacement
-    (`fe_models.elements.solids.body`)
-    (3) else the rotations that are dofs, and zero for the others, as in a plane model; without any, the rotation is
-        unknown
+    (2) else, if the elements provide the rotation: half the curl of the displacement
+        (`fe_models.elements.solids.body`)
+    (3) else the rotations that are dofs, and zero for the others, as in a plane model; if no rotation is a dof, the
+        rotation is unknown
 
     Parameters
     ----------
     body
         Coupled body.
     Phi
-        Shapes over its dofs, (n_dof, n_q).
+        Shapes over the dofs of the body, (n_dof, n_q).
     axes
         Axes of B as columns, in mesh axes, (3, 3).
     row_of
@@ -162,7 +162,7 @@ def kept_points(body: FEBody, Phi: Array, axes: Array, row_of: IntArray) -> Kept
 def rotations_of_dofs(body: FEBody, Phi: Array, u: Array, nodes: IntArray) -> tuple[Array, np.ndarray]:
     """Return the rotation dofs, (n, 3, n_q), zero where there is none, and whether each is a dof, (n, 3) bool.
 
-    A recovery row without entries gives no motion: that rotation had no stiffness and was removed from the model.
+    A recovery row without entries provides no motion: its rotation had no stiffness and was removed from the model.
     """
     place = np.full(len(body.nodes), -1)
     place[nodes] = np.arange(len(nodes))
@@ -197,7 +197,7 @@ def node_weights(body: FEBody) -> Array:
 def weighted_rigid_modes(body: FEBody, origin: Array) -> Array | None:
     """Return W Psi_R over the dofs of the body, (n_dof, 6); (W Psi_R)ᵀ u gives weighted sums of columns u.
 
-    None if there is no Buckens frame because too few nodes have three translations, or because they are collinear.
+    The result is None if there is no Buckens frame: too few nodes have three translations, or they are collinear.
     """
     weights, dofs = node_weights(body), body.to_mesh.dofs
     used = weights > 0

@@ -1,9 +1,8 @@
-"""Damping of strain patterns: a part of a body gets such damping so that the whole body keeps its damping ratios.
+"""Damping of strain patterns: damping of a part of a body with which the whole body keeps its damping ratios.
 
 D = beta K + Σ_k d_k (K s_k)(K s_k)ᵀ, with patterns s_k of unit energy, s_kᵀ K s_l = 1 if k = l, else 0. Pattern k is
-damped as by (beta + d_k) K, all other strain as by beta K. D of a rigid-body motion is zero, because K of it
-is, and D is positive semidefinite, because no coefficient is negative. `cms split` writes these dampings
-(`cms.jobs.part_damping`).
+damped as by (beta + d_k) K, all other strain as by beta K. D does not damp rigid-body motion u, because K u = 0, and D
+is positive semidefinite, because no coefficient is negative. `cms split` writes this damping (`cms.jobs.part_damping`).
 """
 
 import hashlib
@@ -32,7 +31,7 @@ class StrainDamping:
     Parameters
     ----------
     beta
-        Coefficient of the strain beside the patterns, 0 or more [time].
+        Coefficient of K, 0 or more [time].
     coefficients
         d_k, 0 or more, in addition to beta, (n,) [time].
     forces
@@ -87,7 +86,7 @@ class StrainDamping:
         Parameters
         ----------
         body
-            The coupled body, whose dofs must be those of the damping.
+            Coupled body with the same dofs as the damping.
         Phi
             Shapes, (n_dof, n_q).
         K

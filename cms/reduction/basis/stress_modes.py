@@ -15,7 +15,7 @@ FEWEST = 16  #: smallest number of columns processed at a time
 FEWEST_OF_RANKS = 4  #: smallest number of distributed columns processed at a time; they belong to large bodies
 BYTES_AT_ONCE = 512e6  #: memory for the stress at all nodes, before the kept nodes are selected
 BYTES_FROM_DISK = (
-    64e6  #: memory limit if columns lie on disk or are distributed; with the columns, five times as much is used
+    64e6  #: memory limit if columns are on disk or distributed; columns and stress together take five times as much
 )
 
 
@@ -27,7 +27,7 @@ def nodal_stress_modes(body: FEBody, Phi: Array, nodes: IntArray, axes: Array) -
     body
         Body, coupled or not.
     Phi
-        Shapes over its dofs, (n_dof, n_q).
+        Shapes over the dofs of the body, (n_dof, n_q).
     nodes
         Indices into `FEBody.nodes`, (n,). Reference nodes are not in the mesh; their stress is zero.
     axes

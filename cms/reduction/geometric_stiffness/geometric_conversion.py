@@ -1,16 +1,15 @@
 """Conversion of the geometric stiffness of a reduced body to another body frame, from its own data (theory.md §7).
 
 A load consists of a load per unit mass A c + b, a wrench at each interface, and amplitudes of six loads distributed
-over the nodes. With its reaction it is balanced. The stress of a balanced load does not depend on the support, so its
-matrix is the same linear combination of the matrices of the old unit loads.
+over the nodes. Load and reaction together are balanced. The stress of a balanced load does not depend on the support,
+so its matrix is a linear combination of the old matrices, with the coefficients of the load in the old unit loads.
 
 (1) express the unit loads of the new frame in old coordinates
 (2) add the reaction of the new frame: a rigid-body acceleration (Tisserand), a wrench at its interface (nodal), or a
     load distributed over the nodes (Buckens)
 (3) combine the matrices of the balanced loads from the old ones
-(4) transform to the new shapes (phi - Psi_R C) Z; the matrices between two rotations follow from the loads, which a
-    rotation rotates; those between a rotation and a shape are stored, and where they are missing the same rule is
-    assumed
+(4) transform to the new shapes (phi - Psi_R C) Z; matrix entries between two rotations follow from rotating the loads;
+    entries between a rotation and a shape are stored; if they are missing, they are computed in the same way
 """
 
 import logging
@@ -52,7 +51,7 @@ def require_convertible(reduced: ReducedBody, frame: BodyFrame) -> None:
             return
         raise BodyError(
             f"reduced body {reduced.name!r}: the loads at interface {frame.at!r} were left out of its geometric "
-            "stiffness, and a nodal frame there puts its reaction on it; reduce the body anew with that interface "
+            "stiffness, but a nodal frame there has its reaction at it; reduce the body anew with that interface "
             "among geometric_stiffness = [...], or leave the geometric stiffness out (cms frame "
             "--no-geometric-stiffness)"
         )
@@ -61,12 +60,12 @@ def require_convertible(reduced: ReducedBody, frame: BodyFrame) -> None:
     why = "whose reaction is no load at one node"
     if frame.kind == "buckens":
         why = (
-            "whose reaction, loads spread over the nodes, is not on record (a file of a version before 4, or "
+            "whose reaction, loads distributed over the nodes, is not stored (a file of a version before 4, or "
             "spread_loads = false)"
         )
     raise BodyError(
-        f"reduced body {reduced.name!r}: its geometric stiffness can go to a Tisserand frame or to a nodal frame at an "
-        f"interface with one reference node, not to this {frame.kind} frame, {why}; reduce "
+        f"reduced body {reduced.name!r}: its geometric stiffness can be converted to a Tisserand frame, or a nodal "
+        f"frame at an interface with one reference node, not to this {frame.kind} frame, {why}; reduce "
         "the body anew in that frame, or leave the geometric stiffness out (cms frame --no-geometric-stiffness, or "
         "replace(body, geometric=None, quadratic=None))"
     )
@@ -86,9 +85,9 @@ def converted_geometric_stiffness(
     Parameters
     ----------
     frame
-        The new frame.
+        New frame.
     C, Z, p, R
-        As in `cms.reduction.frame_conversion.Change`: rigid part of each shape, new shapes, and place of the new frame.
+        Fields of `cms.reduction.frame_conversion.Change`: rigid part of each shape, new shapes, place of the new frame.
     """
     old, moments = reduced.geometric, reduced.moments
     assert old is not None

@@ -3,9 +3,9 @@
 (1) balance the unit loads f_j with the support of the frame: P f_j (`cms.reduction.geometric_stiffness.unit_states`)
 (2) compute static states u_j = G_R P f_j with the factorisation of the mode set; only their stress counts
 (3) compute Phiᵀ K_geo(sigma_j) Phi of the elements, also for rotations of the body, as needed for other frames
-(4) add rigid links: forces on followers, internal minus applied, do work on their second-order motion
-    and on that of nodes inside the body that follow the mean of others,
-    and so do the multipliers of distributing interfaces inside the body, on the second-order gap that they hold closed
+(4) add rigid links: forces on followers (internal minus applied) do work on their second-order motion, and on the
+    second-order motion of nodes inside the body that follow the mean of others; multipliers of distributing interfaces
+    inside the body do work on the second-order gap that they close
 (5) add interfaces that follow the mean of their members: the applied loads do work on the second-order mean motion
 """
 
@@ -86,7 +86,7 @@ def mean_second_order(points: Array, weights: Array, reference: Array, v: Array,
 # geometric reduction --------------------------------------------------------------------------------------------------
 
 
-COLLINEAR = 1e-12  #: second largest spread of the members over the largest one, below which they count as collinear
+COLLINEAR = 1e-12  #: ratio of the second largest spread of members to the largest, below which they are collinear
 LOADS_AT_ONCE = 60  #: number of loads whose mesh displacements are in memory at a time
 
 
@@ -98,9 +98,9 @@ def reduced_geometric_stiffness(body: FEBody | Families, Phi: Array, condition: 
     body
         A coupled body with an element model, or its `Families`.
     Phi
-        Shapes over its dofs that satisfy the condition of the frame, (n_dof, n_q).
+        Shapes over the dofs of the body that satisfy the condition of the frame, (n_dof, n_q).
     condition
-        The frame condition, which is also the support of all loads.
+        Frame condition, which is also the support of all loads.
 
     Raises
     ------
@@ -156,10 +156,10 @@ def elastic_part(body: FEBody, u: Array, mass: MassLoads, Phi: Array) -> Array:
 def mean_nodes_part(body: FEBody, forces: Array, Phi: Array) -> Array:
     """Return the work of forces on the mesh dofs on the second-order motion of nodes that follow a mean, (k, n, n).
 
-    To second order the node moves (1) as the mean of its members, (2) its own followers move by their levers in
-    addition, and (3) by the linear mean of the second-order motion of members that follow leaders: the forces act on
-    the members. In the matrix to the mesh these links look like levers from the leaders to the node, which is right for
-    its translation only; their work is taken out.
+    The second-order work has three parts: (1) forces on the node, which moves as the second-order mean of its members;
+    (2) forces on its own followers, which also move by their levers; (3) forces passed to members that follow leaders,
+    because the node moves by the linear mean of their second-order motion. In the matrix to the mesh these links appear
+    as levers from the leaders to the node, which is correct only for its translation, so their work is subtracted.
     """
     K = np.zeros((forces.shape[1], Phi.shape[1], Phi.shape[1]))
     six = np.stack([np.zeros(6, np.int64), np.arange(6)], axis=1)
@@ -186,8 +186,8 @@ def mean_nodes_part(body: FEBody, forces: Array, Phi: Array) -> Array:
 def tie_part(body: FEBody, u: Array, Phi: Array) -> Array:
     """Return the work of multipliers on the second-order gap of the ties of a body, (k, n, n).
 
-    The gap is the second-order motion of the reference node, as it follows a lever or the members of another interface,
-    minus that of the mean of the members. A multiplier lambda puts F = Sᵀ lambda on it.
+    The gap is the second-order motion of the reference node, which follows a lever or the members of another interface,
+    minus the second-order motion of the mean of the members. A multiplier lambda exerts F = Sᵀ lambda on the gap.
     """
     K = np.zeros((u.shape[1], Phi.shape[1], Phi.shape[1]))
     six = np.stack([np.zeros(6, np.int64), np.arange(6)], axis=1)
@@ -211,8 +211,8 @@ def mean_part(body: FEBody, on_dofs: Array, Phi: Array, axes: Array, loaded: tup
     """Step (5): return the work of the loads on the second-order motion of the interfaces, (k, n, n).
 
     A distributing interface transmits the load on its reference node to its members. The other interfaces that are not
-    nodes of the body follow several members, or a lever. This only matters for their own unit loads, with indices 12 +
-    6 i + c, where i counts the loaded interfaces.
+    nodes of the body follow several members or a lever. For them, only their own unit loads do such work; these have
+    the indices 12 + 6 i + c, where i counts the loaded interfaces.
     """
     work = distributing_part(body, on_dofs, Phi)
     turn = np.kron(np.eye(2), axes)

@@ -3,9 +3,8 @@
     r = c + Phi q + ½ Σ q_k q_l g_kl
 
 The geometric stiffness of a unit force at a node is minus its second-order displacement, K_kl = -e·g_kl (theory.md §7).
-g therefore follows node by node from the same static solutions and the same pass over the elements. It is the field
-whose inertia the geometric stiffness of the other unit loads contains. The two belong together, and are never counted
-twice.
+g therefore follows node by node from the same static solutions and the same pass over the elements. The geometric
+stiffness of the other unit loads already contains the inertia of this field, so quadratic modes add no inertia forces.
 """
 
 import numpy as np
@@ -34,7 +33,7 @@ def quadratic_modes(source: FEBody | Families, Phi: Array, condition: FrameCondi
     source
         A coupled body with an element model, or its `Families`.
     Phi
-        Shapes over its dofs that satisfy the condition of the frame, (n_dof, n_q).
+        Shapes over the dofs of the body that satisfy the condition of the frame, (n_dof, n_q).
     condition
         The frame condition.
     nodes
@@ -43,7 +42,7 @@ def quadratic_modes(source: FEBody | Families, Phi: Array, condition: FrameCondi
     Raises
     ------
     BodyError
-        If the elements do not know their geometric stiffness, or the field would be too large.
+        If the elements do not provide their geometric stiffness, or the field would be too large.
     """
     body = body_of(source)
     require_geometric_stiffness(body)
@@ -72,7 +71,7 @@ def force_stiffness(
     Parameters
     ----------
     forces
-        Along the axes of B, node by node, one load a column, (3 n_nodes, k). Each costs a static solution.
+        Loads as columns: forces along the axes of B, node by node, (3 n_nodes, k). Each load costs a static solution.
     """
     axes = condition.frame.axes
     # force components in mesh axes, node by node

@@ -32,7 +32,7 @@ __all__ = [
 ]  # fmt: skip
 
 
-#: size of a balanced load over the original load, below which the support carries all of it
+#: size of a balanced load relative to the original load, below which the support carries all of it
 BALANCED = 1e-10
 
 
@@ -83,7 +83,7 @@ def balanced(body: FEBody, loads: UnitLoads, condition: FrameCondition) -> UnitL
     else:
         after = together(body, loads.mass, loads.on_dofs - condition.W @ amounts)
     is_zero = np.abs(after.F).max(axis=0) <= BALANCED * np.abs(loads.F).max(axis=0)
-    # a load per unit mass may load sections even if its nodal forces vanish: its size at the nodes and over the length
+    # a load per unit mass may load sections even if its nodal forces vanish: take its size at the nodes, and A × length
     remainder, size = (
         np.abs(mass.at(body.nodes)).max(axis=(0, 1)) + np.abs(mass.A).max(axis=(1, 2)) * body.length
         for mass in (after.mass, loads.mass)
@@ -148,10 +148,10 @@ def unit_states(
     spread: bool = True,
     interfaces: Sequence[str] | None = None,
 ) -> UnitStates:
-    """Return the static states of the unit loads of a body in a frame, which `reduce(..., geometric=states)` takes too.
+    """Return the static states of the unit loads of a body in a frame, as input of `reduce(..., geometric=states)`.
 
-    They are computed while the factorisation of the mode set exists, which can then be freed before the reduction needs
-    the memory. This matters from several hundred thousand dofs on.
+    Compute them while the factorisation of the mode set exists; it can then be freed before the reduction needs the
+    memory. This matters from several hundred thousand dofs on.
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ def require_geometric_stiffness(body: FEBody) -> None:
     """Raise `BodyError` unless the elements can compute their geometric stiffness."""
     if not has_geometric_stiffness(body):
         raise BodyError(
-            f"body {body.name!r}: geometric stiffness needs the elements, and it came without them (bare matrices); "
+            f"body {body.name!r}: geometric stiffness needs the elements, but the body has none (bare matrices); "
             "build it from its mesh (fe_models.solid_body, beam_body), or reduce it without (geometric=False, in a job "
             "geometric_stiffness = false)"
         )

@@ -114,7 +114,7 @@ def write_recovery(
         replace_files(files)
     except OSError as error:
         raise RecoveryError(f"{path}: cannot be written: {reason(error)}; nothing was written") from error
-    return RecoveryFiles(tuple(files), (*notes, f"left out by the rows: {content.table.truncated or 'not said'}"))
+    return RecoveryFiles(tuple(files), (*notes, f"left out by the rows: {content.table.truncated or 'unknown'}"))
 
 
 def chosen(body: ReducedBody, name: str | None) -> RecoveryTable:
@@ -219,7 +219,7 @@ def op4_files(path: Path, content: _Content) -> Files:
     notes = (
         f"matrices: {words}",
         *((f"zero and left out: {zero}",) if zero else ()),
-        f"op4 holds no labels and units: {rows.name} has those of the rows, {columns.name} those of the columns",
+        f"op4 has no labels and units: {rows.name} names those of the rows, {columns.name} those of the columns",
     )
     files = {
         path: b"".join(op4_parts(f"OP4 file {path}", kept)),
@@ -265,7 +265,7 @@ def csv_files(path: Path, content: _Content) -> Files:
         for column, unit, values in zip(columns, units, matrix.T, strict=True):
             table[f"{name}: {column}"], table_units[f"{name}: {column}"] = values, unit
     notes: tuple[str, ...] = (
-        "units in brackets are those of the coordinate; its velocity and acceleration are per time",
+        "units in brackets are units of the coordinate; for its velocity and acceleration divide by time and time²",
     )
     if left:
         notes += (f"zero and left out: {', '.join(left)}",)
@@ -415,8 +415,8 @@ class CraigBampton:
                 L[:, rows] = (static @ turn)[:, : len(rows)]
             elif static.any():
                 raise RecoveryError(
-                    f"recovery {table.name!r}: interface {interface.name!r} has {len(rows)} dofs of several nodes, and "
-                    "the static part knows the wrench of all together"
+                    f"recovery {table.name!r}: interface {interface.name!r} has {len(rows)} dofs of several nodes, but "
+                    "the static part only has the total wrench; expected an interface with one node"
                 )
         return L, other, T.T @ forces
 
@@ -434,7 +434,7 @@ def craig_bampton_matrices(body: ReducedBody, *, about: tuple[float, float, floa
     Raises
     ------
     RecoveryError
-        If its modes do not move the interface dofs independently, or the interfaces do not hold the body.
+        If its modes do not move the interface dofs independently, or the body can move with fixed interfaces.
     """
     try:
         model = interface_model(body)

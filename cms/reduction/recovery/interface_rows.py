@@ -52,7 +52,7 @@ def interface_part(body: ReducedBody, rows: Rows, loads: LoadColumns, forces: Ar
     Parameters
     ----------
     loads, forces
-        The loads, and their forces on z, (6 + n_q, n_loads).
+        Loads, and their forces on z, (6 + n_q, n_loads).
 
     Raises
     ------
@@ -141,7 +141,7 @@ def wrench_about(node: BoundaryNode, about: Array) -> Array:
 
 
 def carried_wrench(body: ReducedBody, about: Array) -> Array:
-    """Return the map from force and torque in B about its origin to those in mesh axes about a point, (6, 6)."""
+    """Return the map of force and torque from axes and origin of B to mesh axes and a given point, (6, 6)."""
     A = body.frame.axes
     to_point = np.kron(np.eye(2), A)
     arm = body.frame.origin - about

@@ -28,7 +28,7 @@ def kept_part(body: ReducedBody, rows: Rows, loads: LoadColumns) -> PartOfTable:
     Raises
     ------
     RecoveryError
-        If the body does not know the quantity, a place or a component.
+        If the body does not have the quantity, a place or a component.
     """
     if rows.quantity in OF_MOTION:
         order = OF_MOTION.index(rows.quantity)
@@ -39,7 +39,7 @@ def kept_part(body: ReducedBody, rows: Rows, loads: LoadColumns) -> PartOfTable:
         static = np.zeros((len(names), len(loads.names)))
     else:
         raise RecoveryError(
-            f"body {body.name!r}: recovery of {rows.quantity}: a reduced body does not know it; make the table while "
+            f"body {body.name!r}: recovery of {rows.quantity}: a reduced body cannot provide it; make the table while "
             "the body is reduced (recovery = ..., [recovery.NAME] in a job)"
         )
     chosen = np.array([k for k, name in enumerate(names) if not rows.components or name.component in rows.components])
@@ -106,14 +106,14 @@ def stress_rows(body: ReducedBody, rows: Rows) -> tuple[list[RowName], Array]:
         else:
             kept = kept_nodes(body, at, skin=True)
             if body.stress is None:
-                raise RecoveryError(f"body {body.name!r}: recovery of stress: its file holds none of the nodes")
+                raise RecoveryError(f"body {body.name!r}: recovery of stress: its file contains no stress of nodes")
             stress = np.asarray(body.stress)[kept]
             shows = stress.any(axis=(1, 2))
             kept, stress = kept[shows], stress[shows]
             places = [("node", number_of(body, k), name_of(body, k)) for k in kept.tolist()]
             if not len(kept):
                 raise RecoveryError(
-                    f"body {body.name!r}: node {at} shows no stress: it is a reference node or on the axis "
+                    f"body {body.name!r}: node {at} has no stress: it is a reference node or on the axis "
                     "of a beam; take a node of the solid or shell, or a stress point"
                 )
         names += [RowName("stress", *place, word, STRESS) for place in places for word in STRESS_COMPONENTS]

@@ -119,7 +119,7 @@ def node_force(body: ReducedBody, name: str) -> Array:
     turning = [] if body.kept is None else [row for row in rows if body.kept.of_node(row) is not None]
     if not rows or word not in WRENCH or not place.startswith("node "):
         raise RecoveryError(
-            f"body {body.name!r}: load {name!r}: its work on the modes is not known, since the body does not keep that "
+            f"body {body.name!r}: load {name!r}: its work on the modes is unknown, because the body does not keep this "
             "node; reduce it again with the table (nodes of loads_at are kept), or make the table without loads_at"
         )
     row = (turning or rows)[0]

@@ -4,7 +4,7 @@ For every row R over the dofs of the model (docs/theory.md §11):
 
 (1) mode displacement: R [Psi_B, Phi], over z
 (2) u_j = G (F_j - W Psi_R (Psi_Rᵀ W Psi_R)⁻¹ Psi_Rᵀ F_j): static response to each balanced load, in the frame
-(3) residual response: u_j - Phi K⁻¹ Phiᵀ F_j, the part that the modes lack
+(3) residual response: u_j - Phi K⁻¹ Phiᵀ F_j, the part that the modes do not contain
 (4) the same for the inertia forces -M [Psi_B, Phi], over z''
 (5) rows of displacement, stress and element force use (1), (3) and (4); rows of velocity and acceleration use only (1),
     and accelerations also the part omega × (omega × c) of a spin
@@ -36,7 +36,7 @@ OF_MODEL = (
     "stiffening; the static part has only the loads of its columns; velocities and accelerations have none"
 )
 OF_BODY = (
-    "mode displacement alone: the static part of displacements and stresses that the modes lack needs the model; make "
+    "mode displacement alone: the static part of displacement and stress outside the modes needs the model; make "
     "the table while the body is reduced (recovery = ..., [recovery.NAME] in a job)"
 )
 
@@ -46,9 +46,9 @@ def recovery_matrices(
 ) -> Mapping[str, RecoveryTable]:
     """Return recovery tables with the rows that a reduced body can compute without its FE model.
 
-    These are motions and stress of kept nodes, motions of interfaces, interface forces and net forces. The static part
-    of displacement and stress that the modes lack is missing. `reduce(..., recovery=requests)` adds it, and offers the
-    other quantities.
+    These are motions and stress of kept nodes, motions of interfaces, interface forces and net forces, without the
+    static part of displacement and stress that the modes do not contain. `reduce(..., recovery=requests)` includes this
+    part, and provides the other quantities.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def unique(requests: RecoveryRequest | Iterable[RecoveryRequest]) -> tuple[Recov
     found = (requests,) if isinstance(requests, RecoveryRequest) else tuple(requests)
     names = [request.name for request in found]
     if len(set(names)) != len(names):
-        raise RecoveryError(f"recovery: two tables have one name; got {', '.join(names)}")
+        raise RecoveryError(f"recovery: two tables have the same name; got {', '.join(names)}")
     return found
 
 
@@ -139,8 +139,8 @@ def recovery_of_model(
     reduced
         The reduced body with these shapes.
     over
-        Combinations of the modes, (n_q, k): the tables are then over (d, theta) and these, which costs k static
-        solutions in place of n_q; None: over all modes.
+        Combinations of the modes, (n_q, k). The columns of the tables are then (d, theta) and these combinations, which
+        costs k static solutions instead of n_q. None: all modes.
 
     Raises
     ------
@@ -191,9 +191,9 @@ def part_of_block(block: Block, columns: Array, width: int, reduced: ReducedBody
     Parameters
     ----------
     columns
-        [Psi_B, Phi], residual responses to the loads, and residual responses to the inertia forces, (n_dof, .).
+        [Psi_B, Phi], residual responses to the loads, and residual responses to the inertia forces, (n_dof, n).
     width
-        Columns of [Psi_B, Phi].
+        Number of columns of [Psi_B, Phi].
     """
     n, n_loads = len(block.names), len(loads.names)
     dynamic, static = np.zeros((3, n, width)), np.zeros((n, n_loads))

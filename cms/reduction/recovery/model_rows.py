@@ -30,7 +30,7 @@ def model_block(body: FEBody, rows: Rows) -> Block:
     Raises
     ------
     RecoveryError
-        If the body does not know a place, a component or the quantity.
+        If the body does not have a place, a component or the quantity.
     """
     if rows.quantity in OF_MOTION:
         block = motion_block(body, rows)
@@ -128,7 +128,7 @@ def stress_block(body: FEBody, rows: Rows) -> Block:
             continue
         if model is None or not model.has_nodal_stress:
             raise RecoveryError(
-                f"body {body.name!r}: recovery of {rows.quantity}: the model knows no stress at nodes (bare matrices, "
+                f"body {body.name!r}: recovery of {rows.quantity}: the model has no stress at nodes (bare matrices, "
                 "or beams without a skin); ask for forces in its elements"
             )
         nodes += stressed_nodes(body, places, at, places.nodes(at, skin=True)).tolist()
@@ -195,7 +195,7 @@ def stressed_nodes(body: FEBody, places: Places, at: str | int, nodes: IntArray)
     found = nodes[on_mesh[nodes].any(axis=(1, 2))]
     if not len(found):
         raise RecoveryError(
-            f"body {body.name!r}: node {places.word(int(nodes[0]))} ({at!r}) shows no stress: it is a reference node "
+            f"body {body.name!r}: node {places.word(int(nodes[0]))} ({at!r}) has no stress: it is a reference node "
             "or on the axis of a beam; take a node of the solid or shell, a stress point, or the forces in the beams"
         )
     return found
@@ -211,7 +211,7 @@ def element_block(body: FEBody, rows: Rows) -> Block:
         known = tuple(dict.fromkeys(group.quantity for group in element_groups(body)))
         raise RecoveryError(
             f"body {body.name!r}: recovery of {rows.quantity}: it has no such elements"
-            + (f"; it has {', '.join(known)}" if known else ": of bare matrices no elements are known")
+            + (f"; it has {', '.join(known)}" if known else ": it consists of bare matrices without elements")
         )
     chosen = [(group, elements) for group, elements in elements_of(body, rows, groups) if len(elements)]
     names = [

@@ -44,7 +44,7 @@ class Places:
         if isinstance(at, int) and not numbering.nodes.size:
             if not 0 <= at < len(self.body.nodes):
                 raise RecoveryError(
-                    f"{where}: no node {at}; the body knows no numbers, and its indices are 0 to "
+                    f"{where}: no node {at}; the body has no node numbers, and its indices are 0 to "
                     f"{len(self.body.nodes) - 1}"
                 )
             return np.array([at], dtype=np.int64)

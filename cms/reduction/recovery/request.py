@@ -61,7 +61,7 @@ class Rows:
             )
         if self.quantity in OF_NODES and not self.at:
             raise RecoveryError(
-                f"recovery rows: {self.quantity}: at is missing; expected nodes, node sets or interfaces, as "
+                f"recovery rows: {self.quantity}: at is missing; expected nodes, node sets or interfaces, such as "
                 'at = ["tip", 17]'
             )
         if (self.about is not None) != (self.quantity == "net force"):

@@ -53,8 +53,8 @@ class PetscFactor:
     ) -> None:
         """Factorise a matrix from its lower triangle, (n, n), with all diagonal entries stored and row indices sorted.
 
-        The entries are sent to the ranks, and `lower` is empty afterwards, so that rank 0 does not hold them twice. For
-        a distributed matrix each rank uses its own rows.
+        The entries are sent to the ranks, and `lower` is empty afterwards, so that rank 0 does not store them twice.
+        For a distributed matrix each rank uses its own rows.
 
         on_disk: the factor is stored in files of each rank, in the folder named by MUMPS_OOC_TMPDIR (/tmp).
         keeps_matrix: the matrix is kept together with its factor, for a search by SLEPc.

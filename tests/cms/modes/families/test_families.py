@@ -271,7 +271,7 @@ def test_a_grounded_body_is_refused_where_it_must_be_free():
     K[0, 0] *= 2
     with Families(replace(body, K=sp.csc_array(K))) as f:
         assert f.Psi_C.shape == (body.n_dof, 12)
-        with pytest.raises(BodyError, match="held to the ground, or nodes not where K has them"):
+        with pytest.raises(BodyError, match="held to the ground, or nodes have wrong positions"):
             _ = f.Psi_U
 
 

@@ -147,7 +147,7 @@ def test_modes_that_come_below_a_cutoff_late_are_not_left_out(shell, direct, mon
     assert modes.data["frequency error"][-N:].max() < 1e-3
     monkeypatch.setattr("cms.linear_algebra.substructures.modes.GUARDS", 1)
     monkeypatch.setattr("cms.linear_algebra.substructures.modes.GUARD_SHARE", 0.0)
-    with pytest.raises(cms.CmsError, match=r"came to lie below it.*choose a larger cutoff_factor"):
+    with pytest.raises(cms.CmsError, match=r"are below this frequency.*choose a larger cutoff_factor"):
         cms.multilevel(shell, n_modes=ModeCount(cutoff=cutoff))
 
 

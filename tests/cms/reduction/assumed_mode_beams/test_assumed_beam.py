@@ -192,7 +192,7 @@ def test_a_nodal_frame_at_the_chord_holds_its_ends():
         ({"n_axial": -1}, ModeSetError, "n_axial = -1"),
         ({"n_axial": 0, "n_bending": 0, "n_torsion": 0}, ModeSetError, "at least one function"),
         ({"n_shear": 2}, ModeSetError, "rigid in shear"),
-        ({"stations": {"tip": 1.5}}, BodyError, "station 'tip': expected a place within 0 .. 1"),
+        ({"stations": {"tip": 1.5}}, BodyError, "station 'tip': expected a position in 0 .. 1"),
         ({"stations": {}}, BodyError, "at least one station"),
         ({"frame": cms.NodalFrame("stat")}, BodyError, "no station 'stat'"),
         ({"frame": cms.BuckensFrame()}, BodyError, "no Buckens frame"),

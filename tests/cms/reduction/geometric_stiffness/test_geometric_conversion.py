@@ -148,7 +148,7 @@ def test_a_reaction_that_is_not_on_record_is_refused(made):
     """One frame is held at dofs of several nodes; the other needs the spread loads."""
     with pytest.raises(BodyError, match=r"'bar': its geometric stiffness can .* whose reaction is no load at one"):
         cms.convert_frame(made["tisserand"], NodalFrame())
-    with pytest.raises(BodyError, match=r"spread over the nodes, is not on record .*reduce the body anew"):
+    with pytest.raises(BodyError, match=r"distributed over the nodes, is not stored .*reduce the body anew"):
         cms.convert_frame(as_before_version_4(made["tisserand"]), BuckensFrame())
     for target in (NodalFrame(), BuckensFrame()):
         assert cms.convert_frame(replace(made["tisserand"], geometric=None), target).geometric is None

@@ -224,7 +224,7 @@ def test_the_command_lists_writes_and_adds_rows(file, tmp_path):
     text = run("recovery", file)
     assert "element 12 beam force end A N" in text
     out = run("recovery", file, "--over", "interfaces", "--units", "mm-t-s", "-o", tmp_path / "drm.op4")
-    assert "op4 holds no labels and units" in out
+    assert "op4 has no labels and units" in out
     assert (tmp_path / "drm_columns.csv").is_file()
     (tmp_path / "more.toml").write_text('[recovery.more]\nrows = [{quantity = "acceleration", at = "root"}]\n')
     run("recovery", file, "--rows", tmp_path / "more.toml", "-o", tmp_path / "more.h5")
