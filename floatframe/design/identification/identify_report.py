@@ -21,8 +21,8 @@ __all__ = ["identification_document", "identification_record", "verdict_of"]
 #: relative deviations up to which a parameter is well determined, and above which it is undetermined
 SURE, DOUBTFUL = 0.05, 0.3
 UNREAL = (
-    "no real bodies, with positive masses and inertias, fit within the noise: look at signs, units and places of the "
-    "joints in the system file, or at what the model lacks"
+    "no real bodies, with positive masses and inertias, fit within the noise: check signs, units and positions of the "
+    "joints in the system file, or effects that the model lacks"
 )
 OFF = 3.0  #: number of deviations above which a value differs significantly from the system file
 NEARER = 0.7  #: ratio of deviations below which another motion is a significant improvement
@@ -187,7 +187,7 @@ def head(record: dict[str, Any]) -> tuple[str, Answer]:
     answer = (
         f"{n['well known']} of {record['n_base']} combinations are known within {SURE:.0%}, "
         f"{n['roughly known']} within {DOUBTFUL:.0%}, {n['not known']} are not known; "
-        f"{n['zero within its deviation']} cannot be told from zero."
+        f"{n['zero within its deviation']} cannot be distinguished from zero."
     )
     off = [each["name"] for each in record["parameters"] if each["off"] is not None and abs(each["off"]) > OFF]
     if off:
@@ -218,8 +218,8 @@ def parameter_section(record: dict[str, Any]) -> Section:
     heads = ("combination", "value>", "deviation>", "unit", "", "in the system file>", "off it, deviations>")
     return Section(
         "parameters", "What the motion tells", (TextTable(heads, rows),),
-        "A combination is all that can be told, its parts are not. Deviations are standard deviations; three times as "
-        "much is nearly sure. The system file knows no drives.", "Parameters",
+        "The motion determines each combination as a whole, not its parts. Deviations are standard deviations; errors "
+                "rarely exceed three of them. The system file contains no drives.", "Parameters",
     )  # fmt: skip
 
 
@@ -252,18 +252,18 @@ def fit_section(made: Estimate, record: dict[str, Any]) -> Section:
     heads = ("channel", "noise>", "unit", "misfit>", "neighbours correlate>")
     return Section(
         "fit", "How well it fits", (drawn, TextTable(heads, rows)),
-        "Noise is the standard deviation of the residual, misfit its rms over that of what was measured.", "Fit",
+        "Noise is the standard deviation of the residual; misfit is its rms relative to the measurement.", "Fit",
     )  # fmt: skip
 
 
 def residual_section(made: Estimate) -> Section:
     """Return the section with the residuals, at their own scale."""
-    words = "Measured less modelled; grey: two standard deviations, where 95 % of noise lies."
+    words = "Measured minus modelled values; grey: two standard deviations, which contain 95 % of the noise."
     drawn = Figure("residuals-chart", residual_chart(made), words)
     return Section(
         "residuals", "What is left", (drawn,),
-        "Noise has no shape. Waves, steps at reversals of a joint or drifts are something that the model lacks: "
-        "elasticity, friction of another kind, a wrong zero.", "Residuals",
+        "Noise has no pattern. Waves, steps at reversals of a joint and drifts are effects that the model lacks: "
+                "elasticity, friction of another kind, a wrong zero.", "Residuals",
     )  # fmt: skip
 
 
@@ -291,7 +291,7 @@ def unseen_section(record: dict[str, Any]) -> Section:
     heads = ("measured instead", "combinations>", "among them, in other combinations than here")
     blocks: list[Block] = [Paragraph(f"Parameters without any effect on what was measured: {words}.")]
     if rows:
-        blocks += [Paragraph("Other sensors tell other combinations:"), TextTable(heads, rows)]
+        blocks += [Paragraph("Other sensors determine other combinations:"), TextTable(heads, rows)]
     return Section("unseen", "What no motion tells", blocks, "", "Unseen")
 
 
@@ -314,13 +314,13 @@ def next_section(made: Estimate, record: dict[str, Any]) -> Section:
     ]
     heads = ("combination", "deviation now>", "with this motion>", "unit", "then")
     nothing = (
-        "No combination that is doubtful now would be told much better: measure longer, with less noise, or with "
-        "larger accelerations."
+        "This motion would determine no doubtful combination much better: measure longer, with less noise, or "
+        "with larger accelerations."
     )
     blocks: list[Block] = [TextTable(heads, rows) if rows else Paragraph(nothing)]
     worse = sum(each["deviation_of_next_motion"] > each["deviation"] / NEARER for each in record["parameters"])
     if worse:
-        told = f"It tells {worse} of the combinations less well than this one did: measure it besides."
+        told = f"It determines {worse} of the combinations less well than this one did: measure both."
         blocks.append(Paragraph(told))
     n = record["next_motion"]
     chart = next_chart(n, [column.unit for column in made.base.form.columns])
@@ -358,8 +358,8 @@ def real_section(made: Estimate, record: dict[str, Any]) -> Section:
     return Section(
         "real", "Bodies that could be built", (TextTable(heads, rows),),
         "Positive masses and inertias that fit the measurements (squared misfit "
-        f"{record['real_bodies']['excess']:+.2%} over the best), near the system file where nothing was measured. "
-        f"J about the origin of the body, elements of the tensor [{second}].", "Bodies",
+                f"{record['real_bodies']['excess']:+.2%} over the best). Values that are not measured are close to the "
+                        f"system file. J: elements of the tensor about the origin of the body [{second}].", "Bodies",
     )  # fmt: skip
 
 

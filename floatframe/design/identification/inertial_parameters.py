@@ -2,8 +2,8 @@
 
     phi = (m, S_x, S_y, S_z, J_xx, J_xy, J_xz, J_yy, J_yz, J_zz)
 
-mass, first moment, inertia about the origin of the body frame (J_xy etc. are elements of the tensor: minus the
-products of inertia), all in axes of the body.
+contains the mass, the first moment and the inertia about the origin of the body frame, all in axes of the body (J_xy
+etc. are elements of the tensor: minus the products of inertia).
 """
 
 from collections.abc import Sequence
@@ -103,6 +103,6 @@ def system_with(system: System, parameters: Sequence[Array] | Array) -> System:
     bodies = []
     for body, values in zip(system.bodies, phi, strict=True):
         if not isinstance(body, RigidBody):
-            raise ModelError(f"system {system.name!r}: body {body.name!r} is not rigid: it has other parameters")
+            raise ModelError(f"system {system.name!r}: body {body.name!r}: expected a rigid body, got a flexible one")
         bodies.append(body_from_parameters(body, values))
     return replace(system, bodies=bodies)

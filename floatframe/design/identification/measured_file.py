@@ -1,14 +1,14 @@
 """A measured motion from a file: positions, torques, and reactions at the base, by the names of their channels.
 
     joint1/angle                 position of a coordinate, by its name in results
-    joint1/angle rate            its rate, joint1/angle acceleration: its acceleration; else derived from positions
+    joint1/angle rate            its rate; joint1/angle acceleration: its acceleration; if missing: from positions
     joint1/angle torque          torque or force of its drive; joint1/angle force is the same
     base F_x ... base M_z        force and moment of the ground on the tree, about the origin of the ground
 
-Rates that were not measured are central differences. A cut-off (Butterworth of fourth order, forwards and backwards, no
-phase) takes the noise off positions and rates; torques and reactions are filtered with the rows of the linear form made
-of them, so that both sides of the equations stay equal where they jump (friction); rows are then thinned to what the
-band still holds.
+Rates that were not measured are central differences. A filter (Butterworth of fourth order, forwards and backwards,
+without phase) removes noise from positions and rates. The same filter acts on the torques, the reactions and the rows
+of the linear form, so that both sides of the equations remain equal at jumps (friction). After filtering, only as many
+rows are kept as are independent within the passed band.
 """
 
 import os
@@ -31,7 +31,7 @@ from floatframe.model.system import System
 __all__ = ["MeasuredFile", "measured_coordinates", "read_measured"]
 
 LEAST_ROWS = 20  #: smallest number of instants for an estimate
-#: noise that passes the filter has the band of a sharp one at 0.898 of its cut-off, the integral of 1/(1 + x⁸)²
+#: bandwidth of the filtered noise, relative to the cut-off: the integral of 1/(1 + x⁸)²
 BAND = 0.898
 ENDS = 3  #: periods of the cut-off that are excluded at both ends, where filters and differences are inaccurate
 KINDS = {"": "position", " rate": "rate", " acceleration": "acceleration", " torque": "torque", " force": "torque"}
@@ -48,23 +48,23 @@ class MeasuredFile:
 def read_measured(
     path: str | os.PathLike[str], form: LinearForm, *, cutoff: float | None = None, thin: int | None = None
 ) -> MeasuredFile:
-    """Read a measured motion of a tree of rigid bodies, or of one with loops by its independent coordinates.
+    """Read a measured motion of a tree of rigid bodies, or of the independent coordinates of a system with loops.
 
     Parameters
     ----------
     path
         A table of channels, see `floatframe.files.signals.read_signals`.
     form
-        Of the tree; angles in rad, deg, lengths in any unit that the file states are turned into its units.
+        The linear form; angles (rad, deg) and lengths in any unit that the file states are converted to its units.
     cutoff
-        Of the filter [Hz]; None: channels as they are.
-    thin
-        Every how many rows one is taken; by default all, or with a cut-off as many as it leaves independent.
+        Cut-off frequency of the filter [Hz]; None: no filter.
+        thin
+            Every thin-th row is used; default: all rows, or with a cut-off as many as are independent after filtering.
 
     Raises
     ------
     ModelError
-        If channels are missing, not known or in wrong units, the file is too short, or the cut-off too high.
+        If channels are missing, unknown or in wrong units, the file is too short, or the cut-off is too high.
     SignalError
         If the file cannot be read.
     """

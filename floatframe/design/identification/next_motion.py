@@ -31,13 +31,13 @@ def next_motion(made: Estimate, *, seed: int = 0) -> NextMotion | None:
 
     It is None if no tried motion has a lower condition number than the measured one.
 
-    It lasts as long as what was measured, and is judged with as many rows and the noise that was found. Torques are not
-    limited: those of the estimate stay near what was measured, as accelerations do.
+    It has the duration of the measured motion, and its accuracy is computed for the same number of rows and the same
+    noise. Torques are not limited, because with limited accelerations they remain near the measured torques.
 
     Raises
     ------
     ModelError
-        If loops cannot be closed on the way.
+        If loops cannot be closed during the motion.
     """
     form, samples = made.base.form, made.measured.samples
     own = slice(None) if form.independent is None else form.independent

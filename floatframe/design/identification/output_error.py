@@ -1,17 +1,18 @@
 """Identification of any system from measured outputs, by fitting its computed motion to the measured one.
 
-What moves by itself (flexible links, elastic drives, loops) is not told by a linear form, whose motion has to be
-measured whole. It is computed, and its outputs y(t, p) are compared: the output error method, maximum likelihood for
-white noise on the outputs [1]_.
+A linear form needs the complete measured motion. It cannot identify systems in which some coordinates are not measured
+(flexible links, elastic drives, loops). For these the motion is computed and its outputs y(t, p) are compared with the
+measurement: the output error method, which is maximum likelihood for white noise on the outputs [1]_.
 
-(1) r = (measured - y(p)) / sigma of each channel at each time, J = dy/dp / sigma: differences of whole runs
-(2) Gauss-Newton over the logarithms of the parameters, which keep their signs: J dx = r in the least squares sense, at
-    most a factor e at once, shortened while the sum of squares does not fall
-(3) sigma of each channel from its residuals; again from (1) until parameters stand within a share of their deviations
+(1) r = (measured - y(p)) / sigma of each channel at each time, J = dy/dp / sigma by differences of complete runs
+(2) Gauss-Newton step in the logarithms of the parameters, which keep their signs: least-squares solution of J dx = r,
+    limited to a factor e, and shortened until the sum of squares decreases
+(3) sigma of each channel from its residuals; repeat from (1) until the parameters change by less than a small fraction
+    of their deviations
 (4) deviations from C = (Jᵀ J)⁻¹, the bound of Cramér and Rao for white noise
 
-Derivatives of an earlier fit (`near`) serve as long as steps shrink with them, so that many measurements of one system
-take few runs each.
+Derivatives of an earlier fit (`near`) are used as long as steps shrink with them, so that each of many measurements of
+one system takes few runs.
 
 References
 ----------
@@ -48,7 +49,9 @@ STANDS = 1e-3  #: change of the parameters, relative to their deviations, at whi
 SHRINKS = 0.3  #: ratio of successive steps up to which old derivatives are reused
 ROUNDS = 40  #: largest number of Gauss-Newton iterations
 HALVINGS = 8
-ALIKE = 1e-4  #: singular value of J, columns of length one, below which parameters act alike: differences have 1e-5
+ALIKE = (
+    1e-4  #: singular value of J with unit columns, below which parameters act alike; differences have errors of 1e-5
+)
 WHITE = 2.6  #: largest correlation of neighbouring residuals of white noise, in 1/sqrt(n) (99.5 %)
 TOLERANCE = 1e-10  #: tolerance of Newton iterations in compared runs
 
@@ -74,7 +77,7 @@ class MeasuredOutputs:
         t = np.asarray(self.time, dtype=float)
         steps = np.diff(t)
         if t.ndim != 1 or len(t) < 3 or not np.isfinite(t).all() or steps.max() > (1 + 1e-6) * steps.min() > 0:
-            raise ModelError("fit_outputs: time: expected at least three rising times of one distance")
+            raise ModelError("fit_outputs: time: expected at least three equally spaced, increasing times")
         if not self.values:
             raise ModelError("fit_outputs: expected at least one measured output, got none")
         for name, column in self.values.items():
@@ -158,7 +161,7 @@ class OutputFit:
         ]
         if coloured:
             said.append(
-                f"residuals of {', '.join(coloured)} are not white: the model lacks something there, and the "
+                f"residuals of {', '.join(coloured)} are not white: the model lacks an effect, and the "
                 "standard deviations of the parameters are too small"
             )
         c = np.abs(np.triu(self.correlations, 1))
@@ -166,14 +169,14 @@ class OutputFit:
             i, j = np.unravel_index(int(np.argmax(c)), c.shape)
             said.append(
                 f"{self.names[i]} and {self.names[j]} act nearly alike (their errors correlate by "
-                f"{self.correlations[i, j]:+.3f}); measure a motion or an output that tells them apart"
+                f"{self.correlations[i, j]:+.3f}); measure a motion or an output that distinguishes them"
             )
         return tuple(said)
 
     def derived(self, function: Callable[[dict[str, float]], float]) -> tuple[float, float]:
         """Return a number that follows from the parameters, such as a frequency, and its standard deviation.
 
-        By its first derivatives, central differences of half a deviation of each parameter.
+        The deviation follows from first derivatives, by central differences of half a deviation of each parameter.
         """
         at = dict(zip(self.names, self.values.tolist(), strict=True))
         slopes = np.array(
@@ -201,35 +204,37 @@ def fit_outputs(
     Parameters
     ----------
     system_of
-        Makes the system of a dict of names and values; prescribed motions and forces are those of the measurement, and
-        it begins as placed, as the measurement did.
-    start
-        The parameters: first guesses by name, whose signs they keep, as masses, stiffness and damping do.
+        Returns the system for a dict of names and values. Its prescribed motions and forces are those of the
+        measurement, and it begins as placed, as the measurement did.
+        start
+            First guesses of the parameters by name; parameters keep these signs, as masses, stiffness and damping do.
     measured
         Columns of sensors or coordinates of the system over time.
     h
-        Step of the runs [s], the distance of the times divided by a whole number; default: that distance.
+        Step of the runs [s], the spacing of the times divided by a whole number; default: this spacing.
     integrator, state
-        As for `integrate`; by default generalized-alpha with a tight tolerance.
-    sigma
-        Noise of every channel where it is known; by default it follows from the residuals.
-    near
-        A fit of another measurement of the same outputs, whose derivatives serve at first.
+        As for `integrate`; default: generalized-alpha with a tight tolerance.
+        sigma
+            Known noise of every channel; default: computed from the residuals.
+        near
+            A fit of another measurement of the same outputs, whose derivatives are used first.
 
     Raises
     ------
     ModelError
-        If an output is not there, the step does not divide the distance, there are fewer values than parameters, a
-        parameter changes nothing or several act alike, or the search does not end; by name.
+        If an output does not exist, the step does not divide the spacing, there are fewer values than parameters, a
+        parameter has no effect, several act alike (the message names them), or the search does not converge.
     """
     names = tuple(start)
     p = np.array([float(start[name]) for name in names])
     if not len(p) or not p.all() or not np.isfinite(p).all():
-        raise ModelError("fit_outputs: start: expected finite first guesses other than 0, whose signs stay")
+        raise ModelError(
+            "fit_outputs: start: expected finite first guesses other than 0, with the signs of the parameters"
+        )
     data, channels = measured.table, tuple(measured.values)
     n, n_y = data.shape
     if n * n_y <= len(p):
-        raise ModelError(f"fit_outputs: {n * n_y} values cannot tell {len(p)} parameters; measure longer")
+        raise ModelError(f"fit_outputs: {n * n_y} values cannot determine {len(p)} parameters; measure longer")
     if near is not None and (near.names != names or near.residuals.shape != data.shape or near.channels != channels):
         raise ModelError("fit_outputs: near: expected a fit of the same parameters and outputs at as many times")
     known = None if sigma is None else sigma_of(sigma, channels)
@@ -272,7 +277,7 @@ def fit_outputs(
         if near is None and length > 1.0:
             S, is_fresh = run.slopes(p), True
     else:
-        raise ModelError(f"fit_outputs: parameters do not stand after {ROUNDS} steps; begin nearer, or with fewer")
+        raise ModelError(f"fit_outputs: parameters did not converge in {ROUNDS} steps; begin nearer, or with fewer")
     S = S / p
     A = (S / noise[:, None]).reshape(-1, len(p))
     length_of = np.linalg.norm(A, axis=0)
@@ -294,11 +299,11 @@ def computed_outputs(
     system
         The system, with its sensors.
     time
-        Output times at equal distances, (n_t,) [s].
+        Equally spaced output times, (n_t,) [s].
     outputs
         Names of sensor columns or coordinates, as for `fit_outputs`.
     h
-        Step of the run [s], the distance of the times divided by a whole number; None: that distance.
+        Step of the run [s], the spacing of the times divided by a whole number; None: this spacing.
     integrator
         As for `integrate`; None: generalized-alpha with a tight tolerance.
     state
@@ -307,14 +312,14 @@ def computed_outputs(
     Raises
     ------
     ModelError
-        If an output is not there, or the step does not divide the distance of the times.
+        If an output does not exist, or the step does not divide the spacing of the times.
     """
     t = np.asarray(time, dtype=float)
     distance = float(t[-1] - t[0]) / (len(t) - 1)
     every = 1 if h is None else round(distance / h)
     if every < 1 or (h is not None and abs(every * h / distance - 1) > 1e-6):
         raise ModelError(
-            f"fit_outputs: h = {h:.6g}: expected the distance of the measured times, {distance:.6g}, divided by a "
+            f"fit_outputs: h = {h:.6g}: expected the spacing of the measured times, {distance:.6g}, divided by a "
             "whole number"
         )
     columns = columns_of(system, wanted_of(tuple(outputs)))
@@ -395,7 +400,7 @@ def newton_step(S: Array, e: Array, noise: Array, names: tuple[str, ...]) -> tup
     if s[-1] <= ALIKE * s[0]:
         alike = [name for name, share in zip(names, np.abs(Vt[-1]), strict=True) if share > 0.1]
         raise ModelError(
-            f"fit_outputs: {' and '.join(alike)} act alike: the outputs cannot tell them apart; hold all but one"
+            f"fit_outputs: {' and '.join(alike)} act alike: the outputs cannot distinguish them; fix all but one"
         )
     along = U.T @ (e / noise).ravel()
     return (Vt.T @ (along / s)) / size, float(np.linalg.norm(along))
@@ -416,5 +421,5 @@ def sigma_of(given: Mapping[str, float], channels: tuple[str, ...]) -> Array:
             raise ModelError(f"fit_outputs: sigma of {quoted(name)}: expected a number above 0, got {value:.6g}")
     missing = [name for name in channels if name not in given]
     if missing:
-        raise ModelError(f"fit_outputs: sigma: expected that of every output, none for {', '.join(missing)}")
+        raise ModelError(f"fit_outputs: sigma: expected the noise of every output, got none for {', '.join(missing)}")
     return np.array([float(given[name]) for name in channels])

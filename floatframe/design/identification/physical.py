@@ -1,12 +1,12 @@
 """Physically consistent parameters that fit measurements: masses and inertias of a real mass distribution.
 
-A rigid body is real where its pseudo-inertia (`inertial_parameters.pseudo_inertia`) is positive definite. It is written
-P = L Lᵀ with positive diagonal exp(.), so that every choice of the ten unknowns of a body is real, and fitted by
+A rigid body is real if its pseudo-inertia P (`inertial_parameters.pseudo_inertia`) is positive definite. With P = L Lᵀ,
+where exp(.) keeps the diagonal of L positive, every choice of the ten unknowns l of a body is real. The fit is
 
     min |S^(-1/2) (W phi - y)|² + weight² Σ_bodies |l - l_prior|²,
 
-the second term holding what the measurement cannot tell near what the drawing says. The deviations of base parameters
-are those of `estimate`; this finds one real robot among all that share them.
+The second term keeps values that the measurement does not determine near those of the system file. The deviations of
+base parameters are those of `estimate`; this finds one real robot among all with the same base parameters.
 """
 
 from dataclasses import dataclass
@@ -43,11 +43,11 @@ def real_parameters(estimate: Estimate, *, prior: Array | None = None, weight: f
     Parameters
     ----------
     estimate
-        Whose motion, measurements and noise are used.
+        The estimate, with its motion, measurements and noise.
     prior
-        Parameters near which to stay where nothing is measured, (p,); by default those of the system; of real bodies.
+        Parameters of real bodies, (p,), to which values that are not measured stay close; default: those of the system.
     weight
-        Of the distance from there: 1 counts a factor e of a size of a body as one standard deviation.
+        Weight of the distance from the prior: with 1, a factor e in a size of a body counts as one standard deviation.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def real_parameters(estimate: Estimate, *, prior: Array | None = None, weight: f
         values = la.eigvalsh(P)
         if values[0] <= 0:
             raise ModelError(
-                f"real_parameters: body {body.name!r}: the prior is that of no real body (pseudo-inertia has the "
+                f"real_parameters: body {body.name!r}: the prior is not a real body (its pseudo-inertia has the "
                 f"eigenvalue {values[0]:.3g}); a point mass or a rod without thickness: give it a small extent"
             )
         start.append(log_cholesky(P))
@@ -72,7 +72,7 @@ def real_parameters(estimate: Estimate, *, prior: Array | None = None, weight: f
     W, y = estimate.measured.rows(form)
     rows = estimate.base.rows(W)
     root = np.sqrt(estimate.weights) / estimate.sigma
-    # R of the weighted rows of base parameters: the fit is |R (B phi - beta)|², whatever the number of rows
+    # R factor of the weighted rows of base parameters: the misfit is |R (B phi - beta)|² for any number of rows
     R = la.qr((rows * root[..., None]).reshape(-1, len(estimate.values)), mode="r")[0][: len(estimate.values)]
     RB = R @ estimate.base.B
     aim = R @ estimate.values
@@ -100,7 +100,7 @@ def real_parameters(estimate: Estimate, *, prior: Array | None = None, weight: f
 
 
 def log_cholesky(P: Array) -> Array:
-    """Return ten unknowns: log of the diagonal of the Cholesky factor, the rest over the diagonal of its column."""
+    """Return ten unknowns: logarithms of the diagonal of the Cholesky factor, and its other entries divided by it."""
     L = la.cholesky(P, lower=True)
     d = np.diag(L)
     return np.array([np.log(L[a, a]) if a == b else L[a, b] / d[b] for a, b in zip(*LOWER, strict=True)])

@@ -2,12 +2,12 @@
 
     tau = Y(x, x_dot, x_ddot) phi,      [F; M]_base = Y_0(x, x_dot, x_ddot) phi
 
-For a body, with a: acceleration of its origin less gravity, all in its axes,
+For a body, with the acceleration a of its origin minus gravity, all in its axes,
 
     f = m a + (alpha~ + omega~ omega~) S,      n = -a~ S + (L(alpha) + omega~ L(omega)) J,      L(x) J = J x,
 
-and the equation of a column of a joint is the power of the wrenches of all bodies that it carries, at its unit rate.
-Where loops close, tau are the torques of the independent coordinates, Γᵀ Y phi (`loops`).
+and the equation of a joint column is the power of the wrenches of all bodies that the joint carries, at unit rate.
+In systems with loops, tau are the torques of the independent coordinates, Γᵀ Y phi (`loops`).
 """
 
 from collections.abc import Sequence
@@ -50,20 +50,21 @@ __all__ = [
 
 
 # loops ----------------------------------------------------------------------------------------------------------------
-# Motions of trees with closed loops by their independent coordinates: all others follow from the joints that are cut.
+# Motions of systems with closed loops: the dependent coordinates z_d follow from the independent ones z_i and the cut
+# joints.
 #
-# With C the derivative of what cut joints hold by the rates of all coordinates z = (z_i, z_d),
+# With C the derivative of the constraints g of the cut joints by all coordinates z = (z_i, z_d),
 #
 #     g(z) = 0,      C_d z_d' = -C_i z_i',      C_d z_d'' = -C_i z_i'' - (second rates of g at z'' = 0),
 #
-# and the forces that drive the independent coordinates are those of the tree that is left, projected on the motions
-# that the loops allow (reactions of cut joints do no work on them):
+# and the forces that drive the independent coordinates are the forces of the remaining tree, projected on the motions
+# that the loops allow (reactions of cut joints do no work in these motions):
 #
 #     tau_i = Γᵀ Y phi,        Γ = dz'/dz_i' = (1, -C_d⁻¹ C_i).
 #
-# Rows of cut joints may repeat each other, as three of five do in a parallelogram of hinges: equations are solved in
-# the least squares sense, and what is left of g is looked at. A motion is followed in short steps from where the system
-# is placed, so that it stays on its branch.
+# Rows of cut joints may be redundant, as three of five are in a parallelogram of hinges. The equations are therefore
+# solved by least squares, and the residual of g is checked. A motion is followed in short steps from the placed
+# configuration, so that it stays on the same branch.
 
 
 #: largest singular value of C that counts as zero, relative to the largest one, with scaled rows and columns
@@ -74,16 +75,18 @@ STRIDE = 0.1  #: largest step of an independent coordinate [rad, or system sizes
 
 
 def looped_tree(system: System, where: str) -> SystemTree:
-    """Return the tree of a system of rigid bodies with loops that cut joints close; `ModelError` for anything else."""
+    """Return the tree of a system of rigid bodies with loops, and its cut joints; `ModelError` for any other system."""
     rigid_bodies(system, where)
     tree = tree_of(system)
     if tree.is_tree:
-        raise ModelError(f"{where}: no loop: independent coordinates are all of its coordinates")
+        raise ModelError(
+            f"{where}: independent: expected closed loops, got a tree, in which all coordinates are independent"
+        )
     beside = [coupler.name for coupler in system.couplers] + [element.name for element in system.elements]
     if beside:
         raise ModelError(
-            f"{where}: {', '.join(quoted(name) for name in beside)}: couplers and elements are no joints, whose "
-            "reactions do no work; leave them out"
+            f"{where}: {', '.join(quoted(name) for name in beside)}: expected joints, whose reactions do no work, "
+            "got couplers or elements; remove them"
         )
     normal = [
         force.joint
@@ -93,18 +96,18 @@ def looped_tree(system: System, where: str) -> SystemTree:
     if normal:
         raise ModelError(
             f"{where}: joint {quoted(normal[0])} has friction by its normal force, which is not linear in the "
-            "parameters; leave it out"
+            "parameters; remove it"
         )
     driven = [column.name for column in tree.columns if column.is_driven]
     if driven:
         raise ModelError(
-            f"{where}: {', '.join(quoted(name) for name in driven)}: prescribed motions; with loops the motion is "
-            "given by the samples: leave them out"
+            f"{where}: {', '.join(quoted(name) for name in driven)}: these motions are prescribed, but with loops "
+            "the samples give the motion; remove them"
         )
     model = compiled_system(system).model
     kinds = model.rows.kind[tree.tree.kept_row >= 0]
     if (is_held(kinds) & ~is_held_position(kinds)).any():
-        raise ModelError(f"{where}: joints that hold velocities (rolling) close no loop that positions could follow")
+        raise ModelError(f"{where}: joints that constrain velocities (rolling) are not supported in loops; remove them")
     return tree
 
 
@@ -128,7 +131,7 @@ class Loops:
         self.names = ", ".join(quoted(name) for name in (*self.parts.cut, *self.parts.constrained))
 
     def put(self, x: Array, rate: Array, acceleration: Array, *, by_increments: bool) -> Array:
-        """Set the motion, and return C in scaled rows and coordinates, (n_rows, n_c); `work` has the rates of g."""
+        """Set the motion in `work`, with the rates of g; return C with scaled rows and coordinates, (n_rows, n_c)."""
         from floatframe.engine.tree.kernels.entry import constraints
 
         joints = self.joints
@@ -143,7 +146,7 @@ class Loops:
         return self.work.connections.g[self.rows] / self.row_size
 
     def close(self, x: Array, dependent: IntArray, at: str) -> Array:
-        """Return the coordinates with dependent ones that close the loops."""
+        """Return the coordinates after the dependent ones are changed so that the loops are closed."""
         x, zero = x.copy(), np.zeros_like(x)
         for _ in range(MOST):
             C_d = self.put(x, zero, zero, by_increments=True)[:, dependent]
@@ -156,7 +159,7 @@ class Loops:
                 break
         raise ModelError(
             f"{self.where}: the loops cut at {self.names} cannot be closed {at} (they miss by {np.abs(g).max():.2g} of "
-            "their size); the coordinates are out of reach, or their zero is not where the system is placed"
+            "their size); the coordinates are out of reach, or their zero is not the placed configuration"
         )
 
 
@@ -171,12 +174,13 @@ def independent_columns(system: System, names: Sequence[str] | None, where: str)
     Parameters
     ----------
     names
-        As given; they have to be as many as the system can move in, and to determine all others as it is placed.
+        The given names. Their number must be the number of degrees of freedom, and they must determine all other
+        coordinates in the placed configuration.
 
     Raises
     ------
     ModelError
-        If they are not; with names that are.
+        If they are not independent; the message suggests names that are.
     """
     loops = Loops(system, where)
     every = [column.name for column in loops.parts.columns]
@@ -188,7 +192,7 @@ def independent_columns(system: System, names: Sequence[str] | None, where: str)
     fit = f"{n_i} of {', '.join(every)} move independently"
     if names is None:
         raise ModelError(
-            f"{where}: loops are cut at {loops.names}; {fit}: say which are driven and measured, such as independent = "
+            f"{where}: loops are cut at {loops.names}; {fit}: name those driven and measured, such as independent = "
             f"({', '.join(repr(each) for each in proposed(C, every, n_d))})"
         )
     for name in names:
@@ -201,8 +205,8 @@ def independent_columns(system: System, names: Sequence[str] | None, where: str)
     s_d = la.svdvals(C[:, rest])
     if s_d[n_d - 1] <= RANK * s[0]:
         raise ModelError(
-            f"{where}: independent: {', '.join(names)} do not determine the others as the system is placed; take such "
-            f"as {', '.join(proposed(C, every, n_d))}, or place it away from where its links are in line"
+            f"{where}: independent: {', '.join(names)} do not determine the others in the placed configuration; take "
+            f"{', '.join(proposed(C, every, n_d))}, or place the system where its links are not in line"
         )
     return columns
 
@@ -220,14 +224,14 @@ def loop_samples(system: System, independent: IntArray, x: Array, rate: Array, a
     Parameters
     ----------
     independent
-        Their columns, (n_i,).
+        Columns of the independent coordinates, (n_i,).
     x, rate, acceleration
-        Of them, (n, n_i), as in `tree_samples`; one instant not far from the next.
+        Values of the independent coordinates, (n, n_i), as in `tree_samples`; successive instants must be close.
 
     Raises
     ------
     ModelError
-        If loops cannot be closed, or a position is singular, with the number of the instant.
+        If loops cannot be closed, or a position is singular; the message has the number of the instant.
     """
     where = f"system {system.name!r}: samples"
     loops = Loops(system, where)
@@ -272,7 +276,7 @@ def loop_samples(system: System, independent: IntArray, x: Array, rate: Array, a
 
 #: terms of a drive in addition to those of the bodies, with descriptions
 DRIVE_TERMS = {
-    "motor-inertia": "inertia of rotor and gear, seen at the joint: times the acceleration",
+    "motor-inertia": "inertia of rotor and gear, reduced to the joint: times the acceleration",
     "viscous": "viscous friction: times the rate",
     "coulomb": "Coulomb friction: times the sign of the rate",
     "offset": "constant torque",
@@ -321,22 +325,22 @@ class LinearForm:
 
 
 def linear_form(system: System, terms: Sequence[str] = (), *, independent: Sequence[str] | None = None) -> LinearForm:
-    """Return the linear form of a tree of rigid bodies, or of one whose joints close loops.
+    """Return the linear form of a system of rigid bodies, which may have closed loops.
 
     Parameters
     ----------
     system
-        Its bodies are rigid; forces but gravity are left out.
-    terms
-        Of `DRIVE_TERMS`, for each coordinate, also those that loops make dependent, but not for joints that are cut.
-    independent
-        Where joints close loops: the coordinates that are driven and measured, as many as move independently. The
-        others follow, and torques are those that act on these (`floatframe.design.identification.regressors`).
+        The system; all forces except gravity are ignored.
+        terms
+            Names in `DRIVE_TERMS`, for each coordinate, including dependent ones, but not for cut joints.
+        independent
+            For systems with loops: the coordinates that are driven and measured, as many as there are degrees of
+            freedom. The others follow from them; torques act on them (`floatframe.design.identification.regressors`).
 
     Raises
     ------
     ModelError
-        If it is no tree of rigid bodies, a term is not known, or coordinates are not independent.
+        If the system contains anything else, a term is unknown, or coordinates are not independent.
     """
     where = f"system {system.name!r}: inertial parameters"
     has_loops = independent is not None or bool(tree_of(system).cut)
@@ -344,7 +348,7 @@ def linear_form(system: System, terms: Sequence[str] = (), *, independent: Seque
     columns = independent_columns(system, independent, where) if has_loops else None
     if not tree.columns:
         raise ModelError(
-            f"system {system.name!r}: inertial parameters: no joint has a coordinate, so that nothing moves"
+            f"system {system.name!r}: inertial parameters: expected a joint with a coordinate, got none; nothing moves"
         )
     for term in terms:
         if term not in DRIVE_TERMS:
@@ -399,7 +403,7 @@ def torque_rows(form: LinearForm, samples: TreeSamples) -> Array:
 
 
 def reaction_rows(form: LinearForm, samples: TreeSamples, point: Array) -> Array:
-    """Return Y_0, (n, 6, p): inner terms of drives do not reach the ground."""
+    """Return Y_0, (n, 6, p); columns of drives are zero, because their torques are internal."""
     n, n_b = samples.r.shape[:2]
     A = body_wrenches(samples)
     Y = np.zeros((n, 6, len(form.names)))

@@ -1,14 +1,14 @@
 """A flexible link whose identified mass, stiffness and damping differ from its finite element model.
 
-With the density times mu and the moduli times kappa, shapes are the same; with M-orthonormal modes q goes over to
-sqrt(mu) q, so that
+If the density is multiplied by mu and the moduli by kappa, the shapes do not change. With M-orthonormal modes, q
+becomes sqrt(mu) q, so that
 
     m, S, R -> mu (.),   C1, P -> sqrt(mu) (.),   Psi -> Psi / sqrt(mu),   omega² -> kappa/mu omega²,
 
-and geometric stiffness by interface forces is divided by mu, that by accelerations stays. All but the frequencies and
-stresses is the change of the unit of mass by 1/mu, which the modal file knows of every entry. Uniform factors are what
-is wrong of a model at first order: density and modulus of a material, the thickness of a tube; a body whose shapes are
-wrong is updated by its finite elements.
+Geometric stiffness by interface forces is divided by mu; geometric stiffness by accelerations does not change. Except
+for frequencies and stresses, this is a change of the unit of mass by 1/mu, and the modal file states the unit of every
+entry. Uniform factors are the main errors of a model: density and modulus of a material, thickness of a tube. If the
+shapes of a body are wrong, its finite element model must be updated.
 """
 
 from collections.abc import Sequence
@@ -32,7 +32,7 @@ def scaled_link(
     Parameters
     ----------
     body
-        As its model says. Load cases stay; recovery tables are left out.
+        The body of the finite element model. Load cases are kept; recovery tables are removed.
     mass, stiffness
         Factors of density and moduli, above 0.
     damping
@@ -63,7 +63,7 @@ def scaled_body(reduced: ReducedBody, mass: float, stiffness: float) -> ReducedB
     """Return a reduced body with density and moduli multiplied by factors."""
     lighter = replace(reduced.units, name="scaled", mass=reduced.units.mass / mass)
     made = replace(convert_units(replace(reduced, recovery={}), lighter), units=reduced.units)
-    ratio = stiffness / mass  # numbers in the lighter unit are those of moduli times `mass`
+    ratio = stiffness / mass  # the change of the unit of mass alone multiplies the moduli by `mass`
     loads = tuple(
         replace(case, h=case.h / mass, force=case.force / mass, torque=case.torque / mass) for case in made.load_cases
     )

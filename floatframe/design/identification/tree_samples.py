@@ -1,8 +1,9 @@
 """Motions of a tree of rigid bodies at many instants as arrays, from which linear forms are computed.
 
-For sample s, body i and column k of the joints (docs/relative.md §2): pose, angular velocity and accelerations of the
-body, direction of the column, and the place of the marker that it moves. The velocity that a unit rate of column k
-gives to the point P of a body that hangs at its joint is ±(t_k + a_k × (P - p_k)), its angular velocity ±a_k.
+The arrays contain, for sample s, body i and column k of the joints (docs/relative.md §2), the pose, angular velocity
+and accelerations of the body, the direction of the column, and the position of the marker that it moves. A unit rate of
+column k gives the point P of a body carried by the joint the velocity ±(t_k + a_k × (P - p_k)), and the body the
+angular velocity ±a_k.
 """
 
 from dataclasses import dataclass
@@ -58,8 +59,7 @@ def rigid_bodies(system: System, where: str) -> None:
     if flexible:
         raise ModelError(
             f"{where}: expected rigid bodies, got the flexible {', '.join(quoted(name) for name in flexible)}; "
-            "inertial parameters are those of rigid bodies: replace it by a RigidBody, or fit what sensors see "
-            "(fit_outputs)"
+            "replace it by a RigidBody, or fit the outputs of sensors (fit_outputs)"
         )
 
 
@@ -72,8 +72,8 @@ def rigid_tree(system: System, where: str) -> SystemTree:
         raise ModelError(
             f"{where}: expected a tree, but {', '.join(quoted(name) for name in loops)} "
             f"{'is a constraint' if len(loops) == 1 else 'are constraints'} beside its joints (a loop, a joint without "
-            "coordinates of its own, or friction by normal force); loops of joints: linear_form(independent=...); "
-            "for others leave it out, or identify the open tree"
+            "coordinates of its own, or friction by normal force); for loops of joints, take "
+            "linear_form(independent=...); otherwise remove it, or identify the open tree"
         )
     return tree
 
@@ -91,10 +91,10 @@ def tree_samples(system: System, x: Array, rate: Array, acceleration: Array) -> 
     system
         A tree of rigid bodies.
     x, rate, acceleration
-        Of each coordinate of `tree_of(system).columns` at each instant, (n, n_c). As in results, angles are zero as
-        the system is placed, distances where the points of the markers coincide. The rotation of a spherical joint or
-        a free body is the rotation vector from where it is placed, its rates are angular velocities about the axes of
-        the moved marker.
+        Values for each coordinate of `tree_of(system).columns` at each instant, (n, n_c). As in results, angles are
+        zero in the placed configuration, and distances are zero if the points of the markers coincide. The rotation of
+        a spherical joint or a free body is the rotation vector from the placed configuration; its rates are angular
+        velocities about the axes of the moved marker.
     """
     tree = rigid_tree(system, f"system {system.name!r}: samples").tree
     n, n_c = len(x), len(tree.side)

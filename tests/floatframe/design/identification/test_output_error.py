@@ -102,7 +102,7 @@ def test_wrong_measurements_are_refused(swung, first):
         fit_outputs(oscillator, TRUE, data, h=0.03)
     with pytest.raises(ModelError, match="no such column"):
         fit_outputs(oscillator, TRUE, MeasuredOutputs(TIME, {"place w": swung}))
-    with pytest.raises(ModelError, match="times of one distance"):
+    with pytest.raises(ModelError, match="equally spaced, increasing times"):
         MeasuredOutputs(TIME**2, {"place x": swung})
     with pytest.raises(ModelError, match="61 values"):
         MeasuredOutputs(TIME, {"place x": swung[1:]})
