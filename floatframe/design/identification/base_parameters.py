@@ -454,8 +454,8 @@ def base_parameters(form: LinearForm, *, source: str = "torques", by: str = "rul
         What is measured: "torques" of all coordinates, "reactions" of the ground, or "both".
     by
         "rules" over the joints, or "samples": the rank of the form over random motions.
-        seed
-            Seed of the random motions.
+    seed
+        Seed of the random motions.
 
     Raises
     ------

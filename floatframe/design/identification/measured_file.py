@@ -58,8 +58,8 @@ def read_measured(
         The linear form; angles (rad, deg) and lengths in any unit that the file states are converted to its units.
     cutoff
         Cut-off frequency of the filter [Hz]; None: no filter.
-        thin
-            Every thin-th row is used; default: all rows, or with a cut-off as many as are independent after filtering.
+    thin
+        Every thin-th row is used; default: all rows, or with a cut-off as many as are independent after filtering.
 
     Raises
     ------

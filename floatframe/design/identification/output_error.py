@@ -206,18 +206,18 @@ def fit_outputs(
     system_of
         Returns the system for a dict of names and values. Its prescribed motions and forces are those of the
         measurement, and it begins as placed, as the measurement did.
-        start
-            First guesses of the parameters by name; parameters keep these signs, as masses, stiffness and damping do.
+    start
+        First guesses of the parameters by name; parameters keep these signs, as masses, stiffness and damping do.
     measured
         Columns of sensors or coordinates of the system over time.
     h
         Step of the runs [s], the spacing of the times divided by a whole number; default: this spacing.
     integrator, state
         As for `integrate`; default: generalized-alpha with a tight tolerance.
-        sigma
-            Known noise of every channel; default: computed from the residuals.
-        near
-            A fit of another measurement of the same outputs, whose derivatives are used first.
+    sigma
+        Known noise of every channel; default: computed from the residuals.
+    near
+        A fit of another measurement of the same outputs, whose derivatives are used first.
 
     Raises
     ------

@@ -331,11 +331,11 @@ def linear_form(system: System, terms: Sequence[str] = (), *, independent: Seque
     ----------
     system
         The system; all forces except gravity are ignored.
-        terms
-            Names in `DRIVE_TERMS`, for each coordinate, including dependent ones, but not for cut joints.
-        independent
-            For systems with loops: the coordinates that are driven and measured, as many as there are degrees of
-            freedom. The others follow from them; torques act on them (`floatframe.design.identification.regressors`).
+    terms
+        Names in `DRIVE_TERMS`, for each coordinate, including dependent ones, but not for cut joints.
+    independent
+        For systems with loops: the coordinates that are driven and measured, as many as there are degrees of
+        freedom. The others follow from them; torques act on them (`floatframe.design.identification.regressors`).
 
     Raises
     ------

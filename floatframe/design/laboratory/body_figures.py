@@ -23,9 +23,9 @@ def error_figure(results: Sequence[SetError], *, n_shown: int) -> "Figure":
     Parameters
     ----------
     results
-        Of `body_study`, of one loading.
+        Results of `body_study` for one loading.
     n_shown
-        Number of vibration modes of the histories on the right; of a set without such a case its nearest number.
+        Number of vibration modes of the histories on the right; for a set without this case, the nearest number.
 
     Raises
     ------

@@ -50,15 +50,15 @@ __all__ = [
 
 
 # body errors ----------------------------------------------------------------------------------------------------------
-# How far the deformation of a reduced body is from that of the full model, over the whole body and over time.
+# Difference between the deformation of a reduced body and of the full model, over the whole body and over time.
 #
-# Of both the rigid part is taken off, u - N Nᵀ M u (mean axes), so that body frames and small motions of the whole do
-# not count. With e(t) the difference,
+# The rigid part of both is removed, u - N Nᵀ M u (mean axes), so that body frames and small rigid motions have no
+# effect. With e(t) the difference,
 #
-#     epsilon_M(t) = |e|_M / max |u_full|_M     displacement, each mass by its own
-#     epsilon_K(t) = |e|_K / max |u_full|_K     strain energy: what stresses see
+#     epsilon_M(t) = |e|_M / max |u_full|_M     displacement, weighted by mass
+#     epsilon_K(t) = |e|_K / max |u_full|_K     strain energy, which measures errors of stress
 #
-# a norm |x|_A² = xᵀ A x, the greatest taken over the whole motion of the full model.
+# where |x|_A² = xᵀ A x, and the maximum is over the whole motion of the full model.
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +100,9 @@ class BodyReference:
         elastic = without_rigid(self.body, np.asarray(self.u))
         greatest = tuple(float(norms(A, elastic).max()) for A in (self.body.M, self.body.K))
         if not min(greatest) > 0:
-            raise ModelError(f"body reference: body {self.body.name!r} does not deform; nothing to compare with")
+            raise ModelError(
+                f"body reference: body {self.body.name!r} does not deform, so that errors relative to it do not exist"
+            )
         object.__setattr__(self, "elastic", elastic)
         object.__setattr__(self, "greatest", greatest)
 
@@ -211,24 +213,24 @@ def body_study(
     Parameters
     ----------
     loadings
-        By name; their flexible body is a place holder.
+        Loadings by name; their flexible body is a placeholder.
     name
-        Of the flexible body.
+        Name of the flexible body.
     body
         Its coupled finite element model (`lean_body` saves time).
     full
-        Of `full_motions`.
+        Motions of the full model, from `full_motions`.
     cases
-        Name of a set, what makes it, number of modes.
+        Name of a mode set, the function that makes it, and the number of modes.
     stress
-        Place -> rows over the dofs of the body (`stress_rows`).
+        Rows over the dofs of the body for each place (`stress_rows`).
     on_case
         Called with each result, for progress.
 
     Raises
     ------
     ModelError
-        If a loading has no motion of the full model. Sets that fail become results that say why.
+        If a loading has no motion of the full model. A set that fails becomes a result with the reason.
     """
     missing = [key for key in loadings if key not in full]
     if missing:
@@ -284,12 +286,12 @@ def stress_rows(body: FEBody) -> sp.csr_array:
     Parameters
     ----------
     body
-        Coupled, with points of `fe_models.shell_points`: few, for their cells are asked dof by dof.
+        Coupled body with points of `fe_models.shell_points`: only a few, because each of their dofs is evaluated.
 
     Raises
     ------
     ModelError
-        If it has none.
+        If it has no such points.
     """
     points = body.stress_points
     if not isinstance(points, ShellPoints) or body.recovery is None:

@@ -1,4 +1,4 @@
-"""Geometrically exact beams as a reference without linear frame and modes; two meshes give their error."""
+"""Geometrically exact beams as a reference without modes and linear deformation; two meshes give their error."""
 
 from dataclasses import dataclass, replace
 
@@ -20,10 +20,10 @@ __all__ = ["ExactBeam", "with_exact_beams"]
 @dataclass(frozen=True)
 @checked_fields(ModelError)
 class ExactBeam:
-    """Reference with geometrically exact beams on the lines of the body: given number of elements, and twice as many.
+    """Reference with geometrically exact beams on the lines of the body, in two meshes.
 
-    The finer motion is the reference; errors fall with the square of the element, so that a third of the difference of
-    both is its own error.
+    The finer mesh has twice as many elements and is the reference. Errors decrease with the square of the element
+    length, so that the error of the reference is a third of the difference between both.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def with_exact_beams(system: System, name: str, model: FEBody, elements: int) ->
     Raises
     ------
     ModelError
-        If the body is not of lines, or something of the system names what such beams have not.
+        If the body does not consist of lines, or the system refers to something that such beams do not have.
     """
     system = replace(system, bodies=placed_bodies(system))
     body = system.body(name)

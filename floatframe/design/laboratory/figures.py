@@ -20,7 +20,7 @@ FLOOR = 1e-9  #: smallest error in figures; smaller errors are drawn at this val
 def convergence_figure(result: LaboratoryResult) -> "Figure":
     """Return a figure: on the left error over modal coordinates, on the right error over processor time.
 
-    One line a description; its modes run along it. Cases without a motion are left out, and said in the table.
+    Each description is one line over its number of modes. Cases without a motion are only in the table.
 
     Raises
     ------

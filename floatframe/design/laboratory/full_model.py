@@ -1,8 +1,8 @@
 """The full finite element model as a reference: the unreduced body in the multibody system.
 
-With every displacement of the mesh among its shapes the floating frame loses nothing: no mode is left out, static or
-vibrating, so that what differs from it is the truncation of a case. It stays a description of small deformation about
-a moving frame, with the geometric stiffness of the unit loads; where that ends, parts or an exact beam tell.
+The shapes are all displacements of the mesh, so that no static or vibration mode is missing, and the difference between
+a case and this reference is the truncation of the case. The model still describes small deformation about a moving
+frame, with the geometric stiffness of the unit loads; parts or an exact beam show where this becomes inaccurate.
 """
 
 from dataclasses import dataclass
@@ -42,13 +42,13 @@ class FullModel:
 def all_dofs(body: FEBody, most_dofs: int = MOST_DOFS) -> ModeSet:
     """Return unit columns for all dofs of a coupled body, a complete mode set.
 
-    The reference node of a distributing interface follows its members, C_r u_r + C_m u_m = 0 (its multiplier rows of
-    K), and has no column of its own; multipliers have none.
+    The reference node of a distributing interface has no column, because it follows its members, C_r u_r + C_m u_m = 0
+    (its multiplier rows of K); neither have multipliers.
 
     Raises
     ------
     ModelError
-        If these are more than may be.
+        If there are more than `most_dofs`.
     """
     is_multiplier = body.dofs[:, 1] == MULTIPLIER
     followers = [i.dofs for i in body.interfaces if i.kind == "distributing" and i.dofs is not None]

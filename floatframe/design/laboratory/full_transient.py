@@ -1,6 +1,6 @@
 """A linear transient of a complete finite element model by direct integration without reduction.
 
-With h the dofs whose motion is given, i the others, in the axes of the mesh and relative to a frame that may move,
+Index h is for dofs whose motion is given, i for the others. In the axes of the mesh, relative to a frame that may move,
 
     M_ii u_i'' + D_ii u_i' + K_ii u_i = f_i - (M_ih u_h'' + D_ih u_h' + K_ih u_h)
     f = W p(t) + Σ f_k p_k(t) - M Psi_R (a, alpha) + Σ omega_a omega_b f_ab  (wrenches, load cases, inertia)
@@ -10,8 +10,8 @@ With h the dofs whose motion is given, i the others, in the axes of the mesh and
 (2) (c_m M_ii + gamma h D_ii + beta h² K_ii) a_1 = f_i - K_ii u_p - D_ii v_p - M_ii w: one matrix, factorised once
 (3) forces that move the given dofs: the rows h of the same equation
 
-Linear in the deformation: what couples it with the turning of the frame (Coriolis, softening, geometric stiffness) is
-left out, so that omega has to stay well below the lowest frequency.
+The equations are linear in the deformation. They do not contain its coupling with the rotation of the frame (Coriolis,
+softening, geometric stiffness), so that omega must be well below the lowest frequency.
 """
 
 from collections.abc import Mapping
@@ -114,18 +114,18 @@ def full_transient(
     body
         A coupled body.
     t
-        Times at even steps, (n_t,), in the time unit of the body.
+        Equally spaced times, (n_t,), in the time unit of the body.
     motions
-        Interface -> motion of its boundary dofs (reference node, mesh axes; all dofs of kind "nodes"), (n_t, n_dofs),
-        or a tuple of it and its first and second rates, which otherwise come from a spline of degree five.
+        Motion of the boundary dofs of each interface (reference node, mesh axes; all dofs of kind "nodes"),
+        (n_t, n_dofs), or a tuple with its first and second derivatives, which otherwise come from a quintic spline.
     wrenches
-        Interface -> force and moment on its reference point, mesh axes, (n_t, 6).
+        Force and moment on the reference point of each interface, mesh axes, (n_t, 6).
     loads
-        Load case of the body -> amplitude, (n_t,).
+        Amplitude of each load case of the body, (n_t,).
     frame
-        Motion of the frame that the displacement is relative to; None: it stands still.
+        Motion of the frame relative to which displacements are measured; None: a fixed frame.
     damping
-        Added to the body's own: alpha M + beta K.
+        Damping alpha M + beta K, in addition to the damping of the body.
     rho_inf
         Spectral radius at infinite frequency of generalized-alpha, 0 to 1.
     rows
@@ -134,7 +134,7 @@ def full_transient(
         Start in equilibrium with the loads and motions of the first time, instead of undeformed; the given motions must
         hold the body.
     every
-        Results at every so many of the times, from the first on.
+        Results are stored at every `every`-th time, from the first on.
 
     Raises
     ------
@@ -161,7 +161,7 @@ def full_transient(
     if 3.0 * n_out * P.shape[0] > MOST_NUMBERS:
         raise ModelError(
             f"{where}: {P.shape[0]} rows at {n_out} times are {24e-9 * n_out * P.shape[0]:.1f} GB; give rows = a "
-            "matrix of what is wanted, or every = 10, say"
+            "matrix of selected rows, or every = 10, for example"
         )
     moved = {name: history(where, body, name, given, t) for name, given in (motions or {}).items()}
     held = np.concatenate([boundary_dofs(body, name) for name in moved] or [np.zeros(0, np.int64)])
@@ -289,7 +289,9 @@ def load_columns(
     columns, amplitudes = [np.zeros((body.n_dof, 0))], [np.zeros((len(t), 0))]
     both = sorted(moved & set(wrenches))
     if both:
-        raise ModelError(f"{where}: {', '.join(both)}: motion and wrench are given; the one follows from the other")
+        raise ModelError(
+            f"{where}: {', '.join(both)}: expected a motion or a wrench, got both; each follows from the other"
+        )
     if wrenches:
         columns.append(Ports.of_body(body, tuple(wrenches)).loads())
     cases = {case.name: case.f for case in body.load_cases}
@@ -323,7 +325,10 @@ def spin_columns(body: FEBody, origin: Array) -> Array:
     if body.element_model is not None and has_geometric_stiffness(body):
         on_mesh = body.element_model.mass_forces(spin)
         return np.asarray(on_mesh if body.recovery is None else body.recovery.matrix.T @ on_mesh)
-    at_nodes, at_dofs = spin.at(body.nodes), np.zeros((body.n_dof, spin.k))  # bare matrices: the field at the nodes
+    at_nodes, at_dofs = (
+        spin.at(body.nodes),
+        np.zeros((body.n_dof, spin.k)),
+    )  # model of matrices alone: the field at the nodes
     node, component = body.dofs.T
     is_translation = (component >= 0) & (component < 3)
     at_dofs[is_translation] = at_nodes[node[is_translation], component[is_translation]]
@@ -343,7 +348,7 @@ def equilibrium(where: str, K_i: sp.csc_array, f: Array) -> Array:
     except FactorizationError as error:
         raise ModelError(
             f"{where}: is_preloaded: the interfaces whose motion is given do not hold the body ({error}); give the "
-            "motion of more of them, or begin undeformed"
+            "motion of more interfaces, or begin undeformed"
         ) from error
     with factor:
         return np.asarray(factor.solve(f))

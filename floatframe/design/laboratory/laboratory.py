@@ -1,11 +1,11 @@
 """Comparison of descriptions of a flexible body in a mechanism with a reference: error, cost, cause of the error.
 
-(1) every case is reduced, put into the system and run; the first run is made twice, so that compilation is no cost
-(2) error of each column of each sensor: root mean square of its distance from the reference, over the range of the
-    reference; the error of a case is its largest
-(3) what a case lacks: *truncation*, its distance from the case of the same family with the most modes; *description*,
-    the distance of that one from the reference (body frame, stiffening, number of parts, the basis itself). The greater
-    of both is what fails first; notes that the frame left its range say when
+(1) every case is reduced, put into the system and run; an earlier short run excludes compilation from the cost
+(2) error of each column of each sensor: root mean square of its difference from the reference, divided by the range of
+    the reference; the error of a case is the largest error of its columns
+(3) causes of the error of a case: *truncation* is its distance from the case of the same family with the most modes;
+    *description* is the distance of that case from the reference (body frame, stiffening, number of parts, the basis
+    itself). The larger one fails first; notes state when the body left the linear range of its frame
 """
 
 import logging
@@ -196,11 +196,11 @@ def study(
     Parameters
     ----------
     system
-        The mechanism, with sensors; its body is only a place holder.
+        The mechanism, with sensors; its flexible body is only a placeholder.
     body
         Name of that flexible body.
     job
-        Job file it is reduced by; mode set, number of modes and frame come from the cases.
+        Job file of its reduction; mode set, number of modes and frame come from the cases.
     cases
         The descriptions of the body to compare.
     integrator
@@ -227,7 +227,7 @@ def study(
     ModelError
         If the system has no such body or sensor, or the reference has no column that is compared.
     CmsError
-        If the reference case cannot be reduced or run; other cases that fail become rows that say why.
+        If the reference case cannot be reduced or run; other cases that fail become rows with the reason.
     """
     stages = stages or Stages()
     names = [sensor.name for sensor in system.sensors]
@@ -280,7 +280,7 @@ def study(
                        for name, values in told.columns.items()}  # fmt: skip
             lost = [name for name in wanted if name not in {sensor.name for sensor in fine.sensors}]
             if lost:
-                told = replace(told, words=f"{told.words} (without {', '.join(lost)}, which they do not know)")
+                told = replace(told, words=f"{told.words} (without {', '.join(lost)}, which they do not have)")
         else:
             told = reference
         failures: dict[Case, str] = {}
@@ -343,8 +343,8 @@ def compared_columns(reference: Reference, found: Sequence[Mapping[str, Array]])
     if not moving:
         known = ", ".join(found[0]) if found else "none"
         raise ModelError(
-            f"study: the reference has no moving column that the sensors have; it has {', '.join(reference.columns)}, "
-            f"they have {known}"
+            f"study: expected a moving column of the reference among those of the sensors; the reference has "
+            f"{', '.join(reference.columns)}, the sensors have {known}"
         )
     return moving
 
@@ -362,9 +362,9 @@ def distance(a: Array, b: Array, scale: float) -> float:
 class BodyShelf:
     """Reduced bodies of one job, each computed once for its case; a context manager with a folder for jobs of parts.
 
-    The finite element model of a job is built and factorised once: all mode sets, numbers of modes and frames share its
-    families, and vibration modes are sought once, as many as the largest case asks for. With stiffening or without it
-    is the same body.
+    The finite element model of a job is built and factorised once. All mode sets, numbers of modes and frames share its
+    families, and vibration modes are computed once, for the case with the most modes. Cases with and without stiffening
+    share one reduced body.
     """
 
     def __init__(self, job: str | Path, cut: str = "rigid", *, cases: Iterable[Case] = ()) -> None:
@@ -393,7 +393,7 @@ class BodyShelf:
         Raises
         ------
         CmsError, FeModelsError
-            If the job cannot be reduced so, or cut into so many parts.
+            If the job cannot be reduced as the case requires, or cannot be cut into its number of parts.
         """
         key = (case.mode_set, case.n_modes, case.frame, case.parts)
         if key not in self._made:
@@ -407,13 +407,13 @@ class BodyShelf:
         Raises
         ------
         CmsError, FeModelsError, ModelError
-            If the job cannot be read, or the body has more dofs than may be.
+            If the job cannot be read, or the body has too many dofs.
         """
         families = self._families_of(self.job)
         modes = all_dofs(families.body, asked.most_dofs)
         job = changed_job(read_job(self.job), Case(frame="tisserand"))
         plan = Plan.of_stiffness(job, families.body)
-        states = self._states_of(self.job, job, plan, families, 0)  # of a reference however many modes there are
+        states = self._states_of(self.job, job, plan, families, 0)  # needed with any number of modes
         return reduced(job, plan, families, modes, states, Stages())
 
     def model(self) -> FEBody:
@@ -434,7 +434,7 @@ class BodyShelf:
         if most > case.n_modes and (path, case.mode_set) not in self._begun:
             self._begun.add((path, case.mode_set))
             largest = job.model_copy(update={"reduction": job.reduction.model_copy(update={"n_modes": most})})
-            with suppress(ReportedError):  # found once, the others are its first ones; too many are told where they are
+            with suppress(ReportedError):  # smaller cases take the first of these modes; too many fail below
                 job_mode_set(families, reduction_of(largest, families.body))
         modes = job_mode_set(families, reduction_of(job, families.body))
         plan = Plan.of_stiffness(job, families.body)

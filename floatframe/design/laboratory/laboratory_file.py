@@ -79,7 +79,7 @@ class ReferenceTable(Table):
             raise ValueError('kind = "file": expected file = the path of a table')
         others = given - own if own is not None else given & {"file", "most_dofs", "elements"}
         if others:
-            raise ValueError(f'of a reference of kind "{kind}" expected no {", ".join(sorted(others))}')
+            raise ValueError(f'kind = "{kind}": expected no {", ".join(sorted(others))}')
         return self
 
     @property
@@ -100,7 +100,7 @@ class LaboratoryFile(Table):
     kind: str = kind_field("laboratory")
     system: PathBeside = Field(description="the path of a system file with [run] and sensors")
     body: str = Field(description="the name of its flexible body")
-    job: PathBeside = Field(description="the path of the job that body is reduced by")
+    job: PathBeside = Field(description="the path of the job that reduces this body")
     sensors: Annotated[tuple[str, ...], BeforeValidator(as_tuple)] | None = Field(
         None, description="a list of names of sensors; default: all"
     )

@@ -35,21 +35,21 @@ def with_body(system: System, name: str, reduced: Sequence[ReducedBody], *, stif
     Parameters
     ----------
     reduced
-        The body, or its parts in their order, joined at their interfaces cut_1, cut_2, ...; all drawn in one mesh.
+        The body, or its parts in order, joined at the interfaces cut_1, cut_2, ...; all parts come from one mesh.
     stiffening
-        Whether their geometric stiffness counts.
+        Whether geometric stiffness is included.
 
     Raises
     ------
     ModelError
-        If there is no such flexible body, it is deformed at the start, or something names a place or the body itself
-        in a way that no part answers.
+        If there is no such flexible body, it is deformed at the start, or the system refers to a place on it that no
+        part has, or to the body as a whole.
     """
     body = system.body(name)
     if not isinstance(body, FlexibleBody):
         raise ModelError(f"system {system.name!r}: body {name!r}: expected a flexible body")
     if np.any(body.q) or np.any(body.q_dot):
-        raise ModelError(f"flexible body {name!r}: is deformed at the start; other modes know nothing of it")
+        raise ModelError(f"flexible body {name!r}: is deformed at the start, which other modes cannot represent")
     names = [name] if len(reduced) == 1 else [f"{name}_{k + 1}" for k in range(len(reduced))]
     parts = tuple(
         replace(body, name=part, reduced=each, q=np.zeros(0), q_dot=np.zeros(0), source="", stiffening=stiffening)
@@ -77,7 +77,7 @@ def with_part(system: System, name: str, part: FlexiblePart) -> System:
     Raises
     ------
     ModelError
-        If a joint or force names a place that the part has not, or the body as a whole.
+        If a joint or force refers to a place that the part does not have, or to the body as a whole.
     """
     system = replace(system, bodies=placed_bodies(system))
     body = system.body(name)
@@ -119,12 +119,10 @@ def marker_of_part(
         nearest = min(away, key=lambda body: away[body])
         size = float(np.linalg.norm(np.ptp(list(places.values()), axis=0)))
         if away[nearest] > marker.tolerance * size:
-            raise ModelError(f"no node of {part.name!r} is at {marker.position.tolist()}, {nearest!r} is nearest")
+            raise ModelError(f"{part.name!r} has no node at {marker.position.tolist()}; the nearest is {nearest!r}")
         found = Marker(nearest)
     else:
-        raise ModelError(
-            f"a marker on {part.name!r} without a place, or on an element or set: name an interface or node"
-        )
+        raise ModelError(f"a marker on {part.name!r}: expected an interface or node, got an element, a set or no place")
     return replace(found, triad=np.eye(3) if found.triad is None else found.triad)
 
 
@@ -143,8 +141,8 @@ def moved(part: Any, name: str, to: Callable[[Marker], Marker], n_parts: int) ->
         value = getattr(part, each.name)
         if value == name if isinstance(value, str) and each.name != "name" else isinstance(value, FlexibleBody):
             raise ModelError(
-                f"{getattr(part, 'name', type(part).__name__)!r}: {each.name}: names the body {name!r} as a whole, "
-                f"which has {n_parts} or more parts here; name a place on it, or leave the case out"
+                f"{getattr(part, 'name', type(part).__name__)!r}: {each.name}: refers to the body {name!r} as a whole, "
+                f"which has {n_parts} or more parts here; name a place on it, or remove the case"
             )
         new = (
             moved(value, name, to, n_parts)
@@ -157,7 +155,7 @@ def moved(part: Any, name: str, to: Callable[[Marker], Marker], n_parts: int) ->
 
 
 def marker_on_part(marker: Marker, parts: Sequence[FlexibleBody]) -> Marker:
-    """Return a marker on the part that has its interface, or that keeps the node nearest to it."""
+    """Return a marker on the part that has its interface, or the node nearest to it."""
     if marker.interface is not None:
         for part in parts:
             if marker.interface in [interface.name for interface in part.reduced.interfaces]:

@@ -6,11 +6,12 @@
         M u'' + D u' + K u + Σ B_uᵀ (D_b x' + K_b x) = -M Psi_R (a, alpha) - Σ omega_a omega_b f_ab + Σ B_uᵀ W_b(t)
         M_k w_k'' + Σ B_kᵀ (D_b x' + K_b x) = 0,        x = B_u u + Σ B_k w_k
 
-    with x the further deformation of a bushing; the right side balances itself, since (1) is a motion (`imbalance`)
+    with x the additional deformation of a bushing; the right-hand side is in balance, since (1) is a motion
+    (`imbalance`)
 (3) one factorisation and direct integration (`full_transient`); the chosen bodies are in balance in (1) already
 
-What (1) may do: anything. What (2) leaves out: products of u, w with the angles by which bodies stand against each
-other and with omega (Coriolis), so that errors are of the order of those angles times what flexibility changes.
+The motion (1) may be arbitrarily large. (2) neglects products of u and w with the relative angles of the bodies and
+with omega (Coriolis), so that errors are of the order of these angles times the effect of flexibility.
 """
 
 from collections.abc import Sequence
@@ -85,23 +86,23 @@ def suspended_motion(
     Parameters
     ----------
     system
-        Without gravity; the flexible body is held by bushings alone, between its interfaces and other bodies; all
-        bodies are placed along the ground axes.
+        A system without gravity; the flexible body is held only by bushings between its interfaces and other bodies;
+        all bodies are placed along the ground axes.
     name
-        Of the flexible body.
+        Name of the flexible body.
     body
         Its coupled finite element model, from which it was reduced in mean axes.
     free
-        Rigid bodies that may follow its deformation, held by bushings too; all others move as they do in (1).
+        Rigid bodies that may follow its deformation, also held by bushings; all others move as in (1).
     every
-        Results at every so many steps.
+        Results are stored at every `every`-th step.
     damping
-        Of the finite element model.
+        Damping of the finite element model.
 
     Raises
     ------
     ModelError
-        If the system is not of this kind.
+        If the system does not satisfy these conditions.
     """
     flexible = system.body(name)
     where = f"suspended body {name!r}"
@@ -150,7 +151,7 @@ def _placed(where: str, system: System, name: str) -> Array:
     """Return the position of the frame of a body, (3,); `ModelError` unless its axes are the ground axes."""
     body = {each.name: each for each in placed_bodies(system)}[system.body(name).name]
     if np.abs(np.asarray(body.orientation) - [1, 0, 0, 0]).max() > ALIGNED:
-        raise ModelError(f"{where}: body {name!r} is turned as placed; expected axes along those of the ground")
+        raise ModelError(f"{where}: body {name!r}: expected axes along the ground axes, got a rotated body")
     return body.drawn_position
 
 
@@ -169,7 +170,7 @@ def _link(where: str, system: System, body: FEBody, name: str, free: Sequence[st
     if not isinstance(force, Bushing):
         touched = [body_name(m.body) for m in vars(force).values() if isinstance(m, Marker)]
         if name in touched or set(touched) & set(free):
-            raise ModelError(f"{where}: force {getattr(force, 'name', '')!r}: expected bushings alone")
+            raise ModelError(f"{where}: force {getattr(force, 'name', '')!r}: expected a bushing")
         return None
     ends = [_end(end) for end in (force.marker_a, force.marker_b)]
     owners = [owner for owner, _ in ends]
@@ -179,7 +180,7 @@ def _link(where: str, system: System, body: FEBody, name: str, free: Sequence[st
         raise ModelError(f"{where}: bushing {force.name!r}: expected no preload and no tables")
     point = next((p for p in (_point(where, system, body, *end, name) for end in ends) if p is not None), None)
     if point is None:
-        raise ModelError(f"{where}: bushing {force.name!r}: neither of its ends says where it is")
+        raise ModelError(f"{where}: bushing {force.name!r}: expected a position at one of its ends, got none")
     n = body.n_dof + 6 * len(free)
     B, interface = sp.lil_array((6, n)), ""
     for sign, (owner, marker) in zip((-1.0, 1.0), ends, strict=True):
@@ -251,8 +252,8 @@ def _loads(
 def _wrench(flexible: FlexibleBody, name: str, rigid: Trajectory, link: _Link) -> Array:
     """Return force and moment of a bushing on the body at its interface in (1), mesh axes, (n_t, 6).
 
-    A bushing without mass is in balance: what it does to B is -F and -M + d × F, d from the point of A to that of B;
-    both act at the reference point of the interface whatever d is.
+    A bushing without mass is in balance: it acts on B with -F and -M + d × F, where d is from the point of A to that of
+    B; both act at the reference point of the interface for any d.
     """
     motion, frame = rigid.body(name), flexible.reduced.frame
     interface = next(each for each in flexible.reduced.interfaces if each.name == link.interface)
@@ -273,7 +274,7 @@ def _marker_path(rigid: Trajectory, flexible: FlexibleBody, link: _Link, name: s
     motion, body = rigid.body(owner), rigid.body(name)
     if marker is not None and marker.position is not None:
         local = marker.position
-    else:  # placed where the interface was
+    else:  # at the placed position of the interface
         interface = next(each for each in flexible.reduced.interfaces if each.name == link.interface)
         local = rotation_matrix(motion.p[0]).T @ (
             body.r[0] + rotation_matrix(body.p[0]) @ interface.position - motion.r[0]

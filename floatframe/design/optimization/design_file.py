@@ -62,7 +62,7 @@ class ParameterSection(Table):
     """[parameters.NAME]: numbers of the system file that are free between bounds."""
 
     path: Annotated[str | tuple[str | PathSection, ...], BeforeValidator(list_as_tuple)] = Field(
-        description="the key path in the system file, text, such as bodies.rod.mass, or a list of those that take one "
+        description="the key path in the system file, text, such as bodies.rod.mass, or a list of paths that share one "
         "value: text or tables {path = ..., factor = ...}"
     )
     lower: float = Field(description="a number, the lower bound")
@@ -111,11 +111,11 @@ class QuantitySection(Table):
         analysis = self.analysis or analysis
         if analysis != RESPONSE:
             if self.band is not None or self.at is not None:
-                raise ValueError(f'{name}: band and at are of analysis = "response", this is taken from {analysis!r}')
+                raise ValueError(f'{name}: band and at belong to analysis = "response", got analysis = {analysis!r}')
             return Output(name, self.of, self.take)
         if (self.band is None) == (self.at is None):
             raise ValueError(
-                f"{name}: expected band or at, of a frequency response, got {'both' if self.at else 'neither'}"
+                f"{name}: expected either band or at for a frequency response, got {'both' if self.at else 'neither'}"
             )
         take = self.take if "take" in self.model_fields_set else "greatest"
         if take not in RESPONSE_TAKES or (self.at is not None and "take" in self.model_fields_set):
@@ -134,9 +134,9 @@ class ObjectiveSection(QuantitySection):
     goal: choice("goal", lambda: GOALS) | None = Field(  # type: ignore[valid-type]
         None, description=f"one of {', '.join(GOALS)}; default: smallest"
     )
-    target: float | None = Field(None, description="a number to come near to")
+    target: float | None = Field(None, description="a number to approach")
     table: Annotated[Path, BeforeValidator(existing_file("table"))] | None = Field(
-        None, description="the path of a .csv file with columns t and value to come near to"
+        None, description="the path of a .csv file with columns t and value, the history to approach"
     )
     weight: Annotated[float, Field(gt=0)] = Field(1.0, description="a number above 0")
 
@@ -146,7 +146,7 @@ class ObjectiveSection(QuantitySection):
         if len(given) > 1:
             raise ValueError(f"expected one of goal, target and table, got {' and '.join(given)}")
         if self.table is not None and "take" in self.model_fields_set:
-            raise ValueError("take: a table is compared at all its times; leave take out")
+            raise ValueError("take: a table is compared at all its times; remove take")
         return self
 
 
@@ -176,30 +176,30 @@ class DesignFile(Table):
         "run", description=f"one of {', '.join((*ANALYSES, RESPONSE))}"
     )
     combine: choice("combination", lambda: COMBINATIONS) = Field(  # type: ignore[valid-type]
-        "sum", description=f"one of {', '.join(COMBINATIONS)}: what is made small of all objectives"
+        "sum", description=f"one of {', '.join(COMBINATIONS)}: the combination of all objectives that is minimised"
     )
     method: choice("method", lambda: METHODS) = Field(  # type: ignore[valid-type]
         description=f"one of {', '.join(METHODS)}"
     )
     workers: Annotated[int | str, BeforeValidator(workers_of_file)] | None = Field(
-        None, description=f"{WORKERS_HELP}; default: one process a processor"
+        None, description=f"{WORKERS_HELP}; default: one process per processor"
     )
     iterations: Annotated[int, Field(ge=1, le=100_000)] = Field(
-        100, description="a whole number above 0 and up to 100000, at most so many"
+        100, description="a whole number above 0 and up to 100000, the largest number of iterations"
     )
     tolerance: Annotated[float, Field(ge=SMALLEST_TOLERANCE, lt=1)] = Field(
-        1e-9, description=f"a number of {SMALLEST_TOLERANCE:g} to 1, when to end"
+        1e-9, description=f"a number of {SMALLEST_TOLERANCE:g} to 1, the tolerance at which the method ends"
     )
     differences: choice("differences", lambda: DIFFERENCES) = Field(  # type: ignore[valid-type]
         "central", description=f"one of {', '.join(DIFFERENCES)}"
     )
     step: Annotated[float, Field(gt=0, le=0.1)] = Field(
-        1e-5, description="a number above 0 and up to 0.1, the step of differences as a part of upper - lower"
+        1e-5, description="a number above 0 and up to 0.1, the step of differences as a fraction of upper - lower"
     )
     population: Annotated[int, Field(ge=5, le=10_000)] | None = Field(
-        None, description="a whole number of 5 or more, of differential-evolution; default: 15 a parameter"
+        None, description="a whole number of 5 or more, for differential-evolution; default: 15 per parameter"
     )
-    seed: Annotated[int, Field(ge=0)] = Field(0, description="a whole number, of differential-evolution")
+    seed: Annotated[int, Field(ge=0)] = Field(0, description="a whole number, for differential-evolution")
     parameters: dict[str, ParameterSection] = Field(description="tables [parameters.NAME]")
     objectives: dict[str, ObjectiveSection] = Field(description="tables [objectives.NAME]")
     constraints: dict[str, ConstraintSection] = Field({}, description="tables [constraints.NAME]")
@@ -216,12 +216,12 @@ class DesignFile(Table):
         paths = [place.path for section in self.parameters.values() for place in section.places()]
         repeated = sorted({path for path in paths if paths.count(path) > 1})
         if repeated:
-            raise ValueError(f"parameters: the key path {repeated[0]} stands twice")
+            raise ValueError(f"parameters: the key path {repeated[0]} occurs twice")
         if self.method == "least-squares":
             if self.combine != "sum":
-                raise ValueError('combine: method = "least-squares" makes a sum of squares small; take slsqp')
+                raise ValueError('combine: method = "least-squares" minimises a sum of squares; take slsqp')
             if self.constraints:
-                raise ValueError('constraints: method = "least-squares" takes none; take slsqp or trust-constr')
+                raise ValueError('constraints: method = "least-squares" supports none; take slsqp or trust-constr')
             plain = [name for name, o in self.objectives.items() if o.target is None and o.table is None]
             if plain:
                 raise ValueError(f'objectives.{plain[0]}: method = "least-squares" expects a target or a table')
@@ -246,8 +246,8 @@ def read_design(path: str | os.PathLike[str]) -> Design:
     Raises
     ------
     SystemFileError
-        With every problem: key path, value, what was expected, choices and the nearest name; for a key path that the
-        system does not hold, or that leads to no number; for a table that cannot be read.
+        If the file is not valid, a key path does not exist in the system or does not lead to a number, or a table
+        cannot be read. The message lists every problem, with key path, value, expected value, choices and nearest name.
     """
     path = Path(path)
     data = validated(DesignFile, read_toml(path, SystemFileError), path, SystemFileError, context=path.parent)
@@ -287,14 +287,16 @@ def read_design(path: str | os.PathLike[str]) -> Design:
 
 
 def parameter_of(name: str, section: ParameterSection, content: dict[str, Any], path: Path) -> DesignParameter:
-    """Return a parameter; `SystemFileError` if a key path leads to no number, or the start is outside of its bounds."""
+    """Return a parameter; `SystemFileError` if a key path does not lead to a number, or the start is out of bounds."""
     where = f"{path}: parameters.{name}"
     found = []
     places = section.places()
     for place in places:
         value = value_of(content, place.path, where, SystemFileError)
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise SystemFileError(f"{where}: path = {place.path!r}: expected the place of a number, got {value!r:.60}")
+            raise SystemFileError(
+                f"{where}: path = {place.path!r}: expected the key path of a number, got {value!r:.60}"
+            )
         found.append(float(value) / place.factor)
     start = found[0] if section.start is None else section.start
     if not section.lower <= start <= section.upper:
@@ -313,7 +315,7 @@ def read_table(path: Path) -> tuple[Array, Array]:
     Raises
     ------
     SystemFileError
-        With the line that does not hold two finite numbers, or whose time does not grow.
+        If a line does not contain two finite numbers, or its time does not increase; the message has the line number.
     """
     rows: list[tuple[float, float]] = []
     with open(path, newline="", encoding="utf-8-sig", errors="replace") as file:
@@ -330,7 +332,7 @@ def read_table(path: Path) -> tuple[Array, Array]:
                 raise SystemFileError(f"{path}, line {i + 1}: expected finite numbers, got {cells}")
             if rows and t <= rows[-1][0]:
                 before = rows[-1][0]
-                raise SystemFileError(f"{path}, line {i + 1}: expected times that grow, got {t:g} after {before:g}")
+                raise SystemFileError(f"{path}, line {i + 1}: expected increasing times, got {t:g} after {before:g}")
             rows.append((t, value))
     if not rows:
         raise SystemFileError(f"{path}: expected lines t,value, got none")

@@ -36,27 +36,30 @@ __all__ = [
 
 
 # responses ------------------------------------------------------------------------------------------------------------
-# Numbers of frequency responses: the greatest amplitude in a band, the least, means, or that at one frequency.
+# Numbers from frequency responses: the largest, smallest or mean amplitude in a band, or the amplitude at one
+# frequency.
 
 
 GRID = 120  #: number of equidistant frequencies in a band, in addition to those near its resonances
-LIKELY = 0.8  #: amplitude on the grid, relative to the best, from which an extreme between the neighbours is searched
+LIKELY = (
+    0.8  #: amplitude on the grid, relative to the best, above which an extreme between the neighbours is searched for
+)
 
 
 def response_number(quantity: Quantity, linear: LinearSystem, per_second: float) -> float:
     """Return the number that a quantity takes from the amplitude of a frequency response.
 
-    The extremes of a band are found on a grid that is fine about resonances, then between the points of the grid, so
+    The extremes of a band are found on a grid that is fine near resonances, then refined between the grid points, so
     that the number changes smoothly with the parameters.
 
     Parameters
     ----------
     quantity
-        Of the analysis "response"; it is of "OUTPUT / INPUT".
+        A quantity of the analysis "response", of "OUTPUT / INPUT".
     linear
-        With the inputs and outputs of the system file.
+        The linear system with the inputs and outputs of the system file.
     per_second
-        From frequencies of the system to Hz.
+        Factor from frequencies of the system to Hz.
     """
     amplitude = amplitude_of(quantity, linear, per_second)
     if quantity.at is not None:
@@ -77,7 +80,7 @@ def amplitude_of(quantity: Quantity, linear: LinearSystem, per_second: float) ->
     of = quantity.output.of
     names = of.split(" / ")
     if len(names) != 2:
-        raise ModelError(f'{quantity.output.name}: of = {of!r}: expected "OUTPUT / INPUT", of a frequency response')
+        raise ModelError(f'{quantity.output.name}: of = {of!r}: expected "OUTPUT / INPUT" for a frequency response')
     places = []
     for name, known, kind in zip(names, (linear.outputs, linear.inputs), ("output", "input"), strict=True):
         if name not in known:
@@ -112,9 +115,9 @@ class Evaluation:
     """Values of the parameters and the resulting numbers."""
 
     values: tuple[float, ...]  #: values of the parameters
-    numbers: tuple[tuple[float, ...], ...] = ()  #: of every objective and constraint: one, or one a time of its table
+    numbers: tuple[tuple[float, ...], ...] = ()  #: of each objective and constraint: one, or one per table time
     error: str = ""  #: reason why there are no numbers
-    is_lasting: bool = True  #: whether another attempt would give the same error; not so if the process was killed
+    is_lasting: bool = True  #: whether another attempt would give the same error; False if the process was killed
 
 
 @dataclass(frozen=True)
@@ -180,8 +183,8 @@ def numbers_of(quantity: Quantity, system: System, motion: Trajectory) -> tuple[
     slack = 1e-9 * max(abs(t[-1]), abs(t[0]))
     if wanted[0] < t[0] - slack or wanted[-1] > t[-1] + slack:
         raise ModelError(
-            f"objective {quantity.output.name!r}: its table goes from t = {wanted[0]:g} to {wanted[-1]:g}, the motion "
-            f"from {t[0]:g} to {t[-1]:g}; let the run be longer, or the table shorter"
+            f"objective {quantity.output.name!r}: its table covers t = {wanted[0]:g} to {wanted[-1]:g}, but the motion "
+            f"only {t[0]:g} to {t[-1]:g}; extend the run, or shorten the table"
         )
     curve = CubicSpline(t, values) if len(t) > 3 else None
     return tuple(float(v) for v in (curve(wanted) if curve is not None else np.interp(wanted, t, values)))
@@ -222,7 +225,7 @@ def scalar(design: Design, evaluation: Evaluation) -> float:
 
 
 def violations(design: Design, evaluation: Evaluation) -> Array:
-    """Return g, (n_g,), in units of the limit (of 1 for a limit of 0); a permitted point has g <= 0."""
+    """Return g, (n_g,), relative to the limit (absolute for a limit of 0); a permitted point has g <= 0."""
     g: list[float] = []
     for q, numbers in zip(design.constraints, evaluation.numbers[len(design.objectives) :], strict=True):
         if q.least is not None:
@@ -238,8 +241,8 @@ def open_journal(path: Path, design: Design, files: tuple[str, ...]) -> TaskJour
     Raises
     ------
     ResultsError
-        If the file is no journal, or one of another system, other numbers or another version of the program; it is left
-        as it is.
+        If the file is not a journal, or belongs to another system, other numbers or another version of the program. The
+        file is not changed.
     """
     asked = [
         (q.analysis, q.output.of, q.output.take, q.band, q.at, None if q.times is None else q.times.tolist())

@@ -26,7 +26,7 @@ def plot_history(result: OptimizationResult) -> "Figure":
 
 
 def plot_objective(result: OptimizationResult, ax: "Axes") -> "Axes":
-    """Draw F of every evaluation and the smallest so far; hollow if limits are violated, a cross below if it failed."""
+    """Draw F of all evaluations and its minimum so far; hollow: limits are violated, cross at the bottom: failed."""
     rows = result.history
     number = np.arange(1, len(rows) + 1)
     F = np.array([row.objective for row in rows])
@@ -52,7 +52,7 @@ def plot_objective(result: OptimizationResult, ax: "Axes") -> "Axes":
 
 
 def plot_parameters(result: OptimizationResult, ax: "Axes") -> "Axes":
-    """Draw the parameters from their lower (0) to their upper bounds (1), without the points for differences."""
+    """Draw the parameters, scaled from 0 (lower bound) to 1 (upper bound), without the points of differences."""
     rows = [(i + 1, row) for i, row in enumerate(result.history) if not row.is_difference]
     number = [i for i, _ in rows]
     is_swarm = result.design.method == "differential-evolution"

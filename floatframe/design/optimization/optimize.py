@@ -33,7 +33,7 @@ from floatframe.errors import ModelError
 
 __all__ = ["Evaluated", "OptimizationResult", "optimize"]
 
-PERMITTED = 1e-6  #: largest violation of a limit, in units of the limit, that is permitted
+PERMITTED = 1e-6  #: largest permitted violation of a limit, relative to the limit
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Evaluated:
 
     evaluation: Evaluation
     objective: float  #: F, which is minimised; NaN where the evaluation failed
-    #: largest violation of a limit, in units of the limit; 0 if there is none, infinite where the evaluation failed
+    #: largest violation of a limit, relative to the limit; 0 if there is none, infinite if the evaluation failed
     violation: float
     is_difference: bool  #: whether it was computed only for a derivative
     is_known: bool  #: whether it comes from the journal
@@ -80,7 +80,7 @@ class OptimizationResult:
 
 
 def numbers_by_name(design: Design, evaluation: Evaluation) -> dict[str, float]:
-    """Return the number of each objective and constraint, of a table the rms deviation; NaN where there is none."""
+    """Return the number of each objective and constraint, for a table the rms deviation; NaN if there is none."""
     found: dict[str, float] = {}
     for i, q in enumerate(design.quantities):
         numbers = np.array(evaluation.numbers[i]) if evaluation.numbers else np.full(1, np.nan)
@@ -100,23 +100,23 @@ def optimize(
     Parameters
     ----------
     design
-        As `read_design` returns it.
+        The design, from `read_design`.
     workers
-        Where evaluations are computed (docs/cluster.md); default: as the design says, or one process a processor.
+        Workers that compute evaluations (docs/cluster.md); default: those in the design, or one process per processor.
     journal
-        A file that every evaluation is appended to; what it holds is not computed again. None: nothing is written.
+        A file to which every evaluation is appended; those in it are not computed again. None: nothing is written.
     progress
         Called with each new row of the history.
 
     Raises
     ------
     ModelError, SystemFileError
-        Before any work, if the system is not valid or has no such sensor, column or mode; if the first evaluation
-        fails, or both sides of a difference; if no evaluation keeps the limits.
+        Before any work, if the system is not valid or has no such sensor, column or mode; if the first evaluation or
+        both sides of a difference fail; if no evaluation satisfies the limits.
     ResultsError
-        If the journal is one of another system, other numbers or another version of the program.
+        If the journal belongs to another system, other numbers or another version of the program.
     WorkerError
-        If no workers can be had.
+        If no workers are available.
     """
     from floatframe.files.system_file.read_system import read_system
 
@@ -144,7 +144,7 @@ def best_of(design: Design, history: Sequence[Evaluated]) -> Evaluated:
     if not kept:
         nearest = min(history, key=lambda row: row.violation)
         raise ModelError(
-            f"{design.source}: none of {len(history)} evaluations keeps all constraints; the nearest one, at "
+            f"{design.source}: none of {len(history)} evaluations satisfies all constraints; the nearest one, at "
             f"{values_of(design, nearest.evaluation.values)}, misses a limit by {nearest.violation:.3g} of it; widen "
             "limits or bounds, or begin elsewhere"
         )
@@ -184,9 +184,9 @@ class Evaluator:
         return (start - self.lower) / (self.upper - self.lower)
 
     def at(self, points: Sequence[Array], *, n_trials: int | None = None) -> list[Evaluated]:
-        """Return the rows at scaled points, of which the first `n_trials` (default: all) are not for differences.
+        """Return the rows at scaled points; those after the first `n_trials` (default: none) are for differences.
 
-        What is not known is computed by the workers.
+        The workers compute points that are not known yet.
         """
         values = [tuple(float(v) for v in self.values(z)) for z in points]
         new = list(dict.fromkeys(v for v in values if v not in self.rows))
@@ -267,8 +267,8 @@ def inside(z: Array) -> Array:
 def minimum_of(evaluator: Evaluator, start: Array) -> tuple[bool, str]:
     """Minimise F within limits by gradients; a failed trial counts as worse than all others, and violates every limit.
 
-    The largest of several terms has kinks: there s is made small with all terms of the objectives at or below it, s a
-    further unknown behind z, both in units of F at the start.
+    The largest of several terms is not smooth. Then s, a further unknown after z, is minimised under the constraint
+    that no term of the objectives exceeds s, both in units of F at the start.
     """
     from scipy.optimize import NonlinearConstraint, minimize
 
@@ -323,8 +323,8 @@ def minimum_of(evaluator: Evaluator, start: Array) -> tuple[bool, str]:
         options |= {"gtol": design.tolerance, "xtol": design.tolerance}
         if n_limits:
             limits = [NonlinearConstraint(excess, -np.inf, 0.0, jac=excess_rates)]
-            options |= {"gtol": 0.0, "barrier_tol": design.tolerance}  # gtol looks at no complementarity: too early
-    with warnings.catch_warnings():  # a step that changes no gradient, as rounding has it near the end, is no news
+            options |= {"gtol": 0.0, "barrier_tol": design.tolerance}  # gtol ignores complementarity and ends too early
+    with warnings.catch_warnings():  # near the end, rounding errors give steps without a change of the gradient
         warnings.filterwarnings("ignore", "delta_grad == 0.0", UserWarning)
         found = minimize(
             goal, x, jac=goal_rates, method=design.method, bounds=bounds, constraints=limits, options=options
@@ -352,7 +352,7 @@ def evolution_of(evaluator: Evaluator, start: Array) -> tuple[bool, str]:
 
     limits = (NonlinearConstraint(excess, -np.inf, 0.0),) if n_limits else ()
     first = qmc.LatinHypercube(len(start), rng=np.random.default_rng(design.seed)).random(design.population)
-    first[0] = start  # in the place of one point of the hypercube
+    first[0] = start  # replaces one point of the hypercube
     found = differential_evolution(
         objective, [(0.0, 1.0)] * len(start), constraints=limits, init=first, maxiter=design.iterations, tol=0.0,
         atol=design.tolerance, rng=np.random.default_rng(design.seed + 1), polish=False, vectorized=True,

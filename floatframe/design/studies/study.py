@@ -187,14 +187,14 @@ def check(study: Study, point: tuple[Any, ...]) -> None:
         read_system_keys(study)
         if "unknown key" in str(error):
             raise
-        system = plain  # the values of this point are impossible, which gives a failed row
+        system = plain  # the values of this point are impossible: its row will be a failure
     if study.analysis == "modes":
         for output in study.outputs:
             mode_and_part(output)
         return
     try:
         placed = as_placed(system)
-    except Exception:  # a failure caused by this point is a row, if the unchanged file does not fail
+    except Exception:  # if only this point fails and not the unchanged file, its row is a failure
         system, placed = plain, as_placed(plain)
     for output in study.outputs:
         output_value(output, system, placed)
@@ -323,6 +323,6 @@ def mode_and_part(output: Output) -> tuple[str, int | str]:
     if part not in OF_MODES or not number.isdigit() or int(number) < 1:
         raise ModelError(
             f"output {output.name!r}: of = {output.of!r}: expected one of {', '.join(OF_MODES)} and the number of a "
-            'mode, such as "frequency 1", or of all modes the least or greatest: "damping least"'
+            'mode, such as "frequency 1", or the least or greatest over all modes, such as "damping least"'
         )
     return part, int(number)

@@ -58,7 +58,7 @@ class ParameterSection(Table):
     first: float | None = Field(None, description="a number, the first value")
     last: float | None = Field(None, description="a number, the last value")
     number: Annotated[int, Field(ge=1, le=MOST_POINTS)] | None = Field(
-        None, description=f"a whole number above 0 and up to {MOST_POINTS}, how many values"
+        None, description=f"a whole number above 0 and up to {MOST_POINTS}, the number of values"
     )
     scale: choice("scale", lambda: SCALES) = Field(  # type: ignore[valid-type]
         "linear", description=f"one of {', '.join(SCALES)}"
@@ -106,10 +106,10 @@ class StudyFile(Table):
         "run", description=f"one of {', '.join(ANALYSES)}"
     )
     combine: choice("combination", lambda: COMBINATIONS) = Field(  # type: ignore[valid-type]
-        "all", description="all: every value with every other; together: the first ones, the second ones and so on"
+        "all", description="all: all combinations of values; together: all first values, all second values and so on"
     )
     workers: Annotated[int | str, BeforeValidator(workers_of_file)] | None = Field(
-        None, description=f"{WORKERS_HELP}; default: one process a processor"
+        None, description=f"{WORKERS_HELP}; default: one process per processor"
     )
     parameters: dict[str, ParameterSection] = Field(description="tables [parameters.NAME]")
     outputs: dict[str, OutputSection] = Field(description="tables [outputs.NAME]")

@@ -41,7 +41,7 @@ def plot_study(table: StudyTable) -> "Figure":
 
 
 def plot_study_output(table: StudyTable, name: str, ax: "Axes") -> "Axes":
-    """Plot an output over the first parameter, a curve for each combination of the others; failures as ticks below."""
+    """Plot an output over the first parameter, one curve per combination of the others; ticks below: failures."""
     study, values = table.study, table.column(name)
     k = [output.name for output in study.outputs].index(name)
     first = study.parameters[0]

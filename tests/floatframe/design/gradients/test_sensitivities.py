@@ -428,5 +428,5 @@ def test_contacts_whose_steps_are_divided_are_refused():
     foot = ff.SphereContact("foot", ground, body, radius_b=0.1, stiffness=1e5)
     rail = ff.PrismaticJoint("rail", ground, body, axis=(0, 0, 1))
     system = ff.System([ff.RigidBody("b", 1.0, np.eye(3))], [rail], [foot])
-    with pytest.raises(ff.ModelError, match="contact 'foot' divides steps where it closes, which is not"):
+    with pytest.raises(ff.ModelError, match="contact 'foot' divides the step in which it closes, which is not"):
         ff.sensitivities(system, ["rail.distance value"], ["bodies.b.mass"], t_end=0.02, h=1e-3)

@@ -135,7 +135,7 @@ def test_what_does_not_move_a_loop_is_refused_by_name(form):
     gear = CoordinateCoupler(
         "gear", [(JointCoordinate("turn", "angle"), 1.0), (JointCoordinate("wrist", "angle"), -2.0)]
     )
-    with pytest.raises(ModelError, match="'gear': couplers and elements are no joints"):
+    with pytest.raises(ModelError, match="'gear': expected joints, whose reactions do no work"):
         linear_form(replace(robot, couplers=[gear]), independent=ANGLES)
     with pytest.raises(ModelError, match="rules of base parameters hold for trees"):
         base_parameters(form)

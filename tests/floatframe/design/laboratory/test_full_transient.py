@@ -123,7 +123,7 @@ def test_what_is_refused(body):
     still = np.zeros((11, 6))
     with pytest.raises(ModelError, match="evenly spaced"):
         full_transient(body, np.array([0, 1.0, 3.0]))
-    with pytest.raises(ModelError, match="motion and wrench are given"):
+    with pytest.raises(ModelError, match="expected a motion or a wrench, got both"):
         full_transient(body, t, motions={"left": still}, wrenches={"left": still})
     with pytest.raises(ModelError, match=r"motion of 'left': expected \(11, 6\)"):
         full_transient(body, t, motions={"left": still[:5]})

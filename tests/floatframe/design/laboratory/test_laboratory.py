@@ -229,7 +229,7 @@ def test_what_is_refused(folder):
         study(body="blad")
     with pytest.raises(ModelError, match="expected some of tip, load; got hub"):
         study(sensors=["hub"])
-    with pytest.raises(ModelError, match="no moving column"):
+    with pytest.raises(ModelError, match="expected a moving column"):
         study(reference=ff.Reference("other", np.array([0.0, 1.0]), {"hub x": np.array([0.0, 1.0])}))
     with pytest.raises(ModelError, match="at least one case"):
         study(cases=[])

@@ -196,12 +196,12 @@ def test_a_system_is_not_written_away_from_the_files_that_it_names(copied):
 
 
 @pytest.mark.parametrize(("old", "new", "words"), [
-    ("band = [0.1, 0.15]", "", "expected band or at, of a frequency response, got neither"),
+    ("band = [0.1, 0.15]", "", "expected either band or at for a frequency response, got neither"),
     ("band = [0.1, 0.15]", "band = [0.15, 0.1]", "expected two numbers, [from, to], the second greater"),
     ("band = [0.1, 0.15]", "band = [0.1, 0.15]\nat = 0.12", "got both"),
     ("band = [0.1, 0.15]", 'band = [0.1, 0.15]\ntake = "last"', "take = 'last': expected one of greatest, least"),
-    ("band = [0.1, 0.15]", 'analysis = "modes"\nband = [0.1, 0.15]', 'band and at are of analysis = "response"'),
-    ('method = "slsqp"', 'method = "least-squares"', "makes a sum of squares small"),
+    ("band = [0.1, 0.15]", 'analysis = "modes"\nband = [0.1, 0.15]', 'band and at belong to analysis = "response"'),
+    ('method = "slsqp"', 'method = "least-squares"', "minimises a sum of squares"),
     ('path = "c"', 'path = [{ path = "c", factor = 0 }]', "expected a number other than 0"),
 ])  # fmt: skip
 def test_mistakes_in_responses_are_answered_in_words(copied, old, new, words):

@@ -331,7 +331,7 @@ def test_the_command_works_in_processes_and_writes_table_picture_and_journal(fol
 
 @pytest.mark.parametrize(("old", "new", "words"), [
     ("rod.center_of_mass.0", "rdo.center_of_mass.0", "there is no 'rdo'; did you mean 'rod'"),
-    ("rod.center_of_mass.0", "rod.center_of_mass", "expected the place of a number"),
+    ("rod.center_of_mass.0", "rod.center_of_mass", "expected the key path of a number"),
     ("lower = 0.05", "lower = 1.5", "expected lower below upper, got lower = 1.5, upper = 1"),
     ("lower = 0.05", "lower = 0.6", "outside of the bounds 0.6 to 1; give start"),
     ("slsqp", "slqsp", "did you mean 'slsqp'"),
@@ -341,7 +341,7 @@ def test_the_command_works_in_processes_and_writes_table_picture_and_journal(fol
     ('goal = "greatest"', 'goal = "greatest"\ntarget = 1.0', "expected one of goal, target and table"),
     ('goal = "greatest"', 'table = "x.csv"', "has no times"),
     ('goal = "greatest"', '[constraints.low]\nof = "frequency 1"', "expected least or most"),
-    ('goal = "greatest"', '[constraints.low]\nof = "frequency 1"\nleast = 9.0', "keeps all constraints; the nearest"),
+    ('goal = "greatest"', '[constraints.low]\nof = "frequency 1"\nleast = 9.0', "satisfies all constraints; the"),
 ])  # fmt: skip
 def test_mistakes_are_answered_in_words(folder, old, new, words):
     text = LONGER.replace(old, new).replace("[parameters", "iterations = 3\n[parameters", 1)
@@ -355,8 +355,8 @@ def test_tables_and_first_evaluations_that_do_not_fit_are_told(folder):
         optimize(read_design(folder / "fit.toml"))
     (folder / "fit.toml").write_text(FIT)
     write_table(folder / "y.csv", [0.0, 7.0], [0.0, 1.0])
-    with pytest.raises(ModelError, match="its table goes from t = 0 to 7, the motion from 0 to 3"):
+    with pytest.raises(ModelError, match="its table covers t = 0 to 7, but the motion only 0 to 3"):
         optimize(read_design(folder / "fit.toml"))
     write_table(folder / "y.csv", [1.0, 0.5], [0.0, 1.0])
-    with pytest.raises(SystemFileError, match=r"y.csv, line 3: expected times that grow, got 0.5 after 1"):
+    with pytest.raises(SystemFileError, match=r"y.csv, line 3: expected increasing times, got 0.5 after 1"):
         read_design(folder / "fit.toml")
