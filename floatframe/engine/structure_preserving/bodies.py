@@ -52,8 +52,8 @@ def central_bodies(model: Model, names: tuple[str, ...], scheme: str) -> tuple[C
             M = known[t].mass_matrix[3:, 3:]
             if len(M) and np.linalg.eigvalsh(M)[0] <= 1e-12 * np.abs(np.diag(M)).max():
                 raise ModelError(
-                    f"{scheme}: body {names[i]!r} has a mode without mass, whose velocity has no momentum; "
-                    "remove it, or use generalized-alpha"
+                    f"{scheme}: body {names[i]!r} has a mode without mass, which has no momentum; remove the mode, or "
+                    "use generalized-alpha"
                 )
         bodies.append(known[t])
     return tuple(bodies)

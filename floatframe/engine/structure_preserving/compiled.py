@@ -71,8 +71,8 @@ def constants_of(ds: DiscreteSystem, h: float, rho_inf: float) -> tuple[Array, I
 def pattern_of(ds: DiscreteSystem) -> tuple[Pattern, dict[str, int]]:
     """Return the sparsity of the derivatives: numbers of blocks, their rows, and their colors.
 
-    A block acts on itself and on those with which it shares a connection. Blocks whose rows have none in common are
-    changed together.
+    A block affects its own rows and those of the blocks with which it shares a connection. Blocks that affect no common
+    row are varied together.
     """
     model, n_b = ds.model, len(ds.bodies)
     u0 = model.bodies.u0
@@ -96,7 +96,7 @@ def pattern_of(ds: DiscreteSystem) -> tuple[Pattern, dict[str, int]]:
     for k, own in enumerate(unknowns):
         block_of[own] = k
     colors: list[list[int]] = []
-    taken: list[set[int]] = []  # rows of the blocks of each group
+    taken: list[set[int]] = []  # rows that the blocks of each group affect
     groups: list[list[int]] = []
     for k in range(len(unknowns)):
         free = next((g for g, used in enumerate(taken) if not used & near[k]), len(taken))
@@ -213,7 +213,7 @@ class Kept:
     def go_on_from(self, memory: object, f: Array, *, is_anew: bool) -> None:
         """Prepare the arrays for steps from a memory with multipliers f, reusing those of the last steps if they fit.
 
-        is_anew: without what was known, as a run that goes on from a file begins.
+        is_anew: whether to discard what is known from earlier steps, as a run resumed from a file does.
         """
         arrays = [getattr(self.step, name) for name in REMEMBERED]
         if memory is self.before and not is_anew:
@@ -227,7 +227,7 @@ class Kept:
         self.before, self.known = memory, tuple(array.copy() for array in arrays)
 
 
-#: by the identity of an array of the working arrays; an entry is removed when that array is freed
+#: data by the id of an array of the working arrays; an entry is removed when that array is freed
 KEPT: dict[int, Kept] = {}
 
 

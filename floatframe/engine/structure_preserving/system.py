@@ -17,7 +17,7 @@ __all__ = ["Connection", "DiscreteSystem", "discrete_system", "element_states", 
 
 @dataclass(frozen=True, eq=False)
 class Connection:
-    """A joint, force or coupler between markers A and B; couplers and user forces have a pair for each coordinate."""
+    """A joint, force or coupler between markers A and B; couplers and user forces have two markers per coordinate."""
 
     number: int
     markers: tuple[int, ...]
@@ -65,7 +65,7 @@ def discrete_system(system: System, scheme: str) -> DiscreteSystem:
     Raises
     ------
     ModelError
-        If a joint or force is of a kind that the scheme does not know, or a mode has no mass.
+        If the scheme does not support a kind of joint or force, or a mode has no mass.
     """
     compiled = compiled_system(system)
     model = compiled.model
@@ -142,8 +142,8 @@ def require_known(compiled: CompiledSystem, scheme: str) -> None:
             continue
         if scheme == "Variational" and is_held_velocity(kinds).any():
             raise ModelError(
-                f"{scheme}: joint {name!r} holds velocities that come from no positions, which no variational "
-                "principle gives; use energy-momentum or generalized-alpha"
+                f"{scheme}: joint {name!r} has nonholonomic constraints, which follow from no variational principle; "
+                "use energy-momentum or generalized-alpha"
             )
 
 
@@ -153,11 +153,12 @@ def require_known_element(model: Model, c: int, name: str, scheme: str) -> None:
     markers = range(first, first + int(model.laws.head[int(model.connections.item[c]), 0]))
     if (model.markers.accelerated[list(markers)] >= 0).any():
         raise ModelError(
-            f"{scheme}: element {name!r} feels accelerations, and a step of this scheme has none, only changes of "
+            f"{scheme}: element {name!r} depends on accelerations, but steps of this scheme have only changes of "
             "momenta; use generalized-alpha"
         )
     if scheme == "Variational" and multiplier_rows(model, c):
         raise ModelError(
-            f"{scheme}: element {name!r} has multipliers of its own, which would act at both ends of a step with two "
-            "values, in a law that need not be linear in them; use energy-momentum or generalized-alpha"
+            f"{scheme}: element {name!r} has multipliers of its own, but in this scheme multipliers have different "
+            "values at both ends of a step, and the law may be nonlinear in them; use energy-momentum or "
+            "generalized-alpha"
         )

@@ -1,13 +1,14 @@
 """Bodies relative to their centre of mass, and the motion of one body over a step.
 
-With v the velocity of the centre of mass and a = omega × s + 1C q_dot, s = s(q)/m, 1C = ds/dq (over the mass here, and
-with K_t of a stiffened body, docs/theory.md §7), the kinetic energy separates:
+With v the velocity of the centre of mass and a = omega × s + 1C q_dot, s = s(q)/m, 1C = ds/dq (divided by the mass
+here, and including K_t of a stiffened body, docs/theory.md §7), the kinetic energy separates:
 
     T = m |v|²/2 + T_r,   T_r = 1/2 omega·J omega + omega·B q_dot + 1/2 q_dot·M q_dot - m |a|²/2 = 1/2 wᵀ M_c(q) w
     Pi = J omega + B q_dot - m s × a,   Y = Bᵀ omega + M q_dot - m 1Cᵀ a,   w = (omega, q_dot)
 
-with J, B, M of theory.md §6 about the frame origin, of degree two in q. Between q_0 and q_1 products change by the
-product rule with means, so that w_0ᵀ (M_c(q_1) - M_c(q_0)) w_1 = 2 Σ (q_1 - q_0)_k N_k exactly, N from `inertia_force`.
+with J, B, M of theory.md §6 about the frame origin, of degree two in q. The product rule with mean values gives the
+changes of products between q_0 and q_1, so that w_0ᵀ (M_c(q_1) - M_c(q_0)) w_1 = 2 Σ (q_1 - q_0)_k N_k exactly, with N
+from `inertia_force`.
 """
 
 from floatframe.engine.kernels.body import (
@@ -243,8 +244,8 @@ def keep_bodies(model, discrete, step, memory):
 def body_step(model, discrete, step, i):
     """Compute the motion of body i over the step from its unknowns.
 
-    Forces of the variational scheme act at one configuration. The angular velocity there that belongs to the momentum
-    of the interval is (1 + theta²/4) theta/h (exactly, for turns about a principal axis).
+    Forces of the variational scheme act at one configuration, where the angular velocity is (1 + theta²/4) theta/h. For
+    rotations about a principal axis it belongs exactly to the momentum of the interval.
     """
     t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
     R, theta = matrix(step.R_0[i]), vector(step.z[u0 + 3 :])

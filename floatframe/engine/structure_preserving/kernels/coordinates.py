@@ -1,13 +1,14 @@
 """Coordinates over a step: values at both ends, their change, and forces along them that do exact work.
 
-A distance along an axis of A is a sum of products of a direction and a position, a distance of points the root of one,
-an angle that of kernels/rows.py: each has a discrete derivative, so that a force Q along a coordinate does the
-work Q times its change. TWIST_B is an angle about an axis of B: that of A seen from B, the other way.
+A distance along an axis of A is a sum of products of a direction and a position, a distance of points is the root of
+such a sum, and angles are those of kernels/rows.py. Each has a discrete derivative, so that a force Q along a
+coordinate does the work Q times its change. TWIST_B is an angle about an axis of B, measured as the angle of A seen
+from B with the opposite sign.
 
-In a step a body turns by 2 atan(|theta|/2) with the mean angular velocity theta/h. A torque by the discrete derivative
-of the angle is so much weaker, which keeps the energy of springs and reactions. Motors, dampers, friction and user
-forces act by the whole torque about the mean axis, with the rate of the mean angular velocities: their impulse is h Q,
-their work h Q times the rate, exactly.
+In a step a body turns by 2 atan(|theta|/2), while its mean angular velocity is theta/h. A torque applied by the
+discrete derivative of the angle is smaller by this ratio, which conserves the energy of springs and reactions. Motors,
+dampers, friction and user forces apply the whole torque about the mean axis, with the rate from the mean angular
+velocities: their impulse is exactly h Q, and their work h Q times the rate.
 """
 
 import math

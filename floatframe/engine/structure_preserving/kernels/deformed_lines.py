@@ -1,27 +1,32 @@
 """A point that slides along a deformed line of a body over a step, see engine/kernels/joints/deformed_line.py.
 
-With d_j(q), th_j(q) of the stations and Hermite functions a_j, b_j of the place s, in the axes of the body from its
-centre of mass,
+d_j(q) and th_j(q) are displacement and rotation of the stations; a_j, b_j are Hermite functions of the coordinate s on
+the line. In body axes, relative to the centre of mass,
 
     sigma(s, q) = c + s e + Σ a_j(s) d_j + b_j(s) th_j × e - s_c(q)
     th(s, q) = e × D' + e (e · Σ l_j(s) th_j),   D' = Σ a_j' d_j + b_j' th_j × e
 
-From (s_0, q_0) to (s_1, q_1) both change by the product rule with means: by q with the shapes of the stations at the
-mean q and the mean of the functions at both places, Psi_sigma dq and Psi_r dq; and by s, with the means of d_j and th_j
-and the quotients (a_j(s_1) - a_j(s_0))/ds, which are the means of a_j' over the way and so have no small divisor,
+The product rule with mean values gives their change from (s_0, q_0) to (s_1, q_1). The part due to q, Psi_sigma dq and
+Psi_r dq, uses the shapes of the stations at the mean q and the means of the functions at s_0 and s_1. The part due to s
+uses the means of d_j and th_j and the quotients (a_j(s_1) - a_j(s_0))/ds, computed without division by ds as the means
+of a_j' between s_0 and s_1:
 
     sigma_1 - sigma_0 = Psi_sigma dq + T ds,    th_1 - th_0 = Psi_r dq + T_r ds
 
-exactly. So the point of the line goes by d + theta_G × l + R_m Psi_sigma dq at its place, and by t ds along the line,
-t = R_m T; its axes turn by the Cayley vector Gamma Psi_r dq in the body, and by kappa ds, kappa = Gamma T_r. The joint
-is closed at both ends of the step, where the point of B is: x_B1 - x_B0 - (its change at the place) = t ds. Then
+exactly. So the point of the line moves by d + theta_G × l + R_m Psi_sigma dq at constant s, and by t ds along the line,
+t = R_m T. Its axes rotate in the body by the Cayley vector Gamma Psi_r dq, and by kappa ds, kappa = Gamma T_r. Because
+the joint is closed at both ends of the step, x_B1 - x_B0 - (the motion of the point at constant s) = t ds for the point
+of B. Therefore these loads of a multiplier f,
 
-    LINE i       f N_i on the point of B and back on the line, N_1 and N_2 normal to t: no work as s changes
-                 if the place is prescribed N_0 = t/|t| too, whose work f |t| ds is that of the drive
-    LINE_TURN    f along the change of E · D, which as s changes is m ds, m = D · R_m (kappa × eps): where the place is
-                 not prescribed a force f m t/|t|² on the point of B and back on the line does its part of the work
+    LINE i       a force f N_i on the point of B and the opposite force on the line, with N_1 and N_2 normal to t, so
+                 that it does no work as s changes; if s is prescribed also N_0 = t/|t|, with the work f |t| ds of the
+                 drive
+    LINE_TURN    f along the change of E · D, of which the part due to s is m ds, m = D · R_m (kappa × eps); if s is not
+                 prescribed, a force f m t/|t|² on the point of B and the opposite force on the line do this part of the
+                 work
 
-do no work, or that of the drive, and balance about any point. At one configuration t and kappa are those there.
+do no work except that of the drive, and balance about any point. If forces act at one configuration, t and kappa are
+those of this configuration.
 """
 
 import math
@@ -198,7 +203,7 @@ def put_shapes(model, discrete, step, k, s_0, s_1):
 
 @inner
 def ways_by_place(model, step, k, end, s_0, s_1):
-    """Return T and T_r by two-point Gauss quadrature between the passed stations."""
+    """Return T and T_r by two-point Gauss quadrature on each interval of stations between s_0 and s_1."""
     e, way, d, th = vector(model.lines.axis[k]), s_1 - s_0, step.station_d[end], step.station_th[end]
     T, slope = e, (0.0, 0.0, 0.0)
     T_r = (0.0, 0.0, 0.0)

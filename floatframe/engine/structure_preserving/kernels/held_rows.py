@@ -82,9 +82,9 @@ def row_rate(model, step, c, k, t):
 
 
 # couplers -------------------------------------------------------------------------------------------------------------
-# Σ a_p x_p = c(t_1) holds at the end of a step, by forces a_p lam along the coordinates. Each has its discrete
-# derivative (kernels/coordinates.py), so that the reaction does the work lam times the change of the sum: none, or that
-# of the prescribed constant. The row is divided by its largest coefficient.
+# Forces a_p lam enforce Σ a_p x_p = c(t_1) at the end of a step. They act through the discrete derivatives of the
+# coordinates (kernels/coordinates.py), so the work of the reaction is lam times the change of the sum: zero, or lam
+# times the change of the prescribed c. The row is divided by its largest coefficient.
 
 
 @inner
@@ -130,12 +130,13 @@ def coupler_rate(model, c, t):
 
 
 # a disc that rolls without slip; N, n, c, s and rho as in the engine kernels/joints/rolling.py -----------------------
-# RIM_HEIGHT, N · d - R s with s = sqrt(1 - c²), changes by the product rule with means, ds = -(c_0 + c_1)/(s_0 + s_1)
-# dc. ROLL holds the displacement of the rim over the step along t, all directions and places at their means:
+# The change of RIM_HEIGHT, N · d - R s with s = sqrt(1 - c²), follows from the product rule with mean values and
+# ds = -(c_0 + c_1)/(s_0 + s_1) dc. ROLL keeps the displacement of the rim over the step along t at zero, with the mean
+# values of all directions and positions,
 #
 #     t · (dx_B - dx_A + phi_B × rho - phi_A × (d + rho)) = 0
 #
-# by a force along t at the rim, whose work it is: none. Forces and moments on A and B balance about any point.
+# by a force along t at the rim, which therefore does no work. Forces and moments on A and B balance about any point.
 
 
 @inner

@@ -1,21 +1,22 @@
 """Markers over a step: positions, rotations, and the exact transfer of the work of marker loads to bodies.
 
-cay(theta) = (1 - tilde/2)⁻¹ (1 + tilde/2), the rotation by 2 atan(|theta|/2) about theta. With R_1 = R_0 cay(theta) and
-theta_G = R_0 theta
+cay(theta) = (1 - tilde/2)⁻¹ (1 + tilde/2) is the rotation by 2 atan(|theta|/2) about theta. With R_1 = R_0 cay(theta)
+and theta_G = R_0 theta
 
     R_1 a_1 - R_0 a_0 = theta_G × (R_0 a_0 + R_1 a_1)/2 + R_m (a_1 - a_0),    R_m = R_0 (1 + tilde(theta)/2):
 
-the change of a vector that turns with a body and changes in it, exact for a step of any size.
+is the change of a vector that rotates with a body and also changes relative to it, exact for a step of any size.
 
 So over a step, with the lever l = (R_0 sigma_0 + R_1 sigma_1)/2 from the centre of mass, and for a
 direction E = R exp(Psi_r q) e = R eps of a marker,
 
     dx = d + theta_G × l + R_m Psi_sigma dq,        dE = theta_G × (E_0 + E_1)/2 + R_m (psi × (eps_0 + eps_1)/2)
 
-where sigma(q) and th(q) are of degree two in q at most (a stiffened body bends its interfaces, theory.md §7), so that
-their changes are Psi_sigma dq and Psi_r dq with the derivatives at the mean of q, and psi = Gamma Psi_r dq is the
-Cayley vector of the elastic rotation. A force F with work F·dx acts by F, l × F and Psi_sigmaᵀ R_mᵀ F; a load G with
-work G·dE by the torque E_mean × G and (Gamma Psi_r)ᵀ (eps_mean × R_mᵀ G).
+Here sigma(q) and th(q) are at most of degree two in q (in a stiffened body the motion of interfaces has terms of second
+order, theory.md §7). So their changes are Psi_sigma dq and Psi_r dq with the derivatives at the mean of q, and
+psi = Gamma Psi_r dq is the Cayley vector of the elastic rotation. A force F, with the work F·dx, consists of the force
+F, the torque l × F and the modal forces Psi_sigmaᵀ R_mᵀ F on the body. A load G on a direction, with the work G·dE,
+consists of the torque E_mean × G and the modal forces (Gamma Psi_r)ᵀ (eps_mean × R_mᵀ G).
 Gamma = T + (psi - T dth) dthᵀ/|dth|², T the left Jacobian at the mean of th = Psi_r q: the discrete derivative of
 Gonzalez (1996), Journal of Nonlinear Science 6, 449-467, of the map th -> exp(th).
 """
@@ -48,7 +49,7 @@ from floatframe.engine.kernels.vector import (
 __all__ = ["add_direction", "add_force", "add_moment", "add_pair", "begin_markers", "begin_unit_load", "change",
            "end_unit_load", "ends", "marker_loads", "marker_step", "put_end_of_forces", "turning"]  # fmt: skip
 
-SMALL = 1e-14  # square of an elastic rotation in a step below which its Cayley vector is T dth to rounding
+SMALL = 1e-14  # square of an elastic rotation in a step below which its Cayley vector is T dth to roundoff
 NONE = (0.0, 0.0, 0.0)
 
 

@@ -1,6 +1,6 @@
 """Values that connections remember between steps: angles beyond full turns, states, approach speeds of contacts.
 
-They stand in the rows of the memory that are theirs; the other rows hold wrenches of the results.
+Each value is in its own row of the memory; the other rows contain wrenches of the results.
 """
 
 from floatframe.engine.kernels.compiler.compilation import inner

@@ -2,8 +2,8 @@
 
 Unknowns are the increments x = (d, theta, dq) of the bodies and mu = h²/2 f, with f the multipliers of the joints; the
 equations of motion are multiplied by h/2, so that the matrix stays well-conditioned as h falls. Unknowns and residuals
-of a body are in its axes at the beginning of the step, so that the matrix does not turn with it.
-Derivatives are differences of residuals, those of unknowns far from each other by one evaluation.
+of a body are in its axes at the beginning of the step, so that the matrix does not rotate with the body.
+Derivatives are differences of residuals. One evaluation serves for several unknowns if they affect no common row.
 """
 
 import math
@@ -42,9 +42,9 @@ __all__ = [
 
 
 # band -----------------------------------------------------------------------------------------------------------------
-# LU factors of a band matrix with row exchanges, rows one after the other: A[i, below + j - i] stands for (i, j).
+# LU factors of a band matrix with row exchanges, stored by rows: A[i, below + j - i] is the entry (i, j).
 #
-# Rows have room for `below` further numbers after the `above` of the band, which exchanges fill.
+# Each row has space for `below` more entries after the `above` entries of the band, which row exchanges fill.
 
 
 @matrix_loops
@@ -104,9 +104,9 @@ def band_solve(A, pivot, below, above, b):
 
 SLOW = 0.25  # ratio of successive corrections above which the derivatives are renewed
 MANY = 7  # number of iterations of a step after which the next one starts with new factors
-# error after a correction relative to the allowed correction, because the factors are not those of the iterate
+# allowed estimate of the next correction, relative to the allowed correction
 LEFT = 1e-2
-ROUNDOFF = 2e-15  # of a position
+ROUNDOFF = 2e-15  # relative roundoff of a position
 
 
 @inner
@@ -231,8 +231,8 @@ def write_state_residual(model, work, discrete, step, c):
 def put_changes(model, discrete, step):
     """Write the difference steps of the unknowns: SMALL times their size, if known.
 
-    A multiplier of an equation of its own, or a state, may be of any size; a change of far less than that is lost in
-    the rounding of what depends on it.
+    A multiplier of an element's equation, or a state, may be of any size. A step much smaller than this size would be
+    lost in the roundoff of quantities that depend on it.
     """
     n_u, first_state = step.load.shape[0], step.load.shape[0] + step.f.shape[0]
     for j in range(step.z.shape[0]):
@@ -242,7 +242,7 @@ def put_changes(model, discrete, step):
         elif j >= n_u:
             size = max(abs(step.z[j]), 0.5 * step.h * step.h * step.f_size[j - n_u])
         step.center[j] = step.z[j]
-        step.delta[j] = step.z[j] + max(discrete.delta[j], SMALL * size) - step.z[j]  # as it is in the end
+        step.delta[j] = step.z[j] + max(discrete.delta[j], SMALL * size) - step.z[j]  # the rounded step
 
 
 @inner
@@ -310,7 +310,7 @@ def size_of(discrete, step):
 
 @inner
 def smallest(model, step, order):
-    """Return the allowed size of a correction: tolerance times the displacement in a step, plus rounding."""
+    """Return the allowed size of a correction: tolerance times the displacement in a step, plus roundoff."""
     floor, mass = 0.0, 0.0
     for i in range(model.bodies.kind.shape[0]):
         m, size = model.body_types.mass[model.bodies.kind[i]], order.length
@@ -326,7 +326,7 @@ def smallest(model, step, order):
 def solve(model, work, discrete, step, order, stage, is_exact):
     """Solve for the unknowns of a step; return DONE, DIVERGED or SINGULAR.
 
-    is_exact: with derivatives made anew in each iteration that needs them, as far as it goes.
+    is_exact: whether to compute derivatives anew unless an iteration reduces the correction to a thousandth.
     """
     least = smallest(model, step, order)
     last = math.inf

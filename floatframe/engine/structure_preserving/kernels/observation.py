@@ -1,7 +1,7 @@
 """Accelerations and reactions at the end of a step from the equations of motion, as in `initial_conditions.initial`.
 
 (2) W du - Jᵀ w = 0,       G du = -G u              velocities that fulfil the joints, W = M + s K
-(3) M u_dot - Jᵀ w = f,    G u_dot = -d(G)/dt u     there
+(3) M u_dot - Jᵀ w = f,    G u_dot = -d(G)/dt u     accelerations and reactions for these velocities
 """
 
 import math
@@ -81,8 +81,8 @@ def observe(model, work, discrete, step, memory, t, rows):
 
     Return whether they exist.
 
-    Reactions that friction depends on are found by iteration. What connections remember stays as the step left it, so
-    that outputs do not change the motion.
+    Reactions on which friction depends are found by iteration. The values that connections remember are not changed, so
+    that outputs do not influence the motion.
     """
     begin(model, work, memory, t)
     g = work.connections.g

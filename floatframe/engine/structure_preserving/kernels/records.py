@@ -1,8 +1,8 @@
 """System data for the compiled steps in addition to the model, and the working arrays of the steps.
 
-Sizes as in `kernels.model`, and n_z: unknowns of a step, n_u increments of the bodies (d, theta in the axes of the body
-at the beginning of the step, dq), then n_mu multipliers, then changes of states. Blocks are the bodies and then the
-connections with multipliers or states.
+Sizes are those of `kernels.model` and n_z, the number of unknowns of a step: n_u increments of the bodies (d, theta in
+the axes of the body at the beginning of the step, dq), then n_mu multipliers, then changes of states. Blocks are the
+bodies, followed by the connections with multipliers or states.
 """
 
 from typing import NamedTuple

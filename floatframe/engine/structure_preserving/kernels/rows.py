@@ -1,9 +1,10 @@
 """Joint constraints over a step: values at its end, and reactions that do no work while joints stay closed.
 
-A constraint is a sum of products of marker positions and directions; by the product rule with means,
-a_1·b_1 - a_0·b_0 = (a_1 - a_0)·b_mean + a_mean·(b_1 - b_0), each has discrete derivatives whose sum with the changes of
-its parts is its own change, and which turn with the ground axes. So its reaction does no work between two
-configurations that fulfil it, and adds no linear or angular momentum.
+A constraint is a sum of products of marker positions and directions. The product rule with mean values,
+a_1·b_1 - a_0·b_0 = (a_1 - a_0)·b_mean + a_mean·(b_1 - b_0), gives discrete derivatives: multiplied by the changes of
+positions and directions, they add up to the change of the constraint, and they are objective under rotations of the
+ground axes. So its reaction does no work between two configurations that fulfil the constraint, and adds no linear or
+angular momentum.
 """
 
 import math

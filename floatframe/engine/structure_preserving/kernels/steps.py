@@ -49,7 +49,7 @@ __all__ = ["advance", "discrete_kernels"]
 # steps ----------------------------------------------------------------------------------------------------------------
 
 
-# fraction of the size of a multiplier without constraint that remains per step when it passes through zero
+# factor per step by which the stored size of a multiplier without constraint falls while the multiplier is small
 FADING = 0.9
 
 
@@ -273,7 +273,7 @@ def is_too_long(model, work, discrete, step):
 def begin_iterate(model, work, memory, others):
     """Set the iterate from the state in the memory, with the mean accelerations of the previous step.
 
-    Not those of the memory, which are those of the last output: outputs do not change a motion.
+    The accelerations in the memory are not used: they belong to the last output, and outputs must not change a motion.
     """
     _, step = others
     load_state(work.state, memory)
@@ -318,8 +318,8 @@ def try_discrete_step(model, work, memory, others, order, t, h):
 def write_discrete_row(model, work, memory, others, t, rows):
     """Write the next row of the results.
 
-    A step is good where its output can be made: after NO_ACCELERATION the memory has gone one step further. The row at
-    the end of a step that ends the run belongs to the step.
+    A step is good only if its output can be computed. After NO_ACCELERATION the memory is therefore one step beyond the
+    last good step. The row at the end of a step that ends the run is written too.
     """
     discrete, step = others
     if not observe(model, work, discrete, step, memory, t, rows):

@@ -1,13 +1,13 @@
 """Contacts of a sphere on B with a plane or sphere on A over a step, see the engine's kernels/connections/contact.py.
 
 The normal force is the discrete derivative of its potential U = k x^(n+1)/(n+1), x the depth, times the factor of
-restitution with the mean rate; friction acts at the point rho = -R_B N of the mean normal against the mean slip V_t:
+restitution at the mean rate. Friction acts at the point rho = -R_B N, N the mean normal, against the mean slip V_t:
 
     f_s = -(U_1 - U_0)/(gap_1 - gap_0),   f = f_s max(0, 1 - (h/v_0) dgap/dt)
     V = (dx_B - dx_A + phi_B × rho - phi_A × (d + rho))/dt,   T = -mu f V_t/sqrt(|V_t|² + v_s²)
 
-so that what is taken, (f_s - f) dgap and -T·V dt, is never negative, and forces and moments balance about any point.
-The speed of approach v_0 is that of the step before the contact began.
+so that the dissipated work, (f_s - f) dgap and -T·V dt, is never negative, and forces and moments balance about any
+point. The speed of approach v_0 is taken from the step before the contact began.
 """
 
 import math
@@ -28,7 +28,7 @@ from floatframe.engine.structure_preserving.kernels.rows import add_slide, mean_
 __all__ = ["contact_load", "speed_of_approach"]
 
 ALIKE = 0.02  # difference of depths relative to their sum, below which the quotient is the mean force
-POINT = math.sqrt(0.6)  # of Gauss, exact to degree five
+POINT = math.sqrt(0.6)  # outer point of Gauss' rule, exact to degree five
 
 
 @inner

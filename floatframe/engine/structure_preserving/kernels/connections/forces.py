@@ -50,20 +50,21 @@ __all__ = ["bushing_load", "user_force_load", "user_state_residual"]
 # engine.
 #
 # With R = A_Aᵀ A_B = exp(theta), s = A_Aᵀ d and Q = exp(-share theta) the deformations are xi = (e, theta), e = Q s;
-# the share is 0 in axes of A, 1 in axes of B, 1/2 half way. Products of axes and places change by the product rule with
-# means, and with the Cayley vectors psi and chi of the two rotations
+# the share is 0 in axes of A, 1 in axes of B, 1/2 half way. The product rule with mean values gives the changes of
+# products of axes and positions. With the Cayley vectors psi and chi of the two rotations,
 #
 # R_1 - R_0 = tilde(psi) R_mean,   psi = Gamma dtheta,     Q_1 - Q_0 = tilde(chi) Q_mean,   chi = -share Gamma' dtheta
 # de = Q_mean ds + chi × (Q_mean s_mean)
 #
-# Gamma and Gamma' by Gonzalez' discrete derivative of exp (kernels/markers.py). So the force f and the moment m of the
-# mean deformations, f·de + m·dtheta being the change of a potential of degree two, act by
+# where Gamma and Gamma' are Gonzalez' discrete derivatives of exp (kernels/markers.py). f and m are the force and the
+# moment of the mean deformations, so that f·de + m·dtheta is the change of a potential of degree two. They act by
 #
 #     f on s:  Q_meanᵀ f,      tau = Gamma⁻ᵀ (m - share Gamma'ᵀ ((Q_mean s_mean) × f)),
 #     on the products a_i · b_j of the axes:  1/2 tilde(tau) P,  P = (1 + tilde(psi)/2) R_0 = R_mean⁻ᵀ,
 #
-# because <tilde(tau) P, tilde(psi) R_mean> = 2 tau·psi. They depend on products of directions alone and add no angular
-# momentum. Rates of damping are changes over the step, so that damping takes energy whatever h; tables act at the mean.
+# because <tilde(tau) P, tilde(psi) R_mean> = 2 tau·psi. These loads depend only on products of directions and add no
+# angular momentum. Damping uses the changes over the step divided by h as rates, so that it removes energy for any h.
+# Tables are evaluated at the mean deformations.
 
 
 @inner
@@ -133,13 +134,14 @@ def bushing_load(model, discrete, step, c):
 
 
 # user forces over a step: Q = f(t, x, v, z) along coordinates, z_1 - z_0 = h g(t, x, v, z) ----------------------------
-# Forces act at the middle of the step, with the mean coordinates and the rates v of their changes, or at one
-# configuration of a variational step; their work Q dx counts as given. States follow the midpoint rule in all schemes.
+# Forces are evaluated at the middle of the step, with the mean coordinates and the mean rates v, or at one
+# configuration of a variational step. Their work Q dx counts as supplied. States follow the midpoint rule in all
+# schemes.
 
 
 @inner
 def put_states(model, work, step, c, first, part):
-    """Write the states of user force c, after a fraction of their change in the step, into the inputs from `first` on.
+    """Write the states of user force c into the inputs from `first` on, after a `part` of their change in the step.
 
     Return the number of inputs.
     """

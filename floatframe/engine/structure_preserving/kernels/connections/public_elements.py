@@ -1,28 +1,33 @@
 """Public elements over a step: their law at mid-step, corrected so that the work equals the change of potential.
 
-Marker m goes from r_0, A_0 to r_1, A_1 = cay(c) A_0. The law is asked once, at the middle of both places and both
-rotations with the rates of the step, and its wrench acts over the step,
+Marker m moves from r_0, A_0 to r_1, A_1 = cay(c) A_0. The law is evaluated once, at the middle of the positions and
+rotations, with the mean rates of the step, and its wrench acts over the step,
 
     r = (r_0 + r_1)/2,   A = cay(c') A_0,  c' = c/(1 + sqrt(1 + |c|²/4)),   v = dr/h,   omega = c/h
     work = Σ F·dr + M·c
 
-A moment M enters by its directions: G_j = M' × E_j/2 at the mean axes E_j, (tr S - S) M'/2 = M with S = Σ E_j E_jᵀ,
-so that the torque on the body is M, and its work that of the rotation of the marker, elastic or not.
-States follow z_1 - z_0 = h z_dot, multipliers lam belong to the step. An element holds g(t_1, r_1, A_1) = 0 at the end
-of the step if g is of positions, h g = 0 in the middle if it is of velocities, g = 0 there if it is an equation.
+A moment M acts by loads G_j = M' × E_j/2 on the mean axes E_j, where (tr S - S) M'/2 = M with S = Σ E_j E_jᵀ. So the
+torque on the body is M, and its work belongs to the rotation of the marker, including the elastic rotation.
+States follow z_1 - z_0 = h z_dot; the multipliers lam are constant in the step. If g depends on positions, the element
+satisfies g(t_1, r_1, A_1) = 0 at the end of the step; if on velocities, h g = 0 in the middle; an equation g = 0 is
+satisfied in the middle too.
 
-The law names its energy E, and its reactions are lam times the gradient of g: together they have the potential
-U = E - Σ lam_j g_j of places alone, t, v, z and lam held. What its change over the step lacks,
+The law declares its energy E, and its reactions are lam times the gradient of g. Together they have the potential
+U = E - Σ lam_j g_j, a function of positions alone at constant t, v, z and lam. The work of the law's wrench differs
+from the change of this potential over the step. The missing work
 
     delta = (dr, c)·grad U - (U_1 - U_0)
 
-is done by a wrench along the motion (Gonzalez 1996, discrete gradient), so that E and lam·dg are exact; delta is of
-third order, the wrench of second. If the wrenches of an element balance, it is that of markers against each other,
+is done by an additional wrench along the motion (Gonzalez 1996, discrete gradient), so that E and lam·dg are exact;
+delta is of third order, the wrench of second. If the wrenches of an element balance, this wrench acts along the motion
+of the markers relative to each other,
 
     F_k = lambda rho_k,  rho_k = dr_k - dr_r - c_r × (r_k - r_r),   M_k = lambda L² (c_k - c_r)
 
-with the opposite on marker r, the first that takes a whole wrench; between points along their lines; else the motion of
-each marker by itself. lambda = delta/(|motion|² + (1e-6 L)²): what is left undone is of the size of rounding.
+with the opposite wrench on marker r, the first one that takes all kinds of loads; between markers that take only forces
+it acts along the lines between them. If the wrenches do not balance or there is no marker r, it acts along the motion
+of each marker. The factor is lambda = delta/(|motion|² + (1e-6 L)²), so that the remaining error is of the size of
+roundoff.
 """
 
 import math
@@ -104,7 +109,7 @@ def way_turned(Q):
 def put_inputs(model, work, discrete, step, c, t, where, s, part):
     """Write the inputs of the law of element c for markers at fraction s ALONG the step, or at its BEGIN or END.
 
-    part: of the changes of its states.
+    part: fraction of the changes of its states.
     """
     i, a, x = model.connections.item[c], model.connections.a[c], work.laws.inputs
     n, width = model.laws.head[i, 0], model.laws.head[i, 1]
@@ -199,9 +204,9 @@ def potential_at(model, work, discrete, step, c, where, s):
 
 @inner
 def marker_of_whole(model, c):
-    """Return the first marker of element c that carries all its kinds of loads; -1 if there is none or it is on ground.
+    """Return the first marker of element c that takes all kinds of its loads; -1 if there is none or it is on ground.
 
-    Also whether it acts by moments.
+    Also return whether the element acts by moments.
     """
     a = model.connections.a[c]
     last = a + model.laws.head[model.connections.item[c], 0]
@@ -221,7 +226,7 @@ def marker_of_whole(model, c):
 
 @inner
 def put_ways(model, step, c, balances):
-    """Write correction forces and moments of element c, proportional to the motions of its markers."""
+    """Write the directions of the correcting wrenches of element c, along the motions of its markers."""
     i, a = model.connections.item[c], model.connections.a[c]
     last, square = a + model.laws.head[i, 0], model.laws.length[i] ** 2
     for m in range(a, last):
@@ -357,7 +362,7 @@ def element_load(model, work, discrete, step, c):
 def element_residual(model, work, discrete, step, c):
     """Write the residuals of states and multipliers of element c; none while velocities are being closed.
 
-    Positions are held at the end of the step, all else in its middle.
+    Constraints of positions are satisfied at the end of the step, all other equations in its middle.
     """
     i, h = model.connections.item[c], step.h
     head = model.laws.head[i]
