@@ -142,7 +142,7 @@ def test_columns_go_to_disk_where_they_do_not_fit_and_take_less_there(caplog):
     assert not caplog.records
     stored = columns_within(0.999 * inside, shape)
     assert stored.to_disk
-    assert "need 2.58 GB, more than 2.58 GB; they are stored on disk: 932 MB" in caplog.text
+    assert "need 2.58 GB, more than 2.58 GB; stored on disk they need 932 MB" in caplog.text
     assert "interface_modes = 20 in [reduction]" in caplog.text
     fronts = analyse(lower_triangle(grid(6)))
     in_core, on_disk = (peak_of(each, fronts, 1, 1e8, on_disk=False) for each in (shape, stored))

@@ -312,5 +312,5 @@ def test_fewer_free_modes_are_taken_where_the_eigensolver_finds_no_more(body, mo
         raise EigenError("eigenmodes: residuals are 3e-4, expected 1e-5")
 
     monkeypatch.setattr(Families, "free_modes", none)
-    with pytest.raises(ModeSetError, match="the rich basis needs free modes, and not even 4 were found"):
+    with pytest.raises(ModeSetError, match="the rich basis needs at least 4 free modes, which were not found"):
         balanced_truncation(body, n_modes=4)

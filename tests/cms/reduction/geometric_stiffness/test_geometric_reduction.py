@@ -303,7 +303,7 @@ def test_states_made_before_serve_when_the_factorisation_is_gone():
         assert_array_equal(getattr(found, name), getattr(expected, name))
     with pytest.raises(ModeSetError, match=r"belong to body 'bar' in a nodal frame; .* no other frame"):
         cms.reduce(body, modes, frame=cms.TisserandFrame(), geometric=states)
-    with pytest.raises(ModeSetError, match="expected states of this very body 'bar'"):
+    with pytest.raises(ModeSetError, match="expected states of this body object 'bar'"):
         cms.reduce(cms.couple(bar(3, 1, 1)), modes, geometric=states)
 
 

@@ -190,7 +190,7 @@ def test_loads_at_nodes_that_are_not_kept_are_refused():
     body = reduced("craig-bampton", "turned")
     table = body.recovery["all"]
     lost = cms.RecoveryTable(**{**table.__dict__, "loads": (*table.loads[:-1], "node index 9999 fz")})
-    with pytest.raises(RecoveryError, match="load 'node index 9999 fz': its work on the modes is not known"):
+    with pytest.raises(RecoveryError, match="load 'node index 9999 fz': its work on the modes is unknown"):
         cms.craig_bampton_matrices(body).recover(lost)
 
 
