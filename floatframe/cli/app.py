@@ -197,7 +197,9 @@ def load_kernels(clock: "Stages") -> None:
     if is_new:
         seconds = time.perf_counter() - began
         typer.echo(
-            f"note: compiled the code of the motion in {seconds:.0f} s ({words()}); later runs find it ready", err=True
+            f"note: compiled the code of the motion in {seconds:.0f} s ({words()}); later runs find it ready. Other "
+            "formulations and schemes are compiled at their first use, or all at once by floatframe prepare",
+            err=True,
         )
 
 

@@ -85,7 +85,9 @@ def set_sentence(points: Sequence[Point]) -> str:
     if not point.is_good:
         most = f"even with {modes_words(point.n_modes)}" if len(points) > 1 else f"with {modes_words(point.n_modes)}"
         what = "not good enough" if severity(points) == "fail" else "misses a limit, though not by far,"
-        return f"{what} {most}: {'; '.join(miss(record) for record in missed(point))}"
+        sentence = f"{what} {most}: {'; '.join(miss(record) for record in missed(point))}"
+        is_inertia = any(record.name == "static-inertia" for record in missed(point))
+        return f"{sentence}; {LIMITS['static-inertia'].action}" if is_inertia else sentence
     text = f"good enough with {modes_words(point.n_modes)}, {point.n_q} coordinates"
     if shown == 0:
         return f"{text}, the fewest that were tried"

@@ -211,7 +211,8 @@ LIMITS: dict[str, Limit] = {
     ),
     "static-inertia": Limit(
         "static response to rigid-body accelerations, error in energy norm", 0.05, None,
-        "add inertia-relief modes (six columns), or keep more vibration modes",
+        "it matters if the body accelerates as a whole; a set with inertia relief, such as craig-bampton-ir, answers "
+        "it exactly with at most six more columns, and more vibration modes answer it gradually",
     ),
     "static-load-cases": Limit(
         "static response to the load cases of the body, error in energy norm", 0.05, None,

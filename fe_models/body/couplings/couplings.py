@@ -9,9 +9,11 @@ members.
 RBE3 elements of a whole deck that join its parts are constraints of fe_models/assembly/constraints.py.
 """
 
+import logging
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -25,10 +27,16 @@ from fe_models.foundation.errors import BodyError
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 from fe_models.foundation.sparse.submatrix import principal_block
 
-__all__ = ["check_overlap", "couple", "mean_motion", "require_spread"]
+__all__ = ["RoundSurface", "check_overlap", "couple", "mean_motion", "require_spread", "round_surface"]
+
+log = logging.getLogger(__name__)
 
 #: ratio of smallest to largest radius of the members about their line, below which they count as collinear
 RANK_TOLERANCE = 1e-6
+ROUND = 0.02  #: deviation from a cylinder, relative to its radius, up to which points lie on it
+FEWEST_ANGLES = 8  #: fewest points about the axis that make a cylinder; four would be the corners of a box
+WIDEST_GAP = np.radians(240.0)  #: largest angle about the axis without points
+OFF_AXIS, OFF_MIDDLE = 0.02, 0.05  #: distances of a reference that are noted, relative to the radius and the length
 
 
 def couple(body: FEBody) -> FEBody:
@@ -54,6 +62,8 @@ def couple(body: FEBody) -> FEBody:
     rigid = [interface for interface in todo if interface.kind == "rigid"]
     distributing = [interface for interface in todo if interface.kind == "distributing"]
     _require_dofs(body, todo)
+    for interface in (*rigid, *distributing):
+        _note_reference(body, interface)
     has_rotation = body.dofs[body.dofs[:, 1] >= 3, 0]
     for interface in (*rigid, *distributing):
         # a single node with rotations has all six motions of a rigid interface
@@ -129,6 +139,63 @@ def couple(body: FEBody) -> FEBody:
         load_cases=tuple(replace(case, f=recovery.T @ case.f) for case in body.load_cases),
         ties=tuple(tie.changed(recovery, new_index) for tie in body.ties),
     )
+
+
+class RoundSurface(NamedTuple):
+    """A cylinder, or a part of its circumference, on which the nodes of an interface lie."""
+
+    middle: Array  #: point on the axis in the middle of the length, (3,) [m]
+    axis: Array  #: unit vector along the axis, (3,)
+    radius: float  #: [m]
+    length: float  #: extent of the nodes along the axis [m]
+
+
+def round_surface(points: Array) -> RoundSurface | None:
+    """Return the cylinder on which points lie; None if they lie on none, or cover less than a third of its turn.
+
+    The axis of a cylinder, and of a part of it that is symmetric, is a principal axis of the points. For each of these
+    axes a circle is fitted to the points seen along it, by linear least squares.
+
+    Parameters
+    ----------
+    points
+        Positions, (n, 3) [m].
+    """
+    center = points.mean(axis=0)
+    for axis, *across in (np.roll(np.linalg.eigh(np.cov((points - center).T))[1].T, -k, axis=0) for k in range(3)):
+        plane, along = (points - center) @ np.array(across).T, (points - center) @ axis
+        fit, _, rank, _ = np.linalg.lstsq(np.column_stack([2 * plane, np.ones(len(plane))]), (plane**2).sum(axis=1))
+        arms = plane - fit[:2]
+        radius = float(np.sqrt(max(fit[2] + fit[:2] @ fit[:2], 0.0)))
+        if rank < 3 or np.abs(np.linalg.norm(arms, axis=1) - radius).max() > ROUND * radius:
+            continue
+        angles = np.unique(np.round(np.arctan2(arms[:, 1], arms[:, 0]), 2))
+        gaps = np.diff(np.append(angles, angles[0] + 2 * np.pi))
+        if len(angles) >= FEWEST_ANGLES and gaps.max() < WIDEST_GAP:
+            middle = center + fit[:2] @ np.array(across) + 0.5 * (along.max() + along.min()) * axis
+            return RoundSurface(middle, axis, radius, float(np.ptp(along)))
+    return None
+
+
+def _note_reference(body: FEBody, interface: Interface) -> None:
+    """Log a warning if the nodes of an interface lie on a cylinder and its reference not in the middle of its axis."""
+    if len(interface.nodes) < FEWEST_ANGLES or (found := round_surface(body.nodes[interface.nodes])) is None:
+        return
+    arm = interface.reference - found.middle
+    from_middle = abs(float(arm @ found.axis))
+    from_axis = float(np.linalg.norm(arm - (arm @ found.axis) * found.axis))
+    places = []
+    if from_axis > OFF_AXIS * found.radius:
+        places.append(f"{from_axis:.3g} off its axis")
+    if from_middle > OFF_MIDDLE * found.length + OFF_AXIS * found.radius:
+        places.append(f"{from_middle:.3g} from the middle of its length")
+    if places:
+        middle = ", ".join(f"{number:.6g}" for number in found.middle)
+        log.warning(
+            "body %r: interface %r: its nodes lie on a cylinder of radius %.4g, its reference point lies %s; joints "
+            "and forces act at the reference: set reference = [%s] if they belong in the middle of the cylinder",
+            body.name, interface.name, found.radius, " and ".join(places), middle,
+        )  # fmt: skip
 
 
 def mean_motion(points: Array, weights: Array, reference: Array) -> Array:

@@ -4,14 +4,14 @@ One entry, since numba compiles and links everything below an entry once more fo
 """
 
 import logging
-import time
 from collections.abc import Callable
+from threading import Timer
 from typing import Any, NamedTuple
 
 from numba import types
 
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.engine.kernels.compiler.choice import compiler, is_lean, words
+from floatframe.engine.kernels.compiler.choice import compiler, words
 from floatframe.engine.kernels.compiler.compilation import kept_entry
 from floatframe.engine.kernels.compiler.sources import source_digest
 from floatframe.engine.kernels.compiler.structure import converter, table_of_numbers
@@ -48,6 +48,18 @@ __all__ = [
 ]
 
 log = logging.getLogger(__name__)
+
+PATIENCE = 1.0  #: time after which a compilation that is under way is announced [s]
+
+
+def announce() -> None:
+    """Log that the code of motions is being compiled."""
+    log.warning(
+        "compiling the code of motions (%s): once on this machine, about 15 s, some minutes with plain numba; the "
+        "command `floatframe prepare` does it in advance",
+        words(),
+    )
+
 
 LINEARIZE, RATES, CORRECT, OBSERVE, ADVANCE, COUNT = range(6)
 
@@ -148,19 +160,27 @@ class CompiledEntry:
 
         Otherwise this happens with the first call. Calls after it find everything ready.
         """
-        before = sum(self.compiled.stats.cache_misses.values())
+        before = self.cache_misses
         self.compiled.compile(self.signature)
         self.is_ready = True
-        return sum(self.compiled.stats.cache_misses.values()) > before
+        return self.cache_misses > before
+
+    @property
+    def cache_misses(self) -> int:
+        """Number of compilations so far, with one that is under way; code from the cache does not count."""
+        return sum(self.compiled.stats.cache_misses.values())
 
     def __call__(self, *records: Any, memory: Any = NO_MEMORY, rows: Any = NO_ROWS, **order: float) -> Outcome:
         """Carry out a request; fields that are not given are zero, and all arrays stay alive until it returns."""
         if not self.is_ready:
-            began = time.perf_counter()
-            if self.prepare():
-                level = logging.INFO if is_lean else logging.WARNING  # plain numba is unusual: the user should see it
-                passed = time.perf_counter() - began
-                log.log(level, "compiled the code of the motion in %.0f s, once: %s", passed, words())
+            misses = self.cache_misses
+            announcement = Timer(PATIENCE, lambda: self.cache_misses > misses and announce())
+            announcement.daemon = True
+            announcement.start()
+            try:
+                self.prepare()
+            finally:
+                announcement.cancel()
         ordered, numbers = table_of_numbers(ORDER, order)
         outcome = self.compiled(*(record.table for record in (*records, memory, rows)), ordered)
         del numbers  # not before

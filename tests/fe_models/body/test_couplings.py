@@ -1,9 +1,13 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.spatial.transform import Rotation
 
-from fe_models.body.couplings.couplings import couple, mean_motion
+from fe_models.body.couplings.couplings import couple, mean_motion, round_surface
 from fe_models.body.fe_body import MULTIPLIER, Interface
 from fe_models.body.rigid_motion import rigid_motion_of_dofs, rigid_motion_of_points
 from fe_models.errors import InterfaceError
@@ -113,3 +117,70 @@ def test_overlapping_interfaces_are_refused_by_name():
     twin = Interface("twin", "nodes", left.nodes[:2], left.reference)
     with pytest.raises(InterfaceError, match="'left' and 'twin' share 2 nodes"):
         couple(with_interfaces(body, left, twin))
+
+
+def turned(points):
+    """Points in a general position."""
+    return points @ Rotation.from_rotvec((0.4, -1.1, 0.7)).as_matrix().T + np.array([3.0, -2.0, 1.0])
+
+
+def bore(arc, length, radius=0.4):
+    """Points on a part of a cylinder about z, from z = 0."""
+    angle, z = np.meshgrid(np.linspace(0.3, 0.3 + arc, 25)[:-1], np.linspace(0, length, 5) if length else [0.0])
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=-1).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("arc", [2 * np.pi, 4.0, np.pi])
+@pytest.mark.parametrize("length", [0.0, 0.25, 2.0])
+def test_the_axis_of_a_bore_or_of_a_part_of_it_is_found(arc, length):
+    found = round_surface(turned(bore(arc, length)))
+    expected = turned(np.array([[0.0, 0.0, length / 2], [0.0, 0.0, length / 2 + 1.0]]))
+    assert_allclose(found.middle, expected[0], rtol=0, atol=1e-12)
+    assert_allclose(np.abs(found.axis @ (expected[1] - expected[0])), 1.0, rtol=1e-12)
+    assert_allclose((found.radius, found.length), (0.4, length), rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        np.array(np.meshgrid([0.0, 1.0], [0.0, 1.0], [0.0, 1.0])).reshape(3, -1).T,
+        np.array(np.meshgrid(np.arange(5.0), np.arange(4.0), [0.0])).reshape(3, -1).T,
+        np.linspace(0.0, 1.0, 9)[:, None] * (1.0, 2.0, 3.0),
+        bore(1.0, 0.5),
+        bore(2 * np.pi, 0.5) * (1.0, 1.1, 1.0),
+    ],
+    ids=["box", "plane", "line", "short arc", "ellipse"],
+)
+def test_other_points_lie_on_no_cylinder(points):
+    assert round_surface(turned(points)) is None
+
+
+@pytest.mark.parametrize(
+    ("moved", "told"),
+    [
+        ((0.0, 0.0, 0.0), None),
+        ((0.03, 0.04, 0.0), "0.05 off its axis; joints"),
+        ((0.0, 0.0, 0.25), "0.25 from the middle of its length; joints"),
+        ((0.03, 0.04, 0.25), "0.05 off its axis and 0.25 from the middle of its length; joints"),
+    ],
+)
+def test_a_reference_beside_the_middle_of_its_bore_is_noted(moved, told, caplog):
+    points = bore(2 * np.pi, 0.5)
+    ring = bar(nx=4, kind="hexahedron")
+    body = replace(
+        ring, nodes=np.concatenate([ring.nodes, turned(points)]), node_volumes=None,
+        dofs=np.concatenate([ring.dofs, [(len(ring.nodes) + k, c) for k in range(len(points)) for c in range(3)]]),
+        M=sp.block_diag([ring.M, sp.eye_array(3 * len(points))], format="csr"),
+        K=sp.block_diag([ring.K, sp.eye_array(3 * len(points))], format="csr"),
+        numbering=ring.numbering.with_nodes_added(len(points)),
+        interfaces=(
+            Interface("eye", "rigid", len(ring.nodes) + np.arange(len(points)), turned(np.array([0, 0, 0.25]) + moved)),
+        ),
+    )  # fmt: skip
+    couple(body)
+    messages = [record.message for record in caplog.records]
+    if told is None:
+        assert messages == []
+    else:
+        assert told in messages[0]
+        assert "reference = [" + ", ".join(f"{x:.6g}" for x in turned(np.array([0, 0, 0.25]))) + "]" in messages[0]

@@ -294,6 +294,11 @@ def test_a_set_that_misses_a_limit_and_fails_none_warns_as_a_check_does():
     near = result_of("craig-bampton", point(9, 15, static_inertia=0.2))
     assert (near.verdict, near.detail.record("static-inertia").verdict) == ("warn", "warn")
     assert near.sentence.startswith("misses a limit, though not by far, with 9 vibration modes: static inertia loads")
+    assert (
+        "matters if the body accelerates as a whole; a set with inertia relief, such as craig-bampton-ir"
+        in near.sentence
+    )
+    assert "inertia relief" not in result_of("guyan", point(0, 6, mac=0.9)).sentence
     far = result_of("guyan", point(0, 6, mac=0.9, static_inertia=0.2))
     assert far.verdict == "fail"
     assert ranking([near, far]) == ()

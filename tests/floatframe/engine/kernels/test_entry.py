@@ -3,9 +3,12 @@
 import os
 import subprocess
 import sys
+import time
+from types import SimpleNamespace
 
 import pytest
 
+from floatframe.engine.kernels import entry
 from floatframe.engine.kernels.compiler.choice import is_lean
 from floatframe.engine.kernels.entry import absolute_kernels, prepare
 
@@ -32,3 +35,29 @@ def test_a_first_compilation_takes_less_than_20_s_of_processor_time(tmp_path):
     run = [sys.executable, "-c", code]
     done = subprocess.run(run, capture_output=True, text=True, check=True, env=environment)
     assert float(done.stdout) < 20.0
+
+
+class Compilation:
+    """Stands for a function of numba whose compilation, or loading from the cache, takes a while."""
+
+    def __init__(self, is_stored):
+        self.is_stored, self.stats = is_stored, SimpleNamespace(cache_misses={})
+
+    def compile(self, signature):
+        self.stats.cache_misses[signature] = 0 if self.is_stored else 1
+        time.sleep(0.3)
+
+    def __call__(self, *tables):
+        return (0, 0, 0, -1, 0.0)
+
+
+@pytest.mark.parametrize(("is_stored", "patience", "n_told"), [(False, 0.05, 1), (True, 0.05, 0), (False, 60.0, 0)])
+def test_python_too_is_told_that_code_is_being_compiled(is_stored, patience, n_told, monkeypatch, caplog):
+    """Once, while it lasts; not for code that is loaded, nor for a compilation that ends soon."""
+    monkeypatch.setattr(entry, "PATIENCE", patience)
+    compiled = Compilation(is_stored)
+    run = entry.CompiledEntry(lambda digest: compiled, entry.__name__, 0)
+    run(what=0)
+    run(what=0)
+    told = [record for record in caplog.records if "compiling the code of motions" in record.message]
+    assert [record.levelname for record in told] == ["WARNING"] * n_told
