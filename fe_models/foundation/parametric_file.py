@@ -231,10 +231,12 @@ def merge(
     """Merge the tables of another file into the content; an empty table removes its key."""
     for key, value in upper.items():
         location = (*here, key)
-        if value == {} and key in content:
-            del content[key]
+        if value == {}:
+            content.pop(key, None)
             continue
-        if isinstance(value, dict) and isinstance(content.get(key), dict):
+        if isinstance(value, dict):
+            if not isinstance(content.get(key), dict):
+                content[key], origins[location] = {}, upper_origins[location]
             merge(content[key], value, upper_origins, origins, location)
             continue
         content[key] = copy.deepcopy(value)

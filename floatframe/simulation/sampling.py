@@ -29,13 +29,13 @@ from floatframe.model.functions.time_functions import N_COEFFICIENTS, TimeFuncti
 from floatframe.model.system import System
 from floatframe.results.head import Head
 from floatframe.results.results_file import MemorySource
-from floatframe.results.sensors import measurement_of
+from floatframe.results.sensors import measurement_of, sensor_and_column
 from floatframe.results.trajectory import Trajectory
 from floatframe.simulation.events import has_events
 from floatframe.simulation.held_functions import force_numbers
 from floatframe.simulation.motion_head import joint_rows
 
-__all__ = ["Sampling"]
+__all__ = ["Sampling", "require_controllers"]
 
 JUMP = 1e-9  #: relative change of an output below which it is constant, as in `TimeFunction.jumps`
 WHOLE = 1e-6  #: difference of a period from a whole number of steps, in steps, that counts as roundoff
@@ -181,6 +181,19 @@ class Sampling:
         }
 
 
+def require_controllers(system: System) -> None:
+    """Raise `ModelError` if a controller measures or drives something that the system does not have."""
+    if system.controllers:
+        require_no_events(system)
+    for each in system.controllers:
+        forces_of(system, each)
+        for name in each.inputs:
+            try:
+                sensor_and_column(system, name)
+            except ModelError as error:
+                raise ModelError(f"controller {each.name!r}: inputs: {error}") from error
+
+
 def require_no_events(system: System) -> None:
     """Raise `ModelError` if a system with controllers has events, which would act between the sampling instants."""
     if has_events(system):
@@ -218,7 +231,8 @@ def forces_of(system: System, controller: Controller) -> list[str]:
     for name in controller.outputs:
         if name not in choices:
             hint = nearest(name, list(choices)) if choices else "; the system has no such force"
-            raise ModelError(f"controllers: outputs: no joint force, point force or body load {quoted(name)}{hint}")
+            where = f"controller {controller.name!r}: outputs"
+            raise ModelError(f"{where}: no joint force, point force or body load {quoted(name)}{hint}")
     return [choices[name].name for name in controller.outputs]
 
 

@@ -29,6 +29,7 @@ from floatframe.model.forces import (
 )
 from floatframe.model.forces.bushing import AXES, DEFORMATIONS
 from floatframe.model.forces.sphere_contact import DISSIPATIONS
+from floatframe.model.functions.time_functions import constant
 from floatframe.model.joints import JOINTS, Joint
 from floatframe.model.joints.coordinate_coupler import CoordinateCoupler, Limits
 
@@ -238,7 +239,9 @@ class ForceSection(Table):
     joint: Name | None = Field(None, description="the name of a joint")
     coordinate: Name | None = Field(None, description="a coordinate of the joint")
     free: float | None = Field(None, description="a number, the coordinate where the spring is free")
-    motor: MotionSection | None = Field(None, description="a table, the force as a function of time")
+    motor: float | MotionSection | None = Field(
+        None, description="a number, or a table, the force as a function of time; 0 if a controller drives it"
+    )
     characteristic: MotionSection | None = Field(None, description="a table, the force as a function of the elongation")
     friction: NotNegative | None = Field(None, description="a number, 0 or more, Coulomb friction")
     friction_coefficient: NotNegative | None = Field(
@@ -342,7 +345,7 @@ def user_force_of(name: str, section: ForceSection, signals: Signals = None) -> 
 
 def force_of(name: str, section: ForceSection, signals: Signals = None) -> Force:
     """Return the force of a table; `signals` are those of the system file, by name."""
-    if section.motor is not None:
+    if isinstance(section.motor, MotionSection):
         require_quantity(f"forces.{name}.motor", section.motor, signals, ("force", "moment", "number"))
     laws = {"characteristic": section.characteristic} | {
         f"characteristics.{key}": table for key, table in (section.characteristics or {}).items()
@@ -351,7 +354,7 @@ def force_of(name: str, section: ForceSection, signals: Signals = None) -> Force
         if law is not None and any(True for _ in law.signals()):
             raise ModelError(f"forces.{name}.{key}: a function of a deformation, expected no signal over time")
     functions = {
-        key: None if table is None else table.function(signals)
+        key: table.function(signals) if isinstance(table, MotionSection) else None if table is None else constant(table)
         for key, table in (("amplitude", section.amplitude), ("characteristic", section.characteristic),
                            ("motor", section.motor))
     }  # fmt: skip

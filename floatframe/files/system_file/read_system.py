@@ -44,6 +44,7 @@ from floatframe.files.system_file.connections import (
     force_of,
     joint_of,
 )
+from floatframe.files.system_file.controller_section import ControllerSection
 from floatframe.files.system_file.element_section import element_of
 from floatframe.files.system_file.keys import Name
 from floatframe.files.system_file.run_section import RunOptions, RunSection
@@ -57,6 +58,7 @@ from floatframe.model.forces import (
 )
 from floatframe.model.system import REDUNDANT, System
 from floatframe.simulation.events import require_events
+from floatframe.simulation.sampling import require_controllers
 
 __all__ = ["RunOptions", "read_system", "unit_hints"]
 
@@ -134,6 +136,7 @@ class SystemFile(Table):
     sensors: dict[str, SensorSection] = Field({}, description="tables [sensors.NAME]")
     inputs: dict[str, InputSection] = Field({}, description="tables [inputs.NAME]")
     outputs: dict[str, OutputSection] = Field({}, description="tables [outputs.NAME]")
+    controllers: dict[str, ControllerSection] = Field({}, description="tables [controllers.NAME]")
     events: dict[str, EventSection] = Field({}, description="tables [events.NAME]")
     fmu: FmuSection | None = Field(None, description="a table [fmu] with inputs, outputs and parameters")
     fmus: dict[str, ForeignSection] = Field({}, description="tables [fmus.NAME]")
@@ -201,12 +204,15 @@ def read_system(
         name = data.system.name or path.stem
         sensors = [section.sensor(key) for key, section in data.sensors.items()]
         data_files = [*content.files[1:], *(each.file for each in data.signals.values()), *element_files]
+        modules = (section.module_file(path.parent) for section in data.controllers.values())
+        data_files += [file for file in modules if file is not None]
         if data.run is not None and data.run.continues is not None:
             data_files.append(data.run.continues)
         system = System(
             bodies, joints, forces, units, name, data.system.redundant, couplers, elements=elements, sensors=sensors,
             inputs=[section.channel(key) for key, section in data.inputs.items()],
             outputs=[section.output(key, sensors) for key, section in data.outputs.items()],
+            controllers=[section.controller(key, path.parent) for key, section in data.controllers.items()],
             events=[section.event(key) for key, section in data.events.items()],
             fmus=[section.unit(key, path.parent) for key, section in data.fmus.items()],
             scene=[section.shape for section in data.scene],
@@ -216,6 +222,7 @@ def read_system(
         )  # fmt: skip
         _ = compiled_system(system)  # looks up all markers and interfaces
         require_events(system)
+        require_controllers(system)
         for signal in signals.values():
             if signal.notes:
                 log.warning("%s: signal %s: %s", path, signal.name, "; ".join(signal.notes))

@@ -152,4 +152,4 @@ class JointForce:
                 )
         numbers = self.stiffness, self.damping, self.preload, self.friction, self.friction_coefficient
         if not any(numbers) and self.motor is None and self.characteristic is None:
-            raise ModelError(f"{where}: expected at least one part above zero, got none")
+            raise ModelError(f"{where}: expected at least one part above zero, or a motor, got none")

@@ -94,6 +94,13 @@ def test_a_base_file_is_merged_key_by_key(read):
     assert [path.name for path in content.files] == ["file.toml", "base.toml"]
 
 
+def test_a_removed_key_may_be_missing_in_the_base_file(read):
+    base = "[run]\nh = 1.0\n[bodies.a]\nmass = 1.0"
+    upper = 'extends = "base.toml"\nfmu = {}\nbodies.b = {}\nsensors.tip = {}\nrun.watch = {}\n[bodies.c]\nmass = 2.0'
+    content = read(upper, base=base)
+    assert content == {"run": {"h": 1.0}, "bodies": {"a": {"mass": 1.0}, "c": {"mass": 2.0}}, "sensors": {}}
+
+
 def test_all_files_that_a_file_extends_are_listed_although_they_give_nothing(read, tmp_path):
     read('extends = "upper.toml"\na = 1', upper='extends = "base.toml"\na = 2', base="a = 3")
     found = extended_files(tmp_path / "file.toml", CmsError)
