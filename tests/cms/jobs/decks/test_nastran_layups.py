@@ -66,6 +66,16 @@ def test_layers_lie_as_the_card_says(tmp_path, options, direction, offset, repea
     assert_allclose(body.M.toarray(), plain.M.toarray(), rtol=0, atol=1e-12 * abs(plain.M).max())
 
 
+def test_a_last_layer_that_is_given_by_its_material_alone_takes_the_thickness_before_it(tmp_path):
+    deck = deck_of(tmp_path, **{",2,,-45.": ",2"})
+    path = tmp_path / "plate.toml"
+    path.write_text(job_text(deck, JobRequest("m-kg-s", {}), "plate.bdf"))
+    body = uncoupled_body(read_job(path), Stages())
+    along = (body.dofs[:, 1] == 0).astype(float)
+    density = 0.01 * 8000.0 + 2 * 0.02 * 1600.0 + 2.0
+    assert_allclose(along @ (body.M @ along), 2.0 * density, rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [

@@ -33,6 +33,13 @@ def test_what_lies_below_the_new_nyquist_frequency_stays(rate):
     assert_allclose([report.rms_before, report.rms_after], [np.sqrt(0.5 * 1.25), rms], rtol=4e-3, atol=0)
 
 
+def test_every_fourth_sample_is_taken_as_it_is():
+    """Without a filter; an interpolation would smooth the edges of a rectangular wave."""
+    wave = Signal("switch", t, np.where(t % 0.1 < 0.05, 1.0, -1.0), "V")
+    found, _ = resampled(wave, RATE / 4, anti_alias=False)
+    assert_allclose(found.values, wave.values[::4], rtol=0, atol=0)
+
+
 @pytest.mark.parametrize("above", [1.0, 1.02, 1.05, 1.5])
 def test_from_the_new_nyquist_frequency_on_nothing_is_left(above):
     """-80 dB at the end of the transition, which begins at 80 % of the new Nyquist frequency."""
