@@ -1,7 +1,7 @@
 """Equations of motion of one body, complete in the deformation (docs/theory.md §6-7), and their tangent.
 
-Components in body axes; a: acceleration of the frame origin minus gravity, alpha: angular acceleration. From
-W_ab = S_ab q, 1C(q) = 1C + K_t q, s = S + 1C q + 1/2 qᵀ K_t q (K_t, K_r: zero unless stiffened):
+Components are in body axes; a is the acceleration of the frame origin minus gravity, alpha the angular acceleration.
+With W_ab = S_ab q, 1C(q) = 1C + K_t q, s = S + 1C q + 1/2 qᵀ K_t q (K_t and K_r are zero unless the body is stiffened):
 
     T_k    = (tr W_k) 1 - W_k                                  (= Σ_l 5C_lk q_l)
     D_k    = 3C_k + T_k
@@ -12,9 +12,9 @@ W_ab = S_ab q, 1C(q) = 1C + K_t q, s = S + 1C q + 1/2 qᵀ K_t q (K_t, K_r: zero
     (2) s × a + J alpha + Σ B_k q_ddot_k + q_dotᵀK_r q_dot + 2 (Σ q_dot_k D_k) omega + omega × (J omega)  = tau
     (3) 1C_k(q)·a + B_k·alpha + (M q_ddot)_k + 2 Y_k·omega - omegaᵀ D_k omega + (D q_dot + K q)_k         = h_k
 
-The matrices K_ab and K_r of a stiffened body are part of its S_ab (`compiling.stiffening`), so that B, D and J hold
-them as they are written here. One pass over S_ab (9 n² numbers), one over 4C (3 n²), and over K_t, K_r (6 n²) carry
-the cost.
+The matrices K_ab and K_r of a stiffened body are part of its S_ab (`compiling.stiffening`), so that the formulas for B,
+D and J include them. Most of the cost is one pass over S_ab (9 n² numbers), one over 4C (3 n²), and one over K_t and
+K_r (6 n²).
 """
 
 from floatframe.engine.kernels.compiler.compilation import loops, view
@@ -250,7 +250,7 @@ def modal_forces(model, work, i, a):
 def body_mass_product(model, work, i, v, out):
     """Write the generalised momenta M u of body i into out, (6 + n_q,); v: its velocities, v_GO in body axes.
 
-    `body_forces` has been called for this configuration.
+    `body_forces` must have been called for this configuration.
     """
     types, bodies = model.body_types, work.bodies
     t, n, q0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i]
@@ -279,8 +279,9 @@ def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
     """Write the derivative of (1) to (3) into H, (6 + n, 6 + n); c_m, c_d, c_k: weights of mass, damping, stiffness.
 
     Columns are (dx, dtheta, dq) with da = c_m dx, dalpha = c_m dtheta, dq_ddot = c_m dq, domega = c_d dtheta,
-    dq_dot = c_d dq, dq: c_k dq. The derivative by the rotation of the body itself (da = a × dphi) goes
-    unweighted into turn, (6 + n, 3). `body_forces` has been called for this iterate. With v = 1C(q) q_dot
+    dq_dot = c_d dq, and c_k times the derivatives by q. The derivative by the rotation of the body (da = a × dphi) is
+    written into turn, (6 + n, 3), without weight. `body_forces` must have been called for this iterate. With
+    v = 1C(q) q_dot
 
         d(1) = m da - tilde(s) dalpha - (2 tilde(v) + tilde(omega × s) + tilde(omega) tilde(s)) domega + ...
         d(2) = tilde(s) da + J dalpha + (2 Σ q_dot_k D_k + tilde(omega) J - tilde(J omega)) domega + ...
@@ -327,7 +328,8 @@ def spin_columns(model, work, i, c_d, H):
 def modal_tangent(model, work, i, c_m, c_d, c_k, H, turn):
     """Write the rows and columns of the modes into H; see `body_tangent`.
 
-    With b = 1C_k: (1) by q, (2) by q but for the sums over modes in `modal_columns`, (3) by a, alpha, omega.
+    These are the derivatives of (1) by q, of (2) by q without the sums over modes (see `modal_columns`), and of (3) by
+    a, alpha, omega. In the code b = 1C_k.
     """
     types, bodies = model.body_types, work.bodies
     t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
@@ -357,9 +359,10 @@ def modal_tangent(model, work, i, c_m, c_d, c_k, H, turn):
 def modal_columns(model, work, i, c_d, c_k, H):
     """Add the terms with 4C and S_ab to H: the modal block, and the remaining derivatives of (2) by q.
 
-    2 4C_kj·omega, B'_kj·alpha - omegaᵀ 5C_jk omega; Σ_k B'_kj q_ddot_k + 2 Σ_k q_dot_k 5C_jk omega, where B'_kj is the
-    derivative of B_k by q_j: 4C_kj, and K_r,kj of a stiffened body; both are in S_ab. The second is Σ A_ab S_ab,kj with
-    A = tilde(alpha) + tilde(omega) tilde(omega), less 2 4C_kj·alpha: alpha·B'_jk = alpha·B'_kj - 2 alpha·4C_kj.
+    The modal block gets 2 4C_kj·omega (by q_dot) and B'_kj·alpha - omegaᵀ 5C_jk omega (by q); (2) gets
+    Σ_k B'_kj q_ddot_k + 2 Σ_k q_dot_k 5C_jk omega. B'_kj is the derivative of B_k by q_j: 4C_kj, and K_r,kj of a
+    stiffened body; both are in S_ab. The second term of the modal block is Σ A_ab S_ab,kj - 2 4C_kj·alpha with
+    A = tilde(alpha) + tilde(omega) tilde(omega), because alpha·B'_jk = alpha·B'_kj - 2 alpha·4C_kj.
     """
     types, t, n, u0 = model.body_types, model.bodies.kind[i], model.bodies.n_q[i], model.bodies.u0[i] + 6
     S, four = block(types, t, S_AB, 9 * n * n), block(types, t, C4, 3 * n * n)

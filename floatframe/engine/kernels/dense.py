@@ -29,8 +29,8 @@ def add_products(A, x, out):
 def lu_factor(A, pivot):
     """Overwrite A, (n, n), with its LU factors; the diagonal of U is stored inverted.
 
-    The pivot is the first number that is at least `ENOUGH` of the largest one of its row, or the one with the largest
-    ratio to it. Return False if a pivot is zero or not finite.
+    The pivot is the first number of a column that is at least `ENOUGH` times the largest number of its row, or else the
+    number with the largest such ratio. Return False if a pivot is zero or not finite.
     """
     n = A.shape[0]
     for k in range(n):
@@ -66,7 +66,7 @@ def lu_factor(A, pivot):
 def lu_solve(A, pivot, b):
     """Overwrite b, (n,), with A⁻¹ b, from the factors of `lu_factor`.
 
-    Four rows at once: their sums do not wait for each other.
+    Four rows are processed at once, because the processor can compute their sums in parallel.
     """
     n = A.shape[0]
     for k in range(n):

@@ -51,7 +51,8 @@ def quadratic(model, work, i, which, x):
 def diagnose(model, work, out, drift):
     """Write energies and momenta into out[:10], and the drift of each joint into drift, (n_c, N_DRIFTS).
 
-    T = 1/2 uᵀ M u; strain 1/2 qᵀ K q; gravity -g·(m r + R s). `evaluate` has been called for this iterate.
+    Kinetic energy 1/2 uᵀ M u, strain energy 1/2 qᵀ K q, gravity -g·(m r + R s). `evaluate` must have been called for
+    this iterate.
     """
     for k in range(10):
         out[k] = 0.0

@@ -1,6 +1,6 @@
 """The entry into compiled code for absolute coordinates, with one plain function for each of its tasks.
 
-One entry, since numba compiles and links everything below an entry once more for each of them.
+There is one entry, because numba compiles and links all inner functions again for each entry.
 """
 
 import logging
@@ -158,7 +158,7 @@ class CompiledEntry:
     def prepare(self) -> bool:
         """Load the kernels from the cache, or compile them; return whether they were compiled in this call.
 
-        Otherwise this happens with the first call. Calls after it find everything ready.
+        Without a call of this function, this happens at the first request.
         """
         before = self.cache_misses
         self.compiled.compile(self.signature)
@@ -183,7 +183,7 @@ class CompiledEntry:
                 announcement.cancel()
         ordered, numbers = table_of_numbers(ORDER, order)
         outcome = self.compiled(*(record.table for record in (*records, memory, rows)), ordered)
-        del numbers  # not before
+        del numbers  # must live until here, because the table has its address
         return Outcome(*outcome)
 
     def observe(self, *records: Any, memory: Memory, t: float) -> Rows:
@@ -195,7 +195,7 @@ class CompiledEntry:
     def advance(
         self, *records: Any, memory: Memory, h: float, first: int, n_steps: int, every: int, **order: float
     ) -> tuple[Rows, Outcome]:
-        """Advance the memory by n_steps of size h; return the report and the results after every `every`-th step.
+        """Advance the memory by n_steps of size h; return the results after every `every`-th step and the report.
 
         order: time of step 0, and numbers of the method; see `kernels.generalized_alpha.time_loop`.
         """

@@ -104,8 +104,9 @@ def tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning):
 def turning_by_unknown(model, work, i):
     """Return the rotation of body i for a change of its unknown dtheta, body axes.
 
-    R exp(theta) turns by T(theta) dtheta. Where the spin is taken by itself, R exp(x) exp(xi e) with x across e and
-    unknowns in the axes of the iterate, it turns by e along e, and across it by T(x) in these axes.
+    R exp(theta) rotates by T(theta) dtheta. If the spin is integrated separately, the orientation is
+    R exp(x) exp(xi e), with x normal to e and the unknowns in the axes of the iterate. In these axes it rotates by the
+    change of xi along e, and by T(x) dx across e.
     """
     theta = vector(work.state.theta[i])
     if work.state.spins[i] == 0:

@@ -88,20 +88,20 @@ DONE, DIVERGED, SINGULAR_BODY, SINGULAR_CONNECTION, INACCURATE, STOPPED = 0, 1, 
 SINGULAR = 6  # status: the Newton matrix is singular, in a formulation with one matrix
 UNRESOLVED = 7  # status: a step is too long for a contact
 TURNED = 8  # status: a body rotates too far in a step
-NO_ACCELERATION = 9  # status: a step has no accelerations at its end, of a scheme that needs none
+NO_ACCELERATION = 9  # status: a step of a scheme without accelerations is done, but none exist at its end
 #: largest rotation [rad] in a step of a body with joints off its rotation axis; above 1.15 joints can add energy
 MOST_TURN = 1.0
-# distance of a joint from the axis of rotation, relative to the size of the system, above which it is away from it
+# distance of a joint from the axis of rotation, relative to the size of the system, above which it counts as off-axis
 OFF_AXIS = 1e-3
 SLOW = 0.2  # ratio of successive corrections above which the factors are renewed
 # weight of the displacement increment, compared with the displacement due to accelerations, in the norm
 OF_MOTION = 1e-5
-FAST = 0.1  # contraction rate below which the predicted next correction ends a step,
-SAFE = 0.5  # if it is below this fraction of the tolerance
-OF_ROUNDOFF = 0.1  # and of roundoff
-AGED = 5e-4  # of the first correction: what the age of the factors may change velocities by
-ROUNDOFF = 2e-15  # of a position
-NOISE = 1e-7  # accelerations due to rounding of positions, relative to those of the motion, that may appear in results
+FAST = 0.1  # contraction rate below which a step may end by the predicted next correction
+SAFE = 0.5  # fraction of the tolerance that this predicted correction must not exceed
+OF_ROUNDOFF = 0.1  # fraction of the roundoff that is added to the tolerance for this purpose
+AGED = 5e-4  # allowed change of velocities due to outdated factors, relative to the first correction
+ROUNDOFF = 2e-15  # relative roundoff of a position
+NOISE = 1e-7  # accelerations due to roundoff of positions, relative to those of the motion, that may appear in results
 SAFETY = 0.9  # safety factor on the step that would just meet the allowed error
 # largest reduction and growth of a step; smallest growth for which the size is changed
 LEAST, MOST, WORTH = 0.2, 2.0, 1.2
@@ -179,8 +179,8 @@ def takes_spin(turn, alpha):
 def begin_spin(model, work, memory, i):
     """Choose whether the step integrates the spin of body i separately; return the reduction of its accelerations.
 
-    So it is done where its axis of symmetry does not hold still in the body's angular velocity, but in space: the
-    angular acceleration is small without w omega × e, or is not much smaller with it.
+    It does so if w omega × e, the angular acceleration due to the rotation of the symmetry axis e, is not zero, and the
+    angular acceleration is not much smaller than the rest without this part (see `takes_spin`).
     """
     u0, zero = model.bodies.u0[i] + 3, (0.0, 0.0, 0.0)
     turn = turn_of_axis(spin_axis(model, i), vector(memory.u[u0:]))
@@ -195,7 +195,7 @@ def begin_spin(model, work, memory, i):
 def take_to_body(model, state, i):
     """Convert omega and alpha of body i from axes that do not spin to its own axes, and add w omega × e to alpha.
 
-    These axes are those of the beginning of the step turned by exp(across).
+    The axes that do not spin are the axes at the beginning of the step rotated by exp(across).
     """
     e, u0 = spin_axis(model, i), model.bodies.u0[i] + 3
     along = dot(e, vector(state.theta[i]))
@@ -208,7 +208,7 @@ def take_to_body(model, state, i):
 def take_age(solver, n_iterations):
     """Count a step with the present factors, and request new ones if it needed more iterations than the mean.
 
-    The mean counts what the factors cost: to go on would raise it, and new ones come back to it.
+    The mean includes the cost of the factors. Further steps with them would raise it, while new factors keep it.
     """
     solver.n_steps += 1
     solver.n_spent += n_iterations
@@ -275,8 +275,8 @@ def update(model, work, memory, by_rate, by_acceleration, c_k, is_held):
 def change_rates(model, work, i, by_theta, by_rate, by_acceleration):
     """Add by_rate y to the velocities of body i, by_acceleration y to its accelerations, and by_theta to theta.
 
-    A body that spins has them in the axes that do not spin with it: omega and alpha - w omega × e follow y there, which
-    is that of theta or, where theta stays, of a velocity.
+    For a body whose spin is integrated separately, omega and alpha - w omega × e change by y in axes that do not spin
+    with it, where y is the change of theta or, if theta stays, of a velocity.
     """
     n, u0, state = model.bodies.n_q[i], model.bodies.u0[i], work.state
     y = work.solver.y[u0 : u0 + 6 + n]
@@ -304,8 +304,8 @@ def change_rates(model, work, i, by_theta, by_rate, by_acceleration):
 def turns_too_far(model, work, length):
     """Return the first body, or -1, that rotates by more than `MOST_TURN` with a joint off its rotation axis.
 
-    A spin that is taken by itself does not count. Where all joints lie on the axis through the frame, its origin does
-    not move on a circle, and any turn is followed.
+    A spin that is integrated separately does not count. If all joints lie on the rotation axis through the frame
+    origin, this origin does not move on a circle, and a rotation of any size is correct.
     """
     for i in range(model.bodies.kind.shape[0]):
         theta = vector(work.state.theta[i])
@@ -326,9 +326,9 @@ def turns_too_far(model, work, length):
 def hold_velocities(model, work, c_k):
     """Write the velocity correction y_rate for the gaps in mu, used by `update`; return its squared norm.
 
-    Accelerations change with velocities, and reactions, which are changed here, with accelerations. Positions stay: so
-    what the factors take of forces that follow positions (modal stiffness, forces that turn against the body) stays
-    too, and residuals become less by it.
+    Accelerations change with the velocities, and reactions with the accelerations; this function changes the reactions.
+    Positions do not change, but the factors include forces that depend on positions (modal stiffness, forces that
+    rotate relative to the body). Their contribution is therefore subtracted from the residuals.
     """
     close_velocities(model, work)
     total, by_turn, y = 0.0, work.bodies.by_turn, work.solver.y
@@ -358,7 +358,7 @@ def largest(x):
 def expect_late_gaps(solver):
     """Add to the velocity gaps in mu the gaps that the first iteration will probably leave; return the largest.
 
-    Rates of what is held change with the positions. The gap that is late changes as it did over the step before.
+    The rates of constraints change with the positions. The gap left is predicted to change as in the step before.
     """
     most = 0.0
     for k in range(solver.mu.shape[0]):
@@ -386,8 +386,9 @@ def keep_late_gaps(solver):
 def are_aged(solver, second, first, of_rates):
     """Whether outdated factors H change the result of a step, from the ratio of its second to its first correction.
 
-    Velocities are corrected by H⁻¹ Gᵀ nu, `of_rates`, which no residual decides, so that they follow the factors: by as
-    much of them as the second correction is of the first, less what it is with new factors.
+    Velocities are corrected by H⁻¹ Gᵀ nu, with the norm `of_rates`. No residual removes the error that outdated factors
+    cause there. Relative to `of_rates` it is estimated as the ratio of the second to the first correction, minus twice
+    this ratio with new factors.
     """
     if not first > 0.0:
         return False
@@ -414,8 +415,9 @@ def take_stiffness(model, i, q, residual):
 def add_reactions(model, work, c_k):
     """Add the wrenches of the velocity correction to the reactions of joints and other constraints.
 
-    Those of force elements stay, as positions do. The wrench of a joint has parts along axes of the ground: all of them
-    change, but for what acts along its soft rows, whose rates disagree with those they repeat by rounding.
+    The wrenches of force elements do not change, because positions do not. All components of the wrench of a joint
+    change, except the parts along its soft rows, because the rates of these differ by roundoff from the rates of the
+    constraints that they repeat.
     """
     for c in range(model.connections.size.shape[0]):
         w0, end = model.connections.w0[c], model.connections.w0[c + 1]
@@ -437,8 +439,8 @@ def add_reactions(model, work, c_k):
 def is_enough(norm, last, wanted, allowed):
     """Whether a correction is small enough, or the next one will be by the ratio of the last two.
 
-    allowed: what is wanted and roundoff. A correction that is not made counts more than one at roundoff, for what is
-    left open in every step has the same sign.
+    allowed: the wanted size plus roundoff. The limit for a correction that is omitted contains less roundoff, because
+    the errors left by omitted corrections have the same sign in all steps.
     """
     left = SAFE * (wanted + OF_ROUNDOFF * (allowed - wanted))
     return norm <= allowed or (last < math.inf and norm <= FAST * last and norm * norm <= last * left)
@@ -448,7 +450,7 @@ def is_enough(norm, last, wanted, allowed):
 def correction_of_states(model, work, c_k):
     """Return the largest correction of a state or of a multiplier without constraint, relative to its size.
 
-    The size is the typical one, the present one, or for a state that of its change in a step.
+    The size is the largest of the typical size, the present value and, for a state, its change in a step.
     """
     largest = 0.0
     for s in range(model.states.row.shape[0]):
@@ -469,7 +471,7 @@ def correction_of_states(model, work, c_k):
 
 @inner
 def roundoff_floor(model, work, length):
-    """Return the squared norm of rounding errors of positions."""
+    """Return the squared norm of roundoff errors of positions."""
     total = 0.0
     for i in range(model.bodies.kind.shape[0]):
         size = length
@@ -508,8 +510,8 @@ def error_factor(order, h):
 def mean_square(model, work, i, jump):
     """Return jumpᵀ M jump of body i divided by mass and squared size, a mean over the points of the body.
 
-    A body is measured alone, so that a heavy one, or one far away, hides nothing. jump, (6 + n_q,), translation in
-    ground axes, is turned to body axes.
+    Each body is measured alone, so that a heavy or distant body does not hide the error of another. jump, (6 + n_q,),
+    whose translation is in ground axes, is overwritten by its components in body axes.
     """
     n, moved = model.bodies.n_q[i], work.bodies.momentum[: 6 + model.bodies.n_q[i]]
     put(jump, 0, turned_back(work.state.R[i], jump))
@@ -524,7 +526,8 @@ def mean_square(model, work, i, jump):
 def one_step(model, work, memory, order, h):
     """Advance the memory by one step, unless the estimated error is larger than allowed.
 
-    Return (status, index of what is singular, last correction by the allowed one, error; -1 if not estimated).
+    Return (status, index of the singular body or connection, last correction divided by the allowed one, error or -1 if
+    it is not estimated).
     """
     alpha_m, alpha_f, beta, gamma = order.alpha_m, order.alpha_f, order.beta, order.gamma
     c_k = beta * h * h
@@ -730,8 +733,8 @@ def write_row(model, work, memory, t, rows):
 def settle_row(model, work, memory, rows):
     """Compute accelerations and reactions of the last row from its positions and velocities.
 
-    In steps so short that they are noise otherwise: reactions of a step close its joints, whose gaps are known to
-    rounding alone, and that by h² counts beside the accelerations. Rounding of velocities does not.
+    This is done for steps so short that these are noise otherwise: the reactions of a step close joint gaps, whose
+    roundoff divided by h² is significant relative to the accelerations. Roundoff of velocities is not.
     """
     k = work.counted.rows - 1
     if not is_noise(model, work, memory.h):
@@ -752,7 +755,7 @@ def settle_row(model, work, memory, rows):
 
 @inner
 def is_noise(model, work, h):
-    """Whether rounding of positions, divided by h², is significant relative to the accelerations."""
+    """Whether roundoff of positions, divided by h², is significant relative to the accelerations."""
     is_held, noise, size = False, 0.0, math.sqrt(dot(model.gravity, model.gravity))
     for k in range(model.rows.holds.shape[0]):
         is_held = is_held or model.rows.holds[k] != NOTHING
@@ -778,8 +781,8 @@ def shares(model):
 def ratio_of_steps(model, memory, h):
     """Return the ratio of h to the previous step size, by which the difference of `a` and u_dot is multiplied.
 
-    Zero where steps grow in a system with contacts. What they differ by is then of the contact, and in the directions
-    of joints of the scheme: it would grow with the step. So u_dot and a begin anew, from the equations of motion.
+    It is zero if steps grow in a system with contacts. Then the difference is due to the contact and, in the directions
+    of joints, to the scheme, and would grow with the step. So u_dot and a start again from the equations of motion.
     """
     if model.gaps.connection.shape[0] > 0 and h > memory.h:
         return 0.0
@@ -790,7 +793,8 @@ def ratio_of_steps(model, memory, h):
 def resize(model, work, memory, t, h):
     """Convert the algorithmic accelerations to those of a step of size h that ends at t.
 
-    Their distance from u_dot is of first order. The iterate is the state of the memory where steps may begin anew.
+    Their difference from u_dot is of first order in h. If they can start again from the equations of motion, the
+    iterate must be the state in the memory.
     """
     ratio = ratio_of_steps(model, memory, h)
     if ratio == 0.0:
@@ -853,21 +857,23 @@ def time_loop(load, try_step, write):
         (model, work, memory, others): write the iterate at the state in the memory, for gaps.
     try_step
         (model, work, memory, others, order, t, h): advance the memory to t by a step of size h, unless it fails or its
-        error is too large; return (status, index of what is singular, last correction by the allowed one, error).
+        error is too large; return (status, index of the singular body or connection, last correction divided by the
+        allowed one, error).
     write
-        (model, work, memory, others, t, rows): write the next row of the results, and return DONE or why there is
-        none. others: further records of the formulation.
+        (model, work, memory, others, t, rows): write the next row of the results, and return DONE or the status that
+        states why there is none. others: further records of the formulation.
     """
 
     @inner
     def advance(model, work, memory, rows, others, order):
         """Advance by n_steps of size h, beginning with step `first` counted from t0; write a row every `every` steps.
 
-        The order is an `entry.Order`. With h_min above 0 each of these is divided into equal parts of at most the size
-        that is wanted: one that fails, or whose error is above `most_error` (if above 0), is tried again, shorter, down
-        to h_min; then parts grow again. In systems with contacts parts are as short as these want them.
+        The order is an `entry.Order`. If h_min is positive, each of these steps is divided into equal parts of at most
+        the wanted size. A part that fails, or whose error is above `most_error` (if positive), is repeated with a
+        smaller size, down to h_min; later parts grow again. Contacts may require shorter parts.
 
-        Return (status, steps done, rows written, index of what is singular, last correction by the allowed one).
+        Return (status, steps done, rows written, index of the singular body or connection, last correction divided by
+        the allowed one).
         """
         h, first, h_min, most_error = order.h, order.first, order.h_min, order.most_error
         put_weights(model, work, order.beta * memory.h**2)

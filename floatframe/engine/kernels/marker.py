@@ -1,7 +1,8 @@
 """Motion of a marker from the motion of its body, and transfer of a wrench from the marker to the body.
 
-With [rho - c; th] = Psi q - 1/2 qᵀ K_P q (K_P, (6, n, n): zero unless the body is stiffened), Psi(q) = Psi - K_P q its
-derivative (t: rows of rho, r: rows of th), E = exp(th), T' = left Jacobian at th, nu = T' th_dot, all in body axes:
+Let [rho - c; th] = Psi q - 1/2 qᵀ K_P q (K_P, (6, n, n), is zero unless the body is stiffened), and let
+Psi(q) = Psi - K_P q be its derivative (index t: rows of rho, r: rows of th). With E = exp(th), T' the left Jacobian at
+th, and nu = T' th_dot, all in body axes,
 
     position     r + R rho                        velocity          v + R (omega × rho + rho_dot)
     axes         R E triad                        angular velocity  R (omega + nu)
@@ -196,13 +197,14 @@ def marker_acceleration(model, work, m, out):
 def acceleration_columns(model, work, m, c_m, c_d, c_k, turning, row):
     """Write c_k times the derivatives of marker m's acceleration by the unknowns of a step, body axes.
 
-    row, (6, 6 + n). In a step du_dot = c_m/c_k of the unknowns, their velocities c_d/c_k, the body turns by `turning`
-    dtheta. In body axes, but for the acceleration of the frame origin,
+    They are written into row, (6, 6 + n). In a step, accelerations change by c_m/c_k and velocities by c_d/c_k times
+    the change of the unknowns, and the body rotates by `turning` dtheta. Without the acceleration of the frame origin,
+    in body axes,
 
         a = omega_dot × rho + Psi_t q_ddot + omega × (omega × rho + 2 rho_dot) - q_dotᵀ K_P,t q_dot
         alpha = omega_dot + T' Psi_r q_ddot + omega × nu + ...
 
-    Of alpha, the derivatives by q and q_dot of T' and its rate are left out: of the size of the elastic rotations.
+    In alpha, the derivatives of T' and its rate by q and q_dot are omitted: they are of the size of elastic rotations.
     """
     i = model.markers.body[m]
     n, u0, omega = model.bodies.n_q[i], model.bodies.u0[i], body_omega(model.bodies, work.state, i)
@@ -287,9 +289,9 @@ def wrench_to_body(model, work, m):
 def marker_columns(model, work, m, rate, turning, column, row):
     """Write the derivatives of marker m's motion by the body unknowns (dx, dtheta, dq), body axes.
 
-    column, (6, 6 + n): of position and rotation by velocities, whose transpose carries a wrench to the body.
-    row, (12, 6 + n): of position, rotation, velocity, angular velocity by the unknowns of a step, in which
-    domega = rate dtheta, dq_dot = rate dq, and the body turns by `turning` dtheta, (3, 3).
+    column, (6, 6 + n): derivatives of position and rotation by the body velocities; its transpose maps a wrench to the
+    body. row, (12, 6 + n): derivatives of position, rotation, velocity and angular velocity by the unknowns of a step,
+    in which domega = rate dtheta, dq_dot = rate dq, and the body rotates by `turning` dtheta, (3, 3).
     """
     i = model.markers.body[m]
     n, omega = model.bodies.n_q[i], body_omega(model.bodies, work.state, i)
@@ -334,7 +336,8 @@ def marker_columns(model, work, m, rate, turning, column, row):
 def marker_stiffness(model, work, m, c_k, H, turn):
     """Add to H and `turn` the derivative of minus the generalised forces of a constant wrench on marker m.
 
-    A wrench fixed in space turns against the body (turn); one fixed in the marker turns with its elastic rotation.
+    A wrench fixed in space rotates relative to the body (turn); a wrench fixed in the marker follows its elastic
+    rotation.
     """
     i = model.markers.body[m]
     n, rho = model.bodies.n_q[i], vector(work.markers.rho[m])

@@ -1,7 +1,7 @@
 """The memory of a motion between steps, and the results of output times; sizes as in `kernels.model`.
 
-`State` is what a user gives and gets, `Memory` all that a method carries from step to step. Kernels overwrite a memory,
-restart records store one, and a block of steps keeps the one after each step (`work.Past`).
+A `State` is what a user gives and gets; a `Memory` is the complete state of a method between steps. Kernels overwrite a
+memory, restart records store one, and a block of steps stores the memory after each step (`work.Past`).
 """
 
 from typing import Any, NamedTuple
@@ -112,7 +112,7 @@ class Rows(NamedTuple):
 def memory_at(state: State, u_dot: Array, w: Array, a: Array | None = None, *, n_angles: int = 0) -> Memory:
     """Return the memory for a state before the first step.
 
-    a: of the method; None: accelerations. n_angles: how many angles are counted, all of the model or none.
+    a: further memory of the method; None: the accelerations. n_angles: number of counted angles, all of the model or 0.
     """
     a = u_dot if a is None else a
     sizes = {"n_b": len(state.r), "n_q": len(state.q), "n_u": len(state.u), "n_w": len(w), "angles": n_angles}

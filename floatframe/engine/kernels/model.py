@@ -1,9 +1,9 @@
 """The compiled system as a record of records, so that the kernels are compiled once for all systems.
 
 Sizes: n_b bodies, n_t types of bodies (instances share one), n_m markers, n_c connections (joints, spring-dampers and
-all that has rows), n_w wrench components = rows. Over all bodies: n_q modes, n_u = 6 n_b + n_q velocities; those of
-body i, u[u0[i]:u0[i + 1]], are v_GO in ground axes (3), omega_B (3), q_dot. Fields that end in 0 say where the part of
-an item begins, and have one entry more for the end.
+all other parts with rows), n_w wrench components, as many as rows. All bodies together have n_q modes and
+n_u = 6 n_b + n_q velocities. The velocities of body i, u[u0[i]:u0[i + 1]], are v_GO in ground axes (3), omega_B (3) and
+q_dot. Fields whose name ends in 0 contain the first index of each item's part; most have one more entry, the end.
 """
 
 from typing import NamedTuple

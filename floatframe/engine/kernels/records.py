@@ -1,15 +1,15 @@
 """Records of arrays; the shape, unit and number type of each array are declared once, in its record.
 
-A record is a named tuple of arrays and of other records. Made without values it holds their declarations, so that
-`Work()` declares all working arrays, and everything else follows from it:
+A record is a named tuple of arrays and of other records. A record created without values contains their declarations.
+So `Work()` declares all working arrays, and everything else follows from it:
 
     zeros(Work(), sizes)         the arrays, all zero
     filled(Springs(), ...)       arrays made of lists
     of_items(Springs(), items)   arrays made of items with one entry for each array
-    measured(Model(), model)     the sizes of given arrays, which must be what is declared
-    leaves(model)                the arrays in their order; kernels find them in it (compiler/structure.py)
+    measured(Model(), model)     the sizes of given arrays, which must agree with their declarations
+    leaves(model)                the arrays in order, in which kernels find them (compiler/structure.py)
 
-Records that Python hands to kernels are `tabled`: `model.table` holds addresses and shapes of all arrays.
+Records that Python passes to kernels are `tabled`: `model.table` contains addresses and shapes of all arrays.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -44,13 +44,13 @@ LINE = 8  #: size of a cache line in numbers; every array begins at a cache line
 
 
 class Tabled:
-    """Data that belong to a record beside its arrays and are freed with it."""
+    """Data that belong to a record in addition to its arrays, and are freed with it."""
 
     @cached_property
     def table(self) -> IntArray:
         """Address and shape of each array in the order of the record, as kernels read them.
 
-        Made once, since making it takes as long as a step.
+        It is made once, because this takes as long as a step.
         """
         words: list[int] = []
         for _, array in leaves(self):
@@ -63,7 +63,7 @@ class Tabled:
         """The sizes of the arrays by name, see `measured`."""
         return measured(type(self)(), self)  # type: ignore[type-var]
 
-    def __reduce__(self) -> tuple[Any, ...]:  # a copy has arrays, and so a table, of its own
+    def __reduce__(self) -> tuple[Any, ...]:  # a copy has its own arrays, and therefore its own table
         return type(self), tuple(self)  # type: ignore[arg-type]
 
 
@@ -172,7 +172,7 @@ def declarations(declaration: Any) -> Iterator[Declared]:
 
 
 def grouped(declaration: Record, arrays: Iterator[Array]) -> Record:
-    """Return a record that takes as many of the arrays as it declares."""
+    """Return a record with as many of the arrays as it declares."""
     made: list[Any] = [next(arrays) if isinstance(each, Declared) else grouped(each, arrays) for each in declaration]
     return type(declaration)(*made)
 
@@ -180,7 +180,7 @@ def grouped(declaration: Record, arrays: Iterator[Array]) -> Record:
 def filled(declaration: Record, **values: Any) -> Record:
     """Return a record with arrays made from lists of entries, and numbers made from single values.
 
-    A record in it is given as it is.
+    Records inside the record are passed unchanged.
     """
     made: dict[str, Any] = {}
     for name, declared in zip(declaration._fields, declaration, strict=True):

@@ -1,7 +1,8 @@
 """Rotations in the kernels: exponential map and its Jacobians, with matrices as three rows (`kernels.vector`).
 
-With t = |theta|: exp = 1 + s tilde + a tilde², right Jacobian T = 1 - a tilde + b tilde², left Jacobian Tᵀ, with
-s = sin t / t, a = (1 - cos t)/t², b = (t - sin t)/t³; below t = 1/2 their series (the next term is under 1e-17).
+With t = |theta|: exp = 1 + s tilde + a tilde², right Jacobian T = 1 - a tilde + b tilde², left Jacobian Tᵀ, where
+s = sin t / t, a = (1 - cos t)/t², b = (t - sin t)/t³. Below t = 1/2 their series are used, whose first omitted term is
+less than 1e-17.
 """
 
 import math
@@ -155,7 +156,7 @@ def split_spin(e, th):
 def turn_of_axis(e, omega):
     """Return the angular acceleration w omega × e due to the rotation of axis e, where w is the spin rate.
 
-    omega, alpha and all that follows are in axes of the body.
+    omega and the result are in axes of the body, as in the following functions.
     """
     return scaled(dot(e, omega), cross(omega, e))
 
@@ -171,8 +172,8 @@ def after_spin(e, along, omega, rest):
 def changed_spin(e, theta, omega, alpha, by_theta, by_omega, by_alpha):
     """Return theta, omega, alpha of a spinning body after a correction, which is linear in axes that do not spin.
 
-    These are those of the beginning of the step turned by exp(across): omega and alpha - w omega × e are changed there,
-    and carried along by the change of theta, which is across + along e.
+    These axes are the axes at the beginning of the step rotated by exp(across), where theta = across + along e. omega
+    and alpha - w omega × e are corrected in these axes, and rotated with them by the change of theta.
     """
     rest = sub(alpha, turn_of_axis(e, omega))
     theta = add(theta, turned_about(e, dot(e, theta), by_theta))

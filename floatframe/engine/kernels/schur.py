@@ -4,7 +4,7 @@
     Σ_ends P R_i J_row y + V mu             = -g                                                 (each connection)
 
 With z = H⁻¹(-c_k residual), X = H⁻¹ J_columnᵀ and Z = J_row X the connections have the matrix V + P R Z Rᵀ sign. H, X
-and Z do not turn with the body, so that they can serve for many steps; P, R and V are those of the iterate.
+and Z do not rotate with the body, so that they can be used for many steps; P, R and V are those of the iterate.
 """
 
 import math
@@ -37,7 +37,7 @@ __all__ = [
     "velocity_gaps",
 ]
 
-SOFTER = 1e3  # s of `share_reactions`: well above the rounding errors of A
+SOFTER = 1e3  # s of `share_reactions`: s S is well above the roundoff of A
 SWEEPS = 5  # number of iterations: with soft 1e-9 of A, constraints with a condition number of 1e4 share to 1e-10
 
 
@@ -123,7 +123,7 @@ def assemble(model, work, c_k):
 def add_accelerated(model, work, p, r, s, place):
     """Add the effect of the pair's other wrench on row r through the acceleration of the first marker.
 
-    place: where the row of the block begins in the store s.
+    place: index in the array of blocks s at which the row of the block begins.
     """
     a, b, row = model.elimination.pair_row[p], model.elimination.pair_column[p], work.solver.row
     R, P_a = work.state.R[model.markers.body[a]], work.connections.P_a[model.markers.accelerated[a]]
@@ -312,8 +312,9 @@ def take_motions(model, work):
 def velocity_gaps(model, work, by_rate):
     """Write into mu the difference between position constraints and their rates in the correction.
 
-    In unknowns: y by_rate is the change of velocities. The positions will be closed by a `correction`, which changes
-    their rates by -by_rate g. Rows of positions that have no cheap rate, and all others, have no gap.
+    The gaps have the scale of the unknowns: by_rate y is the change of velocities. A later `correction` closes the
+    positions, which changes their rates by -by_rate g. Position rows whose rate is expensive, and all other rows, get
+    no gap.
     """
     for c in range(model.connections.size.shape[0]):
         write_velocity_gaps(model, work, c, 1.0 / by_rate, work.solver.mu)
@@ -323,8 +324,9 @@ def velocity_gaps(model, work, by_rate):
 def close_velocities(model, work):
     """Write the correction (y, mu) that closes the velocity gaps in mu.
 
-    Unknowns of rotation turn a body by `T_right` of them, velocities at once: y is what they turn it by. Its moments
-    of inertia resist all of that, and mu holds against the unknowns alone: the rest is the `surplus`.
+    An unknown of rotation dtheta rotates the body by `T_right` dtheta, while a velocity acts directly. So y becomes the
+    rotation. `surplus` is the difference between the rotation and the unknown; the inertia resists the whole rotation,
+    but mu balances only the part of the unknown.
     """
     y = work.solver.y
     for k in range(y.shape[0]):
@@ -350,7 +352,7 @@ def add_wrenches(model, work):
             m = bodies.ends[e]
             c = markers.connection[m]
             o, w0, sign = markers.x0[m], connections.w0[c], markers.sign[m]
-            force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)  # of the correction on the marker, body axes
+            force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)  # wrench of the correction on the marker, body axes
             if markers.force[m] >= 0:
                 force = scaled(sign, turned_back(R, mu[w0 + markers.force[m] :]))
             if markers.moment[m] >= 0:
@@ -364,7 +366,7 @@ def add_wrenches(model, work):
 def assemble_masses(model, work, c_k):
     """Factorise the body masses and assemble the connections for accelerations; return whether both are regular.
 
-    Modes without mass have c_k times their stiffness.
+    Modes without mass get c_k times their stiffness as mass.
     """
     bodies, types = model.bodies, model.body_types
     linearize(model, work, 1.0, 0.0, 0.0)
@@ -385,8 +387,9 @@ def assemble_masses(model, work, c_k):
 def settle_accelerations(model, work, c_k):
     """Correct accelerations and wrenches for the positions and velocities of the iterate; return whether they exist.
 
-    M u_dot - Jᵀ w = f, G u_dot = -d(G)/dt u, by one step of Newton's method from those of a step, whose accelerations
-    fulfil the second only as far as they are known by differences. `evaluate` has been called with c_k = 1.
+    Solve M u_dot - Jᵀ w = f, G u_dot = -d(G)/dt u by one iteration of Newton's method from the accelerations of the
+    step, which fulfil the second equation only up to the error of differences. `evaluate` must have been called with
+    c_k = 1.
     """
     solver, g = work.solver, work.connections.g
     constraint_rates(model, work)
@@ -423,15 +426,15 @@ def settle_accelerations(model, work, c_k):
 def share_reactions(model, work, c_k):
     """Distribute the reactions of the iterate among redundant constraints; return whether a solution exists.
 
-    Of all wrenches w' that act on the bodies as w does, Jᵀ w' = Jᵀ w, those of the least sum of soft lambda², lambda
-    being the reaction along a row that may give way, `soft` its mobility. With A = G M⁻¹ Jᵀ and S = soft lambda of w,
-    V = -S, they are the limit of the proximal point algorithm
+    Of all wrenches w' with the same effect on the bodies, Jᵀ w' = Jᵀ w, it finds those with the least sum of
+    soft lambda², where lambda is the reaction along a row with the compliance `soft`. With A = G M⁻¹ Jᵀ, and the matrix
+    S that maps w to soft lambda (V = -S), they are the limit of the proximal point algorithm
 
-        (A + s S) w'_j = A w + s S w'_(j-1),      w'_0 = 0          (rows that hold nothing: V w'_j = V w):
+        (A + s S) w'_j = A w + s S w'_(j-1),      w'_0 = 0          (rows without a constraint: V w'_j = V w).
 
-    all w'_j are reactions to motions of the bodies, which no reactions that balance themselves are part of, and A w'
-    comes nearer to A w in each sweep by the ratio of s S to the least eigenvalue of A. w may hold any sum that balances
-    itself, such as the rounding of positions over c_k. Work arrays are overwritten, factors and y included.
+    All w'_j are reactions to motions of the bodies and contain no self-balanced reactions. Each sweep reduces the
+    difference between A w' and A w by the ratio of s S to the least eigenvalue of A. w may contain any self-balanced
+    sum, such as the roundoff of positions divided by c_k. Work arrays are overwritten, including factors and y.
     """
     rows, connections, solver = model.rows, model.connections, work.solver
     if not assemble_masses(model, work, c_k):

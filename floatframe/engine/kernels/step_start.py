@@ -45,8 +45,8 @@ def hold_states(model, work, memory):
 def accelerate(model, work, memory):
     """Write the accelerations that the equations of motion give at the state in the memory into the memory.
 
-    M u_dot - Jᵀ w = f,  G u_dot = -d(G)/dt u, iterated where forces depend on reactions; the memory stays where there
-    are none.
+    Solve M u_dot - Jᵀ w = f,  G u_dot = -d(G)/dt u, by iteration if forces depend on reactions. If no accelerations
+    exist, the memory is unchanged.
     """
     hold_states(model, work, memory)
     state, g, y = work.state, work.connections.g, work.solver.y

@@ -1,17 +1,18 @@
 """Angles that are counted through full turns from step to step.
 
-An angle is that by which the direction y of one body has turned about the axis x × z of another, from its direction z
-towards -x (as a TWIST row has it). With E = R_h x, Z = R_h z of the holder of the axis, D = R_o y of the other body,
-and omega = omega_o - omega_h, all in ground axes,
+An angle is the rotation of the direction y of one body about the axis x × z of another body (the holder), from its
+direction z towards -x, as in a TWIST row. With E = R_h x and Z = R_h z of the holder, D = R_o y of the other body, and
+omega = omega_o - omega_h, all in ground axes,
 
     th = atan2(S, C),  S = -E·D,  C = Z·D;      th_dot = (C S_dot - S C_dot)/(S² + C²),
     S_dot = -E·(omega × D),  C_dot = Z·(omega × D),
 
-and of all th + 2 pi n the one is taken that is nearest to where the mean rate of the step leads from the angle before.
-Bodies are taken undeformed: elasticity adds less than half a turn.
+The counted angle is the one of all th + 2 pi n that is nearest to the prediction: the previous angle plus the step size
+times the mean rate of the step. Bodies are taken as undeformed, because elasticity adds less than half a turn.
 
-Three angles in a row may be a rotation vector instead, that of A_hᵀ A_o, axes of o as seen in axes x, z × x, z of h: of
-theta + 2 pi n theta/|theta| the one nearest to where the mean of omega, in axes of h, leads.
+Three consecutive angles may instead be the rotation vector of A_hᵀ A_o, the axes of o relative to the axes x, z × x, z
+of h. Then the one of all theta + 2 pi n theta/|theta| is taken that is nearest to the prediction by the mean of omega
+in axes of h.
 """
 
 import math

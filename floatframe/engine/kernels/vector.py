@@ -1,6 +1,6 @@
 """Vectors of three numbers and matrices of three rows in the kernels: tuples, which the compiler keeps in registers.
 
-Where a matrix is only read, an array (3, 3) will do.
+A matrix that is only read may also be an array (3, 3).
 """
 
 import math

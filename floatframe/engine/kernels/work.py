@@ -1,7 +1,7 @@
 """The working arrays of the kernels: the iterate and all results computed from it, overwritten by every evaluation.
 
-Sizes as in `kernels.model`, and n_most: most modes of a body, most_rows: most rows of a connection, n_x: Σ (6 + n_q)
-over the ends of connections. Vectors are in ground axes where nothing else is said.
+Sizes as in `kernels.model`, and n_most: largest number of modes of a body, most_rows: largest number of rows of a
+connection, n_x: Σ (6 + n_q) over the ends of connections. Vectors are in ground axes unless stated otherwise.
 """
 
 from typing import NamedTuple, cast

@@ -1,8 +1,9 @@
 """The type of the arrays in kernels: contiguous, owned by Python, indexed from zero.
 
-It is numba's array type with its own code for numbers and parts: no test for negative indices or for the end of a
-slice that is given, no counted references, and as argument no more than the address and the shape.
-Kernels must not index from the end. The functions of users may: their arrays are of the type `SafeBlock`.
+It is numba's array type with other code for access to numbers and parts: without tests for negative indices, without
+clipping of slices that have an end, and without reference counts. As an argument it consists only of address and shape.
+
+Kernels must not index from the end. User functions may; their arrays are of the type `SafeBlock`.
 """
 
 import operator
@@ -23,7 +24,7 @@ __all__ = ["Block", "SafeBlock", "make_block", "parts_of"]
 
 N_ITEMS, ITEM_SIZE, DATA, SHAPE, STRIDES = 2, 3, 4, 5, 6  # positions of fields in numba's structure of an array
 WORD = ir.IntType(64)
-BITS = 8  # of a byte
+BITS = 8  # bits of a byte
 
 
 class Block(types.Array):

@@ -1,8 +1,8 @@
 """Choice of the compiler for the kernels: the lean compiler for supported versions of numba, otherwise plain numba.
 
 The lean compiler (kernels/compiler/lean.py) replaces inner parts of numba, which change from one version to the next.
-Plain numba makes the same kernels with any version the project supports: it compiles several times as long, once, and
-a step takes somewhat longer (docs/multibody.md has the figures).
+Plain numba compiles the same kernels with any version that the project supports. The compilation, which happens once,
+takes several times as long, and a step takes somewhat longer (docs/multibody.md has the figures).
 """
 
 import os
@@ -28,14 +28,14 @@ def chosen() -> str:
         raise FloatframeError(f"environment variable {VARIABLE}: expected one of {', '.join(CHOICES)}, got {asked!r}")
     if asked == "lean" and installed not in KNOWN_VERSIONS:
         raise FloatframeError(
-            f"environment variable {VARIABLE}: the lean compiler knows numba {', '.join(KNOWN_VERSIONS)}, but "
-            f"{numba.__version__} is installed; leave the variable out to compile with plain numba"
+            f"environment variable {VARIABLE}: the lean compiler supports numba {', '.join(KNOWN_VERSIONS)}, but "
+            f"{numba.__version__} is installed; unset the variable to compile with plain numba"
         )
     return asked or ("lean" if installed in KNOWN_VERSIONS else "plain")
 
 
 is_lean = chosen() == "lean"
-level = int(config.OPT)  # type: ignore[attr-defined]  #: of optimisation, from NUMBA_OPT
+level = int(config.OPT)  # type: ignore[attr-defined]  #: level of optimisation, from NUMBA_OPT
 compiler = f"{chosen()} at level {level}"  #: the settings that determine the machine code of a given source
 
 
@@ -43,6 +43,6 @@ def words() -> str:
     """Describe how the kernels are compiled, in one line for the user."""
     if is_lean:
         return f"lean, with numba {numba.__version__}"
-    asked = f"asked for by {VARIABLE}"
-    why = asked if os.environ.get(VARIABLE) else f"the faster lean way knows numba {', '.join(KNOWN_VERSIONS)}"
+    asked = f"requested by {VARIABLE}"
+    why = asked if os.environ.get(VARIABLE) else f"the faster lean compiler needs numba {', '.join(KNOWN_VERSIONS)}"
     return f"plain, with numba {numba.__version__} ({why})"

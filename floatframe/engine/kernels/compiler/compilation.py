@@ -1,10 +1,15 @@
 """The decorators of compiled functions, and the type of their arrays.
 
-`inner` is for functions that only compiled code calls, `loops` for those of them whose loops run over modes or
-matrices, `matrix_loops` for long ones of these with many callers, `small` for what is written into its
-callers: a few operations, or a part of one function; `view` for one that returns a part of an array,
-`entry` for what Python calls, `kept_entry` where it has one signature and no room for its cache is no error. The lean
-compiler makes them with a numba that it knows, plain numba with any other, see kernels/compiler/choice.py.
+    inner           a function that only compiled code calls
+    loops           an inner function whose loops run over modes or matrices
+    matrix_loops    a long function of this kind with many callers
+    small           an inner function that is inlined: a few operations, or a part of one function
+    view            an inner function that returns a part of an array
+    entry           a function that Python calls
+    kept_entry      an entry with one signature, which is compiled in each process if it cannot be cached on disk
+
+The lean compiler compiles them if it supports the installed numba, otherwise plain numba; see
+kernels/compiler/choice.py.
 """
 
 from floatframe.engine.kernels.compiler.choice import is_lean
@@ -38,9 +43,9 @@ __all__ = ["array_type", "array_value", "entry", "inner", "kept_entry", "loops",
 def kept_entry(function):
     """Return the compiled function that Python calls.
 
-    It is stored on disk, or compiled in each process if impossible.
+    It is stored on disk, or compiled in each process if it cannot be stored.
     """
     try:
         return entry(function)
-    except RuntimeError:  # no folder for the cache
+    except RuntimeError:  # there is no folder for the cache
         return entry(function, cache=False)

@@ -1,13 +1,13 @@
-"""Laws of elements by the lean compiler: the functions of users, and the functions that these call.
+"""Laws of elements, compiled by the lean compiler: the functions of users, and the functions that these call.
 
-A law is made by `njit`, and so are the functions that it calls, or by `register_jitable`. Here each of them is made
-again, from the same Python function, as an inner function of the lean compiler (kernels/compiler/lean.py). It means the
-same as before, hence two differences to kernels: indices may count from the end (`SafeBlock`), and errors pass through
-calls. Division by zero gives infinite numbers or NaN, as it does with NumPy.
+A law and the functions that it calls are decorated by `njit` or `register_jitable`. Here each of their Python functions
+is compiled again as an inner function of the lean compiler (kernels/compiler/lean.py). Because its meaning must not
+change, there are two differences from kernels: indices may count from the end (`SafeBlock`), and errors pass through
+calls. Division by zero gives infinite numbers or NaN, as in NumPy.
 
-A function that makes arrays is compiled by the passes of numba, with counted references, and takes part in the rest:
-it is optimised once, with the law. Whatever else the lean compiler does not know raises an error, and the caller
-compiles the whole law by plain numba.
+A function that creates arrays is compiled by the passes of numba, with reference counts, but is also linked into the
+law and optimised once together with it. Everything else that the lean compiler does not support raises an error, and
+the caller compiles the whole law by plain numba.
 """
 
 from types import CellType, FunctionType

@@ -1,17 +1,17 @@
 """The lean compiler: each inner function becomes intermediate code, and an entry optimises all of it once.
 
-Left alone, numba optimises each function and makes machine code of it, and optimises everything below it once more
-with each caller; it also looks up what an operator means for numbers at every single place, and looks in each function
-for closures, generators, parallel loops and array expressions. All this is three quarters of the time of a
-compilation. Inner functions are never called from Python and own no memory, so that here
+By default, numba optimises each function, generates its machine code, and optimises it once more with each caller. It
+also looks up the meaning of each operator wherever it occurs, and searches each function for closures, generators,
+parallel loops and array expressions. All this is three quarters of the time of a compilation. Inner functions are never
+called from Python and own no memory. Therefore
 
-(1) the library of an inner function stops before optimisation and machine code: its module is read once, and linked by
-    the entries as it is;
+(1) the library of an inner function is neither optimised nor compiled to machine code: its module is parsed once, and
+    entries link it unchanged;
 (2) the library of an entry links all of them and is optimised once;
 (3) while an entry is compiled, the meaning of an operator or built-in function for given types is looked up once, and
-    Python does not look for garbage; numba does not collect warnings about each statement, nor look for `with` and
-    dictionaries of arguments, and finds the variables of a statement by the exact types of its parts;
-(4) the passes of numba are those that kernels need (no closures, lists, array expressions, `raise`);
+    Python's garbage collection is suspended; numba collects no warnings about statements, does not search for `with`
+    and dictionaries of arguments, and finds the variables of a statement by the exact types of its parts;
+(4) only those passes of numba run that kernels need (no closures, lists, array expressions, `raise`);
 (5) variables, operations and calls become lean code of LLVM, see kernels/compiler/lowering.py;
 (6) the code of an inner function is stored on disk, see kernels/compiler/stored.py.
 """
@@ -232,7 +232,7 @@ class InnerLibrary(JITCodeLibrary):
             return
         module = self._final_module.clone()
         for library in libraries:
-            if library not in called:  # of numba, such as `max`: a part of this code, whose name nobody else sees
+            if library not in called:  # functions of numba, such as `max`, become part of this code, with local names
                 add_internal(module, library._get_module_for_linking())
         self.key, self.known[key] = key, self
         write_code(key, StoredCode(result, keys, module.as_bitcode()))
@@ -267,7 +267,7 @@ class InnerLibrary(JITCodeLibrary):
 def add_internal(module, other):
     """Link a copy of another module into a module, with functions that are not visible outside."""
     names = {function.name for function in other.functions if not function.is_declaration}
-    module.link_in(other, preserve=True)  # without those that are not called
+    module.link_in(other, preserve=True)  # links only the functions that are called
     for function in module.functions:
         if function.name in names:
             function.linkage = Linkage.internal
@@ -425,7 +425,7 @@ class InnerCompiler(CompilerBase):
             noalias=state.flags.noalias, global_dict=func.__globals__, abi_tags=[state.flags.get_mangle_string()],
             uid=known.unique_id,
         )  # fmt: skip
-        library.get_function(described.mangled_name)  # an error here rather than a call of nothing
+        library.get_function(described.mangled_name)  # raises an error if the stored code lacks the function
         environment = Environment.from_fndesc(described)
         function = context.get_executable(library, described, environment)
         context.insert_user_function(function, described, [library])
@@ -493,7 +493,7 @@ class LawCompiler(InnerCompiler):
         try:
             return super().compile_extra(func)
         except NumbaError:
-            state.typingctx.callstack._fail_cache.clear()  # what failed without counted references may work with them
+            state.typingctx.callstack._fail_cache.clear()  # types that failed may work with reference counts
             flags = state.flags.copy()
             flags.nrt = True
             again = OwnerCompiler(
@@ -521,8 +521,8 @@ class NotLeanError(Exception):
 def decorator(pipeline_class, **options):
     """Return the decorator for functions that only compiled code calls.
 
-    They have no wrappers for Python, no test before each division, and no counted references (all arrays belong to
-    Python) but where options say so.
+    They have no wrappers for Python, no test before each division, and no reference counts (all arrays belong to
+    Python), unless the options request them.
     """
     return njit(
         **{"_nrt": False} | options,

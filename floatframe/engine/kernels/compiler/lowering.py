@@ -2,11 +2,11 @@
 
 Kernels own no memory and raise no errors, so that here
 
-(1) variables are not counted, not deleted and not set to zero before their first value;
-(2) a variable with one assignment is a value wherever that assignment comes first, not a place on the stack;
-(3) a call of another kernel is a call, without tests of its status;
+(1) references of variables are not counted, and variables are not deleted and not set to zero before their first value;
+(2) a variable with one assignment that precedes all its uses is a value instead of a position on the stack;
+(3) a call of another kernel does not test its status;
 (4) operations on two integers or two reals, and indices of arrays, are written without a search for their meaning;
-(5) loops are unrolled and made of vector instructions only in functions that are decorated so (`loops`).
+(5) loops are unrolled and vectorised only in functions with the decorator `loops`.
 """
 
 import operator

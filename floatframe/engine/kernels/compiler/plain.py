@@ -1,6 +1,6 @@
 """Kernels compiled by plain numba of any supported version, slower but only with numba's public interface.
 
-The names are those of kernels/compiler/lean.py, which says what they are for.
+The names are those of kernels/compiler/lean.py, where their purpose is described.
 """
 
 from llvmlite import ir
@@ -10,7 +10,7 @@ from numba.core import cgutils
 __all__ = ["array_type", "array_value", "entry", "inner", "loops", "matrix_loops", "small", "view"]
 
 WORD = ir.IntType(64)
-BYTES = 8  # of a number
+BYTES = 8  # bytes of a number
 
 inner = small = loops = matrix_loops = view = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 

@@ -1,8 +1,7 @@
 """The sources of compiled kernels: a module and all modules of the project that it imports.
 
-Kernels take codes and constants from modules outside their folder, whose change must reach them as well. Comments,
-docstrings and the way lines are broken make no difference: only the syntax of the sources decides whether kernels are
-compiled again.
+Kernels use codes and constants of modules outside their folder, and must be compiled again if these change. Only the
+syntax of the sources decides whether kernels are compiled again; comments, docstrings and line breaks do not matter.
 """
 
 import ast
@@ -50,9 +49,9 @@ def source_files(module: str, root: Path = ROOT) -> list[Path]:
 def source_digest(module: str, *extra: str, root: Path = ROOT) -> int:
     """Return a positive key that changes with `extra` and with the syntax of a module and of all that it imports.
 
-    Syntax trees take a few tenths of a second; a file beside this one keeps the last key together with a digest of the
-    sources as they were. Where no file can be written, as in an installation of another user, the sources count as they
-    are.
+    Syntax trees take a few tenths of a second. Therefore a file in this folder stores the last key together with a
+    digest of the texts of the sources. If no file can be written, as in an installation of another user, the key is the
+    digest of these texts.
     """
     texts = {path.relative_to(root).as_posix(): path.read_bytes() for path in source_files(module, root)}
     whole = digest_of(extra, texts)
@@ -61,7 +60,7 @@ def source_digest(module: str, *extra: str, root: Path = ROOT) -> int:
         read, key = record.read_text(encoding="ascii").split()
         if read == f"{whole:x}":
             return int(key, 16)
-    except (OSError, ValueError):  # none yet, or half of one
+    except (OSError, ValueError):  # there is no record yet, or it is incomplete
         pass
     key_of_syntax = digest_of(extra, {name: syntax_of(text) for name, text in texts.items()})
     return key_of_syntax if keep(record, f"{whole:x} {key_of_syntax:x}") else whole
@@ -79,7 +78,7 @@ def digest_of(extra: tuple[str, ...], texts: dict[str, bytes]) -> int:
 def syntax_of(text: bytes) -> bytes:
     """Return a digest of the syntax tree of a source without comments, docstrings and numbers of lines."""
     was_enabled = gc.isenabled()
-    gc.disable()  # else half of the time goes into looking for garbage among the nodes
+    gc.disable()  # otherwise half of the time is spent on garbage collection among the nodes
     try:
         tree = ast.parse(text)
         for node in ast.walk(tree):

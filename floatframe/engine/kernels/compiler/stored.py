@@ -1,11 +1,11 @@
 """Intermediate code of inner functions on disk; after an edit, only that function and its callers are compiled.
 
-The key of a function is a digest of everything from which its code follows: its byte code and constants, the values of
+The key of a function is a digest of everything on which its code depends: its byte code and constants, the values of
 the names that it uses, the same for the functions that it calls, the types of its arguments, the modules of the
-compiler, and the versions of numba and Python. Where a value is of a kind that is not known here, there is no key, and
+compiler, and the versions of numba and Python. If this module does not know the kind of a value, there is no key, and
 the function and its callers are compiled in each process.
 
-The file of a key holds the type of the result, the keys of the called functions, and the code. Files that were not
+The file of a key contains the type of the result, the keys of the called functions, and the code. Files that were not
 read for a month are deleted.
 """
 
@@ -38,7 +38,7 @@ __all__ = ["StoredCode", "code_key", "compiler_key", "delete_old", "read_code", 
 FOLDER = Path(os.environ.get("NUMBA_CACHE_DIR") or Path(__file__).parents[3] / "__pycache__") / "inner"
 MONTH = 30 * 24 * 3600.0  # seconds
 
-keys: WeakKeyDictionary[FunctionType, str | None] = WeakKeyDictionary()  # of functions, without types of arguments
+keys: WeakKeyDictionary[FunctionType, str | None] = WeakKeyDictionary()  # digests without types of arguments
 
 
 class UnknownKindError(Exception):
@@ -80,7 +80,7 @@ def code_key(function: FunctionType, arguments: tuple, options: str) -> str | No
 def function_words(function: FunctionType) -> str:
     """Return the digest of a Python function and of everything that it uses."""
     if function not in keys:
-        keys[function] = None  # of a function that calls itself
+        keys[function] = None  # seen again only if the function calls itself, which gives no key
         with contextlib.suppress(UnknownKindError):
             names = function.__code__.co_freevars
             cells = dict(zip(names, [cell.cell_contents for cell in function.__closure__ or ()], strict=True))
@@ -109,7 +109,7 @@ def code_words(code: CodeType, known: dict) -> tuple:
             if is_ours(module.__name__) and hasattr(module, name):
                 values.append((module.__name__, name, value_words(getattr(module, name))))
     for name in code.co_freevars:
-        if name in known:  # else of the function around this one
+        if name in known:  # otherwise the name belongs to the enclosing function
             values.append((name, value_words(known[name])))
     constants = [
         code_words(each, known) if isinstance(each, CodeType) else value_words(each) for each in code.co_consts
@@ -139,7 +139,7 @@ def value_words(value) -> object:
     if isinstance(value, types.Type):
         return type_words(value)
     if isinstance(value, ModuleType):
-        return "module", value.__name__  # of its names, those of ours are looked up where they are used
+        return "module", value.__name__  # names of this project's modules are looked up where they are used
     if isinstance(value, FunctionType) and is_ours(value.__module__):
         return "function", function_words(value)
     if isinstance(value, type) and is_ours(value.__module__):
@@ -182,7 +182,7 @@ def read_code(key: str) -> StoredCode | None:
     try:
         code = pickle.loads(path.read_bytes())
         os.utime(path)
-    except Exception:  # none, or half of one
+    except Exception:  # there is no file, or it is incomplete
         return None
     return code
 

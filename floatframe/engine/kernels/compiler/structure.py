@@ -1,10 +1,10 @@
 """Records of arrays in the kernels: each record is a pointer to a table of addresses and shapes.
 
-The table of a record (`records.tabled`) has for each array, in its order, the address and then the shape; a record in
-a record has its part of the table. A kernel that reads `work.markers.r` gets the array back from there; one number
-(declared without a shape) is read and written as such, `work.counted.evaluations += 1`. Tables and arrays belong to
-Python, so that the kernels count no references; numbers in a table do not change while a kernel runs, so that they may
-be kept in registers.
+The table of a record (`records.tabled`) contains the address and then the shape of each array, in order; a record
+inside a record has a part of the table. A kernel that reads `work.markers.r` makes the array from these numbers. A
+single number (declared without a shape) is read and written directly, `work.counted.evaluations += 1`. Tables and
+arrays belong to Python, so that the kernels count no references. Addresses and shapes in a table do not change while a
+kernel runs, so that they may be kept in registers.
 """
 
 from collections.abc import Mapping
@@ -62,7 +62,7 @@ class StructureFields(AttributeTemplate):
     key = Structure
 
     def generic_resolve(self, structure, name):  # type: ignore[override]
-        """Return the type of a field, None if there is no such name."""
+        """Return the type of a field; None if there is no field with this name."""
         return structure.fields.get(name, (None,))[0]
 
 

@@ -1,7 +1,7 @@
 """A bushing: force and torque from a potential of six deformations between two markers, with damping.
 
-The axes C are those of A turned by a share of the rotation of B against A: 0 (axes of A), 1 (of B), or 1/2 (half way,
-where A and B can be exchanged). With d = r_B - r_A and theta the rotation vector of A_Aᵀ A_B, whose components are the
+The axes C are the axes of A after a `share` of the rotation of B relative to A: 0 (axes of A), 1 (axes of B), or 1/2
+(half way, symmetric in A and B). With d = r_B - r_A and theta the rotation vector of A_Aᵀ A_B, whose components are the
 same in A, B and C,
 
     e = Cᵀ d,  xi = (e, theta),  (f, m) = dV/dxi + D xi_dot,  V = 1/2 xiᵀ K xi + preload · xi + tables of each xi_i
@@ -18,8 +18,8 @@ so that by virtual work, with p = f × e,  F = C f is the force on A (on B the o
 
     -N = -C (q + share p),      q = tau theta × p + Sᵀ m
 
-In axes of A or B turns are counted: of all rotation vectors of A_Aᵀ A_B, theta + 2 pi n theta/t, the one is taken that
-is nearest to where the rates of the last step lead (`kernels/turns.py`). Half way t < pi.
+In axes of A or B, turns are counted: of all rotation vectors theta + 2 pi n theta/t of A_Aᵀ A_B, theta is the one
+nearest to the value predicted by the rates of the last step (`kernels/turns.py`). Half way, t < pi.
 
 `bushing_variation` gives the exact change of F and N; rates follow the same formulas with velocities for variations.
 
@@ -51,7 +51,7 @@ from floatframe.engine.kernels.vector import (
 __all__ = ["bushing_power", "bushing_state", "bushing_variation", "continued", "rotation_vector"]
 
 SERIES_BELOW = 0.01  # t² at the switch
-# value of t below which the direction of the rotation vector is only rounding, compared with full turns
+# value of t below which the direction of the rotation vector is only roundoff, compared with full turns
 NEAR_FULL_TURN = 1e-6
 # series of alpha - 1 in t², half way
 A1, A2, A3, A4, A5 = 1 / 24, 7 / 5760, 31 / 967680, 127 / 154828800, 73 / 3503554560

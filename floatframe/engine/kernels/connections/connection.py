@@ -1,9 +1,9 @@
 """Residual rows of connections as functions of the motion of their markers.
 
-The rows of a connection have its wrench w as unknown. Those of a joint that hold something are in the unit of it; rows
-that say what the wrench is are multiplied by c_k, so that their unknown is c_k dw. Formulas of all kinds of rows are in
-kernels/joints/row_formulas.py. Held rows with `soft` s give way by s c_k times their own force, far below the tolerance
-of positions, so that redundant ones share their load.
+The unknown of the rows of a connection is its wrench w. Constraint rows of a joint have the unit of the constrained
+quantity. Rows that define the wrench are multiplied by c_k, so that their unknown is c_k dw.
+kernels/joints/row_formulas.py names the formulas of all kinds of rows. Constraint rows with a compliance `soft` s yield
+by s c_k times their own force, far below the tolerance of positions, so that redundant rows share their load.
 """
 
 from floatframe.engine.kernels.compiler.compilation import inner, small
@@ -120,8 +120,9 @@ def connection_derivatives(model, work, c, c_k):
 def joint_row_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
     """Write derivatives of row k of a joint: by motions of its markers to row r of P_a and P_b, by its wrench to V.
 
-    A velocity that is held has no position: for c_k = 0, where rows stand for velocities or accelerations, its P is
-    that by the velocities. The change of a soft row's reaction with its direction is left out: of second order.
+    For c_k = 0 rows serve to find velocities or accelerations; P of a velocity constraint then has its derivatives by
+    velocities in the columns of positions. The change of a soft row's reaction due to its change of direction is
+    omitted: it is of second order.
     """
     kind, holds = model.rows.kind[k], model.rows.holds[k]
     if holds == NOTHING:
@@ -145,7 +146,7 @@ def joint_row_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
 def write_velocity_gaps(model, work, c, factor, gap):
     """Write g - factor dg/dt for the position constraints of joint or coupler c into gap, (n_w,), and zero elsewhere.
 
-    Zero for elements, too: their rates ask for the law many times.
+    The gap of elements is set to zero too, because their rates need many evaluations of the law.
     """
     law, g, w0, end = model.connections.law[c], work.connections.g, model.connections.w0[c], model.connections.w0[c + 1]
     if law != JOINT:
@@ -191,7 +192,8 @@ def along(n, m_a, m_b, v, omega_a, omega_b):
 def row_rates(model, work, k, a, b):
     """Return the rate of row k's constrained quantity and its second rate at zero u_dot; zero for other rows.
 
-    Of a velocity that is held: it, and its rate. `work.markers.bias` holds the accelerations of markers at zero u_dot.
+    For a velocity constraint, return the velocity and its rate. `work.markers.bias` contains the accelerations of
+    markers at zero u_dot.
     """
     rows = model.rows
     if rows.holds[k] == NOTHING:
@@ -210,7 +212,7 @@ def row_rates(model, work, k, a, b):
 def constraint_rates(model, work):
     """Write, for every row, the rate of the constrained quantity and its second rate at zero u_dot.
 
-    `evaluate` has been called for the iterate.
+    `evaluate` must have been called for the iterate.
     """
     for m in range(model.markers.body.shape[0]):
         marker_acceleration_bias(model, work, m, work.markers.bias[m])

@@ -6,8 +6,8 @@ N: unit normal from A to B, of the plane (fixed in A) or along d = r_B - r_A; de
     f   = k xⁿ max(0, 1 + (h/v_0) x_dot)  for x > 0            v_0 speed of approach at the beginning of the contact
     F_B = f N - mu f V_t/sqrt(|V_t|² + v_s²)                   V_t slip at the point rho = -R_B N from the centre of B
 
-and on the markers F = -F_B on A, -N_w = -rho × F on B. v_0 is an unknown of its own: while there is
-no contact minus the speed of approach (at least the slow one), in contact the value from the beginning of the step.
+The wrench on the markers is F = -F_B on A, -N_w = -rho × F on B. v_0 is an unknown of its own. Without contact it is
+minus the speed of approach (at least the speed `slow`); in contact it is the value from the beginning of the step.
 
 Described in `floatframe.model.forces.sphere_contact`.
 """

@@ -8,8 +8,9 @@ e an axis of A:
     TWIST_B  the same about an axis of B
     SPAN     x = |d|               v = d · (v_B - v_A)/|d|               force Q d/|d| on B
 
-and the opposite on A. Rows of a coordinate, in this order: x and v as unknowns (angles then go on beyond a turn: the
-one nearest to the value before), the force or torque on A (3), and where a PUSH has A on a body the moment on A (3),
+and the opposite on A. The rows of a coordinate are, in this order: x and v as unknowns (so that angles continue beyond
+a turn: the angle nearest to the previous value), the force or torque on A (3), and the moment on A (3) for a PUSH if A
+is on a body,
 
     X - x = 0,   v' - v = 0,   F + Q e = 0,   M - d × F = 0.
 """
@@ -191,7 +192,7 @@ def coordinate_tangent_rate(model, work, p):
 def coordinate_second_rate(model, work, p, bias_a, bias_b):
     """Return the second rate of coordinate p for given accelerations (6) of its two markers.
 
-    For angles with parallel axes.
+    The formula for angles is valid for parallel axes.
     """
     markers = work.markers
     a, b, k = ends_and_row(model, p)

@@ -1,8 +1,8 @@
 """Coordinate couplers (gears): Σ a_p x_p - c(t) = 0 over the coordinates of a connection.
 
-The multiplier lam is the last unknown; the force along coordinate p is Q_p = a_p lam. The held row is divided by its
-largest coefficient (`row_x`), so that all rows have numbers of one size. While a coupler is not
-engaged its row is lam = 0.
+The multiplier lam is the last unknown; the force along coordinate p is Q_p = a_p lam. The constraint row is divided by
+its largest coefficient (`row_x`), so that all rows have entries of similar size. While a coupler is not engaged, its
+row is lam = 0.
 
 Described in `floatframe.model.joints.coordinate_coupler`.
 """

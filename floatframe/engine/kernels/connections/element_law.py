@@ -2,18 +2,18 @@
 
 The law of an element with n markers, states z and multipliers lam gives, from the motion x of the markers,
 
-    wrench (n, 6), z_dot = g(t, x, z, lam), h(t, x, z, lam) for each multiplier, and outputs that are only seen.
+    wrench (n, 6), z_dot = g(t, x, z, lam), h(t, x, z, lam) for each multiplier, and outputs for results alone.
 
-Unknowns of its rows in this order: the parts of the wrenches that act, for each state its value, rate and algorithmic
-rate (`user_force`), the multipliers:
+The unknowns of its rows are, in this order: the parts of the wrenches that act, for each state its value, rate and
+algorithmic rate (`user_force`), and the multipliers. The rows are
 
     w - wrench = 0;   z - b - kappa g' = 0,   g' - g = 0,   a - b' - rho g' = 0;   h = 0
 
-A multiplier holds a position (h of places and time alone), a velocity, or nothing: then h = 0 is an equation like those
-of wrenches. Two ends whose forces are opposite share one unknown, with the factor -1 at the second.
+A multiplier constrains a position (h depends on positions and time alone), a velocity, or nothing: then h = 0 is an
+equation like those of wrenches. Two ends with opposite forces share one unknown, with the factor -1 at the second end.
 
-The derivatives come from one call, d(wrench, g, h)/d(dr, dphi, dv, domega [, da, dalpha] of each marker, z, lam), row
-by row. A law that asks for accelerations gets 24 numbers of each marker in place of 18.
+One call gives all derivatives, d(wrench, g, h)/d(dr, dphi, dv, domega [, da, dalpha] of each marker, z, lam), row by
+row. A law that depends on accelerations gets 24 numbers for each marker instead of 18.
 
 Described in `floatframe.model.elements.element`.
 """
@@ -31,7 +31,7 @@ from floatframe.model.joints.rows.kinds import NOTHING, POSITION, VELOCITY
 __all__ = ["FIRST", "law_derivatives", "law_power", "law_rates", "law_rows", "law_values", "n_results", "note_stops"]
 
 #: time steps of difference quotients if the time scale of a law is unknown: number of trials, the first step
-#: relative to `REACH`, and the ratio of each step to the one before
+#: relative to `REACH`, and the ratio of successive steps
 MOST_LEVELS, SHORTEST, LONGER = 22, 2.0**-20, 4.0
 ROUNDING = 1e-15  #: relative step of positions in differences
 REACH = 5e-3  #: displacement for the differences of rates, relative to the length over which the law changes
@@ -132,7 +132,7 @@ def law_rows(model, work, c, c_k):
 
 @inner
 def note_what_is_no_number(model, work, c):
-    """Record element c if its law is not finite for a finite motion."""
+    """Record element c if its law is not finite although the motion is finite."""
     head, laws = model.laws.head[model.connections.item[c]], work.laws
     n_in = 1 + head[0] * head[1] + head[2] + head[3]
     note_no_number(work, c, laws.outputs, n_results(head), laws.inputs, n_in)
@@ -142,8 +142,8 @@ def note_what_is_no_number(model, work, c):
 def law_derivatives(model, work, c, c_k):
     """Write the derivatives of element c: P by the motion of its markers, V by its own wrench.
 
-    A velocity that is held has no position: for c_k = 0, where rows stand for velocities or accelerations, its P is
-    that by the velocities.
+    For c_k = 0 rows serve to find velocities or accelerations; P of a velocity constraint then has its derivatives by
+    velocities in the columns of positions.
     """
     i, a, w0 = model.connections.item[c], model.connections.a[c], model.connections.w0[c]
     size = model.connections.size[c]
@@ -226,9 +226,9 @@ def held_slopes(work, V, a, n, n_z, n_lam, per, states, r, holds, c_k, own):
 def law_rates(model, work, c, rate, bias):
     """Write the rates of the constraints of element c and their second rates at zero u_dot, for multiplier rows.
 
-    From the values along the motion with the accelerations of `work.markers.bias`: differences of sixth order, by
-    steps in which neither the motion nor the time changes the law much. Where the time over which it changes is not
-    known, steps grow from short ones to those that rounding and the order of the differences disturb least.
+    They are differences of sixth order of the values along the motion with the accelerations of `work.markers.bias`,
+    with steps in which neither the motion nor the time changes the law much. If the time over which the law changes is
+    unknown, the step grows from a short one until the sum of roundoff and discretisation errors is smallest.
     """
     i, a, w0 = model.connections.item[c], model.connections.a[c], model.connections.w0[c]
     size = model.connections.size[c]
@@ -270,7 +270,7 @@ def rates_by_steps(model, work, c, h, rate, bias):
     """Write the differences of `law_rates` with step h; return their deviation from fourth-order differences [g/s²]."""
     i, a, w0 = model.connections.item[c], model.connections.a[c], model.connections.w0[c]
     size = model.connections.size[c]
-    laws, fourth = model.laws, work.laws.slopes  # data that the derivatives overwrite
+    laws, fourth = model.laws, work.laws.slopes  # space that is free here; the derivatives overwrite it
     n, n_z, n_lam = laws.head[i, 0], laws.head[i, 2], laws.head[i, 3]
     for j in range(n_lam):
         rate[w0 + size - n_lam + j], bias[w0 + size - n_lam + j] = 0.0, 0.0
@@ -335,10 +335,10 @@ def power_on_bodies(model, work, c):
 def law_power(model, work, c):
     """Return energy, supplied power and dissipated power of element c at the iterate.
 
-    An output that ends the run is noted.
+    Also record an output that ends the run.
 
-    Power on the bodies P_b = given - lost - d(energy)/dt. An element that names no energy holds none; what it then
-    does not name follows from P_b.
+    The power on the bodies is P_b = given - lost - d(energy)/dt. An element that declares no energy stores none;
+    supplied or dissipated power that it does not declare then follows from P_b.
     """
     i, laws = model.connections.item[c], model.laws
     energy, given, lost = laws.energy[i], laws.given[i], laws.lost[i]

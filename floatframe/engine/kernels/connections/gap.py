@@ -1,18 +1,18 @@
 """Gaps between bodies that can touch, and the step size near contacts.
 
-A gap is above zero while nothing touches; below zero it is minus the depth x of a contact with the spring k xⁿ. With
-J its derivative by the motion of its markers and 1/m = J M⁻¹ Jᵀ, a contact of the speed v at the depth x holds the
-energy E = m v²/2 + k x^(n+1)/(n+1), goes as deep as x_m = ((n+1) E/k)^(1/(n+1)) and lasts about
+A gap is positive while the bodies do not touch; a negative gap is minus the depth x of a contact with the spring k xⁿ.
+J is the derivative of the gap by the motion of its markers, and 1/m = J M⁻¹ Jᵀ. A contact with the speed v at the depth
+x has the energy E = m v²/2 + k x^(n+1)/(n+1), reaches the depth x_m = ((n+1) E/k)^(1/(n+1)) and lasts about
 
     T = 3 x_m / sqrt(2 E/m)        (pi sqrt(m/k) of a linear spring, 2.94 x_m/v of Hertz)
 
-(1) Before a step, markers are moved on by v t + a t²/2. Where a gap closes on the way, the step ends half a fine step,
-    T/FINE, before.
-(2) After it, a step that changes the depth of a contact by more than CALM of it is good only if it is a fine one.
+(1) Before a step, the motion of the markers is predicted by v t + a t²/2. If a gap closes in the predicted step, the
+    step is shortened and ends half a fine step before. The size of a fine step is T/FINE.
+(2) After a step, a relative change of a contact's depth by more than CALM is accepted only if the step was a fine step.
 
-So contacts are entered, gone through and left in fine steps; one that rests takes steps of any size. Mobilities 1/m are
-those of bodies without their joints, which can only make them heavier; a mode counts as far as the contact is stiffer
-than it.
+So fine steps resolve the beginning, the course and the end of contacts, while contacts at rest allow steps of any size.
+The mobility 1/m is that of the bodies without their joints, which can only reduce it. A mode contributes to it to the
+extent that the contact is stiffer than the mode.
 """
 
 import math
@@ -48,7 +48,7 @@ __all__ = ["gap_of_markers", "next_step", "step_before_contact", "step_of_gap", 
 FINE = 30.0  # number of fine steps in a contact
 CALM = 0.1  # change of the depth of a contact in a step, relative to its depth, that is always allowed
 LONGER = 1.01  # factor by which fine steps may be longer
-NONE = 1e-13  # depth of a contact, relative to the distance of its markers from the origin, below which it is rounding
+NONE = 1e-13  # depth of a contact, relative to the distance of its markers from the origin, that counts as roundoff
 PARTS = 4  # number of points in a step at which gaps are evaluated
 SMALL = 1e-6  # displacement of a marker for derivatives of gaps, relative to the length of the law; angle [rad]
 NEAR = 0.05  # fraction of a fine step: accuracy of the time of the first contact
@@ -57,7 +57,7 @@ MOST_SEARCHES = 40
 
 @inner
 def last_marker(model, c):
-    """Return one more than the number of the last marker of connection c."""
+    """Return the index after the last marker of connection c."""
     n = model.laws.head[model.connections.item[c], 0] if model.connections.law[c] == ELEMENT else 2
     return model.connections.a[c] + n
 
@@ -360,7 +360,7 @@ def take_ends(model, work):
 def next_step(model, work, t, h):
     """Return the longest step that all gaps allow after a step of size h that ended at t.
 
-    Below h: it is too long.
+    If the result is below h, this step was too long.
     """
     longest = math.inf
     work.gaps.shortest, work.gaps.n_closed = -1, 0

@@ -1,17 +1,17 @@
 """Forces from the relative motion of two markers: spring-dampers, bushings and contacts of spheres.
 
-A law gives the force F on A, -F on B, and the moment -N on B from the motion of B seen from A: d = r_B - r_A, the axes
-of both, v = d_dot - omega_A × d and omega = omega_B - omega_A. The moment on A balances them, M = N + d × F. The
-wrench w = (F, M, N), of a spring F alone, has the rows w - law(motion) = 0; a contact has one unknown more, its speed
+A law gives the force F on A, -F on B, and the moment -N on B from the motion of B relative to A: d = r_B - r_A, the
+axes of both, v = d_dot - omega_A × d and omega = omega_B - omega_A. The moment on A balances them, M = N + d × F. The
+wrench w = (F, M, N), for a spring only F, has the rows w - law(motion) = 0. A contact has one more unknown, its speed
 of approach.
 
-Derivatives are taken along unit variations of d, of the rotation u of B, of v and of omega, all seen from A, one after
-the other. With g_d, g_u, g_v, g_w those of a number, and with F or N for the vector x of which it is the part along e,
+Derivatives are taken along unit variations of d, of the rotation u of B, of v and of omega, all relative to A, one
+after the other. Let g_d, g_u, g_v, g_w be the derivatives of the component x·e of a vector x, which is F or N. Then
 
     dx·e = (g_d + omega_A × g_v)·dd + g_u·phi_B + (g_d × d - g_u + g_v × v + g_w × omega + x × e)·phi_A
          + g_v·dd_dot + g_w·domega_B + (g_v × d - g_w)·domega_A
 
-A law of one more force is its state, variation and power, and a line in each of the functions that choose by the law.
+To add a force, write its functions of state, variation and power, and add a line to each function that selects by law.
 """
 
 from floatframe.engine.kernels.compiler.compilation import inner, small
@@ -86,7 +86,7 @@ def pair_derivatives(model, work, c, c_k):
     for k in range(12):
         pair.motion[k] = 0.0
     for k in range(12):
-        if size == ON_A and k % 6 > 2:  # a spring feels no rotation
+        if size == ON_A and k % 6 > 2:  # rotations do not change a spring
             for r in range(ON_A):
                 pair.slopes[r, k] = 0.0
             continue

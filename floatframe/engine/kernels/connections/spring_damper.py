@@ -3,7 +3,7 @@
 F = s d,   s = k (l - l_0) + c l_dot + preload,   d = (r_B - r_A)/l
 dF = (ds - s/l dl) d + s/l dd,   ds = k dl + c dl_dot,   dl = d · dd,   dl_dot = d · dv + (dd · v - l_dot dl)/l
 
-At length zero the tension has a direction only if the free length is zero: then F = k (r_B - r_A) remains.
+At length zero the direction d is undefined; only a spring of free length zero has a force there, F = k (r_B - r_A).
 
 Described in `floatframe.model.forces.springs`.
 """

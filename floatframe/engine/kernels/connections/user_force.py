@@ -69,8 +69,8 @@ __all__ = [
 # tape -----------------------------------------------------------------------------------------------------------------
 # Expressions in the kernels: a tape of operations on numbers, and its exact gradient; see `functions.expressions`.
 #
-# Operation k of a tape works on the results of earlier ones, a and b, counted from the beginning of the tape. The
-# gradient comes from one pass backwards (reverse accumulation): bar_a += bar_k d(k)/d(a).
+# Operation k of a tape uses the results of earlier operations, with the numbers a and b in the tape. One backward pass
+# gives the gradient (reverse accumulation): bar_a += bar_k d(k)/d(a).
 
 
 @inner
@@ -203,9 +203,9 @@ def tape_gradient(tapes, functions, f, inputs, registers, gradient):
 # user force -----------------------------------------------------------------------------------------------------------
 
 
-STEP = 1e-7  # relative step of differences of users' functions, by the sizes of coordinates and states
-LEAST_STEP = 1e-9  # of states
-ROUNDING = 2e-15  # fraction of a number below which a step is lost in rounding
+STEP = 1e-7  # step of differences of users' functions, relative to the sizes of coordinates and states
+LEAST_STEP = 1e-9  # smallest step of states
+ROUNDING = 2e-15  # fraction of a number below which a step is lost in roundoff
 
 
 @inner
@@ -243,7 +243,7 @@ def user_values(model, work, c):
 
 @inner
 def user_outputs(model, work, c, n_in):
-    """Write forces and rates of states for n_in work.users.inputs into work.users.outputs; return their number."""
+    """Write forces and rates of states for the n_in inputs into work.users.outputs; return their number."""
     u = model.connections.item[c]
     n_out = model.users.n_forces[u] + model.users.n_states[u]
     if model.users.address[u] != 0:
@@ -332,7 +332,7 @@ def state_rows(work, s, k, output, c_k):
 
 @inner
 def put_state_derivatives(work, V, s, r):
-    """Write the derivatives of the rows of state s, from row r, into V, without those of its law."""
+    """Write the derivatives of the rows of state s, from row r, into V, without the derivatives of its law."""
     V[r, r], V[r, r + 1] = 1.0, -work.states.kappa[s]
     V[r + 1, r + 1] = 1.0
     V[r + 2, r + 2], V[r + 2, r + 1] = 1.0, -work.states.rho
@@ -378,7 +378,7 @@ def user_force_power(model, work, c):
 def begin_states(rows, states, memory, h, alpha_f):
     """Write the constants b, b', kappa, rho of the integration of states, with rho_inf = alpha_f/(1 - alpha_f).
 
-    The value of each state stands at its row of w, then its rate and algorithmic rate.
+    The row of a state in w contains its value; the next rows contain its rate and its algorithmic rate.
 
     z_new = z + h ((1 - th) a + th a_new),  (1 - d_m) a_new + d_m a = (1 - d_f) g_new + d_f g,  th = 1/2 + d_f - d_m,
     d_m = (3 rho_inf - 1)/(2 (rho_inf + 1)),  d_f = rho_inf/(rho_inf + 1):  second order, stable for all h.

@@ -1,10 +1,11 @@
 """Rows of the constant-velocity joint, for two shafts with equal rotations.
 
-With E, Z normal to the shaft of A and to each other, and D, U those directions of B that lay along them when both
-shafts were in line, B is A turned straight from shaft to shaft, about an axis normal to both, if
+E and Z are normal to the shaft of A and to each other; D and U are the directions of B that coincide with them when
+both shafts are in line. The rotation from A to B is about an axis normal to both shafts if EQUAL_TURN is zero:
 
     EQUAL_TURN   E · U - Z · D = 0          its gradient is along the bisector of the shafts (docs/theory.md §10)
-    BISECTOR     M · (E × (Z_A + Z_B)) = 0  Z_A = A_A z, Z_B = A_B y the shafts: M is along their bisector, for two E
+    BISECTOR     M · (E × (Z_A + Z_B)) = 0  Z_A = A_A z and Z_B = A_B y are the shafts; the rows of two directions E
+                                            put the moment M along their bisector
 
 Described in `floatframe.model.joints.orientation_joints`.
 """

@@ -36,7 +36,7 @@ def given_force(model, i, t, d):
 def coordinate_force(model, work, k, is_angle, x, v, normal):
     """Return the force along coordinate x of row k, and its derivatives by x, v and the normal force.
 
-    -k x - c v + preload + motor(t) + characteristic(x) - (T + mu normal) tanh(v/v_0), summed over the forces there.
+    -k x - c v + preload + motor(t) + characteristic(x) - (T + mu normal) tanh(v/v_0), summed over the row's forces.
     """
     Q, Q_x, Q_v, Q_n, f = 0.0, 0.0, 0.0, 0.0, model.joint_forces
     for i in range(model.rows.force0[k], model.rows.force1[k]):

@@ -1,21 +1,22 @@
 """A point that slides along the deformed centre line of a flexible body.
 
-The line leads along e (unit, body axes) through the markers of stations at s_1 < s_2 < …. Between two of them cubic
-Hermite functions of xi = (s - s_1)/h carry their displacement d and rotation th:
+The line runs along e (unit vector, body axes) through the markers of stations at s_1 < s_2 < …. Cubic Hermite functions
+of xi = (s - s_1)/h interpolate displacement d and rotation th between two stations:
 
     D(s) = a_1 d_1 + a_2 d_2 + b_1 th_1 × e + b_2 th_2 × e,   r = c(s) + D,   r' = e + D'
     th(s) = e × D' + e (e · (l_1 th_1 + l_2 th_2)),   l linear: sections stay normal to the line
 
-Beyond the ends the line is straight. The sliding marker is where B is: (r_B - r)·r' = 0, or where its drive says; all
-that the marker needs (displacement, rotation, their rates and their derivatives by q) is the same combination of
-those of the stations. With n_0 = r'/|r'|, n_1 and n_2 normal to it, d = r_B - r and kappa the turning of its axes by s,
+Beyond the ends the line is straight. The sliding marker is at the point of the line nearest to B, (r_B - r)·r' = 0, or
+at the coordinate that its drive prescribes. Its displacement and rotation, their rates and their derivatives by q are
+the same combinations of those of the stations. Let n_0 = r'/|r'|, n_1 and n_2 normal to it, d = r_B - r, and kappa the
+rotation of its axes per unit of s. Then
 
     LINE i       n_i · d = 0                           i = 1, 2; i = 0 if it is driven
-    LINE_TURN    E · D = 0 as DOT, where A also turns with kappa s_dot
+    LINE_TURN    E · D = 0 as DOT, where A also rotates with kappa s_dot
     LINE_FREE    n_0 · F + kappa · M / |r'| = 0        no force along the line: the wrench does no work as s changes
 
-The places on A where a force acts and n_i turn with s; their change is left out of the tangent, where it is of the
-order of the reaction times the curvature, but not of the residual.
+The point of A on which a force acts, and n_i, change with s. The residual includes this change; the tangent omits it,
+because it is of the size of the reaction times the curvature.
 
 Described in `floatframe.model.joints.sliding`.
 """
@@ -58,7 +59,7 @@ MOST, CLOSE = 30, 1e-14
 def piece(lines, stations, k, s):
     """Return the first of the two stations that enclose s, and the distance between both.
 
-    Beyond the ends of the line the nearest piece.
+    Beyond the ends of the line, return the nearest piece.
     """
     j, last = lines.station0[k], lines.station0[k + 1] - 2
     while j < last and s > stations.s[j + 1]:
@@ -217,9 +218,9 @@ def slide_marker(model, work, k):
 
 @inner
 def turning_change(T, th, s_dot, th_t, th_s, th_st, th_ss):
-    """Return d(T th_s)/dt + d(T th_t)/ds s_dot at the moving point, body at rest; th_t: rate at fixed s, th_s: by s.
+    """Return d(T th_s)/dt + d(T th_t)/ds at the moving point, body at rest; th_t: rate at fixed s, th_s: by s.
 
-    What s_dot times it adds to the angular acceleration of axes that turn with T (th_t + th_s s_dot).
+    Multiplied by s_dot, it is a part of the angular acceleration of axes that rotate with T (th_t + th_s s_dot).
     """
     of_slope, of_rate = left_jacobian_derivative(th, th_s, 1.0), left_jacobian_derivative(th, th_t, 1.0)
     own = add(turned(of_slope, add(th_t, scaled(s_dot, th_s))), turned(of_rate, th_s))
@@ -269,9 +270,9 @@ def line_value(model, work, k, a, b):
 
 @inner
 def place_rates(model, work, a):
-    """Return the prescribed rate of s, else 0, the remaining second rate of s, and the change due to B.
+    """Return the prescribed rate of s, else 0; its second rate, prescribed or due to s_dot; and s_dot's part of d_ddot.
 
-    r_ddot of the place = a + 2 s_dot r'_dot + s_dot² r'' + s_ddot r', A fixed in the line.
+    The point of the line accelerates by a + 2 s_dot r'_dot + s_dot² r'' + s_ddot r', where a belongs to fixed s.
     """
     j, line = model.markers.line[a], work.lines
     s_dot = line.s_dot[j]

@@ -1,20 +1,21 @@
 """Constraint rows between two markers: values, and derivatives by the motion and explicitly by time.
 
-What a row holds, g, depends on d = r_B - r_A, on the axes of both markers and on time, so that
+The constrained quantity g of a row depends on d = r_B - r_A, on the axes of both markers and on time, so that
 
     dg     = n · (dr_B - dr_A) + m_a · dphi_A + m_b · dphi_B + (dg/dt) dt
     g_ddot = n · (a_B - a_A) + m_a · alpha_A + m_b · alpha_B + beta
 
-(n on B, -n on A with the moments m_b, m_a are its reaction). A kind is two functions of (model, work, k, a, b):
+The force n on B, -n on A, with the moments m_b, m_a, is its unit reaction. A kind consists of two functions of
+(model, work, k, a, b):
 
     value   g, n, m_a, m_b
     rates   dg/dt, beta
 
-A row that holds a velocity (ROLL) is written the same: g the velocity, n, m_a, m_b its change with the velocities of
-the markers, beta its rate at zero accelerations. With E = A_A x, Z = A_A z, D = A_B y and E' = R_A e', E'' the rates of
-E as A sees it, omega_A = o, omega_B = p:
+A row that constrains a velocity (ROLL) has the same form: g is the velocity, n, m_a, m_b are its derivatives by the
+velocities of the markers, and beta is its rate at zero accelerations. With E = A_A x, Z = A_A z, D = A_B y,
+omega_A = o, omega_B = p, and the rates E' = R_A e' and E'' of E relative to A,
 
-    E_dot = o × E + E',   E_ddot less alpha × E:  o × (o × E) + 2 o × E' + E''
+    E_dot = o × E + E',   E_ddot - alpha × E = o × (o × E) + 2 o × E' + E''
 """
 
 import math

@@ -5,7 +5,7 @@ With e the axis, d = r_B - r_A, s the slip of B seen from A and n the size of th
     PUSH   dx = e · (dr_B - dr_A) + (e × d) · dphi_A
            dv = e · (dv_B - dv_A) + (e × d) · domega_A - (e × omega_A) · (dr_B - dr_A) + (e × s) · dphi_A
     TWIST  dx = t · (dphi_A - dphi_B), t as in `angle_between`
-           dv = e · (domega_B - domega_A) + (e × (omega_B - omega_A)) · dphi of the marker that holds the axis
+           dv = e · (domega_B - domega_A) + (e × (omega_B - omega_A)) · dphi of the marker with the axis
 """
 
 import math
@@ -48,7 +48,7 @@ def loaded_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
     normal, along = normal_force(w, e)
     _, Q_x, Q_v, Q_n = coordinate_force(model, work, k, is_angle, x, v, normal)
     put(V[r], part, e)
-    turn = cross(e, vector(w[part:]))  # derivative by a rotation of the marker that holds the axis
+    turn = cross(e, vector(w[part:]))  # derivative by a rotation of the marker with the axis
     if Q_n != 0.0 and normal > 0.0:
         f, F = Q_n / normal, vector(w)
         put_sum(V[r], 0, scaled(f, sub(F, scaled(along, e))))

@@ -86,7 +86,7 @@ def axis_between(rows, markers, k, a):
 def turned_angle(rows, markers, k, a, b):
     """Return the angle of B about the axis of row k in A (TWIST_B: in B), and its derivative by a rotation of A.
 
-    By a rotation of B: the opposite.
+    The derivative by a rotation of B is the opposite.
     """
     if rows.kind[k] == TWIST_B:
         angle, t = angle_between(rows, markers, k, b, a)

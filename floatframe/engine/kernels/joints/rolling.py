@@ -1,13 +1,13 @@
 """A thin disc of radius R that rolls on a plane without slip.
 
-N: normal of the plane, fixed in A; n: axis of the disc, fixed in B; d = r_B - r_A. With c = N·n, s = sqrt(1 - c²) the
-rim is nearest to the plane at rho = -R u, u = (N - c n)/s, from the centre, and there
+N is the normal of the plane, fixed in A; n is the axis of the disc, fixed in B; d = r_B - r_A. With c = N·n and
+s = sqrt(1 - c²), the point of the rim nearest to the plane is at rho = -R u, u = (N - c n)/s, from the centre. There
 
     RIM_HEIGHT   N · (d + rho) = N · d - R s = 0
-    ROLL t       t · V = 0,  V = v_B + omega_B × rho - v_A - omega_A × (d + rho),  t fixed in A: holds a velocity
+    ROLL t       t · V = 0,  V = v_B + omega_B × rho - v_A - omega_A × (d + rho),  t fixed in A: a velocity constraint
     RIM x        x · (N_w - rho × F) = 0,  x in ground axes: the force on B acts at the rim
 
-Formulas as in held_rows.py and wrench_rows.py; a row that holds a velocity changes with places too, `roll_by_place`.
+Formulas as in held_rows.py and wrench_rows.py. A velocity constraint also depends on positions, see `roll_by_place`.
 
 Described in `floatframe.model.joints.rolling_disc`.
 """

@@ -1,7 +1,7 @@
 """The formulas of each kind of joint row, by its code: the compiled part of the record `ROW_KINDS`.
 
-A kind that holds something brings `value` and `rates` (held_rows.py), one that says what the wrench is `value` and
-`derivatives` (wrench_rows.py). Kernels call them by the code of the row and know nothing else of it.
+A constraint has the functions `value` and `rates` (held_rows.py), a row that defines the wrench has `value` and
+`derivatives` (wrench_rows.py). Kernels call them by the code of the row and need to know nothing else about it.
 
 Described in `floatframe.model.joints.lower_pairs`, `floatframe.model.joints.orientation_joints`,
 `floatframe.model.joints.point_joints`.
@@ -63,9 +63,9 @@ __all__ = [
 def by_code(name: str, functions: Mapping[int, Callable[..., Any]], arguments: str) -> Callable[..., Any]:
     """Return the inner function name(code, ...) that calls the function with this code.
 
-    All of them take the arguments named and return the same types; a code that is not in the table is not asked for.
-    The name is its own among such functions: the symbols of two of one name and types differ by a number that counts
-    what a process has compiled, and an entry from the cache may bring the number of one for the code of another.
+    All functions take the named arguments and return the same types; only codes of the table may be passed. Each such
+    function needs a name of its own: the symbols of two functions with the same name and types differ only by a number
+    that counts the compilations of a process, so that cached code could be taken for that of the other function.
     """
     different = list(dict.fromkeys(functions.values()))
     lines = [f"def {name}(code, {arguments}):"]
@@ -77,7 +77,7 @@ def by_code(name: str, functions: Mapping[int, Callable[..., Any]], arguments: s
         else:
             lines.append(f"    return f_{k}({arguments})")
     names: dict[str, Any] = {f"f_{k}": function for k, function in enumerate(different)}
-    names["__name__"] = __name__  # the module, a part of the symbol: stored code is found by it
+    names["__name__"] = __name__  # the module is a part of the symbol by which stored code is found
     exec("\n".join(lines), names)
     return inner(names[name])
 

@@ -1,8 +1,9 @@
 """Rows that define the wrench of a joint: zero along free directions, and balance of its parts on A and B.
 
-A kind is two functions: `value`(model, work, k, a, b, w) with w the wrench of the connection, and
-`derivatives`(model, work, k, r, a, b, w, c_k, P_a, P_b, V), which writes row r of P (times c_k) and V; both are zero
-before. A direction that turns with a marker changes by dphi × E, so that d(E · W) = dphi · (E × W) + E · dW.
+A kind consists of two functions: `value`(model, work, k, a, b, w) with w the wrench of the connection, and
+`derivatives`(model, work, k, r, a, b, w, c_k, P_a, P_b, V), which writes row r of P (times c_k) and of V. Both rows
+must be zero before. A direction E that rotates with a marker changes by dphi × E, so that
+d(E · W) = dphi · (E × W) + E · dW.
 """
 
 from floatframe.engine.kernels.compiler.compilation import inner, small

@@ -34,11 +34,12 @@ def test_the_lean_compiler_serves_the_numba_it_knows():
 @pytest.mark.parametrize("version", ["0.60.0", "0.99.1", "1.0.0rc1"])
 def test_any_other_numba_compiles_plainly_and_says_why(version):
     known = ", ".join(KNOWN_VERSIONS)
-    assert said("", version).stdout == f"False plain, with numba {version} (the faster lean way knows numba {known})\n"
+    words = f"False plain, with numba {version} (the faster lean compiler needs numba {known})\n"
+    assert said("", version).stdout == words
 
 
 def test_the_switch_takes_the_plain_compiler():
-    words = f"False plain, with numba {KNOWN_VERSIONS[0]}.0 (asked for by {VARIABLE})\n"
+    words = f"False plain, with numba {KNOWN_VERSIONS[0]}.0 (requested by {VARIABLE})\n"
     assert said("plain", f"{KNOWN_VERSIONS[0]}.0").stdout == words
 
 
@@ -76,7 +77,7 @@ def test_kernels_that_are_not_optimised_move_alike_and_are_stored_apart():
 
 @pytest.mark.parametrize(
     ("compiler", "version", "words"),
-    [("lean", "0.60.0", "the lean compiler knows numba .* but 0.60.0 is installed"), ("fast", "0.68.0", "'fast'")],
+    [("lean", "0.60.0", "the lean compiler supports numba .* but 0.60.0 is installed"), ("fast", "0.68.0", "'fast'")],
 )
 def test_what_cannot_serve_is_refused(compiler, version, words):
     done = said(compiler, version)
